@@ -65,7 +65,6 @@ def summary(tally: Array) -> dict[str, Any]:
         "factorisations": int(tally[entries.FACTORISATIONS]),
         "events": int(tally[entries.EVENTS_LOCATED]),
         "held_steps": int(tally[entries.STEPS_HELD]),
-        "held_rebound": float(tally[entries.RELEASED_SPEED]),
     }
     values |= {gate.name: float(tally[gate.entry]) for gate in GATES}
     values |= {
@@ -99,4 +98,7 @@ def reasons(tally: Array) -> tuple[str, ...]:
     if tally[entries.CONTRADICTED_A] > 0.0:
         pair = [int(tally[entry]) - 1 for entry in (entries.CONTRADICTED_A, entries.CONTRADICTED_B)]
         found.append(f"no impulses keep bodies {pair[0]} and {pair[1]} apart: the run ended there")
+    if tally[entries.ENDLESS_A] > 0.0:
+        pair = [int(tally[entry]) - 1 for entry in (entries.ENDLESS_A, entries.ENDLESS_B)]
+        found.append(f"impacts of bodies {pair[0]} and {pair[1]} accumulate at one instant, to no limit that is proven")
     return tuple(found)

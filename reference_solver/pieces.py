@@ -22,11 +22,13 @@ from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
-#: What a piece is: a force phase; an impact; rebounds that were held, and get their speed now (E22).
-FORCES, IMPACT, RELEASE = 0, 1, 2
+#: What a piece is: a force phase; an impact.
+FORCES, IMPACT = 0, 1
 #: By which scheme: constant acceleration (E19), fifth order, one impulse-level solve, the fixed-step law (E5 to E17),
 #: until two bodies that rock rest on each other, by constant acceleration or where rows turn at impulse level (E22).
-FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING = 0, 1, 2, 3, 4
+#: CHAIN: an impact that is the sum of all those to come, which have no end (E22). UNORDERED: impacts of several pairs
+#: of bodies at once, of which round-off decides which comes first (E21).
+FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING, CHAIN, UNORDERED = 0, 1, 2, 3, 4, 5, 6
 
 #: Contacts that there is room for with each body of a piece.
 CONTACTS_PER_BODY = 4

@@ -44,25 +44,26 @@ DIRECT, FACTORISATIONS = 20, 21
 EVENTS_LOCATED = 22
 #: Steps with more events than are located; what was left of them went at impulse level (E28).
 STEPS_HELD = 23
-#: Largest speed of a rebound that was held to the end of its sub-step (E22) [m/s].
-RELEASED_SPEED = 24
 #: Contact solves whose velocities are proven to be the only answer (E66).
-UNIQUE = 25
+UNIQUE = 24
 
 #: Worst overlap at the start of the run, as a share of the smaller half width.
-START_OVERLAP = 26
+START_OVERLAP = 25
 #: Contact solves opened, contacts or none, and at least 1 after the first part of a step; tells the solve of the start.
-OPENED = 27
+OPENED = 26
 #: Coarsest last place of a body's coordinates, as a share of its smallest half width.
-RESOLUTION = 28
+RESOLUTION = 27
 #: Steps that ended the run because their events were more than the budget (E28).
-EXHAUSTED = 29
+EXHAUSTED = 28
 #: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
-CONTRADICTED_A, CONTRADICTED_B = 30, 31
+CONTRADICTED_A, CONTRADICTED_B = 29, 30
+#: Bodies A and B, one more than their numbers, of impacts that follow each other in an instant without end, and to no
+#: limit that is proven (E22). 0 where there are none.
+ENDLESS_A, ENDLESS_B = 31, 32
 #: Parts of steps that are cut at events (E19).
-SUB_STEPS = 32
+SUB_STEPS = 33
 
-SIZE = 33
+SIZE = 34
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (

@@ -17,7 +17,7 @@ import numpy as np
 from reference_solver.certification import Gate
 from reference_solver.certification.audit import audit
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import FORCES, FROZEN, IMPACT, Pieces
+from reference_solver.pieces import CHAIN, FORCES, FROZEN, IMPACT, Pieces
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, Disc, HalfSpace, Sphere
@@ -66,6 +66,13 @@ def _edge(shape: Disc | Sphere, half: tuple[float, ...], inertia: Any, speed: fl
     return Scene(Model(d, [box, Body(shape, 1.0, inertia, pose, twist)], (*aside, 0.0, -G), 0.0, 0.8), 50, REFERENCE)
 
 
+def _caught(light: float, restitution: float) -> Scene:
+    """A light disc that is between a wall and one of a kilogram, touches both, and goes to the wall the faster."""
+    wall = Body(HalfSpace((1.0, 0.0)), motion="fixed")
+    bodies = [_disc(0.5, 0.0, -1.0, 0, 0, mass=light, inertia=0.125 * light), _disc(1.5, 0.0, -0.5, 0, 0)]
+    return Scene(Model(2, [wall, *bodies], (0.0, 0.0), restitution, 0.0), 20, REFERENCE)
+
+
 def _disc(x: float, y: float, *twist: float, **fields: Any) -> Body:
     own: dict[str, Any] = {"mass": 1.0, "inertia": 0.125, "pose": (x, y, 0.0), "twist": twist or None}
     return Body(Disc(0.5), **(own | fields))
@@ -82,6 +89,9 @@ SCENES = {
     "discs in a row": _planar(
         [_disc(-1.2, 0.5, 2.0, 0.0, 0.0), *(_disc(1.0 * i, 0.5, mass=1.0 + i) for i in range(3))], 0.5, 0.0, steps=40
     ),
+    "light disc caught": _caught(0.05, 0.15),
+    "light disc that gets away": _caught(0.05, 0.9),
+    "disc as heavy": _caught(1.0, 0.15),
     "box that slides": _planar([_box(0.0, 0.5, 2.0, 0.0, 0.0)], steps=40),
     "box that stops": _planar([_box(0.0, 0.5, 0.5, 0.0, 0.0)], steps=40),
     "box that lands": _planar([_box(0.0, 0.6)], steps=60),
@@ -536,6 +546,14 @@ def _spun(pieces: Pieces, size: float) -> Pieces:
     return pieces
 
 
+def _called_endless(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+    """Make impacts without a rebound, and say of each that it is a chain without end."""
+    _, record, simulation = run(replace(scene, model=replace(scene.model, restitution=0.0)))
+    assert record.pieces is not None
+    pieces = replace(record.pieces, scheme=np.where(record.pieces.kind == IMPACT, CHAIN, record.pieces.scheme))
+    return scene.model, replace(record, pieces=pieces), simulation
+
+
 def _pair_after_pair(pieces: Pieces, size: float) -> Pieces:
     """Leave the second pair out of an impact on two bodies that touch: what is hit moves on into the other."""
     contact = _contact(pieces, "impact")
@@ -636,6 +654,14 @@ CORRUPTIONS = (
         given(_sticky),
     ),
     Corruption("law", "pairs are hit one after the other (any size)", "discs in a row", handed(_pair_after_pair)),
+    Corruption("law", "one impact is called a chain without end (any size)", "disc that bounces", _called_endless),
+    Corruption(
+        "law",
+        "a chain that ends is called endless (any size)",
+        "light disc that gets away",
+        given(lambda model, _: replace(model, restitution=0.15)),
+    ),
+    Corruption("law", "a chain that does not contract is called endless (any size)", "disc as heavy", _called_endless),
     Corruption("input", "inertia of what rolls over a hill", "disc that rolls off a disc", given(scaled(1, "inertia"))),
     Corruption("input", "gravity", "disc in flight", given(_gravity(turn=False))),
     Corruption("input", "direction of gravity [rad]", "box that slides", given(_gravity(turn=True))),

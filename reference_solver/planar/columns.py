@@ -42,7 +42,7 @@ A, B = 0, 1
 FEATURE = 2
 #: 1 where bodies meet or part faster than the loads of one step explain.
 IMPACT = 3
-#: How a rebound ends: OPEN_ENDED, SERIES_ENDS or RELEASED, see impact.py (E22).
+#: What becomes of it in an impact: OPEN_ENDED, SERIES_ENDS, CHAIN_ENDS or PARTS, see `stepping.impacts`.
 ENDING = 4
 #: 1 where the points touch, 0 where a gap is left to close.
 MEETS = 5
@@ -79,12 +79,10 @@ POINT = 22
 IMPACT_N, IMPACT_T = 24, 25
 #: Normal and tangential force remembered from the sub-step before [N].
 FORCE_N, FORCE_T = 26, 27
-#: Speed with which a held rebound is released at the end of its sub-step (E22) [m/s].
-RELEASE = 28
 #: u_t at the start of the force phase (E23) [m/s].
-SLIP = 29
+SLIP = 28
 #: e.
-RESTITUTION = 30
+RESTITUTION = 29
 #: Normal and levers at the start of a sub-step at impulse level, or those of its mid-drift: six columns (E28).
-OTHER = 31
-ROW_REALS = 37
+OTHER = 30
+ROW_REALS = 36

@@ -18,7 +18,6 @@ from reference_solver.planar.columns import (
     NY,
     PN,
     PT,
-    RELEASE,
     SIN,
     SPEED,
     TARGET,
@@ -140,7 +139,7 @@ def curve(bodies: Bodies, rows: Rows, sub: SubStep, tally: Array) -> float:
         restore(bodies, sub)
         return 0.0
     for c in range(rows.counts[CONTACTS]):
-        rows.real[c, RELEASE] = rows.real[c, PN] = rows.real[c, PT] = 0.0
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
         rows.real[c, TARGET] = -FAR * rows.real[c, SPEED] if rows.real[c, SPEED] > 0.0 else -FAR
     for k in range(sub.lasting.size[HELD_CONTACTS]):
         if sub.lasting.mode[k] != OPEN:

@@ -6,6 +6,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.model import Array
 from reference_solver.pieces import (
+    CHAIN,
     CONTACTS,
     FIFTH_ORDER,
     FIXED,
@@ -13,16 +14,18 @@ from reference_solver.pieces import (
     FROZEN,
     IMPACT,
     IMPULSE_LEVEL,
-    RELEASE,
     ROCKING,
+    UNORDERED,
     Journal,
 )
-from reference_solver.planar.columns import ARM_B, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
+from reference_solver.planar.columns import ARM_B, ENDING, FEATURE, IMPACT_N, IMPACT_T, NUMBER, NX, NY, PN, PT, A, B
 from reference_solver.planar.midpoint import exchange_levers
 from reference_solver.planar.state import CONTACTS as ROW_CONTACTS
 from reference_solver.planar.state import Bodies, Rows, SubStep
 from reference_solver.stepping.clock import HELD, LEFT
 from reference_solver.stepping.clock import ROCKING as COMES_TO_REST
+from reference_solver.stepping.clock import UNORDERED as HAS_NO_ORDER
+from reference_solver.stepping.impacts import CHAIN_ENDS
 from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.options import Options
@@ -82,21 +85,31 @@ def differ(one: Array, other: Array) -> bool:
 
 
 @inner_kernel
+def enter_impact(bodies: Bodies, rows: Rows, sub: SubStep, pose: Array, options: Options) -> None:
+    """Enter the impact that a located sub-step begins with, at ``pose``, where it changed a velocity."""
+    if not is_kept(sub.journal) or not differ(sub.before, sub.start):
+        return
+    scheme = UNORDERED if sub.clock[HAS_NO_ORDER] > 0.0 else FROZEN
+    for c in range(rows.counts[ROW_CONTACTS]):
+        scheme = CHAIN if rows.integer[c, ENDING] == CHAIN_ENDS else scheme
+    keep_state(sub.journal, pose, sub.before)
+    open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, IMPACT, scheme)
+    enter_bodies(sub.journal, bodies.kind[:, NUMBER], pose, sub.start)
+    enter_contact_rows(sub.journal, bodies, pose, rows, IMPACT_N, IMPACT_T)
+
+
+@inner_kernel
 def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float, curved: bool) -> None:
-    """Enter a located sub-step of ``length``: its impacts where they changed a velocity, then its force phase."""
+    """Enter a located sub-step of ``length``: its impact, then its force phase."""
     journal = sub.journal
     if not is_kept(journal):
         return
     begin = options.dt - sub.clock[LEFT]
-    keep_state(journal, sub.pose, sub.before)
-    if differ(sub.before, sub.start):
-        open_piece(journal, begin, 0.0, IMPACT, FROZEN)
-        enter_bodies(journal, bodies.kind[:, NUMBER], sub.pose, sub.start)
-        if sub.clock[HELD] > 0.0:
-            exchange_levers(rows)  # those of the start
-        enter_contact_rows(journal, bodies, sub.pose, rows, IMPACT_N, IMPACT_T)
-        if sub.clock[HELD] > 0.0:
-            exchange_levers(rows)
+    if sub.clock[HELD] > 0.0:
+        exchange_levers(rows)  # those of the start
+    enter_impact(bodies, rows, sub, sub.pose, options)
+    if sub.clock[HELD] > 0.0:
+        exchange_levers(rows)
     keep_state(journal, sub.pose, sub.start)
     scheme = FIFTH_ORDER if curved else FROZEN
     if sub.clock[HELD] > 0.0 or sub.clock[COMES_TO_REST] > 0.0:
@@ -108,15 +121,6 @@ def enter_sub_step(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, l
     if curved:
         enter_moments(journal, sub.lasting, first)
     keep_state(journal, bodies.pose, bodies.twist)
-
-
-@inner_kernel
-def enter_release(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> None:
-    """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
-    if is_kept(sub.journal):
-        open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
-        enter_bodies(sub.journal, bodies.kind[:, NUMBER], bodies.pose, bodies.twist)
-        enter_contact_rows(sub.journal, bodies, bodies.pose, rows, PN, PT)
 
 
 @inner_kernel

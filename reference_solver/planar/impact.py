@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
@@ -26,7 +28,6 @@ from reference_solver.planar.columns import (
     PN,
     POINT,
     PT,
-    RELEASE,
     RESTITUTION,
     ROUNDING,
     ROW_INTEGERS,
@@ -39,19 +40,18 @@ from reference_solver.planar.columns import (
     B,
 )
 from reference_solver.planar.kinematics import load_speed, normal_velocity, speed_at, tangent_velocity
-from reference_solver.planar.lasting import edge_along
+from reference_solver.planar.lasting import edge_along, write_rows
 from reference_solver.planar.manifolds import row_key
 from reference_solver.planar.rows import measure_speed, prepare_masses, still_speed
 from reference_solver.planar.state import CONTACTS, HALF_SPACE, MANIFOLDS, REMEMBERED, Bodies, Pairs, Rows, SubStep
-from reference_solver.stepping.clock import HELD, LEFT, is_patient
+from reference_solver.stepping.clock import BLOWS, HELD, LEFT, MEETING, SERIES, is_patient
 from reference_solver.stepping.impacts import (
-    BOUNCES,
     CREEP,
     LANDED,
     NO_IMPACT,
     OPEN_ENDED,
+    PARTS,
     REBOUNDED,
-    RELEASED,
     SERIES_DRIFT,
     SERIES_ENDS,
     STRUCK,
@@ -73,7 +73,11 @@ from reference_solver.stepping.noise import (
 )
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.vectors import copy_vectors
-from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B
+
+#: Target of a row that parts, in multiples of its reference speed, or in an impact of the largest of all rows: nothing
+#: closes it that fast, so that it carries no impulse.
+FAR = 1e3
 
 
 @inner_kernel
@@ -191,29 +195,60 @@ def soft_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
 
 
 @inner_kernel
+def least_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
+    """Speed [m/s] below which the bodies of row c, whose reference speed is known, neither meet nor part."""
+    return max(NOISE * rows.real[c, SPEED], still_speed(bodies, rows, c, dt))
+
+
+@inner_kernel
+def note_touching(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> int:
+    """Note the rows that touch in the room of a phase (`operations.note_touching`).
+
+    One that carried load does not part in the first impact of an instant: its normal has turned.
+    """
+    k, lasting, first = 0, sub.lasting, sub.clock[BLOWS] == 0.0
+    for c in range(rows.counts[CONTACTS]):
+        if rows.integer[c, MEETS] == 0:
+            continue
+        if k == len(lasting.row):
+            return -1
+        lasting.row[k] = c
+        lasting.body[k, 0], lasting.body[k, 1] = rows.integer[c, A], rows.integer[c, B]
+        arms = (rows.real[c, ARM_A], rows.real[c, ARM_A + 1], rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
+        write_rows(bodies, lasting, k, (rows.real[c, NX], rows.real[c, NY]), arms)
+        measure_speed(bodies, rows, c, options.dt)
+        lasts = first and rows.real[c, FORCE_N] > 0.0 and rows.real[c, APPROACH] > 0.0
+        lasting.speeds[k] = math.inf if lasts else least_speed(bodies, rows, c, options.dt)
+        lasting.friction[k] = rows.real[c, FRICTION] if options.friction else 0.0
+        lasting.usual[k, 0] = rows.real[c, RESTITUTION] if options.restitution else 0.0
+        k += 1
+    return k
+
+
+@inner_kernel
 def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float) -> int:
-    """Targets -e u- of rows that meet (E21), 0 of all others; returns what there is to solve."""
-    found = NO_IMPACT
+    """Targets -e u- of rows that meet (E21), 0 of all others that take part; returns what there is to solve."""
+    found, fastest = NO_IMPACT, 0.0
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN] = rows.real[c, PT] = 0.0
         rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
-        rows.real[c, TARGET] = rows.real[c, RELEASE] = 0.0
+        rows.real[c, TARGET] = 0.0
         u = rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
         measure_speed(bodies, rows, c, options.dt)
+        fastest = max(fastest, rows.real[c, SPEED])
         rows.integer[c, IMPACT] = 0
-        if u >= -max(NOISE * rows.real[c, SPEED], still_speed(bodies, rows, c, options.dt)):
+        if u >= -least_speed(bodies, rows, c, options.dt):
             continue
         if rows.integer[c, MEETS] == 0:
             continue
         soft = REBOUNDED if options.restitution and rows.real[c, RESTITUTION] > 0.0 else LANDED
         found = max(found, soft if -u <= soft_speed(bodies, rows, c, options.dt) else STRUCK)
         rows.integer[c, IMPACT] = 1
-        if options.restitution:
-            rebound = -rows.real[c, RESTITUTION] * u
-            if rows.integer[c, ENDING] == OPEN_ENDED:
-                rows.real[c, TARGET] = rebound
-            elif rows.integer[c, ENDING] == RELEASED:
-                rows.real[c, RELEASE] = rebound
+        if options.restitution and rows.integer[c, ENDING] == OPEN_ENDED:
+            rows.real[c, TARGET] = -rows.real[c, RESTITUTION] * u
+    for c in range(rows.counts[CONTACTS]):
+        if rows.integer[c, ENDING] == PARTS:
+            rows.real[c, TARGET] = -FAR * fastest
     return found
 
 
@@ -277,7 +312,7 @@ def row_turn(bodies: Bodies, rows: Rows, sub: SubStep, c: int, share: float) -> 
 
 @inner_kernel
 def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length: float) -> bool:
-    """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
+    """Mark rebounds whose series ends in this sub-step (E22); True if any is new.
 
     ``bodies.twist`` are the velocities after ``length`` of it.
     """
@@ -304,10 +339,11 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
             lowest = is_lowest(leaves, pull, gap_noise(bodies, rows, c), e)
             if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub.clock):
                 continue
+            if is_patient(sub.clock):
+                if lasts > sub.clock[MEETING]:
+                    continue
+                sub.clock[SERIES] = max(sub.clock[SERIES], lasts)
             rows.integer[c, ENDING] = SERIES_ENDS
-            new = True
-        elif returns * BOUNCES < left:
-            rows.integer[c, ENDING] = RELEASED
             new = True
     return new
 
@@ -324,22 +360,3 @@ def flies(bodies: Bodies, rows: Rows, c: int, u: float, length: float) -> bool:
         return False
     pull = load_speed(bodies, rows, c, 1.0)
     return u * u > 2.0 * pull * gap_noise(bodies, rows, c) or 2.0 * u > pull * length
-
-
-@inner_kernel
-def release(bodies: Bodies, rows: Rows, problem: Problem, options: Options, tally: Array) -> bool:
-    """Give held rebounds their speed at the end of the sub-step, as impacts (E22); False if there are none."""
-    fastest = 0.0
-    for c in range(rows.counts[CONTACTS]):
-        fastest = max(fastest, rows.real[c, RELEASE])
-    if fastest == 0.0:
-        return False
-    for c in range(rows.counts[CONTACTS]):
-        rows.real[c, TARGET] = rows.real[c, RELEASE]
-        rows.real[c, PN] = rows.real[c, PT] = 0.0
-        rows.real[c, IMPACT_N] = rows.real[c, IMPACT_T] = 0.0
-    open_solve(bodies, 0.0, tally)
-    solve_velocities(bodies, rows, problem, options, tally)
-    certify(bodies, rows, options, tally)
-    tally[RELEASED_SPEED] = max(tally[RELEASED_SPEED], fastest)
-    return True

@@ -34,8 +34,11 @@ from reference_solver.stepping.operations import provide
 
 #: Forms of a contact: two core points; a core point on an edge of A or of B.
 POINTS, EDGE_OF_A, EDGE_OF_B = 0, 1, 2
-#: Entries of `Lasting.kind`: the form; the vertices of A and B nearest to the contact.
-FORM, VERTEX_A, VERTEX_B = 0, 1, 2
+#: Forms in the order in which a contact tries them, one after the other and round again.
+FORMS = 3
+#: Entries of `Lasting.kind`: the form; the vertices of A and B nearest to the contact; the edges of A and B along it on
+#: which a vertex of the other lies, -1 if there is none; how many forms have been tried.
+FORM, VERTEX_A, VERTEX_B, EDGE_A, EDGE_B, TRIED = 0, 1, 2, 3, 4, 5
 #: Entries of `Lasting.place`: core points of A and B in body axes, two numbers each; the normal, from A to B, in the
 #: axes of the edge's owner; distance of the edge from the owner's centre; its two ends along the tangent.
 POINT_A, POINT_B, NORMAL, OFFSET, LOW, HIGH = 0, 2, 4, 6, 7, 8
@@ -101,23 +104,49 @@ def hold(bodies: Bodies, rows: Rows, lasting: Lasting, c: int, k: int) -> None:
         bx, by = corner(bodies, b, vertex_b)
     set_pair(lasting.place[k], POINT_A, into_body(bodies, a, ax, ay))
     set_pair(lasting.place[k], POINT_B, into_body(bodies, b, bx, by))
-    lasting.kind[k, FORM] = POINTS
-    edge_a, edge_b = edge_along(bodies, a, nx, ny), edge_along(bodies, b, -nx, -ny)
+    lasting.kind[k, EDGE_A] = edge_along(bodies, a, nx, ny) if far_b <= near else -1
+    lasting.kind[k, EDGE_B] = edge_along(bodies, b, -nx, -ny) if far_a <= near else -1
+    lasting.kind[k, FORM], lasting.kind[k, TRIED] = POINTS, FORMS
     if bodies.kind[a, SHAPE] == HALF_SPACE:
         own_half_space(bodies, lasting, k, a, EDGE_OF_A)
     elif bodies.kind[b, SHAPE] == HALF_SPACE:
         own_half_space(bodies, lasting, k, b, EDGE_OF_B)
-    elif far_b <= near and edge_a >= 0:
-        own_edge(bodies, lasting, k, EDGE_OF_A, edge_a, near)
-        if far_a <= near and edge_b >= 0 and leaves_edge(bodies, lasting, k, near):
-            own_edge(bodies, lasting, k, EDGE_OF_B, edge_b, near)  # past each other, on faces that stay flush
-    elif far_a <= near and edge_b >= 0:
-        own_edge(bodies, lasting, k, EDGE_OF_B, edge_b, near)
+    elif lasting.kind[k, EDGE_A] >= 0 or lasting.kind[k, EDGE_B] >= 0:
+        lasting.kind[k, TRIED] = 0
+        while next_features(bodies, lasting, k) and leaves_edge(bodies, lasting, k, near):
+            pass
+        lasting.kind[k, TRIED] = 1
     elif far_a > near or far_b > near or ra + rb == 0.0:  # neither: a point of B that keeps to the plane through it
         lasting.kind[k, FORM] = EDGE_OF_A
         set_pair(lasting.place[k], NORMAL, into_body(bodies, a, nx, ny))
         lasting.place[k, OFFSET] = nx * ax + ny * ay
         lasting.place[k, LOW], lasting.place[k, HIGH] = -math.inf, math.inf
+
+
+@inner_kernel
+def next_features(bodies: Bodies, lasting: Lasting, k: int) -> bool:
+    """Let contact k go on with the next features that touch in its place; False, with those it has, if all were tried.
+
+    At the end of an edge the other body's edge may lie on this one's vertex; what is round goes by vertices.
+    """
+    kind, form = lasting.kind[k], lasting.kind[k, FORM]
+    while kind[TRIED] < FORMS:
+        kind[TRIED] += 1
+        form = (form + 1) % FORMS
+        if (
+            form == POINTS
+            and bodies.real[lasting.body[k, 0], ROUNDING] + bodies.real[lasting.body[k, 1], ROUNDING] > 0.0
+        ):
+            for side in range(2):
+                i = lasting.body[k, side]
+                x, y = corner(bodies, i, kind[VERTEX_A + side])
+                set_pair(lasting.place[k], POINT_A + 2 * side, into_body(bodies, i, x, y))
+            kind[FORM] = POINTS
+            return True
+        if form != POINTS and kind[EDGE_A + form - EDGE_OF_A] >= 0:
+            own_edge(bodies, lasting, k, form, kind[EDGE_A + form - EDGE_OF_A])
+            return True
+    return False
 
 
 @inner_kernel
@@ -138,10 +167,9 @@ def own_half_space(bodies: Bodies, lasting: Lasting, k: int, i: int, form: int) 
 
 
 @inner_kernel
-def own_edge(bodies: Bodies, lasting: Lasting, k: int, form: int, edge: int, near: float) -> None:
-    """The edge is that of A or B with number ``edge``; at its end, on the way out, round bodies go by vertices."""
-    place = lasting.place[k]
-    owner, other = lasting.body[k, 0 if form == EDGE_OF_A else 1], lasting.body[k, 1 if form == EDGE_OF_A else 0]
+def own_edge(bodies: Bodies, lasting: Lasting, k: int, form: int, edge: int) -> None:
+    """The edge is that of A or B with number ``edge``."""
+    place, owner = lasting.place[k], lasting.body[k, 0 if form == EDGE_OF_A else 1]
     sign = 1.0 if form == EDGE_OF_A else -1.0
     mx, my = edge_normal(bodies, owner, edge)
     px, py = corner(bodies, owner, edge)
@@ -152,22 +180,16 @@ def own_edge(bodies: Bodies, lasting: Lasting, k: int, form: int, edge: int, nea
     tx, ty = -sign * my, sign * mx
     first, second = tx * px + ty * py, tx * qx + ty * qy
     place[LOW], place[HIGH] = min(first, second), max(first, second)
-    vertex = lasting.kind[k, VERTEX_A if form == EDGE_OF_A else VERTEX_B]
-    if bodies.real[owner, ROUNDING] + bodies.real[other, ROUNDING] == 0.0:
-        return
-    along, _ = along_edge(bodies, lasting, k)
-    if leaves_edge(bodies, lasting, k, near) or along < place[LOW] - near or along > place[HIGH] + near:
-        vx, vy = corner(bodies, owner, vertex)
-        set_pair(place, POINT_A if form == EDGE_OF_A else POINT_B, into_body(bodies, owner, vx, vy))
-        lasting.kind[k, FORM] = POINTS
 
 
 @inner_kernel
 def leaves_edge(bodies: Bodies, lasting: Lasting, k: int, near: float) -> bool:
-    """Whether the core point stands at an end of its edge, on the way out."""
+    """Whether the core point stands at an end of its edge, on the way out, or beyond it."""
+    if lasting.kind[k, FORM] == POINTS:
+        return False
     along, rate = along_edge(bodies, lasting, k)
-    low, high = lasting.place[k, LOW], lasting.place[k, HIGH]
-    return (along <= low + near and rate < 0.0) or (along >= high - near and rate > 0.0)
+    low, high = along - lasting.place[k, LOW], lasting.place[k, HIGH] - along
+    return low < -near or high < -near or (low <= near and rate < 0.0) or (high <= near and rate > 0.0)
 
 
 @inner_kernel
@@ -349,6 +371,7 @@ def is_free(bodies: Bodies, i: int) -> bool:
 
 provide(operations.is_free, Bodies, is_free)
 provide(operations.hold, Bodies, hold)
+provide(operations.next_features, Bodies, next_features)
 provide(operations.evaluate, Bodies, evaluate)
 provide(operations.free_accelerations, Bodies, free_accelerations)
 provide(operations.displace, Bodies, displace)

@@ -18,21 +18,22 @@ from reference_solver.planar.columns import (
     BODY_INTEGERS,
     BODY_REALS,
     COS,
+    ENDING,
     EXTENT,
     FORCE_N,
     FORCE_T,
     LOAD,
     MOTION,
+    NUMBER,
     PN,
     PT,
     REACH,
-    RELEASE,
     SHAPE,
     SIN,
     SIZE,
 )
 from reference_solver.planar.direct import mend_velocities, solve_directly
-from reference_solver.planar.entries import enter_fixed_step, enter_release, enter_sub_step
+from reference_solver.planar.entries import enter_fixed_step, enter_impact, enter_sub_step
 from reference_solver.planar.entries import enter_settled as enter_settled_piece
 from reference_solver.planar.lasting import displace
 from reference_solver.planar.ledger import enter_contacts
@@ -230,7 +231,7 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
     """
     for c in range(rows.counts[CONTACTS]):
         rows.old_key[c] = row_key(bodies, rows, c)
-        lasts = 0.0 if rows.real[c, RELEASE] > 0.0 or rows.real[c, PN] <= 0.0 else 1.0
+        lasts = 0.0 if rows.real[c, PN] <= 0.0 else 1.0
         if length < SHORT * dt and rows.real[c, FORCE_N] > 0.0:
             rows.old_impulse[c, 0] = lasts * rows.real[c, FORCE_N]
             rows.old_impulse[c, 1] = lasts * rows.real[c, FORCE_T]
@@ -241,12 +242,37 @@ def remember_forces(bodies: Bodies, rows: Rows, length: float, dt: float) -> Non
 
 
 @inner_kernel
-def release(island: Island, length: float) -> None:
-    """All rows that were held, together."""
-    bodies, rows = island.bodies, island.rows
-    if impact.release(bodies, rows, island.problem, island.options, island.tally):
-        enter_contacts(bodies, rows, island.ledger)
-        enter_release(bodies, rows, island.sub, island.options, length)
+def note_touching(island: Island) -> int:
+    """Of all rows that touch."""
+    return int(impact.note_touching(island.bodies, island.rows, island.sub, island.options))
+
+
+@inner_kernel
+def mark_contact(island: Island, k: int, ending: int) -> None:
+    """In the table of rows."""
+    island.rows.integer[island.sub.lasting.row[k], ENDING] = ending
+
+
+@inner_kernel
+def ending_of(island: Island, k: int) -> int:
+    """As the table of rows has it."""
+    return int(island.rows.integer[island.sub.lasting.row[k], ENDING])
+
+
+@inner_kernel
+def number_of(island: Island, i: int) -> int:
+    """As the table of bodies has it."""
+    return int(island.bodies.kind[i, NUMBER])
+
+
+@inner_kernel
+def end_blow(island: Island) -> None:
+    """Velocities are those after it already."""
+    rows = island.rows
+    for c in range(rows.counts[CONTACTS]):
+        rows.real[c, PN] = rows.real[c, PT] = 0.0
+    enter_contacts(island.bodies, rows, island.ledger)
+    enter_impact(island.bodies, rows, island.sub, island.bodies.pose, island.options)
 
 
 @inner_kernel
@@ -416,6 +442,7 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         meeting.vector,
         meeting.corner,
         meeting.watched,
+        meeting.sunk,
     )
     return SubStep(
         sub.clock,

@@ -50,6 +50,7 @@ class Meeting(NamedTuple):
     vector: Array  # (VECTORS, 3)
     corner: Array  # (2, v, 3): corners of the cores from the centres, where the pair stands [m]
     watched: Indices  # (v,): 1 for the corners of the second body that may not come down unseen
+    sunk: Array  # (v,): how deep they are in a plane to begin with, which is no contact until it grows [m]
 
 
 def allocate_meeting(bodies: Bodies) -> Meeting:
@@ -67,6 +68,7 @@ def allocate_meeting(bodies: Bodies) -> Meeting:
         vector=np.zeros((VECTORS, 3)),
         corner=np.zeros((2, most, 3)),
         watched=np.zeros(most, np.int64),
+        sunk=np.zeros(most),
     )
 
 

@@ -21,7 +21,7 @@ from reference_solver.planar.columns import (
     SPEED,
     TARGET,
 )
-from reference_solver.planar.impact import closed_gap, doubt, flies, gap_noise
+from reference_solver.planar.impact import FAR, closed_gap, doubt, flies, gap_noise
 from reference_solver.planar.kinematics import normal_velocity, tangent_velocity
 from reference_solver.planar.midpoint import reach_end, turn_rows
 from reference_solver.planar.rows import measure_speed, still_speed, warm_start
@@ -32,10 +32,6 @@ from reference_solver.stepping.noise import NOISE
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, LOAD_WORK, SURFACE_WORK
-
-#: Target of a row that parts, in multiples of its reference speed: nothing in a sub-step closes it that fast, so that
-#: it carries no impulse.
-FAR = 1e3
 
 
 @inner_kernel

@@ -10,8 +10,11 @@ from reference_solver.planar.impact import gap_noise
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.state import MANIFOLDS, Bodies, Rows, SubStep
 from reference_solver.stepping.clock import LEFT, is_patient
-from reference_solver.stepping.impacts import BOUNCES, SERIES_DRIFT, SERIES_ENDS
+from reference_solver.stepping.impacts import SERIES_DRIFT, SERIES_ENDS
 from reference_solver.stepping.noise import NOISE
+
+#: Bodies that rock back this many times within what is left of the step are held for all of it.
+BOUNCES = 32
 
 
 @inner_kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.journal import enter_bodies, is_kept, keep_state, next_contact, open_piece
 from reference_solver.pieces import (
+    CHAIN,
     CONTACTS,
     FIFTH_ORDER,
     FIXED,
@@ -12,13 +13,15 @@ from reference_solver.pieces import (
     FROZEN,
     IMPACT,
     IMPULSE_LEVEL,
-    RELEASE,
+    UNORDERED,
     Journal,
 )
 from reference_solver.spatial.midpoint import exchange_levers
 from reference_solver.spatial.state import POINTS, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import add, cross, row, times_transposed
 from reference_solver.stepping.clock import HELD, LEFT
+from reference_solver.stepping.clock import UNORDERED as HAS_NO_ORDER
+from reference_solver.stepping.impacts import CHAIN_ENDS
 from reference_solver.stepping.lasting import CONTACTS as LASTING
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.options import Options
@@ -69,20 +72,31 @@ def struck(bodies: Bodies) -> bool:
 
 
 @inner_kernel
+def enter_impact(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options) -> None:
+    """Enter the impact that a located sub-step begins with, at the poses kept, where it changed a velocity."""
+    if not is_kept(sub.journal) or not struck(bodies):
+        return
+    scheme = UNORDERED if sub.clock[HAS_NO_ORDER] > 0.0 else FROZEN
+    for m in range(len(manifolds)):
+        for p in range(manifolds.points[m]):
+            scheme = CHAIN if manifolds.ending[m, p] == CHAIN_ENDS else scheme
+    open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, IMPACT, scheme)
+    enter_bodies(sub.journal, bodies.number, sub.journal.pose, bodies.first)
+    enter_points(sub.journal, bodies, manifolds, True)
+
+
+@inner_kernel
 def enter_sub_step(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, length: float) -> None:
-    """Enter a located sub-step of ``length`` from the poses kept: its impacts, if any, then its force phase."""
+    """Enter a located sub-step of ``length`` from the poses kept: its impact, if any, then its force phase."""
     journal = sub.journal
     if not is_kept(journal):
         return
     begin = options.dt - sub.clock[LEFT]
-    if struck(bodies):
-        open_piece(journal, begin, 0.0, IMPACT, FROZEN)
-        enter_bodies(journal, bodies.number, journal.pose, bodies.first)
-        if sub.clock[HELD] > 0.0:
-            exchange_levers(manifolds, sub)  # those of the start
-        enter_points(journal, bodies, manifolds, True)
-        if sub.clock[HELD] > 0.0:
-            exchange_levers(manifolds, sub)
+    if sub.clock[HELD] > 0.0:
+        exchange_levers(manifolds, sub)  # those of the start
+    enter_impact(bodies, manifolds, sub, options)
+    if sub.clock[HELD] > 0.0:
+        exchange_levers(manifolds, sub)
     curved = False
     for i in range(len(bodies)):
         curved = curved or bodies.curved[i] != 0
@@ -104,15 +118,6 @@ def enter_settled(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: O
         open_piece(sub.journal, options.dt - sub.clock[LEFT], 0.0, FORCES, IMPULSE_LEVEL)
         enter_bodies(sub.journal, bodies.number, bodies.pose, bodies.twist)
         enter_points(sub.journal, bodies, manifolds, True)
-
-
-@inner_kernel
-def enter_release(bodies: Bodies, manifolds: Manifolds, sub: SubStep, options: Options, length: float) -> None:
-    """Enter the rebounds that were held for ``length`` and got their speed at the end of it (E22)."""
-    if is_kept(sub.journal):
-        open_piece(sub.journal, options.dt - sub.clock[LEFT] + length, 0.0, RELEASE, FROZEN)
-        enter_bodies(sub.journal, bodies.number, bodies.pose, bodies.twist)
-        enter_points(sub.journal, bodies, manifolds, False)
 
 
 @inner_kernel

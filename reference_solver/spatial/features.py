@@ -48,12 +48,16 @@ from reference_solver.stepping.lasting import FEATURE, Lasting
 #: Cores.
 POINT, LINE, PLANE = 0, 1, 2
 
-#: Entries of `Lasting.kind`: the cores of A and B.
-CORE = 0
+#: Entries of `Lasting.kind`: the cores of A and B; which of `FEATURES` they are, and how many of those were tried.
+CORE, CHOICE, TRIED = 0, 2, 3
+#: What may touch in one place: a point of B on a face of A, one of A on a face of B, one of two edges of A across one
+#: of two of B, and what is nearest on both. They are tried in this order, round again.
+ON_A, ON_B, CROSSED, NEAREST, FEATURES = 0, 1, 2, 6, 7
 #: Entries of `Lasting.place`, those of B after those of A: a point of the core [m], the direction of a line or the
 #: outward normal of a plane (body axes), the radius by which the core is grown [m], and, as they follow from the poses,
-#: the place on a line, from its middle [m]. Then the sign of e_a x e_b along n where lines cross.
-PLACE, DIRECTION, RADIUS, ALONG, SIDE = 0, 6, 12, 14, 16
+#: the place on a line, from its middle [m]. Then the sign of e_a x e_b along n where lines cross; where A and B touched
+#: when the contact was noted (body axes) [m].
+PLACE, DIRECTION, RADIUS, ALONG, SIDE, NOTED = 0, 6, 12, 14, 16, 17
 
 #: Coordinates this near to a face, as a share of its half extent, lie on it.
 ON_FACE = 1e-6
@@ -90,36 +94,113 @@ def name_features(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int
     lasting.body[k, 0], lasting.body[k, 1] = a, b
     lasting.friction[k] = manifolds.friction[m]
     lasting.place[k, SIDE] = 1.0
+    lasting.kind[k, TRIED] = 1
+    set_part(lasting, k, NOTED, 0, times_transposed(bodies.axes, a, row(manifolds.arm_a[m], p, 0)))
+    set_part(lasting, k, NOTED, 1, times_transposed(bodies.axes, b, row(manifolds.arm_b[m], p, 0)))
     n = row(manifolds.frame[m], 2, 0)
     for d in range(3):
         lasting.frame[k, 1, d] = manifolds.frame[m, 0, d]
-    face_a, face_b = facing(bodies, a, n), facing(bodies, b, scale(-1.0, n))
-    core_a = nearest_core(bodies, a, row(manifolds.arm_a[m], p, 0), n, lasting, k, 0)
-    core_b = nearest_core(bodies, b, row(manifolds.arm_b[m], p, 0), scale(-1.0, n), lasting, k, 1)
     for side in range(2):
-        i, face = (a, face_a) if side == 0 else (b, face_b)
-        own, other = (core_a, core_b) if side == 0 else (core_b, core_a)
-        if face < 0 or other != POINT:
+        if not take_features(bodies, lasting, k, n, side):
             continue
-        if own != PLANE and goes_off(bodies, manifolds, lasting, c, k, side, face):
-            if lasting.place[k, RADIUS + 1 - side] > 0.0:
-                return True
-            if cross_over(bodies, manifolds, lasting, c, k):
-                core_a = core_b = LINE
-                break
-            if side == 0 and face_b >= 0 and own == POINT:
-                continue  # a corner on a corner: the other one comes onto the other's face
-        set_face(bodies, i, face, scale(1.0 - 2.0 * side, n), lasting, k, side)
+        lasting.kind[k, CHOICE] = side
+        if bodies.kind[lasting.body[k, side]] == HALF_SPACE or not goes_off(bodies, manifolds, lasting, c, k, side):
+            return True
+        if lasting.place[k, RADIUS + 1 - side] > 0.0:
+            tip, i = part(lasting, k, PLACE, 1 - side)[0], lasting.body[k, 1 - side]
+            onward = tip * dot(passing(bodies, manifolds, lasting, c, k, side), axis(bodies.axes, i, 0))
+            for choice in range(CROSSED if onward > 0.0 else NEAREST, NEAREST):  # a capsule slides out over the edge
+                lasting.kind[k, CHOICE] = choice
+                if take_features(bodies, lasting, k, n, choice):
+                    return True
+            break
+        lasting.kind[k, CHOICE] = ON_B
+        if cross_over(bodies, manifolds, lasting, c, k):
+            return cross_lines(bodies, lasting, k, n)
+        if side == 1 or not take_features(bodies, lasting, k, n, ON_B):  # corners on each other: that of A on B's face
+            lasting.kind[k, CHOICE] = side
+            return take_features(bodies, lasting, k, n, side)
+    lasting.kind[k, CHOICE] = NEAREST
+    return take_features(bodies, lasting, k, n, NEAREST)
+
+
+@inner_kernel
+def cross_lines(bodies: Bodies, lasting: Lasting, k: int, n: Vector) -> bool:
+    """Note on which side of A's line that of B crosses it, n the normal; False where they are all but parallel."""
+    e_a = times(bodies.axes, lasting.body[k, 0], part(lasting, k, DIRECTION, 0))
+    e_b = times(bodies.axes, lasting.body[k, 1], part(lasting, k, DIRECTION, 1))
+    across = cross(e_a, e_b)
+    lasting.place[k, SIDE] = 1.0 if dot(across, n) > 0.0 else -1.0
+    return dot(across, across) > ON_FACE
+
+
+@kernel
+def name_next(bodies: Bodies, lasting: Lasting, k: int) -> bool:
+    """Let contact k go on with the next features that touch in its place; False, with those it has, if all were tried.
+
+    Where corners lie on each other either may be over the other's face, and edges that begin there may cross; what is
+    round rolls on over an edge. Bodies stand at the start of the phase.
+    """
+    n, kind = row(lasting.normal, k, 0), lasting.kind[k]
+    choice = kind[CHOICE]
+    while kind[TRIED] < FEATURES:
+        kind[TRIED] += 1
+        choice = (choice + 1) % FEATURES
+        touches = take_features(bodies, lasting, k, n, choice)
+        if touches and (choice != NEAREST or lasting.place[k, RADIUS] + lasting.place[k, RADIUS + 1] > 0.0):
+            kind[CHOICE] = choice
+            return True
+    return False
+
+
+@inner_kernel
+def take_features(bodies: Bodies, lasting: Lasting, k: int, n: Vector, choice: int) -> bool:
+    """Take what ``choice`` of `FEATURES` says as the cores of contact k, n its normal; False if that does not touch."""
+    core_a = nearest_core(bodies, lasting.body[k, 0], noted_arm(bodies, lasting, k, 0), n, lasting, k, 0)
+    core_b = nearest_core(bodies, lasting.body[k, 1], noted_arm(bodies, lasting, k, 1), scale(-1.0, n), lasting, k, 1)
+    if choice < CROSSED:
+        out = scale(1.0 - 2.0 * choice, n)
+        face = facing(bodies, lasting.body[k, choice], out)
+        if face < 0 or (core_b if choice == ON_A else core_a) != POINT:
+            return False
+        set_face(bodies, lasting.body[k, choice], face, out, lasting, k, choice)
         return True
-    if core_a == LINE and core_b == LINE:
-        e_a, e_b = (
-            times(bodies.axes, a, part(lasting, k, DIRECTION, 0)),
-            times(bodies.axes, b, part(lasting, k, DIRECTION, 1)),
+    if choice < NEAREST:
+        of_a, of_b = (choice - CROSSED) // 2, (choice - CROSSED) % 2
+        return (
+            take_line(bodies, lasting, k, 0, n, of_a)
+            and take_line(bodies, lasting, k, 1, n, of_b)
+            and cross_lines(bodies, lasting, k, n)
         )
-        across = cross(e_a, e_b)
-        lasting.place[k, SIDE] = 1.0 if dot(across, n) > 0.0 else -1.0
-        return dot(across, across) > ON_FACE
-    return core_a != PLANE and core_b != PLANE
+    if core_a == PLANE or core_b == PLANE:
+        return False
+    return core_a != LINE or core_b != LINE or cross_lines(bodies, lasting, k, n)
+
+
+@inner_kernel
+def noted_arm(bodies: Bodies, lasting: Lasting, k: int, side: int) -> Vector:
+    """Where contact k was when it was noted, from the centre of one of its bodies."""
+    return times(bodies.axes, lasting.body[k, side], part(lasting, k, NOTED, side))
+
+
+@inner_kernel
+def take_line(bodies: Bodies, lasting: Lasting, k: int, side: int, n: Vector, choice: int) -> bool:
+    """Take as a core the edge of a box, or the axis of a capsule, that begins where `nearest_core` stands; if there is.
+
+    Of a box's at a right angle to the normal n the first (``choice`` 0), or the next.
+    """
+    i, core = lasting.body[k, side], lasting.kind[k, CORE + side]
+    if core == LINE:
+        return choice == 0
+    axes = 0 if core == PLANE else 3 if bodies.kind[i] == BOX else 1 if bodies.kind[i] == CAPSULE else 0
+    for d in range(axes):
+        if dot(axis(bodies.axes, i, d), n) ** 2 <= PARALLEL:
+            if choice == 0:
+                lasting.kind[k, CORE + side] = LINE
+                lasting.place[k, PLACE + 3 * side + d], lasting.place[k, DIRECTION + 3 * side + d] = 0.0, 1.0
+                return True
+            choice -= 1
+    return False
 
 
 @inner_kernel
@@ -142,26 +223,31 @@ def cross_over(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k
 
 
 @inner_kernel
-def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int, face: int) -> bool:
-    """Whether the point of the other body stands where a face of the box on this side ends, and goes on over its edge.
+def goes_off(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int) -> bool:
+    """Whether the point of the other body stands where the face of the box on this side ends, and goes on over its end.
 
     What is round rolls on over it: its core, which is above the point of contact by its radius, moves out of the face.
     """
-    radius = lasting.place[k, RADIUS + 1 - side]
-    m, p = c // POINTS, c % POINTS
-    i, other = lasting.body[k, side], lasting.body[k, 1 - side]
-    up = scale(radius * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))
+    i, arms = lasting.body[k, side], manifolds.arm_a if side == 0 else manifolds.arm_b
+    local = times_transposed(bodies.axes, i, row(arms[c // POINTS], c % POINTS, 0))
+    way = times_transposed(bodies.axes, i, passing(bodies, manifolds, lasting, c, k, side))
+    for d in range(3):
+        half, aside = bodies.geometry[i, d], part(lasting, k, DIRECTION, side)[d] == 0.0
+        if aside and half - abs(local[d]) <= AT_EDGE * half and way[d] * local[d] > 0.0:
+            return True
+    return False
+
+
+@inner_kernel
+def passing(bodies: Bodies, manifolds: Manifolds, lasting: Lasting, c: int, k: int, side: int) -> Vector:
+    """Velocity of the core of the other body at row c, less that of the body on this side [m/s]."""
+    m, p, i, other = c // POINTS, c % POINTS, lasting.body[k, side], lasting.body[k, 1 - side]
+    up = scale(lasting.place[k, RADIUS + 1 - side] * (1.0 - 2.0 * side), row(manifolds.frame[m], 2, 0))
     arm, far = row(manifolds.arm_a[m], p, 0), row(manifolds.arm_b[m], p, 0)
     if side == 1:
         arm, far = far, arm
     at_other = add(row(bodies.twist, other, 0), cross(row(bodies.twist, other, 3), add(far, up)))
-    own = add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), add(arm, up)))
-    local, passing = times_transposed(bodies.axes, i, arm), times_transposed(bodies.axes, i, sub(at_other, own))
-    for d in range(3):
-        half = bodies.geometry[i, d]
-        if d != face and half - abs(local[d]) <= AT_EDGE * half and passing[d] * local[d] > 0.0:
-            return True
-    return False
+    return sub(at_other, add(row(bodies.twist, i, 0), cross(row(bodies.twist, i, 3), add(arm, up))))
 
 
 @inner_kernel

@@ -8,22 +8,20 @@ from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
+from reference_solver.spatial.features import set_rows
 from reference_solver.spatial.kinematics import load_speed, relative_twist, velocity_at
-from reference_solver.spatial.motion import collect_momentum
-from reference_solver.spatial.prepare import measure_speed, set_response, still_speed
+from reference_solver.spatial.prepare import measure_speed, still_speed
 from reference_solver.spatial.separation import radius_of
-from reference_solver.spatial.state import BOX, HALF_SPACE, SPHERE, Bodies, Manifolds, SubStep
-from reference_solver.spatial.sticking import prepare_wrenches
+from reference_solver.spatial.state import BOX, HALF_SPACE, POINTS, SPHERE, Bodies, Manifolds, SubStep
 from reference_solver.spatial.vector import Vector, axis, dot, length, row, sub
-from reference_solver.stepping.clock import LEFT, is_patient
+from reference_solver.stepping.clock import BLOWS, LEFT, MEETING, SERIES, is_patient
 from reference_solver.stepping.impacts import (
-    BOUNCES,
     CREEP,
     LANDED,
     NO_IMPACT,
     OPEN_ENDED,
+    PARTS,
     REBOUNDED,
-    RELEASED,
     SERIES_DRIFT,
     SERIES_ENDS,
     STRUCK,
@@ -36,7 +34,7 @@ from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.noise import COORDINATE_NOISE, NOISE, PASSED_ON, ROUND_OFF, SPEED_SHARE, UNSOLVED
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.vectors import copy_vectors
-from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B, RELEASED_SPEED
+from reference_solver.tally import CONTRADICTED_A, CONTRADICTED_B
 
 #: A normal whose cosine with a box's axis is short of one by this is that of the face: 1e-6 rad.
 FLUSH = 5e-13
@@ -99,11 +97,48 @@ def soft_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) 
 
 
 @inner_kernel
-def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -> int:
-    """Targets -e u- of points that meet (E21), 0 of all others; returns what there is to solve.
+def least_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, dt: float) -> float:
+    """Speed [m/s] below which the bodies of a point, whose reference speed is known, neither meet nor part."""
+    return max(NOISE * manifolds.speed[m, p], still_speed(bodies, manifolds, m, dt))
+
+
+@inner_kernel
+def note_touching(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options) -> int:
+    """Note the points that touch in the room of a phase (`operations.note_touching`).
+
+    A lasting contact neither meets nor parts in the first impact of an instant: its normal has turned.
+    """
+    k, lasting, first = 0, sub_step.lasting, sub_step.clock[BLOWS] == 0.0
+    for m in range(len(manifolds)):
+        v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        for p in range(manifolds.points[m]):
+            if manifolds.meets[m, p] == 0:
+                continue
+            if k == len(lasting.row):
+                return -1
+            lasting.row[k] = POINTS * m + p
+            lasting.body[k, 0], lasting.body[k, 1] = manifolds.body_a[m], manifolds.body_b[m]
+            for d in range(3):
+                lasting.frame[k, 0, d] = manifolds.frame[m, 2, d]
+                lasting.frame[k, 1, d], lasting.frame[k, 2, d] = manifolds.frame[m, 0, d], manifolds.frame[m, 1, d]
+            set_rows(bodies, lasting, k, row(manifolds.arm_a[m], p, 0), row(manifolds.arm_b[m], p, 0))
+            u = velocity_at(v, w, manifolds, m, p)
+            set_reference_speed(bodies, manifolds, m, p, u, options.dt)
+            lasting.speed[k, 0] = u[2]
+            lasts = first and manifolds.lasts[m, p] == 1
+            lasting.speeds[k] = math.inf if lasts else least_speed(bodies, manifolds, m, p, options.dt)
+            lasting.friction[k] = manifolds.friction[m]
+            lasting.usual[k, 0] = manifolds.restitution[m] if options.restitution else 0.0
+            k += 1
+    return k
+
+
+@inner_kernel
+def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options, first: bool) -> int:
+    """Targets -e u- of points that meet (E21), 0 of all others that take part; returns what there is to solve.
 
     A lasting contact approaches because its normal turned, or closes the gap that opened so: it does not rebound,
-    but what it approaches with goes at once, and is no force.
+    but what it approaches with goes at once, and is no force. That is so in the ``first`` impact of an instant.
     """
     found = NO_IMPACT
     for m in range(len(manifolds)):
@@ -113,13 +148,13 @@ def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -
             clear_point(manifolds, m, p)
             for k in range(3):
                 manifolds.hit[m, p, k] = 0.0
-            manifolds.release[m, p] = 0.0
             u = velocity_at(v, w, manifolds, m, p)
             set_reference_speed(bodies, manifolds, m, p, u, options.dt)
             manifolds.impact[m, p] = 0
-            if u[2] >= -max(NOISE * manifolds.speed[m, p], still_speed(bodies, manifolds, m, options.dt)):
+            manifolds.open[m, p] = 1 if manifolds.ending[m, p] == PARTS else 0
+            if u[2] >= -least_speed(bodies, manifolds, m, p, options.dt):
                 continue
-            if manifolds.lasts[m, p]:
+            if first and manifolds.lasts[m, p]:
                 found = max(found, TURNED)
                 continue
             if manifolds.meets[m, p] == 0:
@@ -129,16 +164,16 @@ def set_impact_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -
             manifolds.impact[m, p] = 1
             if options.restitution and manifolds.ending[m, p] == OPEN_ENDED:
                 manifolds.target[m, p] = -restitution * u[2]
-            elif options.restitution and manifolds.ending[m, p] == RELEASED:
-                manifolds.release[m, p] = -restitution * u[2]
     return found
 
 
 @spliced_kernel
-def collide_now(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> int:
+def collide_now(
+    bodies: Bodies, manifolds: Manifolds, problem: Problem, sub_step: SubStep, options: Options, tally: Array
+) -> int:
     """Impacts of all touching points together, from ``before`` to ``first`` (E21); what they were."""
     copy_vectors(bodies.before, bodies.twist)
-    found = set_impact_targets(bodies, manifolds, options)
+    found = set_impact_targets(bodies, manifolds, options, sub_step.clock[BLOWS] == 0.0)
     if found != NO_IMPACT:
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, manifolds, problem, options, tally)
@@ -202,7 +237,7 @@ def row_turn(bodies: Bodies, manifolds: Manifolds, m: int, slip: float, share: f
 
 @inner_kernel
 def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options: Options, time: float) -> bool:
-    """Mark rebounds whose series ends in this sub-step, or is too fast to follow (E22); True if any is new.
+    """Mark rebounds whose series ends in this sub-step (E22); True if any is new.
 
     ``bodies.twist`` are the velocities after ``time`` of it.
     """
@@ -231,38 +266,10 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 lowest = is_lowest(leaves, pull, gap_noise(bodies, manifolds, m, p), e)
                 if aside > SERIES_DRIFT * extent and not lowest and is_patient(sub_step.clock):
                     continue
+                if is_patient(sub_step.clock):
+                    if lasts > sub_step.clock[MEETING]:
+                        continue
+                    sub_step.clock[SERIES] = max(sub_step.clock[SERIES], lasts)
                 manifolds.ending[m, p] = SERIES_ENDS
                 new = True
-            elif 2.0 * leaves * BOUNCES < pull * left:
-                manifolds.ending[m, p] = RELEASED
-                new = True
     return new
-
-
-@spliced_kernel
-def release(bodies: Bodies, manifolds: Manifolds, problem: Problem, options: Options, tally: Array) -> bool:
-    """Give held rebounds their speed at the end of the sub-step, as impacts (E22); False if there are none."""
-    fastest = 0.0
-    for m in range(len(manifolds)):
-        for p in range(manifolds.points[m]):
-            fastest = max(fastest, manifolds.release[m, p])
-    if fastest == 0.0:
-        return False
-    for m in range(len(manifolds)):
-        for p in range(manifolds.points[m]):
-            clear_point(manifolds, m, p)
-            manifolds.target[m, p] = manifolds.release[m, p]
-            set_response(bodies, manifolds, m, p, options)
-            for k in range(3):
-                manifolds.hit[m, p, k] = 0.0
-    prepare_wrenches(bodies, manifolds, options)
-    copy_vectors(bodies.twist, bodies.before)
-    open_solve(bodies, 0.0, tally)
-    solve_velocities(bodies, manifolds, problem, options, tally)
-    certify(bodies, manifolds, options, tally)
-    for i in range(len(bodies)):
-        if bodies.gyroscopic[i]:
-            before: Vector = row(bodies.before, i, 3)
-            collect_momentum(bodies, i, before)
-    tally[RELEASED_SPEED] = max(tally[RELEASED_SPEED], fastest)
-    return True

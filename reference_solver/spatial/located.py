@@ -18,13 +18,13 @@ from reference_solver.spatial.block import sweep_blocks
 from reference_solver.spatial.broadphase import bound_bodies, find_overlaps
 from reference_solver.spatial.certificate import certify, open_solve, point_work
 from reference_solver.spatial.direct import mend_velocities, solve_directly
-from reference_solver.spatial.entries import enter_fixed_step, enter_release, enter_sub_step
+from reference_solver.spatial.entries import enter_fixed_step, enter_impact, enter_sub_step
 from reference_solver.spatial.entries import enter_settled as enter_settled_piece
 from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.ledger import enter_contacts, enter_impulses
 from reference_solver.spatial.manifolds import keep_remembered, pair_key, pass_on
 from reference_solver.spatial.meeting import Meeting
-from reference_solver.spatial.motion import accelerate, displace, spin_of
+from reference_solver.spatial.motion import accelerate, collect_momentum, displace, spin_of
 from reference_solver.spatial.operations import Spatial
 from reference_solver.spatial.operations import displace as displace_from_start
 from reference_solver.spatial.position import correct_positions
@@ -130,7 +130,8 @@ def levers_of_start(island: Island) -> None:
 @inner_kernel
 def collide_now(island: Island) -> int:
     """Impacts, from ``before`` to ``first``."""
-    return int(impact.collide_now(island.bodies, manifolds_of(island), island.problem, island.options, island.tally))
+    bodies, manifolds, sub = island.bodies, manifolds_of(island), island.sub
+    return int(impact.collide_now(bodies, manifolds, island.problem, sub, island.options, island.tally))
 
 
 @inner_kernel
@@ -296,7 +297,7 @@ def remember_forces(island: Island, length: float) -> None:
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]
             known, divisor = row(manifolds.impulse[m], p, 0), max(length, SHORT * dt)
-            ends = manifolds.release[m, p] > 0.0 or not impact.carries(manifolds, m, p, length / dt)
+            ends = not impact.carries(manifolds, m, p, length / dt)
             if length < SHORT * dt and manifolds.force[m, p, 2] > 0.0:
                 known, divisor = row(manifolds.force[m], p, 0), 1.0
             force = times_transposed(manifolds.frame, m, known)
@@ -306,12 +307,41 @@ def remember_forces(island: Island, length: float) -> None:
 
 
 @inner_kernel
-def release(island: Island, length: float) -> None:
-    """All points that were held, together."""
+def note_touching(island: Island) -> int:
+    """Of all points that touch."""
+    return int(impact.note_touching(island.bodies, manifolds_of(island), island.sub, island.options))
+
+
+@inner_kernel
+def mark_contact(island: Island, k: int, ending: int) -> None:
+    """In the table of manifolds."""
+    row = island.sub.lasting.row[k]
+    island.room.ending[row // POINTS, row % POINTS] = ending
+
+
+@inner_kernel
+def ending_of(island: Island, k: int) -> int:
+    """As the table of manifolds has it."""
+    row = island.sub.lasting.row[k]
+    return int(island.room.ending[row // POINTS, row % POINTS])
+
+
+@inner_kernel
+def number_of(island: Island, i: int) -> int:
+    """As the table of bodies has it."""
+    return int(island.bodies.number[i])
+
+
+@inner_kernel
+def end_blow(island: Island) -> None:
+    """Angular momenta follow the velocities, which are those after it already."""
     bodies, manifolds = island.bodies, manifolds_of(island)
-    if impact.release(bodies, manifolds, island.problem, island.options, island.tally):
-        enter_contacts(bodies, manifolds, island.ledger)
-        enter_release(bodies, manifolds, island.sub, island.options, length)
+    for i in range(len(bodies)):
+        if bodies.gyroscopic[i]:
+            collect_momentum(bodies, i, row(bodies.before, i, 3))
+    enter_impulses(bodies, manifolds, manifolds.hit, island.ledger)
+    keep_state(island.sub.journal, bodies.pose, bodies.before)
+    enter_impact(bodies, manifolds, island.sub, island.options)
 
 
 @inner_kernel
@@ -475,6 +505,7 @@ def sub_part(sub: SubStep, world: World, count: int) -> SubStep:
         meeting.vector,
         meeting.corner,
         meeting.watched,
+        meeting.sunk,
     )
     return SubStep(
         sub.clock,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.spatial.features import distances_to_limits, follow, name_features
+from reference_solver.spatial.features import distances_to_limits, follow, name_features, name_next
 from reference_solver.spatial.motion import momentum_of, put_orientation, set_orientation
 from reference_solver.spatial.state import FREE, Manifolds
 from reference_solver.spatial.turning import vector_curvature, vector_rate
@@ -44,6 +44,12 @@ def is_free(bodies: Spatial, i: int) -> bool:
 def hold(bodies: Spatial, manifolds: Manifolds, lasting: Lasting, c: int, k: int) -> None:
     """Note the features of point c % 8 of manifold c // 8."""
     name_features(bodies.record, manifolds, lasting, c, k)
+
+
+@inner_kernel
+def next_features(bodies: Spatial, lasting: Lasting, k: int) -> bool:
+    """Name the next features of contact k."""
+    return bool(name_next(bodies.record, lasting, k))
 
 
 @inner_kernel
@@ -111,6 +117,7 @@ def feature_limits(bodies: Spatial, lasting: Lasting, k: int, place: int) -> Non
 
 operations.provide(operations.is_free, Spatial, is_free)
 operations.provide(operations.hold, Spatial, hold)
+operations.provide(operations.next_features, Spatial, next_features)
 operations.provide(operations.evaluate, Spatial, evaluate)
 operations.provide(operations.free_accelerations, Spatial, free_accelerations)
 operations.provide(operations.displace, Spatial, displace)

@@ -56,7 +56,7 @@ def note_contacts(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep) -> in
         a, b = manifolds.body_a[m], manifolds.body_b[m]
         extent = min(bodies.extent[a], bodies.extent[b])
         for p in range(manifolds.points[m]):
-            if manifolds.open[m, p] or manifolds.release[m, p] > 0.0:
+            if manifolds.open[m, p]:
                 continue
             if k == len(lasting.gap) or not name_features(bodies, manifolds, lasting, POINTS * m + p, k):
                 return NOT_FOLLOWED

@@ -124,10 +124,9 @@ MANIFOLD = np.dtype(
         ("open", "i8", POINTS),  # 1 where a point parts and carries nothing in a force phase (E20)
         ("lasts", "i8", POINTS),  # 1 where a point carried load in the sub-step before (E20)
         ("meets", "i8", POINTS),  # 1 where bodies touch, 0 where a gap is left to close
-        ("ending", "i8", POINTS),  # how a rebound goes on, see `impact`
+        ("ending", "i8", POINTS),  # what becomes of it in an impact, see `stepping.impacts`
         ("hit", "f8", (POINTS, 3)),  # impulse of the impacts of a sub-step, frame [N s]
         ("force", "f8", (POINTS, 3)),  # remembered from the sub-step before: world axes, then frame [N]
-        ("release", "f8", POINTS),  # speed with which a held rebound is released [m/s]
         ("slip", "f8", (POINTS, 2)),  # u_t at the start of a force phase, frame [m/s]
         ("feature", "i8", POINTS),
         ("gap", "f8", POINTS),  # [m], < 0 overlap

@@ -16,6 +16,7 @@ is the dimension's own ``Bodies``. It imports neither of the two.
 |---|---|
 | ``is_free(bodies, i)`` | whether forces move body i |
 | ``hold(bodies, rows, lasting, c, k)`` | notes features of row c in body axes, so that `evaluate` can follow them |
+| ``next_features(bodies, lasting, k)`` | lets contact k go on with other features that touch in its place |
 | ``evaluate(bodies, lasting)`` | gap, frame, Jacobian, response, u and gamma of all noted contacts at any pose |
 | ``free_accelerations(bodies, lasting)`` | `Lasting.free`: what loads and the gyroscopic term do |
 | ``displace(bodies, lasting, i)`` | pose of i: `Lasting.base` moved by `Lasting.displacement` |

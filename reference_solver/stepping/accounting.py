@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
-from reference_solver.tally import CREATED, KANE, PUMPED, SWEEPS, WORST_SWEEPS
+from reference_solver.tally import CREATED, KANE, PUMPED, START_OVERLAP, SWEEPS, WORST_SWEEPS
 
 #: Created energy up to this share of a solve's work is round-off of its impulses: 1e4 units in the last place, what
 #: cancels where thousands of contacts each do their work.
@@ -39,7 +39,7 @@ def keep(tally: Array, kept: Array) -> None:
 
 @inner_kernel
 def go_back(tally: Array, kept: Array) -> None:
-    """Forget what solves that are made again entered since `keep`, but for the sweeps they cost."""
+    """Forget what solves that are made again entered since `keep`, but for their sweeps and the start that they saw."""
     for k in range(len(tally)):
-        if k != SWEEPS and k != WORST_SWEEPS:
+        if k != SWEEPS and k != WORST_SWEEPS and k != START_OVERLAP:
             tally[k] = kept[k]

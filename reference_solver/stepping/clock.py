@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import kernel
 from reference_solver.model import Array
 from reference_solver.stepping.noise import EVENT_BUDGET
@@ -26,7 +28,13 @@ ROCKING, ROCKS = 11, 12
 BRIEF, LONGER_BRIEF = 13, 14
 #: What events count that follow each other within a thousandth of a step, where each is dear.
 CHAIN = 15
-CLOCK_SIZE = 16
+#: Impacts of the present instant that have been made; 1 where the instant came within a thousandth of a step of the
+#: event before; 1 where round-off decides which of its impacts comes first (E21).
+BLOWS, SOON, UNORDERED = 16, 17, 18
+#: When the last series of rebounds that is taken to end in the sub-step does, and when bodies meet, so that one that
+#: lasts until then is followed (E22); counted from the start of the sub-step [s].
+SERIES, MEETING = 19, 20
+CLOCK_SIZE = 21
 
 #: Value of HELD in a sub-step at whose end bodies that rock have come to rest on each other, where rows turn.
 UNTIL_REST = 0.5
@@ -68,7 +76,8 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = clock[SOON] = 0.0
+    clock[MEETING] = math.inf
     clock[LONGER_BRIEF] = INSTANT
 
 
@@ -102,6 +111,7 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
     phase costs. Too many events of all kinds, and the run ends.
     """
     clock[WEIGHT] = (CRAWL * price if shortened else HASTE) if hasty else 1.0
+    clock[SOON] = 1.0 if hasty else 0.0
     clock[EVENTS] += 1.0
     clock[SOFT] += clock[WEIGHT]
     if not shortened:
@@ -109,6 +119,16 @@ def count_event(clock: Array, tally: Array, hasty: bool, shortened: bool, price:
     tally[EVENTS_LOCATED] += 1.0
     if clock[HELD] == 0.0 and (clock[SOFT] > clock[PATIENCE] or clock[CHAIN] > LONGEST_CHAIN):
         hold_rest(clock, tally)
+    if clock[EVENTS] > EVENT_BUDGET:
+        tally[EXHAUSTED] += 1.0
+
+
+@kernel
+def count_blow(clock: Array, tally: Array) -> None:
+    """Enter an impact that another one follows at once; too many of them, and the run ends."""
+    clock[BLOWS] += 1.0
+    clock[EVENTS] += 1.0
+    tally[EVENTS_LOCATED] += 1.0
     if clock[EVENTS] > EVENT_BUDGET:
         tally[EXHAUSTED] += 1.0
 

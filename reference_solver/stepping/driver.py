@@ -14,7 +14,9 @@ import math
 from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.journal import keep_state
 from reference_solver.stepping.accounting import go_back, keep
+from reference_solver.stepping.chains import open_instant, strikes_again
 from reference_solver.stepping.clock import (
+    BLOWS,
     BRIEF,
     CONFINED,
     ESCAPED,
@@ -22,12 +24,15 @@ from reference_solver.stepping.clock import (
     INSTANT,
     LEFT,
     LONGER_BRIEF,
+    MEETING,
     OUTCOME,
     REBOUND,
     ROCKING,
     ROCKS,
+    SERIES,
     UNSETTLED,
     UNTIL_REST,
+    count_blow,
     count_event,
     end_instant,
     end_settling,
@@ -36,7 +41,7 @@ from reference_solver.stepping.clock import (
     opens_step,
     weigh_event,
 )
-from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES
+from reference_solver.stepping.impacts import LANDED, NO_IMPACT, REBOUNDED, SERIES_PASSES, STRUCK
 from reference_solver.stepping.midpoint import CLOSINGS, PUSHED_INTO
 from reference_solver.stepping.noise import NOTHING_LEFT, SHORT
 from reference_solver.stepping.operations import (
@@ -45,6 +50,7 @@ from reference_solver.stepping.operations import (
     close_gaps,
     collide_now,
     deepest_overlap,
+    end_blow,
     end_rocking,
     end_series,
     end_solve,
@@ -64,7 +70,6 @@ from reference_solver.stepping.operations import (
     press_until_stick,
     price_of_creeping,
     put_back,
-    release,
     return_to_start,
     solve_end,
     weigh_clusters,
@@ -123,6 +128,11 @@ def make_sub_step(island: Island) -> bool:
     length = solve_sub_step(island)
     if tally[CONTRADICTED_A] > 0.0:
         return True
+    if length == 0.0:
+        end_blow(island)
+        count_blow(clock, tally)
+        clock[MEETING] = math.inf
+        return True
     island.sub.lasting.lenient[0] = 1.0 if clock[LONGER_BRIEF] > INSTANT else 0.0
     phase = enter_path(island, length)
     if phase == NO_PHASE:
@@ -143,11 +153,14 @@ def make_sub_step(island: Island) -> bool:
         return_to_start(island)
         clock[ESCAPED], clock[HELD], clock[ROCKS] = 1.0, held, rocks
         return True
+    if end < min(length, clock[SERIES]):  # what has not ended by then is followed
+        go_back(tally, island.sub.opened)
+        return_to_start(island)
+        clock[MEETING], clock[HELD], clock[ROCKS] = end, held, rocks
+        return True
     end = follow_path(island, length, end, phase > 0.0)
     tally[SUB_STEPS] += 1.0
     tally[OPENED] = max(tally[OPENED], 1.0)  # a phase opens no solve, and what is solved after it is not the start
-    if options.restitution:
-        release(island, end)
     haste, shortened = end < SHORT * options.dt, phase == end and clock[OUTCOME] == SHORTENED
     if clock[BRIEF] > 0.0:
         gained, loaded = gained_speed(island, end)
@@ -155,6 +168,7 @@ def make_sub_step(island: Island) -> bool:
     if end < left and (haste or not shortened):
         count_event(clock, tally, haste, shortened, price_of_creeping(island))
     clock[LEFT] = left - end if left - end > NOTHING_LEFT * options.dt else 0.0
+    clock[BLOWS], clock[MEETING] = 0.0, math.inf
     return True
 
 
@@ -162,12 +176,14 @@ def make_sub_step(island: Island) -> bool:
 def solve_sub_step(island: Island) -> float:
     """Impacts and force phase; return the length of the sub-step, ``twist`` being the velocities at its end.
 
-    An attempt that is made again leaves its sweeps in the tally and nothing else.
+    It is 0 where the impact drove bodies together that had no part in it, so that another follows at once (E21). An
+    attempt that is made again leaves its sweeps in the tally and nothing else.
     """
     clock, tally = island.sub.clock, island.tally
-    clock[ROCKING] = 0.0
-    keep(tally, island.sub.opened)
+    clock[ROCKING] = clock[SERIES] = 0.0
     begin_solve(island)
+    open_instant(island)
+    keep(tally, island.sub.opened)
     length, found = clock[LEFT], NO_IMPACT
     for k in range(SERIES_PASSES):
         if k > 0:
@@ -176,6 +192,9 @@ def solve_sub_step(island: Island) -> float:
                 levers_of_start(island)
         found = collide_now(island)
         keep(tally, island.sub.struck)
+        if found >= LANDED and strikes_again(island):
+            weigh_event(clock, 0.0 if found == STRUCK else REBOUND)
+            return 0.0
         most = min(clock[LEFT], clock[BRIEF] * island.options.dt) if clock[BRIEF] > 0.0 else clock[LEFT]
         length = press_until_stick(island, most, found >= LANDED)
         if not (found >= LANDED and island.options.restitution and end_series(island, length)):

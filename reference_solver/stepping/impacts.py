@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from reference_solver.compilation import kernel
 
-#: How a rebound goes on: it flies; its series of bounces ends within the sub-step; it is held until the end of the
-#: sub-step and released there.
-OPEN_ENDED, SERIES_ENDS, RELEASED = 0, 1, 2
+#: What becomes of a contact in an impact: it rebounds; its series of bounces ends within the sub-step (E22); it ends a
+#: chain of impacts without end (E22), and does not rebound either; it parts already, and has no part in the impact.
+OPEN_ENDED, SERIES_ENDS, CHAIN_ENDS, PARTS = 0, 1, 2, 3
 #: What an instant brings: nothing, contacts whose normals turned (spatial), impacts no faster than what loads do in a
 #: step with e = 0, such with e > 0, faster ones.
 NO_IMPACT, TURNED, LANDED, REBOUNDED, STRUCK = 0, 1, 2, 3, 4
-#: A rebound that would return this many times within what is left of the step is not followed bounce by bounce.
-BOUNCES = 32
 #: A series of rebounds is held from where friction, which acts at its impacts only, moves bodies by no more than this
 #: share of the smaller half width other than it would in a contact; as long as half of a step's patience is left.
 SERIES_DRIFT = 1e-11

@@ -67,6 +67,15 @@ def hold(bodies: Any, rows: Any, lasting: Any, c: int, k: int) -> None:
 
 
 @operation
+def next_features(bodies: Any, lasting: Any, k: int) -> bool:
+    """Let contact k go on with other features that touch in its place; False, with those it has, if all were tried.
+
+    Bodies stand at the start of the phase.
+    """
+    raise NotImplementedError
+
+
+@operation
 def evaluate(bodies: Any, lasting: Any) -> None:
     """Follow the noted features of all contacts at the present poses and twists.
 
@@ -241,8 +250,35 @@ def follow_path(island: Any, length: float, end: float, curved: bool) -> float:
 
 
 @operation
-def release(island: Any, length: float) -> None:
-    """Give rebounds that were held for ``length`` their speed at its end (E22), and enter that."""
+def note_touching(island: Any) -> int:
+    """Note the contacts that touch in the room of a phase, each with its normal row alone; how many, -1 if too many.
+
+    Fills ``lasting.row[k]``, ``body[k]``, ``friction[k]``, ``jacobian[k, :, 0]``, ``response[k, :, 0]``,
+    ``speed[k, 0]``, in ``usual[k, 0]`` its e, and in ``speeds[k]`` the speed below which it neither meets nor parts.
+    """
+    raise NotImplementedError
+
+
+@operation
+def mark_contact(island: Any, k: int, ending: int) -> None:
+    """Say what becomes of noted contact k in the impact (`stepping.impacts`)."""
+
+
+@operation
+def ending_of(island: Any, k: int) -> int:
+    """Return what becomes of noted contact k in the impact."""
+    raise NotImplementedError
+
+
+@operation
+def number_of(island: Any, i: int) -> int:
+    """Return the number that body i has in the world."""
+    raise NotImplementedError
+
+
+@operation
+def end_blow(island: Any) -> None:
+    """Enter an impact that another one follows at once; velocities are those after it."""
 
 
 @operation
@@ -378,7 +414,11 @@ OF_ISLANDS = (
     next_impact,
     leaves_bounds,
     follow_path,
-    release,
+    note_touching,
+    mark_contact,
+    ending_of,
+    number_of,
+    end_blow,
     gained_speed,
     price_of_creeping,
     find_loaded,

@@ -45,6 +45,7 @@ from reference_solver.stepping.operations import (
     evaluate,
     feature_limits,
     free_accelerations,
+    next_features,
 )
 from reference_solver.stepping.turning_slips import follow_slip, forget_yields, steady_slips, stops_across
 
@@ -72,6 +73,8 @@ NEXT_TO_NOTHING = 1e-4
 SAFETY = 0.8
 #: Attempts to find a length whose error is small enough, and a step without a second change of modes inside.
 LENGTHS = 24
+#: Changes of mode and of features for each contact.
+CHANGES = 8
 #: Steps in search of the end of a mode.
 SEARCHES = 40
 #: A monitor this far below zero at a stage, whose order is low, tells that a mode ends and begins again in between.
@@ -210,7 +213,7 @@ def step_phase(bodies: Bodies, lasting: Lasting, length: float) -> float:
         if stage < STAGES - 1:
             weigh_stage(bodies, lasting, stage, length)
             watch(bodies, lasting, BETWEEN)
-            if lowest(lasting, BETWEEN) < -SURELY:
+            if lowest(lasting, BETWEEN, True)[0] < -SURELY:
                 lasting.early[0] = min(lasting.early[0], NODES[stage])
     error = lasting.error[0] = relative_error(lasting, length)
     if not clean_up(bodies, lasting):
@@ -329,38 +332,28 @@ def passes_limit(bodies: Bodies, lasting: Lasting) -> bool:
 
 
 @inner_kernel
-def lowest(lasting: Lasting, place: int) -> float:
-    """Least monitor of those that were above zero at the start."""
-    least = math.inf
+def lowest(lasting: Lasting, place: int, above: bool) -> tuple[float, int, int]:
+    """Least monitor of those that were ``above`` zero at the start, or not; its contact and what it is."""
+    least, which, what = math.inf, -1, LOAD
     for k in range(lasting.size[CONTACTS]):
         for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] > FORCE_NOISE:
-                least = min(least, lasting.monitor[place, k, m])
-    return least
-
-
-@inner_kernel
-def fallen_at_once(lasting: Lasting) -> tuple[int, int]:
-    """Contact and monitor that was zero at the start and has fallen most; (-1, `LOAD`) if there is none."""
-    worst, which, what = -FORCE_NOISE, -1, LOAD
-    for k in range(lasting.size[CONTACTS]):
-        for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] <= FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
-                worst, which, what = lasting.monitor[LAST, k, m], k, m
-    return which, what
+            if (lasting.monitor[START, k, m] > FORCE_NOISE) == above and lasting.monitor[place, k, m] < least:
+                least, which, what = lasting.monitor[place, k, m], k, m
+    return least, which, what
 
 
 @inner_kernel
 def rises_first(bodies: Bodies, lasting: Lasting, which: int, what: int, length: float) -> bool:
     """Whether the way to an end of a feature that has fallen below zero grows where the phase begins.
 
-    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Asked of bodies that
-    move: by their velocities at the start, and they are left where those take them in `GLANCE` of the phase.
+    A box that rocks leaves its edge by next to nothing, and comes back to it within the phase. Told by velocities and
+    accelerations at the start; bodies are left where those take them in `GLANCE` of the phase.
     """
     go_back(bodies, lasting)
     for i in range(lasting.size[BODIES]):
         for d in range(lasting.size[VELOCITIES]):
-            lasting.displacement[i, d] = GLANCE * length * lasting.rate[0, i, d]
+            bend = 0.5 * GLANCE * length * lasting.bend[0, i, d]
+            lasting.displacement[i, d] = GLANCE * length * (lasting.rate[0, i, d] + bend)
         displace(bodies, lasting, i)
     evaluate(bodies, lasting)
     weigh_limits(bodies, lasting, which, BETWEEN)
@@ -384,24 +377,14 @@ def stops_at_once(lasting: Lasting) -> bool:
 
 
 @inner_kernel
-def end_first(bodies: Bodies, lasting: Lasting) -> None:
-    """Change the mode that ends as soon as the phase has begun: gaps that were open by round-off are closed by then."""
-    worst, which, what = 0.0, -1, LOAD
-    for k in range(lasting.size[CONTACTS]):
-        for m in range(lasting.monitor.shape[2]):
-            if lasting.monitor[START, k, m] > FORCE_NOISE and lasting.monitor[LAST, k, m] < worst:
-                worst, which, what = lasting.monitor[LAST, k, m], k, m
-    if which >= 0:
-        end_mode(bodies, lasting, which, what)
-
-
-@inner_kernel
 def end_mode(bodies: Bodies, lasting: Lasting, which: int, what: int) -> None:
     """Give contact ``which`` the mode that follows when monitor ``what`` falls below zero."""
-    if what == LOAD or what >= FEATURE:
+    if what >= FEATURE:
+        go_back(bodies, lasting)
+        if not next_features(bodies, lasting, which):
+            lasting.mode[which], lasting.parts[which] = OPEN, GONE
+    elif what == LOAD:
         lasting.mode[which] = OPEN
-        if what >= FEATURE:
-            lasting.parts[which] = GONE
     elif what == ONWARD:
         lasting.mode[which], lasting.slides[which] = STICK, 0
     else:
@@ -452,7 +435,7 @@ def find_end(bodies: Bodies, lasting: Lasting, length: float) -> float:
             return -1.0
         if lasting.size[TANGENTS] > 1 and lasting.error[0] > 1.0:
             return guess  # a slip turns on its way to its end
-        value = lowest(lasting, LAST)
+        value, _, _ = lowest(lasting, LAST, True)
         if abs(value) <= LOCATED:
             return guess
         if value < 0.0:
@@ -527,7 +510,7 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
         go_back(bodies, lasting)
         return 0.0, FAILED
     length, outcome = left, WHOLE
-    for _ in range(LENGTHS + 2 * lasting.size[CONTACTS]):
+    for _ in range(LENGTHS + CHANGES * lasting.size[CONTACTS]):
         if changed:
             if not start_again(bodies, lasting):
                 break
@@ -536,6 +519,8 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
                 length, left, outcome = back, back, SHORTENED
             changed = False
         error = step_phase(bodies, lasting, length)
+        later, _, _ = lowest(lasting, LAST, True)
+        at_once, which, what = lowest(lasting, LAST, False)
         if error < 0.0:
             length, outcome = 0.25 * length, SHORTENED
         elif error > 1.0:
@@ -543,27 +528,29 @@ def find_phase(bodies: Bodies, lasting: Lasting, left: float) -> tuple[float, in
             length, outcome = length / max(parts, 2), SHORTENED
         elif stops_at_once(lasting):
             break
-        elif fallen_at_once(lasting)[0] >= 0:
-            which, what = fallen_at_once(lasting)
+        elif at_once < -FORCE_NOISE:
             if what >= FEATURE and length > SHORTEST * left and rises_first(bodies, lasting, which, what, length):
                 length, outcome = 0.25 * length, SHORTENED
                 continue
             end_mode(bodies, lasting, which, what)
             changed = True
             continue
-        elif lasting.early[0] < 1.0 and lowest(lasting, LAST) >= 0.0:
+        elif lasting.early[0] < 1.0 and later >= 0.0:
             length, outcome = lasting.early[0] * length, SHORTENED
-        elif lowest(lasting, LAST) < -LOCATED:
+        elif later < -LOCATED:
             end = find_end(bodies, lasting, length)
             if end >= SHORTEST * left:
-                ends = not stops_across(lasting) and lasting.error[0] <= 1.0
-                if ends or BEFORE_END * end < SHORTEST * left:
+                settled = not stops_across(lasting) and lasting.error[0] <= 1.0
+                if settled or BEFORE_END * end < SHORTEST * left:
                     return end, ENDED
                 length, outcome = BEFORE_END * end, SHORTENED
                 continue
             if end < 0.0:
                 break
-            end_first(bodies, lasting)
+            # As soon as the phase has begun: gaps that were open by round-off are closed by then.
+            later, which, what = lowest(lasting, LAST, True)
+            if later < 0.0:
+                end_mode(bodies, lasting, which, what)
             changed = True
         else:
             return length, outcome

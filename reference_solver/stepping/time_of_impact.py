@@ -197,6 +197,7 @@ def watch_free_corners(meeting: Any, time: float) -> bool:
         above = height(meeting, 1, c, 1.0) - low
         rate, _ = corner_rate(meeting, 0, c)
         meeting.watched[c] = 1 if above > noise or rate * time > noise else 0
+        meeting.sunk[c] = 0.0
         found = found or meeting.watched[c] == 1
     return found
 
@@ -214,12 +215,21 @@ def gap(meeting: Any) -> float:
 
 
 @inner_kernel
+def sink(meeting: Any) -> None:
+    """Note how deep each corner of the second body is in the plane."""
+    deepest = -gap(meeting)
+    far = farthest(meeting, 1, -1.0)
+    for c in range(meeting.kind[CORNERS_SECOND]):
+        meeting.sunk[c] = max(deepest - (far - height(meeting, 1, c, -1.0)), 0.0)
+
+
+@inner_kernel
 def farthest(meeting: Any, k: int, sign: float) -> float:
     """How far the watched corners of body k reach along the normal times ``sign`` from its centre [m]."""
     far = -math.inf
     for c in range(meeting.kind[CORNERS_FIRST + k]):
         if k == 0 or meeting.watched[c]:
-            far = max(far, height(meeting, k, c, sign))
+            far = max(far, height(meeting, k, c, sign) - (0.0 if k == 0 else meeting.sunk[c]))
     return far
 
 
@@ -268,7 +278,7 @@ def corner_rate(meeting: Any, c: int, d: int) -> tuple[float, float]:
         rate += (tz * v[NORMAL, 0] - tx * v[NORMAL, 2]) * (v[CENTRE + 1, 1] - v[CENTRE, 1] + ay - fy)
         rate += (tx * v[NORMAL, 1] - ty * v[NORMAL, 0]) * (v[CENTRE + 1, 2] - v[CENTRE, 2] + az - fz)
     reach = 0.0 if meeting.kind[PLANE] else height(meeting, 0, c, 1.0)
-    return rate, reach + height(meeting, 1, d, -1.0)
+    return rate, reach + height(meeting, 1, d, -1.0) - meeting.sunk[d]
 
 
 @inner_kernel
@@ -423,7 +433,7 @@ def edge_bend_bound(meeting: Any, now: float, until: float) -> float:
 def watch_all(meeting: Any) -> None:
     """Let no corner of the second body come down unseen."""
     for c in range(meeting.kind[CORNERS_SECOND]):
-        meeting.watched[c] = 1
+        meeting.watched[c], meeting.sunk[c] = 1, 0.0
 
 
 @operation
@@ -474,10 +484,15 @@ def relative_acceleration(meeting: Any, t: float) -> float:
 def advance(meeting: Any, now: float, until: float) -> float:
     """Advance from safe time to safe time until the separation is round-off (E26); inf if that is after ``until``.
 
+    What overlaps now touches when it overlaps more: of a plane, each corner by itself, for bodies that rock come down
+    on one corner while another is still in the plane by round-off.
+
     A pair that touches now has to part before it can meet. While it is within noise, and no corner parts for certain,
     steps are as long as a fall by that noise takes.
     """
     stand(meeting, now)
+    if meeting.kind[PLANE]:
+        sink(meeting)
     t, value = now, gap(meeting)
     bend = bend_bound(meeting, now, until)
     noise, least = gap_noise(meeting), round_off(meeting)

@@ -68,10 +68,13 @@ WIDTH = 150
 @click.option("--random", "count", type=click.IntRange(1), help="Attack: N random scenes against variants of them.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of the first random scene.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Random scenes: only planar (2) or spatial (3).")
-def certify(as_json: bool, order: bool, self_test: bool, count: int | None, seed: int, dim: tuple[int, ...]) -> None:
+@click.option("--chains", is_flag=True, help="Random scenes: rows of bodies, in which impacts accumulate.")
+def certify(
+    as_json: bool, order: bool, self_test: bool, count: int | None, seed: int, dim: tuple[int, ...], chains: bool
+) -> None:
     """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold.
 
-    With --random scenes are drawn, certified and run again mirrored, boosted, with other steps and so on: what is
+    With --random scenes are drawn, certified and run again mirrored, moved, with other steps and so on: what is
     certified and differs is a defect, and fails; what is refused is told with the condition.
     """
     console = terminal(stderr=True)
@@ -83,7 +86,7 @@ def certify(as_json: bool, order: bool, self_test: bool, count: int | None, seed
     if self_test:
         sys.exit(show_self_test(console, as_json))
     if count is not None:
-        sys.exit(show_random(console, as_json, count, seed, dim or (2, 3)))
+        sys.exit(show_random(console, as_json, count, seed, dim or (2, 3), chains))
     runs = [run for part in PARTS for run in (piles.PILES if part == IN_RUNS else (part,))]
     found = side_by_side(measured, runs, console)
     gates = [

@@ -30,7 +30,8 @@ NAMED = 6
 #: Distance from runs with other steps beyond which a refused answer counts as wrong, not only as refused [m].
 WRONG = 1e-6
 
-Job = tuple[int, int]
+#: Seed, dimension and, unless any scene will do, the kind that is drawn.
+Job = tuple[int, int] | tuple[int, int, str]
 
 
 @dataclass
@@ -45,20 +46,23 @@ def serve(connection: Connection) -> None:
     connection.send_bytes(READY)
     while True:
         try:
-            seed, dimension = json.loads(connection.recv_bytes())
+            seed, dimension, *kind = json.loads(connection.recv_bytes())
         except EOFError:
             return
         try:
-            answer = attack(seed, dimension).as_dict()
+            answer = attack(seed, dimension, *kind).as_dict()
         except Exception as error:  # a scene that breaks the solver is a find like any other
             answer = {"seed": seed, "dimension": dimension, "broken": said_by(error)}
         connection.send_bytes(json.dumps(answer).encode())
 
 
-def show_random(console: Console, as_json: bool, count: int, seed: int, dimensions: Sequence[int]) -> int:
+def show_random(
+    console: Console, as_json: bool, count: int, seed: int, dimensions: Sequence[int], chains: bool = False
+) -> int:
     """Print what became of random scenes; 1 if one is certified and differs, or has no answer, else 0."""
     found: list[dict[str, Any]] = []
-    jobs = [(s, d) for d in dimensions for s in range(seed, seed + count)]
+    seeds = range(seed, seed + count)
+    jobs: list[Job] = [(s, d, "chains") if chains else (s, d) for d in dimensions for s in seeds]
     with console.status("attacking") as status:
         for answer in attacked(jobs):
             found.append(answer)

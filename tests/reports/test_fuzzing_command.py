@@ -42,6 +42,11 @@ def test_both_dimensions_are_asked_where_none_is_named(monkeypatch):
     assert asked == [(seed, d) for d in (2, 3) for seed in (5, 6, 7)]
 
 
+def test_rows_in_which_impacts_accumulate_are_asked_by_name(monkeypatch):
+    _, asked = certify(monkeypatch, flags=("--dim", "2", "--chains"))
+    assert asked == [(5, 2, "chains"), (6, 2, "chains"), (7, 2, "chains")]
+
+
 def test_a_certified_scene_that_differs_fails_and_is_named(monkeypatch):
     result, _ = certify(monkeypatch, answer(6, defects=[["mirrored", 0.25, 1e-5, 2e-12]]))
     assert result.exit_code == 1
@@ -134,8 +139,9 @@ def test_what_a_scene_raises_is_told_in_one_line(monkeypatch):
 
 
 def test_the_command_hands_over(monkeypatch):
-    monkeypatch.setattr(certifying, "show_random", lambda console, as_json, count, seed, dims: 7)
+    monkeypatch.setattr(certifying, "show_random", lambda console, as_json, count, seed, dims, chains: 7 + chains)
     assert CliRunner().invoke(main, ["certify", "--random", "1"]).exit_code == 7
+    assert CliRunner().invoke(main, ["certify", "--random", "1", "--chains"]).exit_code == 8
 
 
 def test_what_refused_stands_most_frequent_first_with_its_numbers():

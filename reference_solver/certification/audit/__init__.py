@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_solver.certification.audit import contact, energy, motion, sharing, space, touching
+from reference_solver.certification.audit import chains, contact, energy, motion, sharing, space, touching
 from reference_solver.certification.audit.run import Run
 from reference_solver.model import Model
 from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
@@ -83,6 +83,8 @@ CHECKS = {
     "choice": Check(1e-9, "corners meet along a normal that they do not close along last"),
     # Speeds after a solve: its residual.
     "together": Check(1e-9, "an impact leaves out what touches as well"),
+    # Each such impact is proven from its own velocities, or is not.
+    "endless": Check(0.0, "impacts are summed up as if they had no end, and that is not so"),
     # Coordinates must resolve the overlap that is allowed ten times over.
     "resolution": Check(1e-7, "bodies are so far out that their places are no longer resolved"),
     # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
@@ -147,6 +149,15 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
+def grazes(model: Model, record: Record, dt: float, noise: float) -> np.ndarray:
+    """Return how far (s,) impacts move bodies of which round-off decides whether they are [m] (`contact.grazes`).
+
+    Gaps below ``noise`` [m] count as none. Raises ValueError if the record has no pieces.
+    """
+    begin, speed = contact.grazes(_run_of(model, record, dt), record.t, record.pose, noise)
+    return np.maximum(record.t - begin[:, None], 0.0).T @ speed
+
+
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
     """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
 
@@ -169,6 +180,7 @@ def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Ite
     yield from motion.measured(run, start, record)
     yield from contact.measured(run)
     yield from touching.measured(run)
+    yield from chains.measured(run)
     yield from space.measured(run, start)
     yield from energy.measured(run)
     coarse = np.isin(run.pieces.scheme, (FIXED, IMPULSE_LEVEL)) & (run.pieces.kind == FORCES)

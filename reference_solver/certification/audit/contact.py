@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,14 +10,20 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.audit.run import Run, cross, twist_of
 from reference_solver.certification.audit.turning import SOLVED, turned_contacts, turns_beside
+from reference_solver.certification.geometry import nearest
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 from reference_solver.shapes import Disc, Sphere
 
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
+#: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part, or lie and
+#: have turned. And share of the speeds that meet which is round-off of a solve.
+PARTS, LIES = 1e-5, 1e-9
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
+#: How many times as fast as until the next sample bodies may go apart at first.
+APART = 4.0
 #: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
 #: the contacts of a body is rounded at that size.
 UNITS = 4.0
@@ -24,7 +31,7 @@ UNITS = 4.0
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts."""
-    names = ("pull", "cone", "normal", "friction", "moment", "scale", "held", "unknown")
+    names = ("pull", "cone", "normal", "friction", "moment", "scale", "unknown")
     if not len(run.pieces.body_a):
         yield from ((name, 0.0) for name in names)
         return
@@ -46,7 +53,7 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
     )
     approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
-    held = run.is_impact[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
+    held = (run.is_impact & ~run.is_chain)[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
     return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
 
 
@@ -71,6 +78,43 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
     return rubs * way / (1.0 + e), np.maximum(*spins) * way
+
+
+def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]:
+    """When (k,) bodies meet or do not as round-off has it [s], and what (k,) speed of any of their points that changes.
+
+    Bodies that go apart with the acceleration a after they came near each other with the speed u were nearer by
+    ``u^2/(2 a)`` then. Where gaps below ``noise`` [m] count as none, they meet with any u up to ``sqrt(2 a noise)``, or
+    pass each other. The acceleration is that of the gap until the first sample (``t``, ``pose``) after the impact, if
+    the pair has no impulse before it; it may have been `APART` times as large when they met.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    approach = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+    pushed = np.linalg.norm(pieces.impulse, axis=1) > 0.0
+    rows = np.flatnonzero(pushed)
+    pair, begin = (pieces.body_a * len(run.free) + pieces.body_b)[rows], pieces.begin[owner[rows]]
+    until = np.full(len(pushed), np.inf)
+    order = np.lexsort((begin, pair))
+    same = pair[order[1:]] == pair[order[:-1]]
+    until[rows[order[:-1]]] = np.where(same, begin[order[1:]], np.inf)
+    sample = np.minimum(np.searchsorted(t, pieces.begin[owner], side="right"), len(t) - 1)
+    alone = run.is_impact[owner] & pushed & (approach < 0.0) & (until >= t[sample]) & (t[sample] > pieces.begin[owner])
+    times, speed, mass = [], [], reduced_mass(run)
+    for j in np.flatnonzero(alone):
+        both, at = (int(pieces.body_a[j]), int(pieces.body_b[j])), pose[sample[j]]
+        first, second = (run.model.bodies[i].shape for i in both)
+        gap = max(float(nearest(first, at[both[0]], second, at[both[1]]).gap), 0.0)
+        met = math.sqrt(2.0 * APART * noise * 2.0 * gap) / (t[sample[j]] - pieces.begin[owner[j]])
+        if -approach[j] <= met:
+            impulse = (1.0 + run.model.restitution[both]) * met * mass[j]
+            far = [
+                (1.0 + run.mass[i] * run.reach[i] ** 2 / run.moments[i].min()) / run.mass[i]
+                for i in both
+                if run.free[i]
+            ]
+            times.append(float(pieces.begin[owner[j]]))
+            speed.append(impulse * max(far))
+    return np.array(times), np.array(speed)
 
 
 def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
@@ -117,7 +161,7 @@ def _laws(run: Run) -> Iterator[float]:
     # What corrects impulses at the end of a piece of the impulse-level scheme may be of any sign; the piece itself
     # closes gaps with rows of mid-drift. Runs that hold one are no truth anyway (see `fallback`).
     correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
-    impact, release, frozen = run.is_impact[owner], run.is_release[owner], run.is_frozen[owner]
+    impact, chain, frozen = run.is_impact[owner], run.is_chain[owner], run.is_frozen[owner]
 
     # Impulses of one solve are known to some units in the last place of the largest of them, not of each.
     largest = np.zeros(len(pieces))
@@ -129,8 +173,8 @@ def _laws(run: Run) -> Iterator[float]:
     yield _worst(np.where(correction, 0.0, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
-    # allowed after an impact is -e u-; a soft rebound may be held instead, and is then counted.
-    rebound = np.where(impact, np.maximum(-restitution * approach, 0.0), 0.0)
+    # allowed after an impact is -e u-, after a chain of them none; a soft rebound may be held instead.
+    rebound = np.where(impact & ~chain, np.maximum(-restitution * approach, 0.0), 0.0)
     soft = rebound <= SOFT_STEPS * run.pull * run.dt
     # Where rows turn within a piece, the velocity at its start must be none: that of a later piece tells of its end.
     ends = np.where(frozen, leaves, approach)
@@ -138,12 +182,20 @@ def _laws(run: Run) -> Iterator[float]:
     stopped = np.abs(pressed - np.maximum(pressed - mass * ends, 0.0))
     held = impact & soft & (rebound > 0.0) & (stopped < defect)
     defect = np.where(held, stopped, defect)
-    # Rebounds that are released leave with what was held in their step at most; and what is not pressed and is not an
-    # impact may part, or come closer: a gap is a matter of geometry.
+    # What parts as an impact begins has no part in it, but in a chain, and comes closer only to be struck next.
+    # All points of a pair that meets answer together.
+    _, pair = np.unique((owner * len(run.free) + a) * len(run.free) + b, return_inverse=True)
+    met = np.bincount(pair, approach < -LIES * speed) > 0.0
+    parts = impact & (approach > 0.0) & ~(chain & (pressed > 0.0)) & ~met[pair]
+    alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
+    fastest = np.zeros(len(pieces))
+    np.maximum.at(fastest, owner, -approach)
+    certain = PARTS * fastest[owner] + LIES * speed + 2.0 * np.minimum(run.still[a], run.still[b])
+    alone = np.where(approach > certain, alone, np.minimum(alone, defect))
+    defect = np.where(parts, alone, defect)
+    # What is not pressed and is not an impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
-    defect = np.where(parting | coarse, 0.0, defect)
-    defect = np.where(release, mass * np.maximum(leaves - _held_back(run, rebound), 0.0), defect)
-    yield _worst(defect, scale)
+    yield _worst(np.where(parting | coarse, 0.0, defect), scale)
 
     # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
     # the mean of those at both ends, each at its own point and normal.
@@ -179,19 +231,8 @@ def _laws(run: Run) -> Iterator[float]:
     yield _worst(np.where(coarse & ~frozen, 0.0, off), arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
-    yield float(held.sum() + (release & (pressed > 0.0)).sum())
     movable = (run.free[a] & (row_a < 0)) | (run.free[b] & (row_b < 0))
     yield float(movable.sum())
-
-
-def _held_back(run: Run, rebound: Array) -> Array:
-    """Fastest rebound (c,) that impacts of the same pair in the same step called for [m/s]."""
-    pieces, n = run.pieces, len(run.free)
-    keys = (pieces.step[run.contact_owner] * n + pieces.body_a) * n + pieces.body_b
-    _, which = np.unique(keys, return_inverse=True)
-    most = np.zeros(which.max() + 1)
-    np.maximum.at(most, which, rebound)
-    return np.asarray(most[which])
 
 
 def reduced_mass(run: Run) -> Array:

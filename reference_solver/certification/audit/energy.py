@@ -76,8 +76,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
 
     The third is what is not known of the work of surfaces and torques.
 
-    Newton's restitution may create energy (`_may_gain`), and so may the release of a held rebound: energy that was
-    taken away before. Both are exempt and judged by their laws.
+    Newton's restitution may create energy (`_may_gain`): such pieces are exempt, and judged by their law.
     """
     pieces, body = run.pieces, run.pieces.body
     free, owner = run.free[body], run.owner
@@ -97,25 +96,22 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     np.add.at(most, owner, np.where(free, before + after + np.abs(load), 0.0))
     # What loads do to all free bodies in a step: at rest, all that there is of kinetic energy is round-off.
     usual = float((run.mass * np.maximum(run.pull * run.dt, run.still) ** 2)[run.free].sum()) or 1.0
-    return gained, run.is_release | (run.is_impact & _may_gain(run)), unseen, max(float(most.max()), usual)
+    return gained, run.is_impact & _may_gain(run), unseen, max(float(most.max()), usual)
 
 
 def _may_gain(run: Run) -> NDArray[np.bool_]:
     """Whether (p,) an impact of each piece's contacts may create energy by Newton's law (E63).
 
     With impulses p it changes it by ``p.(u- + u+)/2``, u seen from what is moved: by ``-(1 - e) p_n |u_n-|/2`` of each
-    contact that approaches. One that parts before, and is pressed since others are struck, adds ``p_n u_n-/2``: a body
-    that flies off stops at once, but what strikes it is thrown back by a share of all that it was approached with.
-    Without a rebound the sum is below zero nevertheless, and with one e for all that approach.
+    contact that approaches: without friction the sum is below zero.
     """
     pieces, owner = run.pieces, run.contact_owner
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
     pressed = (pieces.impulse * n).sum(axis=1) > 0.0
-    e, parts = run.model.restitution[a, b], (run.meeting_velocity(after=False) * n).sum(axis=1) > 0.0
-    bouncy, uneven = np.zeros(len(pieces), bool), np.zeros(len(pieces), bool)
-    bouncy[owner[pressed & (e > 0.0)]] = True
-    uneven[owner[pressed & (parts | (run.model.friction[a, b] > 0.0))]] = True
-    return np.asarray(bouncy & uneven)
+    bouncy, rough = np.zeros(len(pieces), bool), np.zeros(len(pieces), bool)
+    bouncy[owner[pressed & (run.model.restitution[a, b] > 0.0)]] = True
+    rough[owner[pressed & (run.model.friction[a, b] > 0.0)]] = True
+    return np.asarray(bouncy & rough)
 
 
 def _turn(run: Run) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, RELEASE, ROCKING, Pieces
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -172,9 +172,17 @@ class Run:
         return np.asarray(self.pieces.kind == IMPACT)
 
     @cached_property
-    def is_release(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece releases held rebounds."""
-        return np.asarray(self.pieces.kind == RELEASE)
+    def is_chain(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece is the sum of a chain of impacts without end."""
+        return np.asarray(self.is_impact & (self.pieces.scheme == CHAIN))
+
+    @cached_property
+    def is_followed(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece is an impact after which the same bodies have another one at the same instant."""
+        pieces, first = self.pieces, self.pieces.body[self.pieces.first_body[:-1]]
+        same = np.zeros(len(pieces), bool)
+        same[:-1] = (pieces.begin[1:] == pieces.begin[:-1]) & (first[1:] == first[:-1])
+        return np.asarray(same & self.is_impact & np.append(self.is_impact[1:], False))
 
     @cached_property
     def is_fixed(self) -> NDArray[np.bool_]:

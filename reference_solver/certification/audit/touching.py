@@ -23,6 +23,8 @@ from reference_solver.shapes import smallest_extent
 NO_GAP = 1e-13
 #: Share of a step up to which a piece is an instant: slips that have all but ended are taken out in 1e-8 of one (E54).
 INSTANT = 1e-7
+#: Share of the speeds there above which what touches parts.
+PARTING = 1e-9
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
@@ -105,7 +107,7 @@ def _opened(
         # Of a rod that lies flush the nearest point is the other end, or the middle: it tells nothing of this one.
         told = np.linalg.norm(nearest - pieces.point[rows], axis=1) <= SAME * size
         point = 0.5 * (found.point_a + found.point_b)
-        first, last = (_moving(run, i, run.side[k][rows], point, pose[k]) for k, i in enumerate(bodies))
+        first, last = (_moving(run, i, run.side[k][rows], point, pose[k], after=True) for k, i in enumerate(bodies))
         speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1)
         parting = ((last - first) * found.normal).sum(axis=1) - noise / radius * speed - still
         parting = np.minimum(parting, np.linalg.norm(pieces.impulse[rows], axis=1) / mass[rows]).clip(min=0.0)
@@ -132,7 +134,8 @@ def _corner_on_face(shape: Any, pose: Array, other: Any, pose_other: Array, poin
 def _left_out(run: Run) -> float:
     """Approach after an impact of a pair of its bodies that touches and is no contact of it, over the speeds there.
 
-    All that touches at that instant is solved together (E21): pair after pair would be another law.
+    All that touches at that instant and does not part is solved together (E21): pair after pair would be another law.
+    What parts may come closer, if the same instant has another impact.
     """
     pieces, d = run.pieces, run.d
     worst = 0.0
@@ -163,15 +166,19 @@ def _left_out(run: Run) -> float:
         size = min(run.extent[i], run.extent[j])
         # At the middle of both points: of a face that lies flush the mean of its corners, as good as any.
         point = 0.5 * (found.point_a + found.point_b)
-        speeds = [
-            _moving(run, body, side[near], point, pose[near])
-            for body, side, pose in zip((i, j), sides, poses, strict=True)
-        ]
-        closing = -((speeds[1] - speeds[0]) * found.normal).sum(axis=1)
+        shares, noise = [], run.pull * run.dt * 1e-9 + 1e-15 * size / run.dt
+        for after in (False, True):
+            one, other = (
+                _moving(run, body, side[near], point, pose[near], after)
+                for body, side, pose in zip((i, j), sides, poses, strict=True)
+            )
+            closing, speed = (
+                -((other - one) * found.normal).sum(axis=1),
+                np.linalg.norm([one, other], axis=2).sum(axis=0),
+            )
+            shares.append(np.where(speed > 0.0, closing / (speed + noise), 0.0))
         touch = np.abs(found.gap) <= NO_GAP * size
-        speed = np.linalg.norm(speeds[0], axis=1) + np.linalg.norm(speeds[1], axis=1)
-        noise = run.pull * run.dt * 1e-9 + 1e-15 * size / run.dt
-        share = np.where(touch & (speed > 0.0), closing / (speed + noise), 0.0)
+        share = np.where(touch & ~(run.is_followed[at[near]] & (shares[0] < -PARTING)), shares[1], 0.0)
         worst = max(worst, float(share.max()))
     return worst
 
@@ -183,10 +190,11 @@ def _at(run: Run, i: int, rows: Indices, pieces: Indices) -> Array:
     return run.prescribed_pose(i, run.pieces.begin[pieces])
 
 
-def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array) -> Array:
-    """Velocities (s, d) of points of body i after impacts."""
+def _moving(run: Run, i: int, rows: Indices, point: Array, pose: Array, after: bool) -> Array:
+    """Velocities (s, d) of points of body i before or ``after`` their pieces."""
     own = np.tile(twist_of(run.model.bodies[i]), (len(rows), 1))
-    twist = np.where((rows >= 0)[:, None], run.pieces.twist_after[rows], own) if run.free[i] else own
+    told = run.pieces.twist_after if after else run.pieces.twist_before
+    twist = np.where((rows >= 0)[:, None], told[rows], own) if run.free[i] else own
     return np.asarray(twist[:, : run.d] + turned(twist[:, run.d :], point - pose[:, : run.d]))
 
 

@@ -73,6 +73,81 @@ def scene(seed: int, dimension: int) -> Scene:
     return Scene(model, rate, STRIDE * round(float(rng.choice(TIMES)) * rate / STRIDE))
 
 
+def chain(seed: int, dimension: int) -> Scene:
+    """Return the world of a seed in which impacts tend to accumulate: bodies in a row that run into one another.
+
+    Two to five free bodies with masses over three decades, between walls or between nothing, along any direction; e
+    from 0 to .9, friction in some, gravity along the row in some. One in four rows lies on a smooth floor under
+    gravity.
+    """
+    rng = np.random.default_rng([seed, dimension, 1])
+    along = rng.normal(size=dimension)
+    lies = rng.uniform() < 0.25
+    if lies:
+        along[-1] = 0.0
+    along /= np.linalg.norm(along)
+    count, radius = int(rng.integers(2, 6)), float(rng.uniform(0.05, 0.3))
+    turned, far = _turn_to(along), rng.uniform(-2.0, 2.0, dimension)
+    walls = (rng.uniform() < 0.75, rng.uniform() < 0.4)
+    bodies, at = [], 0.0
+    for _ in range(count):
+        shape, moment = (_round, _brick, _pill)[int(rng.choice(3, p=(0.7, 0.2, 0.1)))](radius, dimension)
+        half = radius if not isinstance(shape, Capsule) else shape.half_length + radius
+        at += 10.0 ** rng.uniform(-3.0, -0.7) + half
+        twist = np.zeros(dimension + _spins(dimension))
+        twist[:dimension] = rng.uniform(-1.5, 0.5) * along
+        mass = 10.0 ** rng.uniform(-1.5, 1.5)
+        place = far + at * along
+        bodies.append(Body(shape, mass, _scaled(mass, moment), (*place, *turned), tuple(twist)))
+        at += half
+    upright = _upright(dimension)
+    ends = ((walls[0], along, far), (walls[1], -along, far + (at + 10.0 ** rng.uniform(-3.0, -0.7)) * along))
+    bodies += [
+        Body(HalfSpace(tuple(n)), pose=(*place, *upright), motion="fixed") for is_there, n, place in ends if is_there
+    ]
+    gravity = np.zeros(dimension)
+    if lies:
+        up = np.eye(dimension)[-1]
+        bodies.append(Body(HalfSpace(tuple(up)), pose=(*(far - radius * up), *upright), motion="fixed"))
+        gravity = -GRAVITY * up
+    elif rng.uniform() < 0.4:
+        gravity = -GRAVITY * along
+    n = len(bodies)
+    restitution = rng.uniform(0.0, 0.9, (n, n)) if rng.uniform() < 0.5 else rng.uniform(0.0, 0.9) + np.zeros((n, n))
+    friction = np.full((n, n), rng.uniform(0.0, 0.6) if rng.uniform() < 0.25 else 0.0)
+    if lies:
+        restitution[-1] = restitution[:, -1] = friction[-1] = friction[:, -1] = 0.0
+    model = Model(dimension, bodies, tuple(gravity), _symmetric(restitution), _symmetric(friction))
+    return Scene(model, int(rng.choice(RATES)), 6 * STRIDE)
+
+
+#: What can be drawn, by name.
+DRAWN = {"any": scene, "chains": chain}
+
+
+def _turn_to(along: Array) -> tuple[float, ...]:
+    """Orientation in which the first axis of a body has the direction ``along``."""
+    if len(along) == 2:
+        return (math.atan2(along[1], along[0]),)
+    half = np.array([1.0 + along[0], 0.0, -along[2], along[1]])  # half-way between no turn and the whole one
+    return tuple(half / np.linalg.norm(half))
+
+
+def _round(radius: float, d: int) -> tuple[Shape, Array | float]:
+    return (Disc(radius), 0.5 * radius**2) if d == 2 else (Sphere(radius), np.full(3, 0.4 * radius**2))
+
+
+def _brick(radius: float, d: int) -> tuple[Shape, Array | float]:
+    half = np.full(d, radius)
+    moment = (half @ half - half**2) / 3.0
+    return Box(tuple(float(x) for x in half)), float(half @ half) / 3.0 if d == 2 else moment
+
+
+def _pill(radius: float, d: int) -> tuple[Shape, Array | float]:
+    about, across = 0.5 * radius**2, 0.25 * radius**2 + (2.0 * radius) ** 2 / 3.0
+    return Capsule(radius, radius), across if d == 2 else np.array([about, across, across])
+
+
 def _symmetric(values: Any) -> Any:
     upper = np.triu(values, 1) if np.ndim(values) else values
     return upper + upper.T if np.ndim(values) else upper

@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_solver.certification.fuzz.scenes import STRIDE, Scene
 from reference_solver.certification.relations import Change, permuted
-from reference_solver.certification.truth import Certificate, certify
+from reference_solver.certification.truth import PLACES, Certificate, away, certify
 from reference_solver.model import Array, Model
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
@@ -79,6 +79,7 @@ def variants(scene: Scene) -> dict[str, Variant]:
         "quarter turn": Change(d, axes=turn[0], signs=turn[1]),
         "boosted": Change(d, boost=BOOST[:d]),
     }
+    changes |= {f"moved by {far:g}": away(model, far) for far in PLACES}
     for name, change in changes.items():
         found[name] = Variant(change.model(model), dt, seen=change.pose)
     found["restarted"] = Variant(model, dt, restarts=True)

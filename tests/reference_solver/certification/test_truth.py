@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certification import truth
+from reference_solver.certification.relations import Change
 from reference_solver.certification.truth import certify, distance
 
 
@@ -62,3 +64,23 @@ def test_a_smaller_accuracy_costs_steps_and_gains_digits():
 def test_an_accuracy_that_no_phase_can_have_is_refused():
     with pytest.raises(ValueError, match="accuracy"):
         replace(Settings.reference(0.01), accuracy=1e-13)
+
+
+def test_a_run_that_comes_out_otherwise_far_from_the_origin_is_refused(monkeypatch):
+    """Gravity a millionth stronger there. Where nothing is, what is left is round-off, and X is what it was."""
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.7, 0.0), (1.0, -1.0, 3.0))
+    model = Model(2, [floor, disc], (0.0, -9.81), 0.8, 0.1)
+    found = certify(model, Settings.reference(1.0 / 240.0), 60)
+    assert found.holds
+
+    class Heavier(Change):
+        def model(self, old):
+            moved = super().model(old)
+            return replace(moved, gravity=tuple(1.000001 * g for g in moved.gravity))
+
+    plain = truth.away
+    monkeypatch.setattr(truth, "away", lambda model, far: Heavier(2, shift=plain(model, far).shift))
+    other = certify(model, Settings.reference(1.0 / 240.0), 60)
+    assert not other.holds and "moved by 30 half widths" in other.reasons[0]
+    assert (other.error == found.error).all()
