@@ -19,7 +19,8 @@ far apart two motions can be that both obey the laws, where contacts can share a
 at once meet, or do not, as round-off has it: what that moves comes to it as well (`audit.contact`).
 
 *Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
-is made twice more far from the origin: what differs there, beyond X and what coarser coordinates explain, refuses.
+is made twice more far from the origin: what differs there, beyond the X of both and what coarser coordinates explain,
+refuses.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -244,8 +245,8 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
         change = away(model, far)
         moved = Simulation(change.model(model), settings).record(steps, stride).pose
         apart = distance(model, change.pose(found.pose, found.t), moved)
-        # What happens a little sooner or later there X may tell later only.
-        allowed = found.error[within][-1] + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
+        # Either run is within X of the truth. What happens a little sooner or later there X may tell later only.
+        allowed = 2.0 * found.error[within][-1] + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
         beyond = np.flatnonzero(within & ~(apart <= allowed))
         if len(beyond):
             k = int(beyond[0])

@@ -49,6 +49,9 @@ TURN_ALONG = 0.01
 ON_FACE = 1e-9
 #: A direction that turns faster than this many times both bodies together keeps to edges that are nearly parallel.
 HASTY = 10.0
+#: Share of the noise of its gap below which a corner is held for certain, however gaps are rounded. One that is held and
+#: watched comes no nearer.
+SURELY_HELD = 0.5
 #: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
 DEEP = 3e-5
 #: Overlap at the end of a sub-step with which they are held by the wrong features, however softly they meet.
@@ -188,15 +191,14 @@ def face_corners(meeting: Any, k: int, sign: float) -> int:
 
 @inner_kernel
 def watch_free_corners(meeting: Any, time: float) -> bool:
-    """Watch the corners of the second body that are not held: higher than the lowest, or leaving; False if all are."""
-    noise = gap_noise(meeting)
-    low, found = math.inf, False
+    """Watch the corners of the second body that may not be held: off the plane, or leaving; False if there are none."""
+    found, extent = False, min(meeting.size[0, EXTENT], meeting.size[1, EXTENT])
     for c in range(meeting.kind[CORNERS_SECOND]):
-        low = min(low, height(meeting, 1, c, 1.0))
-    for c in range(meeting.kind[CORNERS_SECOND]):
-        above = height(meeting, 1, c, 1.0) - low
-        rate, _ = corner_rate(meeting, 0, c)
-        meeting.watched[c] = 1 if above > noise or rate * time > noise else 0
+        place = 0.0
+        for d in range(3):
+            place = max(place, abs(meeting.vector[CENTRE + 1, d] + meeting.corner[1, c, d]))
+        noise, (rate, _) = ROUND_OFF * extent + COORDINATE_NOISE * place, corner_rate(meeting, 0, c)
+        meeting.watched[c] = 1 if corner_gap(meeting, c) > SURELY_HELD * noise or rate * time > noise else 0
         meeting.sunk[c] = 0.0
         found = found or meeting.watched[c] == 1
     return found
@@ -207,7 +209,17 @@ def gap(meeting: Any) -> float:
     """Separation of the watched corners where bodies stand now [m]; fills the normal."""
     if meeting.kind[PLANE] == 0:
         return separate(meeting)
-    value = -meeting.offset[0] - meeting.size[1, RADIUS] - farthest(meeting, 1, -1.0)
+    value = math.inf
+    for c in range(meeting.kind[CORNERS_SECOND]):
+        if meeting.watched[c]:
+            value = min(value, corner_gap(meeting, c) + meeting.sunk[c])
+    return value
+
+
+@inner_kernel
+def corner_gap(meeting: Any, c: int) -> float:
+    """Distance of corner c of the second body from the plane [m]."""
+    value = -meeting.offset[0] - meeting.size[1, RADIUS] - height(meeting, 1, c, -1.0)
     for d in range(3):
         between = meeting.vector[CENTRE + 1, d] - meeting.vector[CENTRE, d]
         value += meeting.vector[NORMAL, d] * between
@@ -217,10 +229,8 @@ def gap(meeting: Any) -> float:
 @inner_kernel
 def sink(meeting: Any) -> None:
     """Note how deep each corner of the second body is in the plane."""
-    deepest = -gap(meeting)
-    far = farthest(meeting, 1, -1.0)
     for c in range(meeting.kind[CORNERS_SECOND]):
-        meeting.sunk[c] = max(deepest - (far - height(meeting, 1, c, -1.0)), 0.0)
+        meeting.sunk[c] = max(-corner_gap(meeting, c), 0.0)
 
 
 @inner_kernel
