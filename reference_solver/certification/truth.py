@@ -178,7 +178,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         beyond = f"round-off decides whether bodies {several} are struck together or one after the other"
     apart, shared = shared_loads(model, record, settings.dt, horizon)
     gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
-    grazed = grazes(model, record, settings.dt, gap)
+    grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
     findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
@@ -191,7 +191,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     if not np.isfinite(error[within]).all():
         reasons.append("the run at half the step is no numbers")
     # A difference of two motions that obey the laws grows as that disturbance does.
-    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + grazed))
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     made = (error, growth, horizon, until, moved / size, settings.dt, gap, grazed, light, record.pose)
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)

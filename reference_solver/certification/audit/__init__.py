@@ -149,13 +149,19 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
-def grazes(model: Model, record: Record, dt: float, noise: float) -> np.ndarray:
+def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.ndarray) -> np.ndarray:
     """Return how far (s,) impacts move bodies of which round-off decides whether they are [m] (`contact.grazes`).
 
-    Gaps below ``noise`` [m] count as none. Raises ValueError if the record has no pieces.
+    Gaps below ``noise`` [m] count as none. What an impact moves until the sample after it grows as disturbances do
+    (``growth``), or as in free flight where that is more. Raises ValueError if the record has no pieces.
     """
-    begin, speed = contact.grazes(_run_of(model, record, dt), record.t, record.pose, noise)
-    return np.maximum(record.t - begin[:, None], 0.0).T @ speed
+    moved, growth = np.zeros(len(record.t)), np.maximum(growth, 1.0)
+    for begin, speed in zip(*contact.grazes(_run_of(model, record, dt), record.t, record.pose, noise), strict=True):
+        since = np.maximum(record.t - begin, 0.0)
+        first = int(np.searchsorted(record.t, begin, side="right"))
+        grown = np.where(since > 0.0, since[first] * growth / growth[first], 0.0)
+        moved += speed * np.maximum(since, grown)
+    return moved
 
 
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:

@@ -84,3 +84,54 @@ def test_a_run_that_comes_out_otherwise_far_from_the_origin_is_refused(monkeypat
     other = certify(model, Settings.reference(1.0 / 240.0), 60)
     assert not other.holds and "moved by 30 half widths" in other.reasons[0]
     assert (other.error == found.error).all()
+
+
+def over_the_edge(d, large, r, v, e, way):
+    """A ball that rolls off a table, at whose end a fixed ball of radius ``large`` stands as high as the table."""
+    flat, still = ((0.0,), (0.0,)) if d == 2 else ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    def at(x, up):
+        return (x, up) if d == 2 else (x, 0.0, up)
+
+    table = Body(Box(at(2.0, 0.5) if d == 2 else (2.0, 1.0, 0.5)), pose=at(-2.0, -0.5) + flat, motion="fixed")
+    ball, inertia = (Disc, 0.5 * r * r) if d == 2 else (Sphere, (0.4 * r * r,) * 3)
+    spin = (-v / r,) if d == 2 else (0.0, v / r, 0.0)
+    below = Body(ball(large), pose=at(0.0, -large) + flat, twist=at(0.0, 0.0) + still, motion="fixed")
+    bodies = [table, below, Body(ball(r), 1.0, inertia, at(-way, r) + flat, at(v, 0.0) + spin)]
+    return Model(d, bodies, at(0.0, -9.81), e, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("d", "large", "r", "v", "e", "rate"),
+    [
+        (2, 2.0, 0.05, 9.0, 0.4, 240),
+        (2, 0.3, 0.1, 5.0, 0.7, 500),
+        (2, 4.0, 0.5, 25.0, 0.2, 120),
+        (2, 1.0, 0.3, 5.5, 0.0, 250),
+        (3, 2.0, 0.1, 9.0, 0.6, 240),
+        (3, 1.0, 0.02, 10.0, 0.5, 240),
+    ],
+)
+def test_a_ball_that_flies_off_an_edge_is_no_further_off_than_x(d, large, r, v, e, rate):
+    """Faster than sqrt(g (R + r)) it leaves both at once. What meets within a gap that counts as none is in X."""
+    way = 0.61
+    model, left = over_the_edge(d, large, r, v, e, way), way / v
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.08) * rate))
+    assert found.holds, found.reasons
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.hypot(found.pose[:, 2, 0] + way - v * found.t, found.pose[:, 2, d - 1] - r + 0.5 * 9.81 * flown**2)
+    within = found.t < found.horizon
+    assert within[found.t < left].all()
+    assert (off <= found.error)[within].all()
+    assert found.error[within].max() < 1e-4 * r
+
+
+def test_what_meets_as_round_off_has_it_is_more_than_other_runs_tell(monkeypatch):
+    """Planted: X without it is too small where a ball flies off an edge."""
+    way, v, r, rate = 0.93, 10.0, 0.02, 240
+    model, left = over_the_edge(2, 1.0, r, v, 0.5, way), way / v
+    monkeypatch.setattr(truth, "grazes", lambda model, record, dt, noise, growth: np.zeros(len(record.t)))
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.1) * rate))
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.abs(found.pose[:, 2, 1] - r + 0.5 * 9.81 * flown**2)
+    assert (off > found.error).any()

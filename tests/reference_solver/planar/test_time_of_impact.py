@@ -249,6 +249,41 @@ def test_the_other_corner_of_a_held_box_comes_down_when_its_face_lies_flat(corne
         assert next_contact_of_held(meeting, 0, 1, 0.0, 1.0, 0.0, 0.0, 0.9 * t) == math.inf
 
 
+@pytest.mark.parametrize("deep", [1e-11, 1e-10, 1e-9])
+@pytest.mark.parametrize("corner", [1, -1])
+def test_a_corner_comes_down_on_the_wall_however_deep_another_one_is_in_it(corner, deep):
+    """A box turns from the corner that is in the wall on to the other; the wall is where it is for each corner."""
+    half, angle = (0.5, 0.2), 1e-8 * corner
+    start = (0.1, 0.2, angle)
+    start = (0.1, 0.2 - deep - wall_gap(Box(half), np.array([start]))[0], angle)
+    path = np.array([[0.3], [0.0], [-1e-4 * corner]])
+    t = meet(WALL, Box(half), (np.zeros(3), start), (np.zeros((3, 1)), path))
+    other = 2 + int(np.argmax(outline(Box(half), np.array([start]))[0, 2:, 1]))
+    assert abs(outline(Box(half), poses(start, path, np.array([t])))[0, other, 1]) <= 1e-12  # noise: .2e-12
+    assert 0.0 < t < DT
+
+
+@pytest.mark.parametrize("above", [0.2, 0.6, 0.9, 1.2, 2.0, 10.0])
+@pytest.mark.parametrize("held", [-0.9, 0.0, 0.9])
+def test_a_corner_that_no_contact_holds_is_watched(held, above):
+    """Of a box on a wall one corner is within what counts as no gap, and the other off by less or more than that.
+
+    Bodies turn about the first, so that the other comes down: it is watched wherever it has no contact, at a gap above
+    1e-12 of the half width.
+    """
+    half, place = (0.5, 0.2), 0.1
+    noise = 1e-12 * half[1] + 2e-15 * 0.6
+    angle = (above - held) * noise / (2.0 * half[0])
+    start = (place, half[1] + 0.5 * (held + above) * noise, angle)
+    bodies = [Body(WALL, motion="fixed"), Body(Box(half), 1.0, 1.0, start)]
+    meeting = allocate_meeting(allocate_bodies(Model(2, bodies, (0.0, 0.0), 0.0, 0.0), EVERYTHING))
+    meeting.paths.pose[:] = [(0.0, 0.0, 0.0), start]
+    # about the corner on the left, at first at rest: no corner moves as the step begins
+    meeting.paths.coefficient[1, :, 2] = 20.0 * half[1], -20.0 * half[0], -20.0
+    t = next_contact_of_held(meeting, 0, 1, 0.0, 1.0, 0.0, 0.0, 0.1)
+    assert t < 1e-5 or above <= 1.0
+
+
 @pytest.mark.parametrize("turn", [4.0, 10.0, 30.0])
 def test_a_step_rebounds_from_the_first_contact(turn):
     """Smooth, e = 1: the twist after the step is that after the impulse of the first contact, from dense samples."""
