@@ -49,8 +49,8 @@ TURN_ALONG = 0.01
 ON_FACE = 1e-9
 #: A direction that turns faster than this many times both bodies together keeps to edges that are nearly parallel.
 HASTY = 10.0
-#: Share of the noise of its gap below which a corner is held for certain, however gaps are rounded. One that is held and
-#: watched comes no nearer.
+#: Share of the noise of its gap below which a corner is held for certain, however gaps are rounded. One that is held
+#: and watched comes no nearer.
 SURELY_HELD = 0.5
 #: Overlap of bodies held at impulse level, as a share of the smaller half width, that is an impact if it is hard.
 DEEP = 3e-5

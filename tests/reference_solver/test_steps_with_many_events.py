@@ -9,6 +9,8 @@ import pytest
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate import LOCATED_OVERLAP, reasons
 from reference_solver.certification.piles import planar_pile
+from reference_solver.certification.truth import certify
+from reference_solver.pieces import IMPACT, UNORDERED
 from reference_solver.stepping.clock import (
     CLOCK_SIZE,
     EVENTS,
@@ -312,3 +314,14 @@ def test_a_pile_of_masses_one_to_a_hundred_is_solved_to_its_end():
     simulation.advance(400)
     assert simulation.certificate["reasons"] == ()
     assert simulation.certificate["natural"] <= 1e-10
+
+
+def test_a_pile_has_its_horizon_where_round_off_decides_which_impact_comes_first():
+    """Before it, impacts of that kind are none; beyond it only laws are certified, whatever disturbances have grown."""
+    model, settings, steps = pile(3, 1, 0.5).model, Settings.reference(DT), 80
+    pieces = Simulation(model, settings).record(steps, pieces=True).pieces
+    first = pieces.begin[(pieces.kind == IMPACT) & (pieces.scheme == UNORDERED)].min()
+    certificate = certify(model, settings, steps)
+    assert first < certificate.horizon <= first + DT
+    assert certificate.reasons[-1].endswith("are struck together or one after the other: only laws hold there")
+    assert certificate.error_until(first) < math.inf == certificate.error_until(certificate.horizon)
