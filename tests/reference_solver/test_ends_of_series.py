@@ -5,10 +5,13 @@ import math
 import os
 import subprocess
 import sys
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
 
+from reference_solver import Body, Disc, HalfSpace, Model, Settings
+from reference_solver.certification.truth import certify
 from reference_solver.stepping.impacts import DRIFT_STEPS, drifts_aside, is_lowest, turns_aside
 
 G, NOISE = 9.81, 1e-12
@@ -81,3 +84,51 @@ def test_a_series_that_is_ended_too_early_is_off_by_no_more_than_its_record_tell
     (pose, left_out), (other, told) = planted(1), planted(1e6)
     assert left_out < 1e-10
     assert 1e-7 < np.abs(other - pose).max() < told
+
+
+def bounced(height, speed, spin, radius, share, e, mu, slope, times):
+    """Places (s,) along a slope of a disc that bounces on it, by the law of each impact, in 40 digits [m].
+
+    Friction takes the slip at an impact, or mu times its impulse, and nothing in flight. Slips end before bounces do.
+    """
+    with localcontext() as context:
+        context.prec = 40
+        e, mu, share, r = Decimal(e), Decimal(mu), Decimal(share), Decimal(radius)
+        along, down = Decimal(G) * Decimal(math.sin(slope)), Decimal(G) * Decimal(math.cos(slope))
+        x, v, w, u, h, now = Decimal(0), Decimal(speed), Decimal(spin), Decimal(0), Decimal(height), Decimal(0)
+        places, resting = [], False
+        for t in map(Decimal, times):
+            while not resting:
+                flight = (u + (u * u + 2 * down * h).sqrt()) / down
+                if now + flight > t:
+                    break
+                x, v, now, h = (
+                    x + v * flight + along * flight * flight / 2,
+                    v + along * flight,
+                    now + flight,
+                    Decimal(0),
+                )
+                hits, slip = down * flight - u, v - r * w
+                u = e * hits
+                push = min(abs(slip) * share / (1 + share), mu * (1 + e) * hits).copy_sign(-slip)
+                v, w = v + push, w - push / (share * r)
+                resting = u < Decimal("1e-25")
+            since = t - now
+            acceleration = along / (1 + share) if resting else along
+            places.append(float(x + v * since + acceleration * since * since / 2))
+        return np.array(places)
+
+
+@pytest.mark.parametrize("rate", [60, 240, 1000])
+@pytest.mark.parametrize("e", [0.3, 0.7, 0.9])
+def test_x_contains_what_friction_at_rebounds_leaves_out_where_a_disc_comes_to_rest(e, rate):
+    """Held, it is rubbed all along; bouncing at its impacts only: up to 1e-11 of its radius apart."""
+    radius, share, slope, mu, steps = 0.8, 0.9, 0.1, 1.0, int(0.6 * rate)
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    ball = Body(Disc(radius), 2.0, share * 2.0 * radius**2, (0.0, radius + 0.004, 0.0), (0.1, 0.0, 0.05))
+    gravity = (G * math.sin(slope), -G * math.cos(slope))
+    found = certify(Model(2, [floor, ball], gravity, e, mu), Settings.reference(1.0 / rate), steps)
+    truth = bounced(0.004, 0.1, -0.05, radius, share, e, mu, slope, [k / rate for k in range(steps + 1)])
+    assert found.holds, found.reasons
+    assert (np.abs(found.pose[:, 1, 0] - truth) <= found.error + 2e-15).all()
+    assert found.error[-1] <= 1e-9

@@ -39,31 +39,33 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
 
 
 def ends_of_series(run: Run) -> NDArray[np.bool_]:
-    """Whether (c,) a contact whose lever turns holds a rebound that its law calls for, or comes to rest by rocking.
+    """Whether (c,) a contact that rubs, or whose lever turns, holds a rebound of its law, or comes to rest by rocking.
 
     What such an end leaves out hangs on the number of rebounds that it leaves out, not on the step in which it is.
     """
     pieces, owner = run.pieces, run.contact_owner
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
-    cornered = np.array(
-        [
-            free and not isinstance(body.shape, Disc | Sphere)
-            for free, body in zip(run.free, run.model.bodies, strict=True)
-        ]
-    )
+    cornered = _cornered(run)
     approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
     held = (run.is_impact & ~run.is_chain)[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
-    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b]))
+    rubs = run.model.friction[a, b] > 0.0
+    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b] | rubs))
+
+
+def _cornered(run: Run) -> NDArray[np.bool_]:
+    """Whether (n,) a body is free and has levers that turn with it."""
+    round_ones = [isinstance(body.shape, Disc | Sphere) for body in run.model.bodies]
+    return run.free & ~np.array(round_ones)
 
 
 def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]:
     """What (c,) the rebounds move that each of ``ends`` leaves out [m], and how fast that goes on [m/s].
 
     Of speed u and first flight T they make the way ``s = u T/(1 - e)``. Friction a, which comes in blows instead of all
-    along, moves bodies by ``a T^2/(2 (1 - e^2))`` meanwhile, and a row that turns at the rate w has velocities off by
-    w s (E22): where it is hit, and up to ``m r^2/I`` times that a reach r from the centre. What holds the contact
-    afterwards brings it back, ``T = 2 u/g_n``; a series lasts a step at most.
+    along, moves bodies by ``a T^2/(2 (1 - e^2))`` meanwhile, and a row of corners that turns at the rate w has
+    velocities off by w s (E22): where it is hit, and up to ``m r^2/I`` times that a reach r from the centre. What holds
+    the contact afterwards brings it back, ``T = 2 u/g_n``; a series lasts a step at most.
     """
     pieces, a, b = run.pieces, run.pieces.body_a, run.pieces.body_b
     e, approach = run.model.restitution[a, b], (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
@@ -74,7 +76,11 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
         slows[j] = max(1.0 - e[j], 0.0) * held
     lasts = 2.0 * leaves / np.maximum(slows, 2.0 * leaves / run.dt + np.finfo(float).tiny)
     way = leaves * lasts
-    spins = [np.where(row >= 0, np.linalg.norm(pieces.twist_before[row, run.d :], axis=1), 0.0) for row in run.side]
+    cornered = _cornered(run)
+    spins = [
+        np.where((row >= 0) & cornered[i], np.linalg.norm(pieces.twist_before[row, run.d :], axis=1), 0.0)
+        for i, row in ((a, run.side[0]), (b, run.side[1]))
+    ]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
     return rubs * way / (1.0 + e), np.maximum(*spins) * way
