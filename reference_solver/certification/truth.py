@@ -37,12 +37,12 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.certification.audit import Finding, audit, ends_of_series, grazes, shared_loads
+from reference_solver.certification.audit import Finding, audit, ends_of_series, grazes, shared_loads, without_order
 from reference_solver.certification.audit.run import twist_of
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.certification.relations import Change, permuted
 from reference_solver.model import Array, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT, UNORDERED
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import smallest_extent
@@ -102,7 +102,7 @@ class Certificate:
     dt
         Step [s].
     gap
-        Largest gap that counts as none near the origin [m].
+        Largest gap that counts as none where the run is [m].
     grazed
         (s,) way of bodies that meet or pass each other as such a gap decides [m].
     light
@@ -140,9 +140,8 @@ class Certificate:
         wherever they are.
         """
         steps = COORDINATE_UNITS * np.spacing(place) * (1.0 + OTHER_SIGNS * self.disturbed / self.dt)
-        gap = self.gap + COORDINATE_UNITS * np.spacing(place)
-        apart = self.gap + sqrt(gap / self.gap) * self.grazed
-        return np.maximum.accumulate(steps + apart * (1.0 + np.minimum(self.growth, GROWTH)))
+        grazed = sqrt((self.gap + COORDINATE_UNITS * np.spacing(place)) / self.gap) * self.grazed
+        return np.maximum.accumulate(steps + grazed + self.gap * (1.0 + np.minimum(self.growth, GROWTH)))
 
 
 #: Gaps below this share of a half width, or these units in the last place of a coordinate, are closed (E8).
@@ -172,12 +171,14 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     record = run.record(steps, stride, pieces=True)
     growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
     beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
-    unordered, several = _without_order(record)
+    unordered, several = _without_order(model, record, settings.dt)
     if unordered < horizon:
         horizon = unordered
         beyond = f"round-off decides whether bodies {several} are struck together or one after the other"
     apart, shared = shared_loads(model, record, settings.dt, horizon)
-    gap = GAP * max(reach(body.shape) for body in model.bodies if body.motion == "free")
+    place = np.abs(record.pose[np.isfinite(record.pose)]).max(initial=0.0)
+    gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
+    gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
     findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
     light = run.certificate
@@ -219,15 +220,15 @@ def _first_chain(record: Record) -> float:
     return float(pieces.begin[found[0]]) if len(found) else float("inf")
 
 
-def _without_order(record: Record) -> tuple[float, str]:
-    """First sample after round-off decides the order of impacts on several bodies (E21) [s], and their numbers."""
-    pieces = record.pieces
+def _without_order(model: Model, record: Record, dt: float) -> tuple[float, str]:
+    """First sample after impacts that round-off decides (E21) [s], and the numbers of their bodies."""
+    pieces, found = record.pieces, without_order(model, record, dt)
     assert pieces is not None
-    found = np.flatnonzero((pieces.kind == IMPACT) & (pieces.scheme == UNORDERED))
-    after = np.flatnonzero(record.t > pieces.begin[found[0]]) if len(found) else found
+    after = np.flatnonzero(record.t > pieces.begin[found].min(initial=np.inf))
     if not len(after):
         return float("inf"), ""
-    of_piece = slice(*pieces.first_contact[found[0] : found[0] + 2])
+    first = found[np.argmin(pieces.begin[found])]
+    of_piece = slice(*pieces.first_contact[first : first + 2])
     bodies = sorted({*pieces.body_a[of_piece].tolist(), *pieces.body_b[of_piece].tolist()})
     return float(record.t[after[0]]), ", ".join(map(str, bodies))
 
@@ -245,8 +246,9 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
         change = away(model, far)
         moved = Simulation(change.model(model), settings).record(steps, stride).pose
         apart = distance(model, change.pose(found.pose, found.t), moved)
-        # Either run is within X of the truth. What happens a little sooner or later there X may tell later only.
-        allowed = 2.0 * found.error[within][-1] + found.rounding(float(np.abs(moved[:, :, : model.dimension]).max()))
+        # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
+        error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
+        allowed = 2.0 * error + found.rounding(float(np.nanmax(np.abs(moved[:, :, : model.dimension]))))
         beyond = np.flatnonzero(within & ~(apart <= allowed))
         if len(beyond):
             k = int(beyond[0])

@@ -22,6 +22,7 @@ from reference_solver.planar.columns import (
     IMPACT_N,
     IMPACT_T,
     MEETS,
+    NORMAL_MASS,
     NUMBER,
     NX,
     NY,
@@ -34,6 +35,7 @@ from reference_solver.planar.columns import (
     ROW_REALS,
     SHAPE,
     SPEED,
+    TANGENT_MASS,
     TARGET,
     VERTICES,
     A,
@@ -226,7 +228,7 @@ def note_touching(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) ->
 
 
 @inner_kernel
-def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float) -> int:
+def set_impact_targets(bodies: Bodies, rows: Rows, options: Options) -> int:
     """Targets -e u- of rows that meet (E21), 0 of all others that take part; returns what there is to solve."""
     found, fastest = NO_IMPACT, 0.0
     for c in range(rows.counts[CONTACTS]):
@@ -256,7 +258,7 @@ def set_impact_targets(bodies: Bodies, rows: Rows, options: Options, left: float
 def collide_now(bodies: Bodies, rows: Rows, problem: Problem, sub: SubStep, options: Options, tally: Array) -> int:
     """Impacts of all touching rows together, from ``sub.before`` to ``sub.start`` (E21); what they were."""
     copy_vectors(sub.before, bodies.twist)
-    found = set_impact_targets(bodies, rows, options, sub.clock[LEFT])
+    found = set_impact_targets(bodies, rows, options)
     if found != NO_IMPACT:
         open_solve(bodies, 0.0, tally)
         solve_velocities(bodies, rows, problem, options, tally)
@@ -330,8 +332,10 @@ def end_series(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, lengt
         if returns <= left * (1.0 - e):
             slip = tangent_velocity(sub.start, rows, c)
             gain = (tangent_velocity(bodies.twist, rows, c) - slip) / length
-            slip = slip if abs(slip) > NOISE * rows.real[c, SPEED] else 0.0
-            aside = drifts_aside(slip, gain, rows.real[c, FRICTION], pull, returns, e)
+            slip = max(abs(slip), abs(tangent_velocity(sub.before, rows, c)))  # one that the impact ends as well
+            slip = slip if slip > NOISE * rows.real[c, SPEED] else 0.0
+            rubs = rows.real[c, FRICTION] * rows.real[c, NORMAL_MASS] / rows.real[c, TANGENT_MASS]
+            aside = drifts_aside(slip, gain, rubs, pull, returns, e)
             lasts = returns / (1.0 - e)
             rate = row_turn(bodies, rows, sub, c, min(lasts / length, 1.0))
             aside += turns_aside(leaves, lasts, rate, options.dt)

@@ -247,6 +247,7 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
         e = manifolds.restitution[m]
         v, w = relative_twist(bodies.first, manifolds, m, options.rotation)
         v_last, w_last = relative_twist(bodies.twist, manifolds, m, options.rotation)
+        v_before, w_before = relative_twist(bodies.before, manifolds, m, options.rotation)
         for p in range(manifolds.points[m]):
             if manifolds.impact[m, p] == 0 or manifolds.ending[m, p] != OPEN_ENDED or e == 0.0:
                 continue
@@ -257,8 +258,12 @@ def end_series(bodies: Bodies, manifolds: Manifolds, sub_step: SubStep, options:
                 continue
             if 2.0 * leaves <= pull * left * (1.0 - e):
                 slip, gain = math.hypot(u[0], u[1]), math.hypot(u_last[0] - u[0], u_last[1] - u[1]) / time
+                was = velocity_at(v_before, w_before, manifolds, m, p)
+                slip = max(slip, math.hypot(was[0], was[1]))  # one that the impact ends as well
                 slip = slip if slip > NOISE * manifolds.speed[m, p] else 0.0
-                aside = drifts_aside(slip, gain, manifolds.friction[m], pull, 2.0 * leaves / pull, e)
+                k = manifolds.matrix[m, p]
+                rubs = manifolds.friction[m] * max(k[0], k[3]) / k[5]
+                aside = drifts_aside(slip, gain, rubs, pull, 2.0 * leaves / pull, e)
                 lasts = 2.0 * leaves / (pull * (1.0 - e))
                 rate = row_turn(bodies, manifolds, m, math.hypot(u[0], u[1]), min(lasts / time, 1.0))
                 aside += turns_aside(leaves, lasts, rate, options.dt)

@@ -76,7 +76,7 @@ def open_instant(island: Island) -> None:
             parts += 1 if lasting.mode[k] == LEAVES else 0
         if met < 0 or parts == 0:
             continue
-        if pairs > 1 and clock[SOON] > 0.0:
+        if pairs > 1 and (clock[SOON] > 0.0 or clock[BLOWS] > 0.0):
             clock[UNORDERED] = 1.0
         broken_off = clock[BLOWS] >= MOST_BLOWS
         if broken_off:

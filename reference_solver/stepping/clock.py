@@ -76,7 +76,7 @@ def open_step(clock: Array, bodies: int, dt: float, patience: int) -> None:
     clock[LEFT] = dt
     clock[PATIENCE] = patience + bodies
     clock[EVENTS] = clock[SOFT] = clock[HELD] = clock[JAMMED] = clock[WEIGHT] = 0.0
-    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = clock[SOON] = 0.0
+    clock[ROCKING] = clock[ROCKS] = clock[BRIEF] = clock[CHAIN] = clock[BLOWS] = 0.0
     clock[MEETING] = math.inf
     clock[LONGER_BRIEF] = INSTANT
 

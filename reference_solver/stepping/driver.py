@@ -153,7 +153,9 @@ def make_sub_step(island: Island) -> bool:
         return_to_start(island)
         clock[ESCAPED], clock[HELD], clock[ROCKS] = 1.0, held, rocks
         return True
-    if end < min(length, clock[SERIES]):  # what has not ended by then is followed
+    shortened = phase == end and clock[OUTCOME] == SHORTENED
+    if end < clock[SERIES] and not shortened:
+        # What has not ended by then is followed. That comes to an end: each time fewer series are taken to end.
         go_back(tally, island.sub.opened)
         return_to_start(island)
         clock[MEETING], clock[HELD], clock[ROCKS] = end, held, rocks

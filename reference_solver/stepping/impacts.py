@@ -48,7 +48,8 @@ def drifts_aside(slip: float, gain: float, friction: float, pull: float, returns
     """How far friction at impacts only moves bodies along their contact, beside what it does in a contact [m].
 
     Flights of the times T e^k under the accelerations a, which friction takes from what slips or would: a T^2 / 2 of
-    each, T^2 / (1 - e^2) of all.
+    each, T^2 / (1 - e^2) of all. So it is where an impact ends a ``slip`` that one with e = 0 does not end. The
+    ``friction`` is mu times how much more the contact yields along than across.
     """
     if friction == 0.0:
         return 0.0

@@ -95,7 +95,6 @@ FAULTS: list[tuple[Callable[[], object], str]] = [
     (lambda: spatial(Body("b", Disc(1.0), 1.0, (1.0, 1.0, 1.0))), "b.shape: a Disc has no place in 3-D"),
     (lambda: scene(replace(BALL, inertia=(1.0, 1.0))), "ball.inertia: needs one number"),
     (lambda: spatial(Body("b", Sphere(1.0), 1.0, 1.0)), "b.inertia: needs three principal moments"),
-    (lambda: scene(replace(FLOOR, motion="prescribed", twist=(0.0, 0.0, 1.0))), "floor.twist: a half-space does not"),
     (lambda: scene(replace(BALL, name="n" * 81)), f"bodies: '{'n' * 70}"),
     (lambda: scene(pairs=(Pair("ball", "wall"),)), "pair ball-wall: there is no body called 'wall'"),
     (lambda: check_body(replace(BALL, mass=-1.0), 2), "ball.mass"),

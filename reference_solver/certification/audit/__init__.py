@@ -149,6 +149,14 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
+def without_order(model: Model, record: Record, dt: float) -> np.ndarray:
+    """Return the pieces (k,) of a recorded run at which the motion hangs on round-off (`chains.without_order`).
+
+    Raises ValueError if the record has no pieces.
+    """
+    return chains.without_order(_run_of(model, record, dt))
+
+
 def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.ndarray) -> np.ndarray:
     """Return how far (s,) impacts move bodies of which round-off decides whether they are [m] (`contact.grazes`).
 

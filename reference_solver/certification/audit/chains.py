@@ -21,6 +21,10 @@ FOLLOWED, LONGEST = 5000, 64
 #: Share to which velocities of a cycle are a multiple of those of the one before, and share of the largest that each
 #: velocity must have for its sign to be certain.
 SAME, CLEAR = 1e-9, 1e-7
+#: Share of the fastest approach of an impact below which a speed is round-off: twice the solver's own.
+LEFT = 2e-11
+#: The same of what goes apart with e = 0 and counts as lying; and the share of a step in which nothing happens.
+DRIFTS, SOON = 1e-6, 1e-9
 
 Groups = list[Indices]
 
@@ -28,6 +32,34 @@ Groups = list[Indices]
 def measured(run: Run) -> Iterator[tuple[str, float]]:
     """Yield how many chains of impacts are not proven to be without end."""
     yield "endless", float(sum(not _has_no_end(run, k) for k in np.flatnonzero(run.is_chain).tolist()))
+
+
+def without_order(run: Run) -> Indices:
+    """Impacts of which round-off decides whether bodies are struck at once or in turn.
+
+    Several pairs meet, and which comes first is not known. Or bodies that touch have no speed but round-off, which
+    impacts of one instant have left (but for a cycle that is proven, and for what has carried load since): they may
+    part, or lie. Or, with e = 0, they go apart so slowly that they count as lying, though no load has held them.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    u = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+    fastest = np.zeros(len(pieces))
+    np.maximum.at(fastest, owner, -u)
+    pairs = pieces.body_a * len(run.free) + pieces.body_b
+    pressed = np.flatnonzero((pieces.impulse * pieces.normal).sum(axis=1) > 0.0)
+    order = pressed[np.lexsort((owner[pressed], pairs[pressed]))]
+    last = np.full(len(owner), -1)
+    later = (pairs[order[1:]] == pairs[order[:-1]]) & (owner[order[1:]] != owner[order[:-1]])
+    last[order[1:][later]] = owner[order[:-1][later]]
+    at_once = run.is_followed | np.append(False, run.is_followed[:-1])
+    known, slow = last >= 0, np.abs(u) <= LEFT * fastest[owner]
+    since = pieces.begin[owner] - pieces.begin[last]
+    left = known & slow & (at_once & ~run.is_chain)[last] & (since > 0.0)
+    loaded = known & run.is_forces[last] & (since <= pieces.length[last] + SOON * run.dt)
+    drifts = ~slow & (u > 0.0) & (u <= DRIFTS * fastest[owner]) & ~loaded
+    bounces = run.model.restitution[pieces.body_a, pieces.body_b] > 0.0
+    struck = np.isin(np.arange(len(owner)), pressed) & run.is_impact[owner] & np.where(bounces, left, drifts)
+    return np.flatnonzero(run.is_unordered | (np.bincount(owner[struck], minlength=len(pieces)) > 0))
 
 
 def _has_no_end(run: Run, piece: int) -> bool:

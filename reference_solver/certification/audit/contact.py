@@ -17,9 +17,9 @@ from reference_solver.shapes import Disc, Sphere
 
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
-#: Share of the fastest approach of an impact above which a contact parts for certain; below it, it may part, or lie and
-#: have turned. And share of the speeds that meet which is round-off of a solve.
-PARTS, LIES = 1e-5, 1e-9
+#: Share of the fastest approach of an impact above which a contact with e = 0 parts for certain, and one with e > 0;
+#: below it, it may part, or lie and have turned. And share of the speeds that meet which is round-off of a solve.
+PARTS, LEFT, LIES = 1e-5, 2e-11, 1e-9
 #: A rebound counts as soft where it leaves no faster than what loads do in this many steps.
 SOFT_STEPS = 2.0
 #: How many times as fast as until the next sample bodies may go apart at first.
@@ -39,7 +39,7 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
 
 
 def ends_of_series(run: Run) -> NDArray[np.bool_]:
-    """Whether (c,) a contact that rubs, or whose lever turns, holds a rebound of its law, or comes to rest by rocking.
+    """Whether (c,) a contact holds a rebound of its law, or comes to rest by rocking, where rows turn or contacts rub.
 
     What such an end leaves out hangs on the number of rebounds that it leaves out, not on the step in which it is.
     """
@@ -49,8 +49,8 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
     approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
     held = (run.is_impact & ~run.is_chain)[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
-    rubs = run.model.friction[a, b] > 0.0
-    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b] | rubs))
+    rubs = np.bincount(owner, run.model.friction[a, b], len(pieces)) > 0.0
+    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b] | rubs[owner]))
 
 
 def _cornered(run: Run) -> NDArray[np.bool_]:
@@ -83,7 +83,30 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     ]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
-    return rubs * way / (1.0 + e), np.maximum(*spins) * way
+    return rubs * way / (1.0 + e) + _rubbed_elsewhere(run, leaves, lasts), np.maximum(*spins) * way
+
+
+def _rubbed_elsewhere(run: Run, leaves: Array, lasts: Array) -> Array:
+    """How far (c,) rebounds of speed ``leaves`` that are left out move bodies by friction of other contacts [m].
+
+    A blow of speed u has ``m e u`` more with e than without, and passes no more than that on. The friction that this
+    brings about comes to act within ``lasts`` [s] instead of at once; it changes a slip by no more than there is.
+    """
+    pieces, mass, moved = run.pieces, reduced_mass(run), np.zeros(len(leaves))
+    a, b = pieces.body_a, pieces.body_b
+    meets = run.meeting_velocity(after=False)
+    slips = np.linalg.norm(meets - (meets * pieces.normal).sum(axis=1)[:, None] * pieces.normal, axis=1)
+    slips = np.where(slips > SLIP_NOISE * speeds(run), slips, 0.0)
+    pressed = (pieces.impulse * pieces.normal).sum(axis=1).clip(min=0.0)
+    far = np.where(run.free, 1.0 + run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
+    for j in np.flatnonzero(leaves > 0.0):
+        piece = int(run.contact_owner[j])
+        others = np.arange(pieces.first_contact[piece], pieces.first_contact[piece + 1])
+        others = others[others != j]
+        passed = np.where(pressed[others] > 0.0, mass[j] * leaves[j], 0.0)
+        changed = np.minimum(run.model.friction[a, b][others] * passed / mass[others], slips[others])
+        moved[j] = (changed * np.maximum(far[a[others]], far[b[others]])).sum() * lasts[j]
+    return moved
 
 
 def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]:
@@ -196,7 +219,11 @@ def _laws(run: Run) -> Iterator[float]:
     alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
     fastest = np.zeros(len(pieces))
     np.maximum.at(fastest, owner, -approach)
-    certain = PARTS * fastest[owner] + LIES * speed + 2.0 * np.minimum(run.still[a], run.still[b])
+    certain = (
+        np.where(restitution > 0.0, LEFT, PARTS) * fastest[owner]
+        + LIES * speed
+        + 2.0 * np.minimum(run.still[a], run.still[b])
+    )
     alone = np.where(approach > certain, alone, np.minimum(alone, defect))
     defect = np.where(parts, alone, defect)
     # What is not pressed and is not an impact may part, or come closer: a gap is a matter of geometry.

@@ -276,7 +276,7 @@ def integrated_turn(q: Array, before: Array, after: Array, moments: Array, lengt
 
 def _series(axes: Array, q: Array, momentum: Array, added: Array, moments: Array, angle: Array) -> tuple[Array, ...]:
     """Axes (s, 3, 3), quaternions (s, 4) and integrals of spins (s, 3) after a time of one; vectors are (3, s)."""
-    largest = 2.0 * min(float(angle.max(initial=0.0)), STEPPED_TURN)
+    largest = 2.0 * min(float(np.fmax.reduce(angle, initial=0.0)), STEPPED_TURN)  # a run that ended has no numbers
     terms = int(np.ceil(np.log(LEFT_OUT) / np.log(max(largest, LEFT_OUT))))
     e, turned = np.zeros((terms + 1, 3, 3, len(q))), np.zeros((terms + 1, 4, len(q)))
     rate, spin, across = np.zeros((terms, 3, len(q))), np.zeros((terms, 3, len(q))), np.zeros((terms, 4, 4, len(q)))

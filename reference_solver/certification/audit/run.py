@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certification.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, Pieces
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, UNORDERED, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -175,6 +175,11 @@ class Run:
     def is_chain(self) -> NDArray[np.bool_]:
         """(p,) whether a piece is the sum of a chain of impacts without end."""
         return np.asarray(self.is_impact & (self.pieces.scheme == CHAIN))
+
+    @cached_property
+    def is_unordered(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece is an impact of several pairs of bodies, and round-off decides which comes first."""
+        return np.asarray(self.is_impact & (self.pieces.scheme == UNORDERED))
 
     @cached_property
     def is_followed(self) -> NDArray[np.bool_]:
