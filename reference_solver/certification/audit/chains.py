@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from reference_solver.certification.audit.contact import reduced_mass, speeds
 from reference_solver.certification.audit.run import Indices, Run, cross
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
@@ -25,6 +26,8 @@ SAME, CLEAR = 1e-9, 1e-7
 LEFT = 2e-11
 #: The same of what goes apart with e = 0 and counts as lying; and the share of a step in which nothing happens.
 DRIFTS, SOON = 1e-6, 1e-9
+#: Share of what stops the speeds at a contact below which an impulse of a phase is round-off.
+NO_LOAD = 1e-9
 
 Groups = list[Indices]
 
@@ -46,7 +49,9 @@ def without_order(run: Run) -> Indices:
     fastest = np.zeros(len(pieces))
     np.maximum.at(fastest, owner, -u)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    pressed = np.flatnonzero((pieces.impulse * pieces.normal).sum(axis=1) > 0.0)
+    # What a phase presses by round-off it does not press.
+    least = np.where(run.is_impact[owner], 0.0, NO_LOAD * reduced_mass(run) * speeds(run))
+    pressed = np.flatnonzero((pieces.impulse * pieces.normal).sum(axis=1) > least)
     order = pressed[np.lexsort((owner[pressed], pairs[pressed]))]
     last = np.full(len(owner), -1)
     later = (pairs[order[1:]] == pairs[order[:-1]]) & (owner[order[1:]] != owner[order[:-1]])
