@@ -310,6 +310,16 @@ def test_the_single_setting_that_does_most_is_told_beside_a_cure_of_several(monk
     assert text.endswith("; cone=elliptic alone: 0.0034 m/s")
 
 
+@pytest.mark.parametrize("left, told", [(450.0, True), (451.0, False), (899.0, False)])
+def test_a_single_setting_that_leaves_more_than_half_of_the_error_is_not_told_beside_a_cure(monkeypatch, left, told):
+    def off(s):
+        return (0.5 if s.get("a") and s.get("c") else left if s.get("c") else 900.0, 0.5 if s.get("c") else 9.0)
+
+    (best, _), trials = trials_of(monkeypatch, off, {"a": (1,), "c": (1,)}, handed=True)
+    changes, value = cures._alone(trials, cures._told(trials, trials.start[:2], best), best)
+    assert (changes, value is not None) == (({"c": 1}, True) if told else ({}, False))
+
+
 def test_a_real_engine_is_cured_by_what_its_sheet_says():
     """Chipmunk's box hops as it starts to slide, by an overlap that it is not given at the start."""
     pytest.importorskip("pymunk")
