@@ -11,6 +11,7 @@ from typing import Any
 from adapters import registry
 from adapters.engine_folder import belongs_of
 from adapters.scene import SceneError
+from adapters.settings import text_of
 from reports.wording import number, params_text
 from validation.cells import Observation, Slot, format_dt
 from validation.cells import settings_of as settings_in
@@ -335,11 +336,22 @@ def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str
     else:
         where = (row["scene"], row["dimension"], row["engine"], row["profile"], better)
         paste, what = pasteable(observations, *where, dict(_minimal(row))), f"all that profile {better} changes"
-    if paste or not better:
-        return paste, f"to paste ({what}):" if paste else ""
-    engine, scene = row["engine"], row["scene"]
-    words = ["crosscheck", "export", scene, *_case(row), "--engine", engine, "--profile", better, "--to", "python"]
-    return "", f"nothing to paste: {engine} has no lines of settings; {shlex.join(words)} writes its calls"
+    if paste:
+        return paste, f"to paste ({what}):"
+    return "", nothing_to_paste(cure) if cure else _unpasted(row, ["--profile", better])
+
+
+def nothing_to_paste(cure: Cure) -> str:
+    """What is said where a cure has no lines to paste, since its engine has none: the command that writes its calls."""
+    sets = [word for name, value in sorted(cure.changes.items()) for word in ("--set", f"{name}={text_of(value)}")]
+    row = {name: getattr(cure, name) for name in ("engine", "scene", "dimension", "params", "dt")}
+    return _unpasted(row, ["--profile", cure.shipped, *sets])
+
+
+def _unpasted(row: Mapping[str, Any], profile: Sequence[str]) -> str:
+    engine = row["engine"]
+    words = ["crosscheck", "export", row["scene"], *_case(row), "--engine", engine, *profile, "--to", "python"]
+    return f"nothing to paste: {engine} has no lines of settings; {shlex.join(words)} writes its calls"
 
 
 def setting_text(value: Any) -> str:

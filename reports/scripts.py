@@ -72,9 +72,9 @@ def _head(slot: Slot) -> Iterator[str]:
         yield f"  {within}" + ("" if check.because == because else f": {check.because}")
         because = check.because
     if len(checks) > MOST_CHECKS:
-        yield f"  and {len(checks) - MOST_CHECKS} more: crosscheck describe {canonical.name}"
+        yield f"  and {len(checks) - MOST_CHECKS} more: crosscheck describe {shlex.quote(slot.scene)}"
     params = " ".join(f"--param {name}={value!r}" for name, value in slot.params)
-    asked = f"{slot.scene} {params}".strip()
+    asked = f"{shlex.quote(slot.scene)} {params}".strip()
     cell = f"--dim {slot.dimension} --engine {slot.engine} {shlex.join(profile_words(slot))} --dt {format_dt(slot.dt)}"
     count = f" --iterations {slot.iterations}" if slot.iterations is not None else ""
     yield f"Judged by: crosscheck run {asked} {cell}{count}"

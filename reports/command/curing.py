@@ -17,7 +17,7 @@ from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, fixed, scene_names_of
-from reports.cures import changes_in_words, cure_paste, cure_text
+from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste
 from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
@@ -116,7 +116,8 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         told = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
         left = f"{found.metric} {number(found.before, 4)} -> {number(found.alone_after, 4)}"
         console.print(f"one setting alone: {told}: {left}", markup=False, highlight=False, soft_wrap=True)
-        console.print(Text(cure_paste(replace(found, changes=found.alone))), soft_wrap=True)
+        alone = replace(found, changes=found.alone)
+        console.print(Text(cure_paste(alone) or nothing_to_paste(alone)), soft_wrap=True)
         console.print(
             f"what mends {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
         )
@@ -130,6 +131,8 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     if paste:
         console.print("to paste:", style="bold")
         console.print(Text(paste), soft_wrap=True)
+    else:
+        console.print(nothing_to_paste(found), markup=False, highlight=False, soft_wrap=True)
 
 
 def _alternatives(found: Cure) -> str:

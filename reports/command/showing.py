@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.own_settings import given, suffix_of
+from adapters.registry import is_ranked
 from adapters.scene import SceneError
 from reports import speed
 from reports.answers import Costs, answers, choices
@@ -48,6 +49,7 @@ from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
 from validation.questions.nulls import skill_of
 from validation.records.store import Store
+from validation.running.plan import Request, slots
 
 Plain = Mapping[str, Any]
 #: How far off a row is, for those that have no tolerance in units of which to say it.
@@ -261,11 +263,15 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
     row there; SCENE may be the path of a scene file. With --set the row is that of PROFILE with these settings.
     """
-    row = _with_own(row, set)
+    asked, row = row, _with_own(row, set)
     kept = observed(out, run)
     observations = _where(kept.observations, row)
     rows = judged(kept.run, observations)
-    found = find_row(rows, row)
+    try:
+        found = find_row(rows, row)
+    except SceneError:
+        _check_own(asked, set, {observation.slot.scene for observation in kept.observations})
+        raise
     better, paste, said, differing = _cure(rows, observations, found)
     if as_json:
         plain = [
@@ -304,6 +310,19 @@ def _with_own(row: str, sets: Sequence[str]) -> str:
     if sets and not (slash and more):
         raise SceneError(f"set: names a profile; say ENGINE/PROFILE/SCENE in the place of {row!r}")
     return f"{engine}{slash}{profile}{suffix_of(given(sets))}{more}{where}"
+
+
+def _check_own(row: str, sets: Sequence[str], scenes: Collection[str]) -> None:
+    """Refuse settings that the engine of a row does not have or take, as `run` does.
+
+    Raises
+    ------
+    EngineError
+        Naming the first of them.
+    """
+    named = named_by(row, scenes)
+    if sets and named.get("scene") in scenes:
+        slots(Request((named["scene"],), (named["engine"],), (named["profile"],), sets=given(sets)))
 
 
 def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
@@ -381,13 +400,18 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:
-    """A profile of the same engine that passes this very row, lines to paste and what they are, and what it changes."""
+    """A profile of the same engine that passes this very row, lines to paste and what they are, and what it changes.
+
+    Profiles without a rank are no cures: what they do is not all in settings, so that lines to paste would do another
+    thing.
+    """
     if mark_of(row) == "pass":
         return "", "", "", []
     same = ("engine", "scene", "dimension", "params", "dt", "metric")
     good = [
         other["profile"] for other in rows
         if other["physics"] == "pass" and other["iterations"] is None and all(other[n] == row[n] for n in same)
+        and is_ranked(row["engine"], other["profile"])
     ]  # fmt: skip
     better = good[0] if good and good[0] != row["profile"] else ""
     where = (observations, row["scene"], row["dimension"], row["engine"], row["profile"], better)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -423,6 +424,25 @@ def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
     for said in ("h_n = e^(2n) h0", "apex[1] = 0.25 m", "step 1/120 s", "crosscheck run bounce --param e=0.5 --dim 2"):
         assert said in done.stdout
     assert f"DT, STEPS = {1 / 120!r}" in done.stdout
+
+
+def test_the_head_names_a_scene_file_by_its_path_where_it_points_to_all_checks_and_to_who_judges(tmp_path):
+    """A file is described and run by its path, not by the name that stands in it; a path may have spaces."""
+    pytest.importorskip("pymunk")
+    (tmp_path / "own files").mkdir()
+    path = tmp_path / "own files" / "loaded.toml"
+    checks = "".join(
+        f'[[checks]]\nquantity = "box.x"\nat = {0.01 * k}\nvalue = 0.0\ntolerance = 1.0\n' for k in range(1, 14)
+    )
+    path.write_text(LOADED.format(**PLANAR) + checks)
+    done = CliRunner().invoke(main, ["export", str(path), "--engine", "chipmunk", "--to", "python"])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    for start, word in ((" more: ", "describe"), ("Judged by: ", "run")):
+        (said,) = (line.split(start)[1] for line in lines if start in line)
+        words = shlex.split(said)
+        assert words[:2] == ["crosscheck", word] and words[2].partition("@")[0] == str(path)
+        assert word == "run" or CliRunner().invoke(main, words[1:]).exit_code == 0
 
 
 def test_hostile_names_end_neither_comment_nor_string(tmp_path):

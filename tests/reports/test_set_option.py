@@ -108,6 +108,18 @@ def test_what_explain_cannot_find_is_one_line(ran):
     assert "set: names a profile; say ENGINE/PROFILE/SCENE in the place of '0123abcd'" in done.output
 
 
+@pytest.mark.parametrize(
+    "asked, said",
+    [
+        ("dampng=0.5", "set: chipmunk has no setting 'dampng'; near it: damping"),
+        ("damping=much", "set: damping=much: must be a number"),
+    ],
+)
+def test_explain_says_of_a_setting_that_there_is_not_that_it_is_none_as_run_does(ran, asked, said):
+    done = call("explain", "chipmunk/default/bounce/apex", "--set", asked, "--out", ran[0], status=2)
+    assert said in done.output and len(done.output.splitlines()) == 1
+
+
 def test_the_command_that_runs_a_row_again_asks_for_the_same_cell(ran):
     for row in ran[1]:
         words = shlex.split(reproduce(row["slot"]))

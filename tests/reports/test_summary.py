@@ -384,6 +384,22 @@ def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_e
     assert again["id"] == plain["id"] and again["value"] == plain["value"]
 
 
+@pytest.mark.parametrize("e", [1.0, 0.7])
+def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
+    """MuJoCo's `matched` rebounds by a loop around the solver, which no settings have: pasted without it, they do not.
+
+    e = 0.7 is no standard case, of which nothing is listed.
+    """
+    pytest.importorskip("mujoco")
+    profiles = ("--profile", "default", "--profile", "matched")
+    call("run", "bounce", "--param", f"e={e}", "--dim", "2", "--engine", "mujoco", *profiles, "--out", tmp_path)
+    rows = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
+    assert {row["physics"] for row in rows if (row["profile"], row["metric"]) == ("matched", "apex[1]")} == {"pass"}
+    told = json.loads(call("explain", "mujoco/default/bounce/apex", "--json", "--out", tmp_path).stdout)
+    assert told["physics"] == "fail" and told["cure"]["profile"] == "" and told["cure"]["changes"] == []
+    assert "matched" not in call("explain", "mujoco/default/bounce/apex", "--out", tmp_path).stdout
+
+
 def test_explain_says_why_a_run_is_not_certified(two_engines, monkeypatch):
     out, _ = two_engines
     judged, why = showing.judged, "certificate: a contact pulls"

@@ -1,16 +1,29 @@
 """Cures: the smallest change that mends most and breaks nothing, told of the scene and dimension it was measured on."""
 
+import io
 import re
+import shlex
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from adapters.engine_folder import CURES, inside
 from adapters.registry import facts, find, names
-from reports.command import main
-from reports.cures import changes_in_words, cure_of, cure_paste, cure_text, decided_by, fix, told_cure, told_cures
+from reports.command import curing, main
+from reports.cures import (
+    changes_in_words,
+    cure_of,
+    cure_paste,
+    cure_text,
+    decided_by,
+    fix,
+    nothing_to_paste,
+    told_cure,
+    told_cures,
+)
 from validation.cells import Observation, Outcome, Slot
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
@@ -152,6 +165,26 @@ def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_line
     )
     said = f"nothing to paste: mujoco has no lines of settings; {export} writes its calls"
     assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("", said)
+
+
+def test_a_cure_of_an_engine_without_lines_of_settings_says_how_its_calls_are_written(monkeypatch):
+    """Neither `explain` nor `cure` is silent about it, though no profile has the settings."""
+    cure = replace(CURE, mends=("creep",), changes={"cone": "elliptic", "impratio": 10.0}, alone={}, profile="")
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): cure})
+    monkeypatch.setattr("adapters.mujoco.engine.snippet", lambda *asked: "")
+    row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
+    row |= {"metric": "creep", "params": cure.params, "dt": 1 / 240, "iterations": None}
+    paste, said = fix(row, [], "")
+    assert paste == "" and said == nothing_to_paste(cure)
+    start, command = said.split("; ")
+    words = shlex.split(command.removesuffix(" writes its calls"))
+    assert start == "nothing to paste: mujoco has no lines of settings"
+    assert words[:3] == ["crosscheck", "export", "pinch"]
+    done = CliRunner().invoke(main, words[1:])
+    assert done.exit_code == 0 and "default+cone=elliptic+impratio=10" in done.output
+    shown = Console(file=io.StringIO(), width=300)
+    curing._show("mujoco", "pinch", 2, cure, shown)
+    assert said in shown.file.getvalue()
 
 
 def test_no_fix_that_is_printed_has_a_word_that_its_engine_has_not():
@@ -308,6 +341,16 @@ def test_the_single_setting_that_does_most_is_told_beside_a_cure_of_several(monk
     assert value == pytest.approx(told.check.truth + 2.0 * told.check.bound)
     text = cure_text(replace(CURE, alone={"cone": "elliptic"}, alone_after=0.0034))
     assert text.endswith("; cone=elliptic alone: 0.0034 m/s")
+
+
+@pytest.mark.parametrize("left, told", [(450.0, True), (451.0, False), (899.0, False)])
+def test_a_single_setting_that_leaves_more_than_half_of_the_error_is_not_told_beside_a_cure(monkeypatch, left, told):
+    def off(s):
+        return (0.5 if s.get("a") and s.get("c") else left if s.get("c") else 900.0, 0.5 if s.get("c") else 9.0)
+
+    (best, _), trials = trials_of(monkeypatch, off, {"a": (1,), "c": (1,)}, handed=True)
+    changes, value = cures._alone(trials, cures._told(trials, trials.start[:2], best), best)
+    assert (changes, value is not None) == (({"c": 1}, True) if told else ({}, False))
 
 
 def test_a_real_engine_is_cured_by_what_its_sheet_says():

@@ -53,6 +53,9 @@ CLOCKED = 0.5
 ELSEWHERE = (0.3, 1.0 / 500.0)
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
 INVISIBLE = 1e-3
+#: A single setting is told beside a cure of several if it leaves at most this share of the error: with more than half
+#: of it left, the check fails about as it did.
+HALF = 0.5
 
 Changes = Mapping[str, Any]
 
@@ -88,8 +91,8 @@ class Cure:
     dt
         Step of the cells [s].
     alone, alone_after
-        Where the cure has several settings: the one that does most by itself and breaks nothing, if it brings the
-        check that is told nearer, and the value with it.
+        Where the cure has several settings: the one that does most by itself and breaks nothing, if it takes away at
+        least half of the error of the check that is told, and the value with it.
     """
 
     engine: str
@@ -385,7 +388,7 @@ def _alone(trials: _Trials, told: Reading, best: _Found | None) -> tuple[Changes
     changes = min(singles, key=_Found.rank).changes[trials.slots.index(told.slot)]
     seen = trials.seen[switched(told.slot, changes)] if changes else []
     after = next((each for each in seen if each.check.metric == told.check.metric), None)
-    return (changes, after.value) if after and after.badness < told.badness else ({}, None)
+    return (changes, after.value) if after and after.badness <= HALF * told.badness else ({}, None)
 
 
 def _kind(found: Reading) -> str:
