@@ -318,3 +318,19 @@ def test_a_rebound_of_which_a_step_has_hundreds_is_followed():
     simulation.advance(60)
     assert simulation.certificate["held_steps"] == 0 and simulation.certificate["holds"]
     assert simulation.pose[1, 1] == pytest.approx(0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("e", [0.0725, 0.073, 0.0734])
+def test_what_a_chain_that_ends_has_left_is_struck_within_the_horizon_by_no_other(e):
+    """Of three equal balls with e just above 7 - 4 sqrt 3 impacts end, and leave them parting at less than 1e-11 m/s.
+
+    A fourth that comes later strikes them in turn; at round-off they lie, and are struck at once.
+    """
+    place, speeds = (0.0, 0.5625, 1.25, 2.8), (0.0, 0.0, -1.0, -1.5)
+    restitution = np.full((4, 4), 0.5)
+    for i in range(2):
+        restitution[i, i + 1] = restitution[i + 1, i] = e
+    bodies = [Body(Disc(0.25), 1.0, 0.03, (x, 0.0, 0.0), (v, 0.0, 0.0)) for x, v in zip(place, speeds, strict=True)]
+    found = certify(Model(2, bodies, (0.0, 0.0), restitution, 0.0), Settings.reference(1.0 / 240.0), 300)
+    struck = 0.981  # by the fourth, which closes 1.05 m less what the third has moved
+    assert not found.holds or 0.9 < found.horizon < struck + 0.1

@@ -10,7 +10,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from reference_solver import Body, Disc, HalfSpace, Model, Settings
+from reference_solver import Body, Disc, HalfSpace, Model, Settings, Sphere
 from reference_solver.certification.truth import certify
 from reference_solver.stepping.impacts import DRIFT_STEPS, drifts_aside, is_lowest, turns_aside
 
@@ -132,3 +132,25 @@ def test_x_contains_what_friction_at_rebounds_leaves_out_where_a_disc_comes_to_r
     assert found.holds, found.reasons
     assert (np.abs(found.pose[:, 1, 0] - truth) <= found.error + 2e-15).all()
     assert found.error[-1] <= 1e-9
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+@pytest.mark.parametrize(("d", "yields"), [(2, 3.0), (3, 3.5)])
+@pytest.mark.parametrize(("e", "rate"), [(0.2, 60), (0.5, 240), (0.7, 1000)])
+def test_a_slip_that_a_blow_ends_ends_with_it_however_short_the_series_is(e, rate, d, yields, share):
+    """A blow of (1 + e) m v takes more slip than one of m v: with that much slip the ball rolls at once, by law."""
+    radius, mu = 0.1, 0.6
+    v = (1.0 - e) * G / (12.0 * e * rate)  # all rebounds are over in a sixth of a step
+    slip = yields * mu * v * (1.0 + share * e)
+    up = (0.0,) * (d - 1) + (1.0,)
+    ball, inertia = (Disc, 0.5 * radius**2) if d == 2 else (Sphere, (0.4 * radius**2,) * 3)
+    flat, still = ((0.0,), (0.0,)) if d == 2 else ((1.0, 0.0, 0.0, 0.0), (0.0,) * 3)
+    floor = Body(HalfSpace(up), pose=(0.0,) * d + flat, motion="fixed")
+    moving = (slip, *(-v * x for x in up[1:]))
+    body = Body(ball(radius), 1.0, inertia, tuple(radius * x for x in up) + flat, moving + still)
+    model = Model(d, [floor, body], tuple(-G * x for x in up), e, mu)
+    found = certify(model, Settings.reference(1.0 / rate), 20)
+    assert found.holds, found.reasons
+    rolls = slip * (1.0 - 1.0 / yields)
+    assert (np.abs(found.pose[:, 1, 0] - rolls * found.t) <= found.error).all()
+    assert found.error[-1] < 1e-10

@@ -135,3 +135,19 @@ def test_what_meets_as_round_off_has_it_is_more_than_other_runs_tell(monkeypatch
     flown = np.maximum(found.t - left, 0.0)
     off = np.abs(found.pose[:, 2, 1] - r + 0.5 * 9.81 * flown**2)
     assert (off > found.error).any()
+
+
+@pytest.mark.parametrize("shift", [(300.0, -70.0), (1000.0, 1000.0)])
+def test_what_meets_within_a_gap_that_coordinates_round_is_in_x(shift):
+    """Gaps count as none up to their round-off, which is that of the place."""
+    way, v, r, rate = 0.93, 10.0, 0.02, 240
+    model, left = Change(2, shift=shift).model(over_the_edge(2, 1.0, r, v, 0.5, way)), way / v
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.1) * rate))
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.abs(found.pose[:, 2, 1] - shift[1] - r + 0.5 * 9.81 * flown**2)
+    assert not found.holds or (off <= found.error)[found.t < found.horizon].all()
+
+
+def test_a_world_without_free_bodies_is_certified():
+    still = Body(Disc(0.1), pose=(0.0, 0.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
+    assert certify(Model(2, [still], (0.0, 0.0), 0.0, 0.0), Settings.reference(0.01), 5).holds
