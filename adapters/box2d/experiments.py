@@ -34,6 +34,7 @@ EXPERIMENTS: tuple[Experiment, ...] = tuple(
     for scene, metric, params in (
         ("stack", "penetration", {"n": 2.0}),
         ("v_groove", "displacement", {}),
+        ("bounce", "force_in_flight", {}),
         ("slide", "hop", {}),
         ("slide_to_roll", "final_speed", {}),
         ("roll_incline", "turning", {"ratio": 1.5}),

@@ -102,7 +102,7 @@ def _rubbed_elsewhere(run: Run, leaves: Array, lasts: Array) -> Array:
     for j in np.flatnonzero(leaves > 0.0):
         piece = int(run.contact_owner[j])
         others = np.arange(pieces.first_contact[piece], pieces.first_contact[piece + 1])
-        others = others[others != j]
+        others = others[(others != j) & (leaves[others] == 0.0)]  # what leaves out its own is counted there
         passed = np.where(pressed[others] > 0.0, mass[j] * leaves[j], 0.0)
         changed = np.minimum(run.model.friction[a, b][others] * passed / mass[others], slips[others])
         moved[j] = (changed * np.maximum(far[a[others]], far[b[others]])).sum() * lasts[j]
