@@ -61,7 +61,9 @@ def without_order(run: Run) -> Indices:
     since = pieces.begin[owner] - pieces.begin[last]
     left = known & slow & (at_once & ~run.is_chain)[last] & (since > 0.0)
     loaded = known & run.is_forces[last] & (since <= pieces.length[last] + SOON * run.dt)
-    drifts = ~slow & (u > 0.0) & (u <= DRIFTS * fastest[owner]) & ~loaded
+    _, pair = np.unique(owner * len(run.free) ** 2 + pairs, return_inverse=True)
+    met = np.bincount(pair, u < -LEFT * fastest[owner]) > 0.0  # its points answer together
+    drifts = ~slow & (u > 0.0) & (u <= DRIFTS * fastest[owner]) & ~loaded & ~met[pair]
     bounces = run.model.restitution[pieces.body_a, pieces.body_b] > 0.0
     struck = np.isin(np.arange(len(owner)), pressed) & run.is_impact[owner] & np.where(bounces, left, drifts)
     return np.flatnonzero(run.is_unordered | (np.bincount(owner[struck], minlength=len(pieces)) > 0))
