@@ -121,13 +121,18 @@ def _planted() -> dict[str, str]:
 
 
 def _once(every: Iterable[Cure]) -> list[Cure]:
-    """One cure per engine and scene: what cures the plane cures space. The same settings are said once."""
+    """One cure per engine and scene: what cures the plane cures space. Each table of settings stands once.
+
+    So do its lines to paste, where a scene has the same ones as that beside which the table stands.
+    """
     first: dict[tuple[str, str], Cure] = {}
-    said: dict[tuple[str, tuple[Change, ...], str], str] = {}
+    told: dict[tuple[str, tuple[Change, ...]], Cure] = {}
     for cure in every:
         if (cure.engine, cure.scene) not in first:
-            where = said.setdefault((cure.engine, tuple(cure.changes), cure.paste), cure.scene)
-            first[cure.engine, cure.scene] = cure if where == cure.scene else replace(cure, like=where)
+            same = told.setdefault((cure.engine, tuple(cure.changes)), cure)
+            if same is not cure:
+                cure = replace(cure, like=same.scene, paste="" if cure.paste == same.paste else cure.paste)
+            first[cure.engine, cure.scene] = cure
     return list(first.values())
 
 

@@ -10,7 +10,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from reference_solver import Body, Disc, HalfSpace, Model, Settings, Sphere
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Sphere
 from reference_solver.certification.truth import certify
 from reference_solver.stepping.impacts import DRIFT_STEPS, drifts_aside, is_lowest, turns_aside
 
@@ -87,7 +87,7 @@ def test_a_series_that_is_ended_too_early_is_off_by_no_more_than_its_record_tell
 
 
 def bounced(height, speed, spin, radius, share, e, mu, slope, times):
-    """Places (s,) along a slope of a disc that bounces on it, by the law of each impact, in 40 digits [m].
+    """Return where (s,) along a slope a bouncing disc is at each time, with 40 digits [m].
 
     Friction takes the slip at an impact, or mu times its impulse, and nothing in flight. Slips end before bounces do.
     """
@@ -153,4 +153,25 @@ def test_a_slip_that_a_blow_ends_ends_with_it_however_short_the_series_is(e, rat
     assert found.holds, found.reasons
     rolls = slip * (1.0 - 1.0 / yields)
     assert (np.abs(found.pose[:, 1, 0] - rolls * found.t) <= found.error).all()
+    assert found.error[-1] < 1e-10
+
+
+@pytest.mark.parametrize(("e", "part"), [(0.05, 0.05), (0.3, 0.01), (0.3, 0.05), (0.6, 0.02)])
+def test_a_slip_that_a_blow_ends_elsewhere_ends_with_it(e, part):
+    """A ball lands on a block that slides: its blow presses the block on the floor, and stops it at once, by law.
+
+    All rebounds are over in a ``part`` of a step; held, they would stop the block as much later.
+    """
+    dt, mu, light, heavy = 1.0 / 60.0, 0.4, 0.5, 1.0
+    v = (1.0 - e) * G * dt * part / (2.0 * e)
+    slip = mu * heavy * v * (1.0 + 0.9 * e) / light
+    friction, restitution = np.zeros((3, 3)), np.zeros((3, 3))
+    friction[0, 1] = friction[1, 0] = mu
+    restitution[1, 2] = restitution[2, 1] = e
+    block = Body(Box((0.5, 0.05)), light, light * 0.2525 / 3.0, (0.0, 0.05, 0.0), (slip, 0.0, 0.0))
+    ball = Body(Disc(0.1), heavy, 0.005, (0.0, 0.2, 0.0), (0.0, -v, 0.0))
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    found = certify(Model(2, [floor, block, ball], (0.0, -G), restitution, friction), Settings.reference(dt), 20)
+    assert found.holds, found.reasons
+    assert (np.abs(found.pose[:, 1, 0]) <= found.error + 1e-15).all()
     assert found.error[-1] < 1e-10

@@ -553,8 +553,9 @@ def test_equal_cures_are_said_once_and_others_point_at_the_first():
     found = _once([first, space, flat, other, pasted, cure_of("bullet", "stack")])
     assert [(c.engine, c.scene, c.dimension, c.like) for c in found] == [
         ("chipmunk", "stack", 2, ""), ("chipmunk", "rack", 2, "stack"), ("chipmunk", "pinch", 2, ""),
-        ("chipmunk", "arch", 2, ""), ("bullet", "stack", 2, ""),
+        ("chipmunk", "arch", 2, "stack"), ("bullet", "stack", 2, ""),
     ]  # fmt: skip
+    assert [c.paste for c in found[1:4]] == ["", other.paste, "iterations = 31"]  # lines of its own stay with a scene
 
 
 def test_the_page_of_a_run_that_lacks_an_engine_that_the_last_bench_has_names_both(page_source):

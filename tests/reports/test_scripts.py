@@ -427,7 +427,7 @@ def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
 
 
 def test_the_head_names_a_scene_file_by_its_path_where_it_points_to_all_checks_and_to_who_judges(tmp_path):
-    """A file is described and run by its path, not by the name that stands in it; a path may have spaces."""
+    """The head of a script names the scene file by its path, in quotes where the path has spaces."""
     pytest.importorskip("pymunk")
     (tmp_path / "own files").mkdir()
     path = tmp_path / "own files" / "loaded.toml"

@@ -113,7 +113,7 @@ tolerance = 0.8
 
 
 def on_ice(tmp_path, x, duration):
-    """Physics of each row of a box that slides from ``x`` [m], its front half a metre ahead, on to asphalt at 0."""
+    """Return the verdict of each row: a box, .5 m wide each way, slides from ``x`` [m] on to asphalt at x > 0."""
     path = tmp_path / "ice.toml"
     path.write_text(ICE.format(x=x, duration=duration))
     rows = rows_of("run", [execute(Slot(str(path), (), 2, "reference", "reference", 1 / 240))])

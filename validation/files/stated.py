@@ -148,12 +148,7 @@ def _checks(read: Stated, dt: float) -> list[Check]:
     names = {_metric(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
     depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
-    return [
-        *invariants.checks(read.scene, dt),
-        *(_stated_check(m, c, dt) for m, c in told.items()),
-        depth,
-        *shown,
-    ]
+    return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
 
 
 def _stated_check(metric: str, check: StatedCheck, dt: float) -> Check:

@@ -53,8 +53,8 @@ CLOCKED = 0.5
 ELSEWHERE = (0.3, 1.0 / 500.0)
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
 INVISIBLE = 1e-3
-#: A single setting is told beside a cure of several if it leaves at most this share of the error: with more than half
-#: of it left, the check fails about as it did.
+#: Largest share of the error that may remain for a single setting to be shown beside a fix with several. With more than
+#: half of the error left, the setting does less than its absence would.
 HALF = 0.5
 
 Changes = Mapping[str, Any]

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference_solver.certification.audit.contact import reduced_mass, speeds
+from reference_solver.certification.audit.contact import LEFT, reduced_mass, speeds
 from reference_solver.certification.audit.run import Indices, Run, cross
 from reference_solver.certification.geometry import rotation
 from reference_solver.model import Array
@@ -22,9 +22,8 @@ FOLLOWED, LONGEST = 5000, 64
 #: Share to which velocities of a cycle are a multiple of those of the one before, and share of the largest that each
 #: velocity must have for its sign to be certain.
 SAME, CLEAR = 1e-9, 1e-7
-#: Share of the fastest approach of an impact below which a speed is round-off: twice the solver's own.
-LEFT = 2e-11
-#: The same of what goes apart with e = 0 and counts as lying; and the share of a step in which nothing happens.
+#: Share of the fastest approach of an impact below which contacts with e = 0 that separate count as closed (E21); and
+#: share of a step within which two times are the same.
 DRIFTS, SOON = 1e-6, 1e-9
 #: Share of what stops the speeds at a contact below which an impulse of a phase is round-off.
 NO_LOAD = 1e-9

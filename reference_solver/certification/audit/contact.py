@@ -39,7 +39,7 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
 
 
 def ends_of_series(run: Run) -> NDArray[np.bool_]:
-    """Whether (c,) a contact holds a rebound of its law, or comes to rest by rocking, where rows turn or contacts rub.
+    """Whether (c,) a contact holds a rebound of its law, or comes to rest by rocking, where it rubs or turns.
 
     What such an end leaves out hangs on the number of rebounds that it leaves out, not on the step in which it is.
     """
@@ -49,8 +49,8 @@ def ends_of_series(run: Run) -> NDArray[np.bool_]:
     approach, leaves = ((run.meeting_velocity(after) * n).sum(axis=1) for after in (False, True))
     rebound = -run.model.restitution[a, b] * approach
     held = (run.is_impact & ~run.is_chain)[owner] & (leaves < 0.5 * rebound) & ((pieces.impulse * n).sum(axis=1) > 0.0)
-    rubs = np.bincount(owner, run.model.friction[a, b], len(pieces)) > 0.0
-    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b] | rubs[owner]))
+    rubs = run.model.friction[a, b] > 0.0
+    return np.asarray((held | (pieces.scheme == ROCKING)[owner]) & (cornered[a] | cornered[b] | rubs))
 
 
 def _cornered(run: Run) -> NDArray[np.bool_]:
@@ -83,30 +83,7 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     ]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
-    return rubs * way / (1.0 + e) + _rubbed_elsewhere(run, leaves, lasts), np.maximum(*spins) * way
-
-
-def _rubbed_elsewhere(run: Run, leaves: Array, lasts: Array) -> Array:
-    """How far (c,) rebounds of speed ``leaves`` that are left out move bodies by friction of other contacts [m].
-
-    A blow of speed u has ``m e u`` more with e than without, and passes no more than that on. The friction that this
-    brings about comes to act within ``lasts`` [s] instead of at once; it changes a slip by no more than there is.
-    """
-    pieces, mass, moved = run.pieces, reduced_mass(run), np.zeros(len(leaves))
-    a, b = pieces.body_a, pieces.body_b
-    meets = run.meeting_velocity(after=False)
-    slips = np.linalg.norm(meets - (meets * pieces.normal).sum(axis=1)[:, None] * pieces.normal, axis=1)
-    slips = np.where(slips > SLIP_NOISE * speeds(run), slips, 0.0)
-    pressed = (pieces.impulse * pieces.normal).sum(axis=1).clip(min=0.0)
-    far = np.where(run.free, 1.0 + run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
-    for j in np.flatnonzero(leaves > 0.0):
-        piece = int(run.contact_owner[j])
-        others = np.arange(pieces.first_contact[piece], pieces.first_contact[piece + 1])
-        others = others[(others != j) & (leaves[others] == 0.0)]  # what leaves out its own is counted there
-        passed = np.where(pressed[others] > 0.0, mass[j] * leaves[j], 0.0)
-        changed = np.minimum(run.model.friction[a, b][others] * passed / mass[others], slips[others])
-        moved[j] = (changed * np.maximum(far[a[others]], far[b[others]])).sum() * lasts[j]
-    return moved
+    return rubs * way / (1.0 + e), np.maximum(*spins) * way
 
 
 def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]:

@@ -156,7 +156,7 @@ def _by_root_of_inertia(run: Run, row: Indices, moment: Array) -> Array:
 
 
 def _next_approach(run: Run, approach: Array, leaves: Array) -> Array:
-    """Normal velocity (c,) of each contact as the next piece begins; ``leaves`` if that lacks the contact."""
+    """Return the normal velocity (c,) of each contact as its next piece starts, else ``leaves`` [m/s]."""
     pieces, owner, found = run.pieces, run.contact_owner, leaves.copy()
     order = np.lexsort((owner, pieces.feature, pieces.body_b, pieces.body_a))
     one, other = order[:-1], order[1:]

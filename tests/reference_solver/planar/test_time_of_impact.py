@@ -123,7 +123,7 @@ def safe_time_at_start(meeting, clearance, acceleration):
 
 @pytest.mark.parametrize("spins", [(0.0, 7.0), (-3.0, 7.0)])
 def test_a_gap_bends_by_what_its_corners_turn(spins):
-    """Centres move straight. The gap bends by r w^2 of each body when a corner points at the other body."""
+    """Both centres have constant velocity: a corner at distance r from its centre accelerates by r w^2 at most."""
     shapes, paths = (Box((0.8, 0.3)), TRIANGLE), [np.array([[0.1], [0.2], [w]]) for w in spins]
     meeting = on_paths(*shapes, ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0)), paths)
     assert first_contact(meeting, 0, 1, 0.0, DT) == math.inf

@@ -274,7 +274,7 @@ def test_a_free_body_never_turns_faster_than_its_bound(moments, spin):
 
 @pytest.mark.parametrize("spin", [(0.0, 0.0, 3.0), (2.0, 3.0, -4.0)])
 def test_a_gap_bends_by_no_less_than_its_corners_turn(spin):
-    """Centres move straight. The bound is r w^2 of each body, and up to half more for a rotation vector."""
+    """Both centres have constant velocity: corners accelerate by r w^2, and the bound is up to 1.5 times that."""
     boxes = [Box((0.5, 0.2, 0.1)), Box((0.3, 0.3, 0.3))]
     records = flying(*(moving(box, (9.0 * k, 0.0, 0.0), spin=spin) for k, box in enumerate(boxes)))
     meeting = allocate_meeting(records)
