@@ -91,7 +91,7 @@ def test_of_models_a_fail_is_no_alarm_whatever_a_profile_promises(engine, profil
 
 def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypatch):
     out, rows, _ = ran
-    posed._texts.clear()
+    monkeypatch.setattr(posed, "_texts", {})
     posed.resolve.cache_clear()
     monkeypatch.setattr("adapters.model.read", lambda *_: pytest.fail("a reader of results compiles nothing"))
     assert rows[0]["scene"] in call("show", "--out", out).output
