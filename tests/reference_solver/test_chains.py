@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certification.audit import chains
 from reference_solver.certification.truth import certify
 
 DIGITS, MOST = 50, 30_000
@@ -334,3 +335,13 @@ def test_what_a_chain_that_ends_has_left_is_struck_within_the_horizon_by_no_othe
     assert found.holds, found.reasons
     struck = 1.025  # [s] by the law of each pair in 60 digits, whatever e of these is
     assert struck - 1e-9 <= found.horizon <= struck + 1.0 / 240.0 + 1e-9
+
+
+def test_a_cycle_in_which_a_pair_would_pull_at_one_of_its_points_is_no_proof():
+    """Two points of one pair and one of another; the first impact would take -.064 kg m/s at the first point."""
+    yields = np.array([[6.06, 1.312, -10.501], [1.312, 0.913, -3.342], [-10.501, -3.342, 20.035]])
+    e, pairs = np.array([0.071, 0.071, 0.0475]), np.array([[0, 1], [0, 1], [1, 2]])
+    pulls, presses = np.array([-0.5123, -0.5304, 0.1666]), np.array([-0.8132, -0.2327, 0.0734])
+    assert np.linalg.solve(yields[:2, :2], -pulls[:2]).min() < 0.0 < np.linalg.solve(yields[:2, :2], -presses[:2]).min()
+    assert chains._cycle(pulls, yields, e, pairs)[0] == []
+    assert [group.tolist() for group in chains._cycle(presses, yields, e, pairs)[0]] == [[2], [0, 1]]

@@ -134,10 +134,15 @@ def _next(u: Array, pairs: Indices) -> Indices:
     return meets if certain else meets[:0]
 
 
+def _impulses(group: Indices, yields: Array, e: Array) -> Array:
+    """Matrix (g, g) from the velocities of a group of contacts to the impulses of their impact [kg]."""
+    return -np.linalg.pinv(yields[np.ix_(group, group)]) * (1.0 + e[group])
+
+
 def _answer(group: Indices, yields: Array, e: Array) -> Array:
     """Matrix (c, c) that an impact of a group of contacts multiplies velocities by."""
     found = np.eye(len(e))
-    found[:, group] -= yields[:, group] @ np.linalg.pinv(yields[np.ix_(group, group)]) * (1.0 + e[group])
+    found[:, group] += yields[:, group] @ _impulses(group, yields, e)
     return found
 
 
@@ -147,7 +152,7 @@ def _cycle(u: Array, yields: Array, e: Array, pairs: Indices) -> tuple[Groups, A
     past: list[Array] = []
     for _ in range(FOLLOWED):
         group = _next(u, pairs)
-        if not len(group):
+        if not len(group) or (_impulses(group, yields, e) @ u[group] < 0.0).any():  # contacts do not pull
             break
         for p in range(1, min(LONGEST, len(groups)) + 1):
             struck = np.unique(np.concatenate(groups[-p:]))
