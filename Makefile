@@ -9,7 +9,7 @@ SUITE ?= quick
 comma := ,
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-long recipe extras soak lint setup publish apart releases tune cures mutants mutants-check mutants-sample detection tables clean
+.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants mutants-check mutants-sample detection tables clean
 
 setup: $(STAMP)
 
@@ -40,11 +40,11 @@ REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys
 # Kernels are compiled first, once per dimension: tests side by side would each compile the same.
 test: $(STAMP)
 	$(BIN)/crosscheck compile --engine reference
-	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto
+	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto --dist loadfile
 
-# What takes minutes of CPU in one test: all faults in all scenes, the largest piles.
-test-long: $(STAMP)
-	CROSSCHECK_LONG=1 CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) $(BIN)/python -m pytest -n auto -m long
+# Everything there is, before an issue is called resolved.
+test-all: export CROSSCHECK_ALL = 1
+test-all: test
 
 # An engine made by CONTRIBUTING's recipe, from our wheel in a fresh environment; some 80 s of CPU.
 recipe: $(STAMP)

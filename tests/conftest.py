@@ -7,6 +7,8 @@ import json
 import os
 import sys
 import textwrap
+from collections import defaultdict
+from hashlib import sha1
 
 import pytest
 from click.testing import CliRunner
@@ -22,26 +24,44 @@ from validation.workers.limits import LimitError
 
 #: Runs tests of planted files, which must fail (`test_conftest.py`).
 pytest_plugins = ("pytester",)
+#: Whether all tests run (`make test-all`), or what `make test` has time for.
+ALL = bool(os.environ.get("CROSSCHECK_ALL"))
 # Hypothesis fails an example that takes 200 ms: on a busy machine that says nothing of the code.
-settings.register_profile("without_deadline", deadline=None)
-settings.load_profile("without_deadline")
+settings.register_profile("few", deadline=None, max_examples=25)
+settings.register_profile("all", deadline=None, max_examples=300)
+settings.load_profile("all" if ALL else "few")
 
 
 def pytest_configure(config):
     """Without its engines whole files are skipped: where they are required, that is a failure and not a skip."""
-    config.addinivalue_line("markers", "long: minutes of CPU, run by `make test-long`")
+    config.addinivalue_line("markers", "long: takes seconds of CPU or more; `make test-all` runs it")
+    config.addinivalue_line("markers", "few(n): `make test` runs n cases of a parametrized test, `make test-all` all")
     try:
         registry.check_required()
     except EngineError as error:
         raise pytest.UsageError(str(error)) from None
 
 
-def pytest_collection_modifyitems(items):
-    """Long tests have a command of their own."""
-    if not os.environ.get("CROSSCHECK_LONG"):
-        for item in items:
-            if item.get_closest_marker("long"):
-                item.add_marker(pytest.mark.skip(reason="minutes of CPU: make test-long"))
+def pytest_collection_modifyitems(config, items):
+    """Leave out what `make test` has no time for: long tests, and all but some cases of a test of many.
+
+    The cases that stay are chosen by the hash of their names, so that they are spread over all parameters and are the
+    same each time. A test that the command line names runs.
+    """
+    if ALL:
+        return
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("few"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    out = {item for item in items if item.get_closest_marker("long")}
+    for own in cases.values():
+        number = own[0].get_closest_marker("few").args[0]
+        out.update(sorted(own, key=lambda item: sha1(item.nodeid.encode()).digest())[number:])
+    named = {str(argument) for argument in config.args}
+    out = {item for item in out if not named & {item.nodeid, item.nodeid.partition("[")[0]}}
+    config.hook.pytest_deselected(items=[item for item in items if item in out])
+    items[:] = [item for item in items if item not in out]
 
 
 @pytest.fixture(scope="module", autouse=True)

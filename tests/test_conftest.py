@@ -92,3 +92,37 @@ def shared():
     result = planted(pytester, "pass", shared)
     result.assert_outcomes(passed=2, errors=2)
     result.stdout.fnmatch_lines(["ERROR *::test_one*", "ERROR *::test_two*"])
+
+
+@pytest.mark.parametrize(
+    ("every", "asked", "passed"),
+    [
+        ("", (), 3),
+        ("", ("reports/test_many.py::test_long",), 1),
+        ("1", (), 8),
+        ("", ("reports/test_many.py::test_many",), 6),
+    ],
+)
+def test_long_tests_and_most_cases_of_many_run_when_all_do_or_when_they_are_named(
+    pytester, monkeypatch, every, asked, passed
+):
+    monkeypatch.setenv("CROSSCHECK_ALL", every)
+    monkeypatch.delenv("CROSSCHECK_REQUIRE_ENGINES", raising=False)
+    pytester.makeconftest((HERE / "conftest.py").read_text(encoding="utf-8"))
+    (pytester.mkdir("reports") / "test_many.py").write_text("""
+import pytest
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("k", range(6))
+def test_many(k):
+    pass
+
+@pytest.mark.long
+def test_long():
+    pass
+
+def test_short():
+    pass
+""")
+    result = pytester.runpytest_subprocess(*OPTIONS, *asked)
+    result.assert_outcomes(passed=passed, deselected=8 - passed if not asked else 0)

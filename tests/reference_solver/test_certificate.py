@@ -65,7 +65,7 @@ def kinetic_energy(simulation):
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 3.0), st.floats(0.0, 2.0))
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_the_cone_projection_is_moreaus(normal, size, mu):
     """z = P(z) + rest with P(z) in the cone, the rest in its polar cone, and both orthogonal (Moreau 1962)."""
     n, t = into_cone(normal, size, mu)
@@ -76,7 +76,7 @@ def test_the_cone_projection_is_moreaus(normal, size, mu):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
     """What enumeration finds has no defect, whichever of open, stick and slip it is; a wrong answer has one."""
     random = np.random.default_rng(seed)

@@ -36,7 +36,7 @@ def violation(w, q, mu, solution):
 
 
 @pytest.mark.parametrize("contacts", [1, 2, 3])
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10**6), mu=st.floats(0.05, 0.5))
 def test_every_solution_satisfies_coulombs_law(contacts, seed, mu):
     w, q = random_problem(seed, contacts)
@@ -46,7 +46,7 @@ def test_every_solution_satisfies_coulombs_law(contacts, seed, mu):
     assert max(violation(w, q, mu, s) for s in solutions) <= 1e-9 * max(1.0, scale, np.linalg.cond(w))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10**6))
 def test_a_smooth_problem_has_one_velocity_and_it_minimises_the_energy(seed):
     rng = np.random.default_rng(seed)
@@ -117,7 +117,7 @@ def test_a_problem_scaled_by_mass_ratios_has_the_same_modes():
     assert one.modes == other.modes
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10**6))
 def test_non_negative_least_squares_meets_its_optimality_conditions(seed):
     rng = np.random.default_rng(seed)

@@ -47,7 +47,7 @@ def spatial(*bodies, e=0.0, mu=0.0, gravity=(0.0, 0.0, -G)):
     return EventDriven(Model(3, bodies, gravity, np.float64(e), np.float64(mu)))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-3, 3), st.floats(0.1, 5), st.floats(-20, 20), st.floats(0, 1), st.floats(0.01, 2))
 def test_an_oblique_disc_sticks_or_slips_as_the_closed_form_says(vt, vn, spin, e, mu):
     radius, k = 0.5, 0.5

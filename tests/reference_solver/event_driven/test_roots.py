@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from reference_solver.compilation import kernel
@@ -23,7 +23,6 @@ def first_root(coefficients):
     return quartic(work)
 
 
-@settings(deadline=None)
 @given(st.floats(1e-12, 1e3), st.floats(-1e3, 1e3), st.floats(-100.0, -1e-3))
 def test_a_falling_gap_closes_within_round_off_of_the_exact_root(gap, rate, pull):
     t = Fraction(first_fall(gap, rate, pull))
@@ -47,7 +46,6 @@ def test_an_exact_graze_is_a_miss():
     assert first_fall(1.0, -2.0, 2.0) == math.inf
 
 
-@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.floats(-5.0, 5.0), min_size=4, max_size=4))
 def test_the_first_fall_of_a_quartic_is_the_first_root_with_falling_sign(roots):
     coefficients = np.polynomial.polynomial.polyfromroots(roots)

@@ -65,7 +65,7 @@ pairs = st.tuples(st.sampled_from(sorted(SHAPES)), st.sampled_from(["capsule", "
 
 
 @given(pairs, st.booleans(), numbers, numbers, numbers, numbers)
-@hypothesis_settings(max_examples=400, deadline=None, derandomize=True)
+@hypothesis_settings(derandomize=True)
 def test_contacts_lie_along_the_axis_of_least_overlap(pair, swapped, x, y, angle_a, angle_b):
     """No direction separates better than the normal; the least gap is the separation along it.
 
@@ -98,7 +98,7 @@ def test_contacts_lie_along_the_axis_of_least_overlap(pair, swapped, x, y, angle
 
 
 @given(st.sampled_from(["capsule", "triangle", "hexagon"]), numbers, numbers)
-@hypothesis_settings(max_examples=60, deadline=None, derandomize=True)
+@hypothesis_settings(derandomize=True)
 def test_half_space_touches_the_ends_of_the_facing_edge(name, angle, tilt):
     normal = turned(tilt, [[0.0, 1.0]])[0]
     plane = Body(HalfSpace(tuple(normal), 0.25), motion="fixed")

@@ -77,7 +77,7 @@ SHAPES = {"sphere": Sphere(0.3), "capsule": Capsule(0.5, 0.25), "box": Box((0.5,
 
 
 @given(st.sampled_from(sorted(SHAPES)), st.booleans(), st.tuples(numbers, numbers, numbers), turns, turns)
-@hypothesis_settings(max_examples=150, deadline=None, derandomize=True)
+@hypothesis_settings(derandomize=True)
 def test_contacts_lie_along_the_axis_of_least_overlap(name, swapped, place, turn_a, turn_b):
     """The gap is the separation along the normal, and no direction separates better.
 

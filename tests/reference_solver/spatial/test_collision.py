@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from hypothesis import assume, event, example, given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
@@ -65,7 +64,6 @@ places = st.tuples(numbers, numbers, numbers)
 
 @example((0.5, 0.38, 0.7), (0.47, 1.0, 1.0), (-0.188, 0.0, 0.98), (0.0, 0.5, 0.625, 0.0), (0.375, 0.0, 0.367, 0.0))
 @given(halves, halves, places, turns, turns)
-@hypothesis_settings(max_examples=300, deadline=None)
 def test_box_contacts_appear_along_the_axis_of_least_overlap(half_a, half_b, place, turn_a, turn_b):
     a, b = (half_a, (0.1, -0.2, 0.3), turn_a), (half_b, np.multiply(place, 1.5), turn_b)
     gaps, _ = separations(a, b)
@@ -94,7 +92,6 @@ def test_box_contacts_appear_along_the_axis_of_least_overlap(half_a, half_b, pla
 # Centres side by side along the normal: round-off must not choose which way it points.
 @example((1.0, 1.0, 1.0), (1.0, 0.5, 0.25), (0.125, 0.0, 0.0), (0, 1, 1, 1), (0, 0, 0, 1), (0, 1, 0, 1), (0, 0, 0))
 @given(halves, halves, places, turns, turns, turns, places)
-@hypothesis_settings(max_examples=200, deadline=None)
 def test_contacts_move_with_the_bodies(half_a, half_b, place, turn_a, turn_b, motion, shift):
     """Turning and shifting both boxes turns and shifts normal and points, and keeps gaps and features."""
     a, b = (half_a, (0.0, 0.0, 0.0), turn_a), (half_b, place, turn_b)
@@ -115,7 +112,6 @@ def test_contacts_move_with_the_bodies(half_a, half_b, place, turn_a, turn_b, mo
 
 
 @given(halves, halves, places, turns, turns)
-@hypothesis_settings(max_examples=200, deadline=None)
 def test_exchanging_the_bodies_turns_the_normal_round(half_a, half_b, place, turn_a, turn_b):
     gaps, _ = separations((half_a, (0.0, 0.0, 0.0), turn_a), (half_b, place, turn_b))
     assume(distinct(gaps, min(*half_a, *half_b)))
@@ -171,7 +167,6 @@ def test_a_square_turned_by_45_degrees_keeps_the_corners_that_are_shared(setting
 
 
 @given(halves, halves, st.tuples(numbers, numbers), st.floats(0.05, 1.5), st.booleans(), st.integers(0, 2))
-@hypothesis_settings(max_examples=100, deadline=None)
 def test_a_feature_that_names_two_edges_names_those_that_cross_there(half_a, half_b, place, yaw, below, turned):
     """The contact lies on both lines: whichever of the faces clips, and whichever axes of the boxes stand upright."""
     turn_a = [(1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.5, -0.5, -0.5, -0.5)][turned]
@@ -209,7 +204,6 @@ def test_crossed_edges_touch_where_they_cross():
 
 @given(places, turns, st.tuples(numbers, numbers, numbers).filter(lambda v: math.hypot(*v) > 0.1))
 @example((0.0, 0.0, 0.0), (-0.007, 0.924, 0.522, 0.0), (-0.317, -1.0, -0.383))  # half of the face is flat, half is not
-@hypothesis_settings(max_examples=100, deadline=None)
 def test_a_box_touches_a_half_space_with_its_lowest_corners(place, turn, normal):
     """Corners, their own gaps; those nearly as high as the middle of all are led back to its height (`FLAT`)."""
     half = (0.5, 0.3, 0.2)
@@ -233,7 +227,6 @@ def test_a_box_touches_a_half_space_with_its_lowest_corners(place, turn, normal)
 
 
 @given(places, turns)
-@hypothesis_settings(max_examples=200, deadline=None)
 def test_a_sphere_touches_the_nearest_point_of_a_box(place, turn):
     half, radius = np.array([0.5, 0.3, 0.2]), 0.25
     contacts = touch(body(Box(tuple(half)), (0.0, 0.0, 0.0), turn), body(Sphere(radius), place))

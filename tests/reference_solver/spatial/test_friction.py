@@ -6,7 +6,6 @@ import sys
 import numpy as np
 import pytest
 from hypothesis import assume, given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from reference_solver import Settings
@@ -112,7 +111,6 @@ def upper(k):
 
 
 @given(collision_matrices(), st.tuples(components, components, components), st.floats(0.0, 1.5))
-@hypothesis_settings(max_examples=300, deadline=None)
 def test_the_impulse_of_one_contact_obeys_signorini_and_coulomb(k, q, mu):
     """Whichever branch found the impulse, it must fulfil the law.
 
@@ -132,7 +130,6 @@ def test_the_impulse_of_one_contact_obeys_signorini_and_coulomb(k, q, mu):
 
 
 @given(collision_matrices(), st.tuples(components, components), st.floats(1e-3, 2.0))
-@hypothesis_settings(max_examples=200, deadline=None)
 def test_disc_friction_dissipates_more_than_any_other_impulse_of_the_disc(k, g, radius):
     def cost(p):
         return 0.5 * p @ k[:2, :2] @ p + p @ np.array(g)
