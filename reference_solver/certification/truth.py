@@ -136,10 +136,12 @@ class Certificate:
         """Return what coordinates of the size ``place`` [m] move a body in any run of the scene (s,) [m].
 
         Gaps and places are known to some units in the last place, anew in every step: that is a speed of as much in a
-        step, and moves bodies as the disturbance does, or `OTHER_SIGNS` times as far. Bodies touch at a gap of `GAP`,
-        wherever they are.
+        step, and moves bodies as the disturbance does, or `OTHER_SIGNS` times as far. Where a disturbance of velocities
+        dies out, places still add up the ways of all steps: each sum is rounded by half a unit, in each of two runs.
+        Bodies touch at a gap of `GAP`, wherever they are.
         """
-        steps = COORDINATE_UNITS * np.spacing(place) * (1.0 + OTHER_SIGNS * self.disturbed / self.dt)
+        units = COORDINATE_UNITS * (1.0 + OTHER_SIGNS * self.disturbed / self.dt) + self.t / self.dt
+        steps = np.spacing(place) * units
         grazed = sqrt((self.gap + COORDINATE_UNITS * np.spacing(place)) / self.gap) * self.grazed
         return np.maximum.accumulate(steps + grazed + self.gap * (1.0 + np.minimum(self.growth, GROWTH)))
 

@@ -68,6 +68,13 @@ def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
     assert {row.physics for row in rows_of("run", [found])} == {"pass"}
 
 
+@pytest.mark.parametrize("rate", [480, 960])
+def test_what_sums_of_ways_are_rounded_by_far_from_the_origin_refuses_no_certificate(rate):
+    """A prescribed box pushes a column; friction ends all disturbances, but each step rounds the places of both."""
+    found = execute(Slot("shove", (("angle", 45.0),), 2, "reference", "reference", 1 / rate))
+    assert found.outcome is Outcome.OK, found.certificate["reasons"]
+
+
 @pytest.mark.long
 def test_eight_blocks_that_fall_off_each_other_are_located_throughout_and_certified():
     """Slips of 5e-11 m/s end in a stack that rocks: a projection that takes them out leaves 4e-11 of a cone."""
