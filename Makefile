@@ -6,10 +6,11 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= crosscheck-out
 SUITE ?= quick
+CONSTRAINTS ?= -c constraints.txt
 comma := ,
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants mutants-check mutants-sample detection tables clean
+.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants mutants-sample detection tables size nightly clean
 
 setup: $(STAMP)
 
@@ -17,7 +18,7 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no working python3.11 or python3 on PATH"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" -c constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" $(CONSTRAINTS)
 	@touch $@
 
 # The verdicts decide the exit status; time and report are made whatever they are. Matrix and report's path come last,
@@ -45,6 +46,24 @@ test: $(STAMP)
 # Everything there is, before an issue is called resolved.
 test-all: export CROSSCHECK_ALL = 1
 test-all: test
+
+# What takes hours: everything there is, other versions of Python (PyBullet has no wheels for them), and the newest
+# releases of all that we need instead of those that `constraints.txt` names.
+nightly: test-all soak
+	$(BIN)/crosscheck certify
+	for version in 3.12 3.13; do \
+		$(MAKE) test PYTHON=python$$version VENV=.venv-$$version || exit 2; \
+	done
+	$(MAKE) test VENV=.venv-newest CONSTRAINTS=
+
+# Lines of Python by room.
+size:
+	@for room in reference_solver adapters validation reports tests; do \
+		for part in $$room $$room/*/; do \
+			git ls-files "$${part%/}/*.py" | xargs -r cat | wc -l | xargs printf '%-40s %7d\n' "$${part%/}"; \
+		done; \
+	done
+	@git ls-files tests/tables/kept | xargs cat | wc -l | xargs printf '%-40s %7d\n' "kept text of tests"
 
 # An engine made by CONTRIBUTING's recipe, from our wheel in a fresh environment; some 80 s of CPU.
 recipe: $(STAMP)
@@ -112,11 +131,6 @@ clean:
 mutants: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
 	$(BIN)/python tests/mutation/run.py $(MODULES)
-
-# A sample of them, chosen by the commit: only a survivor that is not listed is a failure.
-mutants-check: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
-	$(BIN)/python tests/mutation/run.py --check 40
 
 # N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 40 min of CPU at first, to
 # see which tests reach which statements, then half a minute a mutant.
