@@ -73,7 +73,7 @@ NEXT_TO_NOTHING = 1e-4
 SAFETY = 0.8
 #: Attempts to find a length whose error is small enough, and a step without a second change of modes inside.
 LENGTHS = 24
-#: Attempts more for each contact: it may begin and end to slip, part and return, and change its features, several times.
+#: Attempts more for each contact: it may begin to slip, stick, part, return and change its features, some of it twice.
 CHANGES = 8
 #: Steps in search of the end of a mode.
 SEARCHES = 40
