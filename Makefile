@@ -10,7 +10,7 @@ CONSTRAINTS ?= -c constraints.txt
 comma := ,
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants mutants-sample detection tables size nightly clean
+.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants detection tables size nightly clean
 
 setup: $(STAMP)
 
@@ -127,18 +127,20 @@ cures: $(STAMP)
 clean:
 	rm -rf $(VENV) $(OUT) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 
-# Mutation score and survivors of the modules that changed since their last run (tests/mutation); a minute a module.
+# How many of N changes of the code, drawn by a seed, do the tests notice? KERNELS=1: of the solver's kernels. What tests
+# reach is recorded first, by `make test`, or with CROSSCHECK_ALL=1 by all tests: half an hour of CPU; then a change costs
+# half a minute. Remove `.coverage*` when the code has changed.
+N ?= 60
+SEED ?= 1
+RECORD := .coverage$(if $(KERNELS),.kernels)$(if $(CROSSCHECK_ALL),.all)
+mutants: export COVERAGE_FILE = $(RECORD)
+mutants: export NUMBA_DISABLE_JIT = $(KERNELS)
 mutants: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
-	$(BIN)/python tests/mutation/run.py $(MODULES)
-
-# N mutants of all modules by a seed: the share that the tests notice, with its interval. Some 40 min of CPU at first, to
-# see which tests reach which statements, then half a minute a mutant.
-N ?= 150
-SEED ?= 1
-mutants-sample: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
-	$(BIN)/python tests/mutation/run.py --sample $(N) --seed $(SEED)
+	test -f $(RECORD) || $(BIN)/python -m pytest -n auto --dist loadfile -q --cov-context=test --cov-report= \
+		$(if $(KERNELS),tests/reference_solver --timeout 60 --cov=reference_solver,--cov=adapters --cov=validation --cov=reports) \
+		|| test -f $(RECORD)
+	$(BIN)/python tests/mutation/mutants.py --record $(RECORD) --seed $(SEED) --count $(N) $(if $(KERNELS),--kernels)
 
 # What every check and receipt can see, from faults planted in our solver, which passes them all; three minutes of CPU.
 detection: $(STAMP)
