@@ -133,14 +133,14 @@ clean:
 N ?= 60
 SEED ?= 1
 RECORD := .coverage$(if $(KERNELS),.kernels)$(if $(CROSSCHECK_ALL),.all)
+PLAIN := $(if $(KERNELS),NUMBA_DISABLE_JIT=1)
 mutants: export COVERAGE_FILE = $(RECORD)
-mutants: export NUMBA_DISABLE_JIT = $(KERNELS)
 mutants: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutants]" -c constraints.txt
-	test -f $(RECORD) || $(BIN)/python -m pytest -n auto --dist loadfile -q --cov-context=test --cov-report= \
+	test -f $(RECORD) || $(PLAIN) $(BIN)/python -m pytest -n auto --dist loadfile -q --cov-context=test --cov-report= \
 		$(if $(KERNELS),tests/reference_solver --timeout 60 --cov=reference_solver,--cov=adapters --cov=validation --cov=reports) \
 		|| test -f $(RECORD)
-	$(BIN)/python tests/mutation/mutants.py --record $(RECORD) --seed $(SEED) --count $(N) $(if $(KERNELS),--kernels)
+	$(PLAIN) $(BIN)/python tests/mutation/mutants.py --record $(RECORD) --seed $(SEED) --count $(N) $(if $(KERNELS),--kernels)
 
 # What every check and receipt can see, from faults planted in our solver, which passes them all; three minutes of CPU.
 detection: $(STAMP)
