@@ -70,7 +70,7 @@ ALONE = 200.0
 #: Exit status of pytest where a test that is named is not there.
 NOT_FOUND = 4
 #: Package -> the kept tables that hold something of most that it does.
-TABLES = {"validation": ("scenes", "results"), "adapters": ("engines", "laws"), "reports": ("commands", "pages")}
+TABLES = {"validation": ("scenes",), "adapters": ("engines", "laws"), "reports": ("screens",)}
 #: Exit statuses where a test file cannot even be collected, or pytest itself ended in an error.
 BROKEN = (2, 3, NOT_FOUND)
 
