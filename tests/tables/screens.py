@@ -1,4 +1,4 @@
-"""Six screens that a user sees most, as they are printed: five of the run that is kept (`kept_run`), one of a run."""
+"""Six screens that a user sees most, as they are printed; the run that most of them tell of is kept (`kept_run`)."""
 
 from __future__ import annotations
 
