@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.probes import PROBES, Case
+from adapters.probes import HALF_EXTENTS, LANDING_LEAD, LANDING_SPEED, PROBES, Case
 from adapters.trajectory import ContactRecord, Trajectory
+from validation.geometry import separation
 
 STEPS = 24
 
@@ -37,3 +38,19 @@ def test_a_motion_that_tells_nothing_is_read_without_a_warning(name, dimension, 
             found = PROBES[name].read(case, scene, resting(scene, told, moved))
         assert set(found) <= set(PROBES[name].quantities)
         assert all(isinstance(number, float) for numbers in found.values() for number in numbers)
+
+
+@pytest.mark.parametrize(("dimension", "faces"), [(2, "xz"), (3, "xyz")])
+def test_what_lands_is_all_at_one_height_and_each_box_on_another_face_by_the_shortest_turn(dimension, faces):
+    case = Case(dimension, 0.5, 0.5, 1 / 240, 0.5)
+    floor, ball, *boxes = PROBES["landing"].make(case).bodies
+    for body in (ball, *boxes):
+        poses = [np.array([each.pose]) for each in (floor, body)]
+        gap = separation(floor.shape, poses[0], body.shape, poses[1])[0]
+        assert float(gap) == pytest.approx(LANDING_LEAD * LANDING_SPEED / 240, abs=1e-12)
+        turn = body.pose[2:] if dimension == 2 else (2.0 * math.acos(body.pose[3]),)
+        assert abs(turn[0]) <= 0.5 * math.pi + 1e-12
+    heights = [box.pose[dimension - 1] for box in boxes]
+    halves = dict(zip("xyz", HALF_EXTENTS, strict=True))
+    assert np.diff(heights) == pytest.approx(np.diff([halves[axis] for axis in faces]), abs=1e-12)
+    assert [box.name for box in boxes] == [f"box {axis}" for axis in faces]

@@ -141,13 +141,22 @@ def page_source(page_folder):
 
 
 @pytest.fixture(scope="session")
-def page_file(page_source, tmp_path_factory) -> Path:
-    """The page itself."""
-    from reports.page import render
+def page_made(page_source, tmp_path_factory) -> tuple[Path, list[dict]]:
+    """The page, and the specifications of its charts as they were drawn."""
+    from reports.page import charts, render
 
-    path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render(page_source), encoding="utf-8")
-    return path
+    path, specs = tmp_path_factory.mktemp("report") / "report.html", []
+    draw = charts.vl_convert.vegalite_to_svg
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(charts.vl_convert, "vegalite_to_svg", lambda spec: (specs.append(spec), draw(spec))[1])
+        path.write_text(render(page_source), encoding="utf-8")
+    return path, specs
+
+
+@pytest.fixture(scope="session")
+def page_file(page_made) -> Path:
+    """The page itself."""
+    return page_made[0]
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import zlib
+from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -95,6 +96,43 @@ def test_no_attribute_carries_code_or_style_or_an_address_elsewhere(elements):
         for name in ("src", "href", "action", "data", "poster", "srcset"):
             target = attributes.get(name)
             assert target is None or target.startswith(("#", "data:application/")), (tag, target[:80])
+
+
+def test_every_link_within_the_page_leads_to_the_one_element_of_its_name(elements):
+    names = Counter(attributes["id"] for _, attributes in elements.tags if "id" in attributes)
+    links = {a["href"][1:] for _, a in elements.tags if a.get("href", "").startswith("#")}
+    assert [name for name, count in names.items() if count > 1 or name in ("", "None")] == []
+    assert links - {""} <= set(names) and len(links) > 20
+
+
+def views(spec, data=None):
+    """Every view of a chart that has channels, with the rows that it draws."""
+    data = spec.get("data", data)
+    if "encoding" in spec:
+        yield spec["encoding"], data
+    for key in ("layer", "hconcat", "vconcat", "concat"):
+        for each in spec.get(key, ()):
+            yield from views(each, data)
+
+
+def test_every_channel_of_a_chart_draws_a_column_of_its_rows_and_every_axis_says_what_it_is(page_made):
+    """What is drawn of a column that is not there is nothing, and no error."""
+    looked = Counter()
+    for spec in page_made[1]:
+        for encoding, data in views(spec):
+            rows = spec["datasets"][data["name"]]
+            for name, channel in encoding.items():
+                for each in channel if isinstance(channel, list) else [channel]:
+                    if "field" not in each:
+                        continue
+                    values = [row[each["field"]] for row in rows]
+                    assert any(value is not None for value in values), (name, each)
+                    if each.get("type") == "quantitative":
+                        assert all(value is None or isinstance(value, int | float) for value in values), (name, each)
+                    if name in ("x", "y") and "axis" in each and each["axis"] is not None:
+                        assert each["axis"].get("title") or each.get("title"), (name, each)
+                    looked[name] += 1
+    assert min(looked[name] for name in ("x", "y", "color", "description")) > 5, looked
 
 
 def test_the_policy_names_exactly_the_one_style_and_the_one_script_of_the_page(elements):

@@ -424,6 +424,7 @@ def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
     for said in ("h_n = e^(2n) h0", "apex[1] = 0.25 m", "step 1/120 s", "crosscheck run bounce --param e=0.5 --dim 2"):
         assert said in done.stdout
     assert f"DT, STEPS = {1 / 120!r}" in done.stdout
+    assert re.search(r"apex\[1\] = 0.25 m within [\d.e+-]+ m: ", done.stdout)
 
 
 def test_the_head_names_a_scene_file_by_its_path_where_it_points_to_all_checks_and_to_who_judges(tmp_path):

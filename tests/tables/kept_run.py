@@ -1,4 +1,4 @@
-"""A results folder that is always the same: runs, a bench, replays, as one text that is kept.
+"""A results folder that is always the same: runs and a bench, as one text that is kept.
 
     python tests/tables/kept_run.py
 
@@ -8,7 +8,6 @@ changes by no release; judged it is anew wherever it is read. Times and ends tha
 
 from __future__ import annotations
 
-import base64
 import json
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -16,13 +15,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from adapters.trajectory import load_trajectory
 from validation.bench.timing import Timing
-from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare, slot_from_dict
+from validation.cells import Observation, Outcome, Slot, observation_from_dict
 from validation.posed import is_file, pinned, primary_of, remember, texts_of
 from validation.records.store import Store
 from validation.running.execution import execute
-from validation.running.tracks import record
 
 FILE = Path(__file__).parent / "run" / "store.jsonl"
 DT = 1 / 240
@@ -87,10 +84,6 @@ def _put(store: Store, line: Mapping[str, Any], texts: Mapping[str, Any]) -> Non
     if line["protocol"]:
         store.add_timings(run, timings())
         store.set_protocol(run, line["protocol"])
-    with store.writing() as database:
-        for slot, body in line["recordings"]:
-            row = (run.id, slot_from_dict(slot).key(), json.dumps(slot), base64.b64decode(body))
-            database.execute("INSERT INTO recordings VALUES (?, ?, ?, ?)", row)
 
 
 def _whole(body: Mapping[str, Any], texts: Mapping[str, Any]) -> dict[str, Any]:
@@ -142,7 +135,7 @@ def line_of(
                 body[field] = f"@{key}"
         bodies.append(body)
     scenes = texts_of(observation.slot.scene for observation in found)
-    empty: dict[str, Any] = {"lost": [], "protocol": {}, "recordings": []}
+    empty: dict[str, Any] = {"lost": [], "protocol": {}}
     return {"run": name, "date": date, "title": title, "scenes": scenes, "observations": bodies} | empty | more
 
 
@@ -180,15 +173,7 @@ def main() -> None:
         folder = Path(name)
         (folder / "drop.toml").write_text(SCENE_FILE, encoding="utf-8")
         own = pinned(str(folder / "drop.toml"))
-        found, replays = list[Observation](), list[Any]()
-        shown = {Slot("bounce", (), 2, *who, DT) for who in SERIES[3:6]} | {Slot("impact", (), 3, *SERIES[5], DT)}
-        for slot in [*slots(), Slot(own, (), 2, "chipmunk", "tuned", DT)]:
-            path = folder / f"{slot.key()}.npz" if slot in shown else None
-            found.append(execute(slot, path))
-            if path is not None and path.exists():
-                made = prepare(slot)
-                told = record(made.canonical, made.scene, load_trajectory(path)).to_bytes()
-                replays.append([slot.as_dict(), base64.b64encode(told).decode()])
+        found = [execute(slot) for slot in [*slots(), Slot(own, (), 2, "chipmunk", "tuned", DT)]]
         benched = [
             execute(Slot("impact", tuple(params.items()), 2, *who, dt))
             for who in SERIES for dt in (1 / 60, 1 / 240) for params in primary_of("impact").variations(dt)[:3]
@@ -200,7 +185,7 @@ def main() -> None:
         line_of("20260102-000000", "2026-01-02T00:00:00+00:00", "bench quick: impact", benched, texts,
                 protocol={"mode": "quick", "seed": 1, "clock": "CPU time", "load_before": [0.1, 0.2]}),
         line_of("20260103-000000", "2026-01-03T00:00:00+00:00", "quick", [*found, *ended_badly()], texts,
-                lost=["0123456789abcdef"], recordings=replays),
+                lost=["0123456789abcdef"]),
         *(line_of(f"2026010{4 + k}-000000", f"2026-01-0{4 + k}T00:00:00+00:00", f"release mujoco=={version}: impact",
                   [_moved(replace(each, engine_version=version), m if k else 1) for m, each in enumerate(found)
                    if each.slot.engine == "mujoco" and each.slot.scene in ("impact", "slide")], texts)

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import islice
 
 import numpy as np
+from of_other_worlds import speaks
 from of_scenes import cells
 from telling import Sections, word
 
@@ -15,6 +16,8 @@ from validation.catalogue import CATALOGUE
 ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
 #: Engines that are set apart, whose laws need no engine; Newton's take twenty seconds, and have tests of their own.
 APART = ("box2d", "box2d3", "rapier", "dart", "drake", "physx")
+#: Engines whose laws are asked in other worlds: ours, and one whose laws are those of all engines of single numbers.
+ASKED_ELSEWHERE = (*ENGINES, "box2d")
 #: Step of the predictions [s], and cells of a scene in each dimension.
 DT, CELLS = 1 / 240, 3
 
@@ -25,11 +28,11 @@ def scenes(engine: str) -> list[str]:
 
 
 def table(engine: str, name: str) -> Sections:
-    """Predicted values and bands of one scene."""
+    """Predicted values and bands of one scene, and in which other worlds its laws speak."""
     canonical, found = CATALOGUE[name], Sections()
     laws = [law for law in laws_of(engine) if law.scene == name]
     for dimension in canonical.dimensions:
-        own = (cell for cell in cells(canonical) if cell[1] == dimension)
+        own = (cell for cell in cells(canonical, "standard") if cell[1] == dimension)
         for title, _, params in islice(own, CELLS):
             scene = canonical.scene(dimension, params)
             found[title] = {}
@@ -44,4 +47,6 @@ def table(engine: str, name: str) -> Sections:
     found["beside its cells"] = {
         f"{'/'.join(law.profiles)} {law.metric}": f"{law.because} ({law.source})" for law in laws
     }
+    if engine in ASKED_ELSEWHERE:
+        found["speaks"] = speaks(engine, name)
     return found

@@ -1,28 +1,30 @@
-"""Tables of where laws speak: the scene of each in worlds a little otherwise, in most of which a law must be silent.
+"""Worlds a little other than a scene, and in which of them each law says something: in most it must be silent.
 
 A law computes a motion from what it takes for granted: two bodies, a level face, no load, no spin. Here one thing after
-the other is not so; what a law says there is kept, be it a number or nothing. No engine runs.
+the other is not so. No engine runs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
-from of_laws import DT, ENGINES, scenes
-from telling import Sections, word
 
 from adapters.engine_folder import laws_of
+from adapters.law import Deviation
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, SceneError, Sphere
+from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE
 
+#: Step of the predictions [s].
+DT = 1 / 240
 #: Longest run that is asked [s]: what is kept is whether a law speaks, and of what it hangs on.
 LONGEST = 0.1
 #: Shorter where a law solves a problem of many contacts at each step.
-SHORTER = {"overhang": 0.02}
+SHORTER = {"overhang": 0.005, "stack": 0.02}
 #: Longer steps, of which a scene is asked as it is [s]; no share of the run is one of them.
 LONGER = 1 / 144
 #: Rotation of all that is turned: three, four, five.
@@ -95,32 +97,43 @@ def worlds(scene: Scene) -> Iterator[tuple[str, Callable[[], Scene]]]:
     yield "all others of another material", lambda: replace(scene, pairs=(own, Pair(restitution=0.875, friction=0.625)))
 
 
-def table(engine: str, name: str) -> Sections:
-    """What laws of one scene say in each world, in the plane and in space."""
-    canonical, found = CATALOGUE[name], Sections()
-    laws = [law for law in laws_of(engine) if law.scene == name]
+def speaks(engine: str, name: str) -> dict[str, str]:
+    """In which worlds laws of one scene say something: by that, whose metrics."""
+    canonical, metrics = CATALOGUE[name], dict[tuple[str, str], dict[str, None]]()
     for dimension in canonical.dimensions:
         whole = canonical.scene(dimension, canonical.representative)
         scene = replace(whole, duration=min(whole.duration, SHORTER.get(name, LONGEST)))
         asked = [(title, make, DT) for title, make in worlds(scene)]
-        for title, make, dt in (*asked, ("at longer steps", lambda scene=scene: scene, LONGER)):
-            try:
-                world = make()
-            except SceneError:
-                continue
-            own = {}
-            for law in laws:
-                with np.errstate(all="ignore"):
-                    try:
-                        said = law.says(world, dt, canonical.measure)
-                    except Exception:  # what the scene's own measure cannot tell of it
-                        continue
-                text = "says nothing" if said is None else f"{word(said[0])} +- {word(said[1])}"
-                own[f"{'/'.join(law.profiles)} {law.metric}"] = text
-            found[f"{dimension}-D {title}"] = own
+        asked.append(("at longer steps", asked[0][1], LONGER))
+        said = {title: who for title, make, dt in asked if (who := _speaking(engine, canonical, make, dt)) is not None}
+        for law in (law for law in laws_of(engine) if law.scene == name):
+            line = _line({title: law in who for title, who in said.items()})
+            for profile in law.profiles:
+                metrics.setdefault((line, f"{dimension}-D {profile}"), {})[law.metric] = None
+    found = dict[tuple[str, str], list[str]]()
+    for (line, who), own in metrics.items():
+        found.setdefault((line, ", ".join(own)), []).append(who)
+    return {f"{', '.join(who)}: {own}": line for (line, own), who in found.items()}
+
+
+def _speaking(engine: str, canonical: CanonicalScene, make: Callable[[], Scene], dt: float) -> set[Deviation] | None:
+    """Laws that say something of a world; None of a world that cannot be."""
+    try:
+        world = make()
+    except SceneError:
+        return None
+    found = set()
+    for law in (law for law in laws_of(engine) if law.scene == canonical.name):
+        # Some worlds lack what the scene measures.
+        with np.errstate(all="ignore"), suppress(Exception):
+            if law.says(world, dt, canonical.measure) is not None:
+                found.add(law)
     return found
 
 
-#: Ours, and one of those that are set apart, whose laws are those that engines of single numbers share.
-ASKED = (*ENGINES, "box2d")
-MAKERS = {f"elsewhere/{engine}-{name}": partial(table, engine, name) for engine in ASKED for name in scenes(engine)}
+def _line(speaks: dict[str, bool]) -> str:
+    """The shorter of two lists: where a law speaks, or where it does not."""
+    yes, no = ([title for title, own in speaks.items() if own is which] for which in (True, False))
+    if len(no) < len(yes):
+        return f"speaks, but not: {', '.join(no)}" if no else "speaks in all worlds"
+    return f"silent, but: {', '.join(yes)}" if yes else "silent in all worlds"

@@ -1,9 +1,10 @@
 """Things as lines of text that can be kept and compared: ``path = value``, one number or sentence each.
 
-A table is a list of sections. Of cells the first one has all of its lines, a later one those in which it differs from
-the first (one in space from the same in the plane), so that a table says what a parameter changes and a diff of it what
-a change of the code does. Numbers are told to 12
-digits and compared to nine: libraries of mathematics differ in the last place, and sums of a thousand terms in more.
+A table is a list of sections. The first has all of its lines; a later one of its kind (of the same first word: a cell,
+a set of settings) has those in which it differs from the first, so that a table says what a parameter changes. A
+spatial cell is compared with the planar cell of the same parameters, and what changes in the first such pair is
+expected of every later one (`expected`): the third axis of gravity is written once. Numbers have 12 digits and are
+compared to nine: libraries of mathematics differ in the last place, and sums of a thousand terms in more.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from difflib import unified_diff
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -87,18 +89,35 @@ def section(**things: Any) -> dict[str, str]:
     return found
 
 
-def told_from(title: str, sections: Sections) -> dict[str, str]:
-    """Lines of the section that one of this title is told as a difference from."""
-    if not title.startswith(("2-D", "3-D")):
-        return {}
-    return sections.get(title.replace("3-D", "2-D", 1)) or next(iter(sections.values()), {})
+def expected(title: str, sections: Sections) -> dict[str, str]:
+    """Lines that a section of this title is expected to have, given those before it; only the others are written.
+
+    A planar cell: those of the first cell. A spatial cell: those of the planar cell of the same parameters, but lines
+    that the first planar cell has as well change as they do from it to its spatial twin.
+    """
+    head, first = next(iter(sections.items()), ("", {}))
+    twin = sections.get(_in_the_plane(title))
+    if not title.startswith("3-D") or twin is None:
+        alike = _in_the_plane(title).partition(" ")[0] == _in_the_plane(head).partition(" ")[0]
+        return first if alike else {}
+    pair = next((name for name in sections if name.startswith("3-D") and _in_the_plane(name) in sections), "")
+    if not pair:
+        return twin
+    flat, space = sections[_in_the_plane(pair)], sections[pair]
+    as_there = {path: space.get(path, ABSENT) for path in flat if twin.get(path) == flat[path]}
+    added = {path: told for path, told in space.items() if path not in flat and path not in twin}
+    return {path: told for path, told in (twin | as_there | added).items() if told != ABSENT}
+
+
+def _in_the_plane(title: str) -> str:
+    return title.replace("3-D", "2-D", 1)
 
 
 def as_text(sections: Sections) -> str:
     """The table as it is kept."""
     out, told_before = list[str](), Sections()
     for title, own in sections.items():
-        base = told_from(title, told_before)
+        base = expected(title, told_before)
         out.append(f"[{title}]")
         missing = {path: ABSENT for path in base if path not in own}
         out += [f"{path} = {told}" for path, told in (own | missing).items() if base.get(path) != told]
@@ -112,7 +131,7 @@ def from_text(text: str) -> Sections:
     own: dict[str, str] = {}
     for line in text.splitlines():
         if line.startswith("[") and line.endswith("]") and " = " not in line:
-            own = found[line[1:-1]] = dict(told_from(line[1:-1], found))
+            own = found[line[1:-1]] = dict(expected(line[1:-1], found))
         else:
             path, _, told = line.partition(" = ")
             if told == ABSENT:
@@ -166,3 +185,18 @@ def check(name: str, make: Callable[[], Sections], share: float = SHARE, nothing
     found = differences(make(), kept, share, nothing)
     told = "\n".join(found[:20])
     assert not found, f"{len(found)} lines of {name} are others. If that is meant: make tables, and say why\n{told}"
+
+
+def screen_differences(printed: str, kept: str, share: float = 1e-7, nothing: float = 1e-10) -> list[str]:
+    """Lines of a screen that are others, as a diff tells them; numbers in them may differ by what machines do."""
+    now, before = printed.splitlines(), kept.splitlines()
+    if len(now) == len(before):
+        now = [old if agree(new, old, share, nothing) else new for new, old in zip(now, before, strict=True)]
+    return [line for line in unified_diff(before, now, lineterm="", n=0) if not line.startswith(("---", "+++", "@@"))]
+
+
+def check_screen(name: str, make: Callable[[], str]) -> None:
+    """Fail with what differs between a screen and what is printed today."""
+    found = screen_differences(make(), (KEPT / f"{name}.txt").read_text(encoding="utf-8"))
+    told = "\n".join(found[:40])
+    assert not found, f"{name} is printed otherwise. If that is meant: make tables, and say why\n{told}"

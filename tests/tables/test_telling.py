@@ -2,7 +2,8 @@
 
 import pytest
 from made import tables
-from telling import ABSENT, KEPT, agree, as_text, check, differences, from_text, section
+from screens import SCREENS
+from telling import ABSENT, KEPT, agree, as_text, check, differences, from_text, screen_differences, section
 
 CELLS = {
     "2-D": {"mass": "1", "place": "(0, 0.5)", "says": "rests at r"},
@@ -43,7 +44,7 @@ def test_a_table_that_is_not_as_it_was_kept_fails_and_names_the_command():
     kept = from_text((KEPT / f"{name}.txt").read_text(encoding="utf-8"))
     check(name, lambda: kept)
     wrong = {title: dict(own) for title, own in kept.items()}
-    wrong["2-D"]["truth.level_speed"] = "1"
+    wrong["2-D"]["scene.duration"] = "1"
     with pytest.raises(AssertionError, match=r"1 lines of scenes/hilltop are others. If that is meant: make tables"):
         check(name, lambda: wrong)
 
@@ -55,10 +56,31 @@ def test_two_lines_of_one_name_are_an_error():
 
 def test_every_table_that_is_kept_is_made_by_something():
     kept = {str(path.relative_to(KEPT).with_suffix("")) for path in KEPT.rglob("*.txt")}
-    made = set(tables())
+    made = set(tables()) | set(SCREENS)
     assert made <= kept
-    # Tables of engines that are not installed here are kept as well.
-    assert {name.partition("/")[0] for name in kept - made} <= {"settings", "held"}
+    # Settings of engines that are not installed here are kept as well.
+    assert {name.partition("/")[0] for name in kept - made} <= {"settings"}
+
+
+def test_what_the_first_spatial_cell_changes_is_expected_of_later_ones():
+    cells = {
+        "2-D": {"gravity": "(0, -1)", "place": "(0, 0.5)", "turn": "0"},
+        "3-D": {"gravity": "(0, 0, -1)", "place": "(0, 0, 0.5)", "axes": "4"},
+        "2-D e=1": {"gravity": "(0, -1)", "place": "(0, 1)", "turn": "0"},
+        "3-D e=1": {"gravity": "(0, 0, -1)", "place": "(0, 0, 1)", "axes": "4"},
+        "2-D e=2": {"gravity": "(0, -2)", "place": "(0, 0.5)"},
+        "3-D e=2": {"gravity": "(0, 0, -2)", "place": "(0, 0, 0.5)", "turn": "0"},
+    }
+    text = as_text(cells)
+    assert from_text(text) == cells
+    assert text.split("[3-D e=1]\n")[1].split("\n[")[0] == "place = (0, 0, 1)"
+
+
+def test_a_screen_agrees_where_only_last_digits_differ_and_tells_lines_that_are_others():
+    kept = "row a\nerror 1.00000001e-3 m\nend\n"
+    assert screen_differences("row a\nerror 1.00000002e-3 m\nend\n", kept) == []
+    assert screen_differences("row a\nerror 2e-3 m\nend\n", kept) == ["-error 1.00000001e-3 m", "+error 2e-3 m"]
+    assert screen_differences("row a\nend\n", kept) == ["-error 1.00000001e-3 m"]
 
 
 def test_a_band_is_kept_in_its_size_however_narrow_it_is():

@@ -290,6 +290,16 @@ def test_what_scatters_in_the_other_pose_alone_is_a_break_unless_the_map_rounds(
     assert held == {"again", *({*found} & rounding)} - {name for name, change in found.items() if change.refused}
 
 
+def test_a_scene_is_as_large_as_its_free_bodies_lie_apart_along_an_axis_and_the_largest_of_them():
+    def box(name, x, y, half, motion="free"):
+        return Body(name, Box((half, half)), pose=(x, y, 0.0), motion=motion)
+
+    bodies = (box("left", 0.0, 1.0, 0.3), box("right", 4.0, 2.0, 0.5), box("wall", 90.0, 0.0, 9.0, "fixed"))
+    scene = Scene("apart", 1, 2, bodies, (), (0.0, -9.81), 1.0)
+    assert size_of(scene) == pytest.approx(4.0 + 2.0 * math.hypot(0.5, 0.5))
+    assert size_of(replace(scene, bodies=(*bodies, box("high", 1.0, 9.0, 0.1)))) == pytest.approx(8.0 + math.sqrt(2.0))
+
+
 @pytest.mark.parametrize(("share", "holds"), [(0.5, True), (20.0, False)])
 def test_scatter_of_turned_starts_counts_as_that_of_moved_ones(monkeypatch, share, holds):
     """A box that lands flat scatters when it is turned in the last place, and not when it is moved."""

@@ -196,6 +196,9 @@ def test_places_angles_velocities_and_forces_are_shown(tmp_path):
     assert measured["final[ball.fy]"][0] == pytest.approx(9.81)
     shown = {c.metric: c.unit for c in canonical.checks(canonical.scene(2), 0.01) if c.truth is None}
     assert shown["final[ball.fy]"] == "N" and shown["final[ball.angle]"] == "rad"
+    checks = canonical.checks(canonical.scene(2), 0.01)
+    assert {c.source for c in checks if c.truth is None} == {""}  # nobody stated it
+    assert "the file states no number for it" in next(c.because for c in checks if c.metric == "final[ball.fy]")
 
 
 @pytest.mark.parametrize(
