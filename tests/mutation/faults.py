@@ -9,9 +9,10 @@ from __future__ import annotations
 import ast
 import random
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,16 +62,21 @@ def modules(kernels: bool) -> list[str]:
     return [name for name in found if not name.startswith(OPTIONAL)]
 
 
-def mutant_of(module: str, source: random.Random) -> Change | None:
-    """Draw one of mutmut's mutants of a module's functions and methods; None if it has none."""
+def mutants_of(module: str) -> list[Callable[[], Change]]:
+    """All of mutmut's mutants of a module's functions and methods; each costs a moment when it is called for."""
     from mutmut.mutation.file_mutation import create_mutations, deep_replace
 
     plain = (ROOT / module).read_text(encoding="utf-8")
     tree, mutations, _, _ = create_mutations(module, plain)
-    if not mutations:
-        return None
-    mutation = source.choice(mutations)
-    spoilt = deep_replace(tree, mutation.original_node, mutation.mutated_node).code
+    return [
+        lambda each=each: change_to(module, plain, deep_replace(tree, each.original_node, each.mutated_node).code)
+        for each in mutations
+        if each.contained_by_top_level_function
+    ]
+
+
+def change_to(module: str, plain: str, spoilt: str) -> Change:
+    """Describe the mutant of a module by the lines in which both sources differ."""
     old, new = plain.splitlines(), spoilt.splitlines()
     first = next(k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b)
     least = min(len(old), len(new)) - first
@@ -79,8 +85,9 @@ def mutant_of(module: str, source: random.Random) -> Change | None:
     told = " -> ".join(" ".join(line.strip() for line in part) for part in parts)
     functions = [node for node in ast.walk(ast.parse(plain)) if isinstance(node, ast.FunctionDef)]
     around = [f for f in functions if f.lineno <= first + 1 <= (f.end_lineno or 0)]
-    outer = min(around, key=lambda f: f.lineno)
-    return Change(module, outer.name, "", told, ((module, outer.lineno, first + 1),), lambda: spoilt)
+    outer = min(around, key=lambda f: f.lineno, default=None)  # none of what a decorator is given
+    name, begin = (outer.name, outer.lineno) if outer else ("", 1)
+    return Change(module, name, "", told, ((module, begin, first + 1),), lambda: spoilt)
 
 
 def faults_of(module: str) -> Iterator[Change]:
@@ -170,8 +177,15 @@ def mutants(seed: int, only: str) -> Iterator[Change]:
     source, names = random.Random(seed), [name for name in modules(False) if name.startswith(only)]
     lines = [len((ROOT / name).read_text(encoding="utf-8").splitlines()) for name in names]
     while True:
-        if (found := mutant_of(source.choices(names, lines)[0], source)) is not None:
-            yield found
+        if found := mutants_of(source.choices(names, lines)[0]):
+            yield source.choice(found)()
+
+
+def listed(rows: Iterable[tuple[str, str]]) -> Iterator[Change]:
+    """Yield the mutants of ``(module, old -> new)`` rows whose text still stands."""
+    for module, told in rows:
+        found = mutants_of(module) if (ROOT / module).exists() else []
+        yield from islice((change for each in found if (change := each()).told == told), 1)
 
 
 def faults(seed: int, only: str) -> Iterator[Change]:
