@@ -6,6 +6,7 @@ set but what an experiment names. The experiments stand here, once for all engin
     slide     a flat box with a speed along the ground: friction, and how that of two bodies combines
     blow      a ball flies at the ground without gravity: restitution, how it combines, below which speed it is none
     flight    a ball far from everything: dampings, sleep, gravity as it is
+    roll      a ball on the ground: sleep, where only what touches another body may
     rest      a flat box on the ground, a ball in it: the gap at which they come to rest, below 0 an overlap
 """
 
@@ -192,9 +193,13 @@ def damping(make: Make, of: Literal["along", "spin"]) -> float:
     return -math.log(getattr(flown, of) / FLIGHT_SPEED) / time + 0.0
 
 
-def sleep(make: Make) -> float:
-    """Time after which a ball at `FLIGHT_SPEED` stands still far from everything [s]; infinite if after `LONG` none."""
-    world = make(Asked(along=FLIGHT_SPEED))
+def sleep(make: Make, rolls: bool = False) -> float:
+    """Time after which a ball at `FLIGHT_SPEED` stands still [s]; infinite if after `LONG` none.
+
+    It is far from everything, or ``rolls`` on the ground: some engines let only what touches another body sleep.
+    """
+    begun = Asked(gap=0.0, along=FLIGHT_SPEED, gravity=GRAVITY) if rolls else Asked(along=FLIGHT_SPEED)
+    world = make(begun)
     for step in range(round(LONG / world.dt)):
         world.advance(1)
         if world.told().along == 0.0:

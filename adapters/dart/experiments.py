@@ -122,7 +122,16 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ("pgs", "overhang", 2, "settle_time", {}),
         ("pgs", "overhang", 2, "penetration", {}),
     ),
-    *_swept("pinch-few-sweeps", 1000, ("pgs", "pinch", 2, "creep", {"margin": 100.0, "pad": 4.0})),
+    *_swept(
+        "pinch-few-sweeps",
+        1000,
+        ("pgs", "pinch", 2, "creep", {"margin": 100.0, "pad": 4.0}),
+        ("pgs", "pinch", 2, "unbalanced", {}),
+        ("pgs", "pinch", 2, "grip[greatest]", {}),
+        ("pgs", "pinch", 3, "grip[least]", {"margin": 100.0}),
+        ("pgs", "pinch", 2, "carried[least]", {"margin": 1.05}),
+        ("pgs", "pinch", 3, "carried[greatest]", {"margin": 1.05}),
+    ),
     *_each(
         "edge-drop-few-sweeps",
         "with a finer tolerance both corners get the same to the last digits; other points of contact do not help",
@@ -165,7 +174,14 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         ("nsgs", "rack", 2, "asymmetry", {}),
         ("fbf", "rack", 2, "asymmetry", {}),
     ),
-    *_swept("stack-few-sweeps", 2000, ("pgs", "stack", 2, "kinetic_energy", {"n": 5.0})),
+    *_swept(
+        "stack-few-sweeps",
+        2000,
+        *(
+            ("pgs", "stack", 2, metric, {"n": 5.0})
+            for metric in ("kinetic_energy", "load[least]", "load[greatest]", "unbalanced")
+        ),
+    ),
     # What leaves its plane.
     *(
         experiment

@@ -236,7 +236,7 @@ DEVIATIONS += tuple(
 )
 #: Scenes of what slips over a floor in both of its axes, and what its motion alone decides.
 SLIPPING: Mapping[str, tuple[str, ...]] = {
-    "slide": ("astray", "braking", "stopping_distance"),
+    "slide": ("astray", "braking", "stopping_distance", *(f"friction[{by}]" for by in ("mean", "least", "greatest"))),
     "slide_to_roll": ("astray", "rolling_place", "rolling_time"),
     "masse": ("end_x", "end_y", "turned"),
 }
@@ -245,7 +245,7 @@ DEVIATIONS += tuple(
         "dart",
         PYRAMIDS,
         scene,
-        metric,
+        exactly(metric),
         pyramid_law(metric),
         "the cone of friction is a pyramid: each axis of the floor has the whole of it, and what slips between them is "
         "braked by up to sqrt(2) of Coulomb's friction",

@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.dart.shipped import MIXING, PUSH_OUT, PUSHED_SHARE
-from adapters.engine import Array
+from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
-from adapters.trajectory import Trajectory
+from adapters.trajectory import ContactRecord, Trajectory
 
 #: Gap of a start that is not found touching [m]: a rounding of places of order 1.
 ROUNDED = 1e-15
@@ -75,6 +75,7 @@ def _motion(scene: Scene, dt: float, gap: float) -> Trajectory:
     x, height, fall = np.array(body.pose[:2]), gap, 0.0
     pose = np.repeat(np.array([[each.pose for each in scene.bodies]]), steps + 1, axis=0)
     twist = np.repeat(np.array([[each.twist for each in scene.bodies]]), steps + 1, axis=0)
+    impulse = np.zeros((steps + 1, 3))
     for step in range(1, steps + 1):
         fall -= g * dt
         pushed = 0.0
@@ -87,6 +88,10 @@ def _motion(scene: Scene, dt: float, gap: float) -> Trajectory:
         v, u = v - given, u - k * given
         x = x + v * dt
         pose[step, 1, :2], twist[step, 1, :2] = x, v
+        impulse[step] = body.mass * np.array((*-given, pushed))
         if radius:
             twist[step, 1, 3:5] = (u[1] / radius, -u[0] / radius)
-    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")
+    first, unknown = np.zeros(steps + 1, np.int64), np.full((steps + 1, 3), np.nan)
+    rows = Contacts(first, first + 1, unknown, unknown, impulse, unknown[:, 0])
+    contacts = ContactRecord(np.arange(steps + 1), np.arange(steps + 2), rows)
+    return Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, contacts, dt, "completed")

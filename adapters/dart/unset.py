@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -65,6 +66,7 @@ class Bare:
 
 
 _SHAPE, _PAIR, _CONTACT = "DynamicsAspect", "ContactConstraint", "ContactConstraint, bouncing velocity threshold"
+_RESTS = "DeactivationOptions.hpp; World.cpp"
 UNSET = (
     Unset("friction of a pair", "1", _SHAPE, 1.0, partial(unset.friction, Bare)),
     Unset("friction of 0.2 and 0.9", "0.2, the smaller", _PAIR, 0.2, partial(unset.friction, Bare, FRICTIONS)),
@@ -74,8 +76,10 @@ UNSET = (
     Unset("no rebound below [m/s]", "0.1", _CONTACT, THRESHOLD, partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
-    Unset("at 1 mm/s asleep after [s]", "0.5, below 1 cm/s and 0.05 rad/s", "World.getDeactivationOptions", None,
+    Unset("in flight at 1 mm/s asleep after [s]", "never: only what touches another body may sleep", _RESTS, math.inf,
           partial(unset.sleep, Bare)),
+    Unset("rolling slower than 1 mm/s asleep after [s]", "0.5: mTimeUntilSleep, below a tenth of 1 cm/s", _RESTS, 0.5,
+          partial(unset.sleep, Bare, rolls=True), 2e-3),
     Unset("gap at rest [m]", "not documented", _PAIR, None, partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "not documented: pushed out by at most 1 mm/s", _PAIR, None,
           partial(unset.left, Bare)),

@@ -111,9 +111,15 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("incline-viscous-friction", "default", 2, "creep", {"ratio": 0.9}, _STICKS, (_SOFT,)),
     ("pinch-viscous-friction", "tamsi", 2, "creep", {"margin": 1.05}, _STICKS, (_SOFT,)),
     ("pinch-glides", "similar", 2, "turned", {"margin": 1.05}, _IMPLICIT, (_STICKS,)),
-    ("pinch-glides", "similar", 2, "carried", {"margin": 1.05}, _IMPLICIT, (_STICKS,)),
+    *(
+        ("pinch-glides", "similar", 2, metric, {"margin": 1.05}, _IMPLICIT, (_STICKS,))
+        for metric in ("carried", "carried[least]", "carried[greatest]", "grip[least]", "grip[greatest]", "unbalanced")
+    ),
     ("pinch-relaxes", "sap", 2, "turned", {"margin": 100.0}, _AT_ONCE, (_STICKS,)),
-    ("pinch-relaxes", "sap", 2, "carried", {"margin": 100.0}, _AT_ONCE, (_STICKS,)),
+    *(
+        ("pinch-relaxes", "sap", 2, metric, {"margin": 100.0}, _AT_ONCE, (_STICKS,))
+        for metric in ("carried", "carried[least]", "carried[greatest]")
+    ),
     ("position-correction-throws", "sap", 2, "launched", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
     ("position-correction-throws", "sap", 2, "drift", {"depth": 0.01}, _IMPLICIT, (_STICKS, _AT_ONCE)),
     ("v-groove-relaxes", "sap", 3, "displacement", {}, _AT_ONCE, (_SOFT, _STICKS)),
@@ -133,6 +139,12 @@ _ROWS: tuple[tuple[str, str, int, str, dict[str, float], _Settings, tuple[_Setti
     ("seam-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("slide-glides", "sap", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
     ("slide-glides", "similar", 3, "braking", {}, _IMPLICIT, (_SOFT,)),
+    *(
+        ("slide-glides", profile, dimension, f"{force}[{by}]", {}, _IMPLICIT, (_SOFT,))
+        for profile, dimension in (("sap", 2), ("similar", 3))
+        for force in ("normal", "friction")
+        for by in ("mean", "least", "greatest")
+    ),
     ("slide-to-roll-glides", "sap", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
     ("slide-to-roll-glides", "similar", 2, "final_speed", {}, _IMPLICIT, (_SOFT,)),
     ("tilt-table-friction-by-an-earlier-load", "default", 2, "acceleration", _CUBE, _IMPLICIT, (_STICKS,)),

@@ -48,7 +48,7 @@ _SCENES = (
     "bounce", "closing_wall", "cradle", "edge_drop", "flat_box", "galperin", "heavy_on_light", "impact", "incline",
     "kane", "masse", "oblique", "off_centre", "overhang", "overlap", "painleve", "pivot", "position_correction",
     "pressed_box", "pyramid", "rack", "rocker", "rocking_block", "rod_gas", "roll_incline", "rolling_spin", "seam",
-    "shove", "slide_to_roll", "stack", "stacked_balls", "starved", "thin_wall", "tilt_table", "tumble",
+    "shove", "slide", "slide_to_roll", "stack", "stacked_balls", "starved", "thin_wall", "tilt_table", "tumble",
 )  # fmt: skip
 
 
@@ -339,6 +339,22 @@ EXPERIMENTS += (
         ("tuned", 2, "rebound_ratio", {}),
     ),
     *_each(
+        "bounce-thrown-back-ahead",
+        "in one step nothing pushes in flight; other manifolds and rebounds of what is slow do not help",
+        _WHOLE,
+        (_ANEW, _REBOUNDS),
+        ("default", 2, "force_in_flight", {"height": 1.04}),
+        ("default", 3, "force_in_flight", {"e": 0.95}),
+        ("tuned", 2, "force_in_flight", {"height": 1.04}),
+    ),
+    *_each(
+        "bounce-thrown-back-ahead",
+        "with as many small steps as there are nothing pushes in flight; with a single one, or seen earlier, it does",
+        _SWEPT,
+        ({"iterations": 1}, {"contact_offset": 0.1}),
+        ("default", 2, "force_in_flight", {"height": 1.11}),
+    ),
+    *_each(
         "cradle-small-steps",
         "in one step it comes within singles; other manifolds do not help",
         _WHOLE,
@@ -498,6 +514,14 @@ EXPERIMENTS += (
         ("default", 2, "down", {"ratio": 20.0}),
     ),
     *_each(
+        "slide-small-steps",
+        "in one step the floor pushes steadily; other manifolds and later contacts do not help",
+        _WHOLE,
+        (_ANEW, _UNSEEN),
+        ("default", 2, "normal[least]", {}),
+        ("default", 2, "normal[greatest]", {}),
+    ),
+    *_each(
         "stack-small-steps",
         "in one step, with sweeps until little is left, the column rests; other manifolds do not help",
         {**_WHOLE, **_SWEPT},
@@ -506,6 +530,11 @@ EXPERIMENTS += (
         ("default", 2, "impulse_scatter", {"n": 2.0}),
         ("default", 2, "settle_time", {"n": 10.0}),
         ("tuned", 2, "kinetic_energy", {"n": 10.0}),
+        *(
+            (profile, 2, metric, {"n": n})
+            for profile, n in (("default", 2.0), ("tuned", 10.0))
+            for metric in ("load[least]", "load[greatest]", "unbalanced")
+        ),
     ),
     *_each(
         "starved-small-steps",

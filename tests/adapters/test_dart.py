@@ -266,6 +266,9 @@ def test_a_ball_beside_a_box_that_moves_away_falls_as_if_it_were_alone(length):
     [
         ("slide", {"heading": 45.0}, "braking", 1.0),
         ("slide", {"heading": 22.5}, "astray", 0.2),
+        ("slide", {"heading": 22.5}, "friction[greatest]", 0.3),
+        ("slide", {"heading": 22.5}, "friction[least]", 0.07),
+        ("slide", {"heading": 45.0}, "friction[mean]", 0.2),
         ("slide_to_roll", {"heading": 30.0}, "rolling_place", 0.1),
         ("masse", {}, "end_y", 0.05),
         ("masse", {"back": 4.0, "side": 1.0}, "turned", 0.1),

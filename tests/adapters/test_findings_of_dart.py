@@ -190,4 +190,5 @@ def test_every_family_has_an_experiment_that_is_about_its_rows():
     assert {each.family for each in EXPERIMENTS} == set(families)
     for each in EXPERIMENTS:
         family = families[each.family]
-        assert each.scene == family.scene and each.profile in family.profiles and each.metric in family.metrics
+        assert each.scene == family.scene and each.profile in family.profiles
+        assert each.metric.partition("[")[0] in family.metrics

@@ -108,3 +108,22 @@ def test_what_rolls_loses_a_hundredth_of_its_spin_and_what_spins_on_the_spot_non
         assert measured("rolling_spin", "tuned", 3, solver=solver)["spin"] == pytest.approx(9.9, abs=0.01)
         spot = measured("rolling_spin", "tuned", 3, {"spin": 50.0, "v": 0.0}, solver=solver)["spin"]
         assert spot == pytest.approx(50.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("small_steps", [1, 2, 4, 10, 50])
+def test_small_steps_throw_back_what_ends_a_step_up_to_one_small_step_before_its_touch(small_steps):
+    """A step's way of free fall is (v + g dt) dt; in one step, of Gauss-Seidel, only what touches is thrown back."""
+    speed = 4.0
+    way = (speed + 9.81 * DT) * DT
+
+    def is_thrown_back(ahead, **changes):
+        height = 0.5 + way * (1.0 + ahead)
+        ball = Body(
+            "ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0), (0, 0, -speed, 0, 0, 0)
+        )
+        scene = Scene("ahead", 1, 3, (FLOOR, ball), (Pair(restitution=0.8, friction=0.0),), (0.0, 0.0, -9.81), DT)
+        chosen = settings(scene, "default", iterations=small_steps, contact_offset=0.1, **changes)
+        return bool(run(ENGINE, scene, DT, chosen, Sampling(1, None)).twist[-1, 1, 2] > 0.0)
+
+    found = [is_thrown_back(ahead / small_steps) for ahead in (-0.1, 0.9, 1.1)]
+    assert found == [True, True, False] and not is_thrown_back(0.1, solver="pgs")

@@ -52,6 +52,16 @@ class Known:
         return Told(self.gap, self.along, self.up, self.spin)
 
 
+class Supported(Known):
+    """The same without friction, and only what touches the ground falls asleep."""
+
+    mu = 0.0
+
+    def __init__(self, asked):
+        super().__init__(asked)
+        self.asleep = Known.asleep if asked.gap <= 0.0 else math.inf
+
+
 def test_the_experiments_find_the_numbers_of_a_world_that_is_known():
     # Drag falls on the way, by what friction takes of the speed: half of that is missed.
     missed = 0.5 * Known.drag * unset.SLIDE_TIME
@@ -63,6 +73,7 @@ def test_the_experiments_find_the_numbers_of_a_world_that_is_known():
     assert unset.least_rebound(Known) == pytest.approx(0.5, rel=5e-3 + Known.drag * Known.dt)
     assert unset.damping(Known, "along") == pytest.approx(0.2) == pytest.approx(unset.damping(Known, "spin"))
     assert unset.sleep(Known) == pytest.approx(0.75, abs=2 * Known.dt)
+    assert unset.sleep(Supported) == math.inf and unset.sleep(Supported, rolls=True) == pytest.approx(0.75, abs=0.01)
     assert unset.gravity(Known) == pytest.approx(-1.6)
     assert abs(unset.rest(Known)) < 1e-9 and unset.left(Known) == pytest.approx(0.03)
     assert unset.reach(lambda gap: gap < 0.02) == pytest.approx(0.02, abs=RADIUS / 2**11)
