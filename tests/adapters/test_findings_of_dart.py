@@ -181,13 +181,3 @@ def test_a_pile_that_starts_a_last_digit_higher_falls_for_a_step_above_its_lowes
     posed, higher = fallen
     assert abs(posed).max() < 0.5
     assert higher[:lowest] == pytest.approx(0.0, abs=0.01) and higher[lowest:] == pytest.approx(1.0, abs=0.01)
-
-
-def test_every_family_has_an_experiment_that_is_about_its_rows():
-    from adapters.dart.experiments import EXPERIMENTS
-
-    families = findings_of("dart").families
-    assert {each.family for each in EXPERIMENTS} == set(families)
-    for each in EXPERIMENTS:
-        family = families[each.family]
-        assert each.scene == family.scene and each.profile in family.profiles and each.metric in family.metrics

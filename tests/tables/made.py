@@ -31,9 +31,6 @@ LAWS: Makers = {
     for engine in of_laws.ENGINES + of_laws.APART
     for scene in of_laws.scenes(engine)
 }
-EXPERIMENTS: Makers = {
-    f"experiments/{engine}": partial(of_engines.experiments_table, engine) for engine in of_laws.ENGINES
-}
 KIT: Makers = {
     "kit/scenes": of_kit.table_of_scenes,
     "kit/faults": of_kit.table_of_faults,
@@ -75,7 +72,6 @@ def tables() -> Makers:
         | MOTIONS
         | LAWS
         | of_other_worlds.MAKERS
-        | EXPERIMENTS
         | KIT
         | QUESTIONS
         | OPTIONS

@@ -11,7 +11,6 @@ from of_scenes import cells
 from telling import Sections, section
 
 from adapters.engine import Engine, EngineError
-from adapters.engine_folder import candidates_of, cured_of, experiments_of
 from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.stepping import posed_for
@@ -83,22 +82,4 @@ def held_table(engine: Engine, profile: str) -> Sections:
             found[title] = section(held=simulation.readback(), pose=simulation.pose(), twist=simulation.twist())
         finally:
             simulation.close()
-    return found
-
-
-def experiments_table(name: str) -> Sections:
-    """Experiments on an engine, by family, row and settings; what tuning tries; what is cured."""
-    found = Sections()
-    for each in experiments_of(name):
-        row = [each.family, each.profile, f"{each.dimension}-D", each.scene, each.metric]
-        row += [f"{key}={value:g}" for key, value in sorted(each.params.items())]
-        row += [f"iterations={each.iterations}"] * (each.iterations is not None)
-        title = " ".join(row)
-        while title in found:
-            title += " (again)"
-        found[title] = section(
-            says=each.says, off=str(dict(each.off)), idle=[str(dict(idle)) for idle in each.idle], within=each.within,
-            dt=each.dt,
-        )  # fmt: skip
-    found["tuning"] = section(tries=candidates_of(name), cured=cured_of(name))
     return found

@@ -13,7 +13,6 @@ from of_print import folder, numbered, on, screen
 from rich.console import Console
 from telling import Sections
 
-from adapters.engine_folder import experiments_of
 from reports import history as written
 from reports import releases as shown
 from reports.command import asking, curing, driving, posing, proving, weighing
@@ -29,7 +28,7 @@ from validation.questions.residuals import LAWS, Residuals
 from validation.records.store import Store
 from validation.releases import history
 from validation.settings.cures import Unsearched, cures_of
-from validation.settings.proofs import Proof, slot_of
+from validation.settings.proofs import Proof, experiments_on, slot_of
 from validation.settings.switching import Reading
 
 CHECK = Check("m", "m/s", 0.8, 0.1, "because", "source")
@@ -51,7 +50,7 @@ def proofs() -> Sections:
     """Experiments that hold, and that fail in each of the ways in which one can."""
     found = Sections()
     for engine in ("chipmunk", "bullet", "mujoco"):
-        experiment = next(each for each in experiments_of(engine) if each.idle)
+        experiment = next(each for each in experiments_on(engine) if each.idle)
         slot = slot_of(engine, experiment)
         fails, passes = Reading(slot, CHECK, 0.5, ""), Reading(slot, CHECK, 0.81, "")
         nothing = Reading(slot, CHECK, None, "the body left")

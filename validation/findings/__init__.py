@@ -23,6 +23,7 @@ from packaging.specifiers import SpecifierSet
 from packaging.version import InvalidVersion
 
 from adapters import registry
+from adapters.experiment import Experiment
 from validation.cells import Slot, format_dt
 from validation.running.plan import is_standard
 
@@ -46,6 +47,8 @@ class Family:
         The mechanism in one sentence, and where it is documented, read or measured.
     releases
         Versions of the engine it holds for, as a version specifier (``>=3.2.7,<3.3``).
+    proofs
+        Experiments that show the mechanism (`validation.findings.proofs`).
     """
 
     id: str
@@ -55,6 +58,7 @@ class Family:
     reason: str
     source: str
     releases: str
+    proofs: tuple[Experiment, ...] = field(default=(), compare=False, repr=False)
 
     def covers(self, key: Key) -> bool:
         """Whether this family speaks about a row of its engine."""
