@@ -224,7 +224,7 @@ def _tuning(engine: str) -> tuple[Tuning, str]:
             return read_tuning(path), ""
         except EngineError as error:
             return Tuning(), str(error)
-    module, _ = (None, "") if _experiments(engine)[1] else _module(engine, EXPERIMENTS)
+    module = None if _experiments(engine)[1] else _module(engine, EXPERIMENTS)[0]
     tried = {name: tuple(values) for name, values in getattr(module, "CANDIDATES", {}).items()}
     belongs = {name: str(other) for name, other in getattr(module, "BELONGS", {}).items()}
     return Tuning(tried, belongs, tuple(getattr(module, "CURED", ()))), ""

@@ -28,8 +28,9 @@ from adapters.engine import EngineError
 from adapters.experiment import Cured
 from adapters.plain import one_line
 
-#: Fields of a table: whether a value fits, and what it must be, in words.
-Fields = Mapping[str, tuple[Callable[[Any], bool], str]]
+#: Of a field: whether a value fits, and what it must be, in words.
+Kind = tuple[Callable[[Any], bool], str]
+Fields = Mapping[str, Kind]
 #: Stands for None, as on the command line.
 NONE = "none"
 
@@ -63,8 +64,14 @@ def is_list_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, list) and all(map(fits, value))
 
 
-NAME: tuple[Callable[[Any], bool], str] = (is_word, "a name")
-DIMENSION: tuple[Callable[[Any], bool], str] = (lambda value: type(value) is int and value in (2, 3), "2 or 3")
+NAME: Kind = (is_word, "a name")
+DIMENSION: Kind = (lambda value: type(value) is int and value in (2, 3), "2 or 3")
+TABLE: Kind = (lambda value: isinstance(value, dict), "a table")
+_PARTS: Fields = {
+    "candidates": TABLE,
+    "belongs": TABLE,
+    "cured": (lambda value: isinstance(value, list), "a list of tables"),
+}
 _CURED: Fields = {
     "shipped": NAME,
     "better": NAME,
@@ -129,9 +136,7 @@ def read_tuning(path: Path) -> Tuning:
 
 
 def _tuning(data: Mapping[str, Any]) -> Tuning:
-    parts: Fields = dict.fromkeys(("candidates", "belongs"), (lambda part: isinstance(part, dict), "a table"))
-    parts |= {"cured": (lambda part: isinstance(part, list), "a list of tables")}
-    checked("tuning", data, parts)
+    checked("tuning", data, _PARTS)
     candidates, belongs = data.get("candidates", {}), data.get("belongs", {})
     checked("candidates", candidates, dict.fromkeys(candidates, (is_list_of(lambda value: True), "a list of values")))
     checked("belongs", belongs, dict.fromkeys(belongs, NAME))

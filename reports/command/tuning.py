@@ -84,8 +84,9 @@ def tune(
 
 def _missing(engine: str, what: str, purpose: str) -> str:
     """Why there is nothing to try or to measure."""
-    fault = fault_of_tuning(engine)
-    return f"{engine}: {fault}" if fault else f"nobody has named {what} of {engine} to {purpose} ({TUNING} in its folder)"
+    if fault := fault_of_tuning(engine):
+        return f"{engine}: {fault}"
+    return f"nobody has named {what} of {engine} to {purpose} ({TUNING} in its folder)"
 
 
 def _decisive(engine: str, jobs: int, as_json: bool) -> bool:

@@ -1,4 +1,4 @@
-"""``tuning.toml`` of an engine's folder: what is tried, what belongs together, what is cured; and what is wrong with it."""
+"""``tuning.toml`` of an engine's folder: what is tried, what belongs together, what is cured; what is wrong with it."""
 
 import pytest
 

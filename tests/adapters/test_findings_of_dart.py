@@ -18,7 +18,6 @@ from adapters.trajectory import Sampling
 from validation.bounds import planar
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, prepare, settings_of
-from validation.findings.files import findings_of
 
 ENGINE = DartEngine()
 DT = 1.0 / 240.0

@@ -87,7 +87,8 @@ def test_all_that_can_be_said_is_read_with_its_kind(proofs):
         (PROOF.replace(" }", ", dt = 0.01 }", 1), 'proof: cell: dt must be a step in words, "1/480"'),
         (PROOF.replace(" }", ', dt = "soon" }', 1),
          "proof: cell: dt: 'soon' is not a number of seconds such as 1/240 or 0.004"),
-        (PROOF.replace(" }", ', dt = "-1/2" }', 1), "proof: cell: dt: -1/2 must be a positive, finite number of seconds"),
+        (PROOF.replace(" }", ', dt = "-1/2" }', 1),
+         "proof: cell: dt: -1/2 must be a positive, finite number of seconds"),
         (PROOF + '"\\u001b[31mred" = 1\n', "proof: \\u{1b}[31mred is no field; there are cell, set, not, within"),
     ],
 )  # fmt: skip

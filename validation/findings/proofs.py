@@ -17,6 +17,7 @@ from adapters.experiment import Experiment
 from adapters.experiment_files import (
     DIMENSION,
     NAME,
+    TABLE,
     Fields,
     checked,
     is_list_of,
@@ -44,7 +45,7 @@ _CELL: Fields = {
     "dt": (is_word, 'a step in words, "1/480"'),
 }
 _PROOF: Fields = {
-    "cell": (lambda value: isinstance(value, dict), "a table"),
+    "cell": TABLE,
     "set": (_is_settings, "a table of settings"),
     "not": (is_list_of(_is_settings), "a list of tables of settings"),
     "within": (lambda value: is_number(value) and value > 0, "a number above 0"),
