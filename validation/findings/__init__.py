@@ -1,6 +1,7 @@
 """Known findings: families of rows that do not pass, each member with its value and band, each family with a reason.
 
     family    one engine, one scene, the profiles and metrics it speaks about, reason, source, releases it holds for
+    proof     of a family: a row that passes once settings switch the mechanism off (`validation.findings.proofs`)
     member    one row of the standard suite: the value that was found, and the band within which it is the same finding
 
 A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and

@@ -1,4 +1,4 @@
-"""Files of findings: ``families.toml`` (reasons) and ``members.csv`` (rows) in one folder per engine.
+"""Files of findings: ``families.toml`` (reasons and their proofs) and ``members.csv`` (rows) in one folder per engine.
 
 They stand in the engine's folder (`adapters.engine_folder`), ours and those of other packages alike; nothing of an
 engine is imported for them.
