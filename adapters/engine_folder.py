@@ -8,8 +8,11 @@
         releases.py       RELEASES: what older releases do differently (`adapters.releases`)
         changes.toml      what the engine's own notes say of steps over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
-        experiments.py    EXPERIMENTS, CANDIDATES, CURED, BELONGS (`adapters.experiment`)
-        findings/         families.toml and members.csv (`validation.findings`), breaks.toml and breaks.csv
+        tuning.toml       what tuning tries, and cures whose settings are measured (`adapters.experiment_files`)
+        findings/         families.toml, which proves them too, and members.csv (`validation.findings`), breaks.toml
+                          and breaks.csv
+        experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
+                          where there is no tuning.toml (`adapters.experiment`)
         unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
         decisive.csv      which settings of its cures matter, as measured (`validation.settings.decisive`)
         cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.settings.cures`)
@@ -38,6 +41,7 @@ from typing import Any
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.experiment import Cured, Experiment
+from adapters.experiment_files import Tuning, read_tuning
 from adapters.foreign import importable, said_by
 from adapters.law import Deviation, Law, Measure, Prediction
 from adapters.plain import one_line
@@ -45,7 +49,7 @@ from adapters.scene import Scene
 from adapters.unset import Unset
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
-CURES = "cures.csv"
+CURES, TUNING = "cures.csv", "tuning.toml"
 
 
 def located(module: str) -> Path | None:
@@ -92,28 +96,24 @@ def covering(engine: str, version: str, profile: str, scene: str, metric: str) -
     return (law for law in laws_of(engine) if law.covers(engine, version, profile, scene, metric))
 
 
-@cache
 def experiments_of(engine: str) -> tuple[Experiment, ...]:
-    """All experiments on ``engine``."""
-    return tuple(_listed(engine, "EXPERIMENTS", Experiment))
+    """Experiments on ``engine`` that its package states in Python; others are proofs of families."""
+    return _experiments(engine)[0]
 
 
-@cache
 def cured_of(engine: str) -> tuple[Cured, ...]:
     """Cures whose settings are measured one by one."""
-    return tuple(_listed(engine, "CURED", Cured))
+    return _tuning(engine)[0].cured
 
 
-@cache
 def candidates_of(engine: str) -> Mapping[str, tuple[Any, ...]]:
     """Stock settings that tuning may change, and the values it tries."""
-    return {name: tuple(values) for name, values in _mapped(engine, "CANDIDATES").items()}
+    return _tuning(engine)[0].candidates
 
 
-@cache
 def belongs_of(engine: str) -> Mapping[str, str]:
     """Settings that mean nothing without another one, and which; they are switched with it."""
-    return {name: str(other) for name, other in _mapped(engine, "BELONGS").items()}
+    return _tuning(engine)[0].belongs
 
 
 @cache
@@ -123,20 +123,24 @@ def unset_of(engine: str) -> tuple[Unset, ...]:
     return tuple(each for each in getattr(module, "UNSET", ()) if isinstance(each, Unset))
 
 
+def fault_of_tuning(engine: str) -> str:
+    """What is wrong with the file or the module that says how ``engine`` is tuned; empty where nothing is."""
+    return _tuning(engine)[1] or _experiments(engine)[1]
+
+
 def problems() -> list[str]:
-    """One line for each engine whose laws or experiments cannot be had."""
+    """One line for each engine and part, of laws, experiments and ``tuning.toml``, that cannot be had."""
     found = []
     for engine in registry.names():
-        for part, said in ((LAWS, _laws(engine)[1]), (EXPERIMENTS, _experiments(engine)[1])):
-            if said:
-                found.append(f"{engine}: its {part} cannot be had: {said}")
+        parts = ((LAWS, _laws(engine)), (EXPERIMENTS, _experiments(engine)), (TUNING, _tuning(engine)))
+        found += [f"{engine}: its {part} cannot be had: {said}" for part, (_, said) in parts if said]
     return found
 
 
 def forget() -> None:
     """Look again at what is installed."""
     registry.find.cache_clear()
-    for each in (laws_of, experiments_of, cured_of, candidates_of, belongs_of, unset_of, _laws, _experiments, _module):
+    for each in (laws_of, unset_of, _laws, _experiments, _tuning, _module):
         each.cache_clear()
 
 
@@ -200,25 +204,27 @@ def _checked(label: str, law: Callable[..., Any]) -> Law:
 
 
 @cache
-def _experiments(engine: str) -> tuple[ModuleType | None, str]:
-    """Module with the experiments, if what it holds is of the right kind."""
+def _experiments(engine: str) -> tuple[tuple[Experiment, ...], str]:
+    """What the module says, if all that it holds is of the right kind."""
     module, why = _module(engine, EXPERIMENTS)
-    if module is None:
-        return None, why
     for name, kind in (("EXPERIMENTS", Experiment), ("CURED", Cured)):
         if not all(isinstance(each, kind) for each in getattr(module, name, ())):
-            return None, f"{name} has what is no {kind.__name__}"
+            return (), f"{name} has what is no {kind.__name__}"
     for name in ("CANDIDATES", "BELONGS"):
         if not isinstance(getattr(module, name, {}), Mapping):
-            return None, f"{name} is no mapping"
-    return module, ""
+            return (), f"{name} is no mapping"
+    return tuple(getattr(module, "EXPERIMENTS", ())), why
 
 
-def _listed(engine: str, name: str, kind: type) -> list[Any]:
-    module, _ = _experiments(engine)
-    return [each for each in getattr(module, name, ()) if isinstance(each, kind)]
-
-
-def _mapped(engine: str, name: str) -> Mapping[str, Any]:
-    module, _ = _experiments(engine)
-    return dict(getattr(module, name, {}))
+@cache
+def _tuning(engine: str) -> tuple[Tuning, str]:
+    path = inside(engine, TUNING)
+    if path is not None:
+        try:
+            return read_tuning(path), ""
+        except EngineError as error:
+            return Tuning(), str(error)
+    module = None if _experiments(engine)[1] else _module(engine, EXPERIMENTS)[0]
+    tried = {name: tuple(values) for name, values in getattr(module, "CANDIDATES", {}).items()}
+    belongs = {name: str(other) for name, other in getattr(module, "BELONGS", {}).items()}
+    return Tuning(tried, belongs, tuple(getattr(module, "CURED", ()))), ""

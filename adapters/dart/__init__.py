@@ -7,7 +7,6 @@ engine         the adapter
 laws           what it does by design; blows of balls on a floor (`falling`), in a line (`in_line`) and in a plane
                (`balls`) step by step, of boxes on an edge (`landing`) that slides (`rubbing`), of balls that slip
                (`slipping`), and what slips on a floor under a pyramid (`pyramid`)
-experiments    what shows the reasons in `findings` to be true
 """
 
 from adapters.dart.engine import DartEngine

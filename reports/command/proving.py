@@ -13,13 +13,12 @@ import click
 from rich.text import Text
 
 from adapters import registry
-from adapters.engine_folder import experiments_of
 from adapters.experiment import Experiment
 from reports.terminal import terminal
 from reports.wording import number, params_text, quantity, reproduce
 from validation.findings import FindingsError
 from validation.findings.files import findings_of
-from validation.settings.proofs import Proof, prove
+from validation.settings.proofs import Proof, experiments_on, prove
 from validation.settings.switching import Reading
 
 #: Names that are told to whoever mistypes one: a list of hundreds says nothing.
@@ -39,13 +38,11 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
     for engine in engines or registry.usual():
         known = findings_of(engine)
         families += list(known.families) if known else []
-        wanted = [e for e in experiments_of(engine) if reason in ("all", e.family)]
+        wanted = [e for e in experiments_on(engine) if reason in ("all", e.family)]
         if wanted and (reason == "all" or (known and reason in known.families)):
             found[engine] = wanted
     if not found and reason in families:
-        raise FindingsError(
-            f"prove: nobody has written an experiment for the reason {reason!r} (its engine's experiments.py)"
-        )
+        raise FindingsError(f"prove: the reason {reason!r} has no proof (in families.toml of its engine)")
     if not found:
         close = ", ".join(map(repr, difflib.get_close_matches(reason, dict.fromkeys(families), n=NEAREST, cutoff=0.5)))
         hint = f"did you mean {close}?" if close else "`crosscheck findings` has the reasons"

@@ -12,7 +12,7 @@ import click
 
 from adapters import registry
 from adapters.engine import EngineError
-from adapters.engine_folder import DECISIVE, candidates_of, cured_of, folder_of
+from adapters.engine_folder import DECISIVE, TUNING, candidates_of, cured_of, fault_of_tuning, folder_of
 from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
@@ -60,7 +60,7 @@ def tune(
         sys.exit(0 if _decisive(engine, jobs, as_json) else 1)
     registry.find(engine)
     if not candidates_of(engine):
-        raise EngineError(f"tune: nobody has named stock settings of {engine} to try (experiments.py in its folder)")
+        raise EngineError(f"tune: {_missing(engine, 'stock settings', 'try')}")
     profile = profile or profile_of(engine, "tuned")
     if profile is None:
         raise EngineError(f"profile: {engine} has no tuned one; name one with --profile")
@@ -82,17 +82,24 @@ def tune(
     sys.exit(1 if any(result.changes for result in found) else 0)
 
 
+def _missing(engine: str, what: str, purpose: str) -> str:
+    """Why there is nothing to try or to measure."""
+    if fault := fault_of_tuning(engine):
+        return f"{engine}: {fault}"
+    return f"nobody has named {what} of {engine} to {purpose} ({TUNING} in its folder)"
+
+
 def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
     """Measure and keep which settings decide the cures of an engine; whether the same do as were listed."""
     if not cured_of(engine):
-        raise EngineError(f"tune: nobody has named cures of {engine} to measure (experiments.py in its folder)")
+        raise EngineError(f"tune: {_missing(engine, 'cures', 'measure')}")
     listed = {(e.scene, e.shipped, e.better): e.text for e in measured_of(engine)}
     try:
         found = measure_all(engine, jobs)
     except ValueError as error:
         raise EngineError(f"tune: {error}") from None
     folder = folder_of(engine)
-    assert folder is not None  # it has experiments, which stand there
+    assert folder is not None  # it has cures to measure, which stand there
     write(found, folder / DECISIVE)
     console = terminal()
     if as_json:

@@ -18,7 +18,6 @@ from adapters.trajectory import Sampling
 from validation.bounds import planar
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, prepare, settings_of
-from validation.findings.files import findings_of
 
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
@@ -181,14 +180,3 @@ def test_a_pile_that_starts_a_last_digit_higher_falls_for_a_step_above_its_lowes
     posed, higher = fallen
     assert abs(posed).max() < 0.5
     assert higher[:lowest] == pytest.approx(0.0, abs=0.01) and higher[lowest:] == pytest.approx(1.0, abs=0.01)
-
-
-def test_every_family_has_an_experiment_that_is_about_its_rows():
-    from adapters.dart.experiments import EXPERIMENTS
-
-    families = findings_of("dart").families
-    assert {each.family for each in EXPERIMENTS} == set(families)
-    for each in EXPERIMENTS:
-        family = families[each.family]
-        assert each.scene == family.scene and each.profile in family.profiles
-        assert each.metric.partition("[")[0] in family.metrics

@@ -299,7 +299,7 @@ def test_a_search_for_settings_is_told_as_it_goes_and_what_is_better_has_a_statu
     assert said("tune", "chipmunk")[2] == ["crosscheck: profile: chipmunk has no tuned one; name one with --profile"]
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: ())
     assert said("tune", "chipmunk")[2] == [
-        "crosscheck: tune: nobody has named stock settings of chipmunk to try (experiments.py in its folder)"
+        "crosscheck: tune: nobody has named stock settings of chipmunk to try (tuning.toml in its folder)"
     ]
 
 

@@ -8,13 +8,14 @@ import pytest
 from click.testing import CliRunner
 
 from adapters import engine_folder, registry
-from adapters.engine_folder import DECISIVE, belongs_of, candidates_of, cured_of, experiments_of, laws_of
+from adapters.engine_folder import DECISIVE, TUNING, belongs_of, candidates_of, cured_of, experiments_of, laws_of
 from reports import palette
 from reports.command import main
 from reports.listing import doctor
 from validation import identity
 from validation.findings import files, solutions_of
 from validation.settings import decisive
+from validation.settings.proofs import experiments_on
 
 pytest.importorskip("pymunk")
 
@@ -54,6 +55,24 @@ metrics = ["*"]
 reason = "a toy's boxes sink"
 source = "its manual"
 releases = ">=7"
+"""
+PROOF = """
+[[family.proof]]
+cell = { profile = "default", dimension = 2, metric = "penetration", params = { n = 5 } }
+set = { collision_slop = 1e-3 }
+"""
+TUNED = """
+[candidates]
+start_overlap = [0.0, 1e-4]
+
+[belongs]
+collision_bias = "collision_slop"
+
+[[cured]]
+shipped = "default"
+better = "tuned"
+scene = "impact"
+cells = [{}]
 """
 MEMBERS = ",".join(files.COLUMNS) + "\n"
 
@@ -105,6 +124,32 @@ def test_one_entry_point_brings_all_parts_of_its_folder(site):
     assert belongs_of("toy") == {"start_overlap": "collision_slop"}
     assert palette.colours_of(["toy"]) == {"toy": "#102030"}
     assert palette.shape_of("default") == palette.MARKS["shipped"][0]
+
+
+def test_experiments_that_are_data_stand_beside_those_in_python_and_its_tuning_takes_their_place(site):
+    with (site / "findings" / files.FAMILIES).open("a") as families:
+        families.write(PROOF)
+    (site / TUNING).write_text(TUNED)
+    forget()
+    assert [(each.says, each.params) for each in experiments_on("toy")] == [
+        ("a toy's boxes sink", {"n": 5.0}), ("stands", {"n": 10.0})
+    ]  # fmt: skip
+    assert candidates_of("toy") == {"start_overlap": (0.0, 1e-4)} and belongs_of("toy")["collision_bias"]
+    assert [each.scene for each in cured_of("toy")] == ["impact"] and engine_folder.problems() == []
+    (site / "experiments.py").unlink()
+    forget()
+    assert len(experiments_on("toy")) == 1 and len(cured_of("toy")) == 1
+
+
+def test_a_tuning_file_that_is_wrong_is_named_by_the_doctor_and_by_the_command_that_wants_it(site):
+    (site / TUNING).write_text(TUNED.replace("cells", "cell"))
+    forget()
+    said = f"{site / TUNING}: cured 1: cell is no field; there are shipped, better, scene, cells, metrics, dimension"
+    assert candidates_of("toy") == {} == belongs_of("toy") and cured_of("toy") == () and len(experiments_of("toy")) == 1
+    assert engine_folder.problems() == [f"toy: its {TUNING} cannot be had: {said}"]
+    for call in (["tune", "toy"], ["tune", "toy", "--decisive"]):
+        done = CliRunner().invoke(main, call)
+        assert (done.exit_code, done.stderr) == (2, f"crosscheck: tune: toy: {said}\n")
 
 
 def test_what_was_measured_of_its_cures_is_read_from_its_folder(site):
@@ -249,7 +294,7 @@ def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engin
     assert {name for name in before if before[name] != after[name]} == {engine}
 
 
-@pytest.mark.parametrize("name", ["laws.py", "experiments.py", "findings/families.toml"])
+@pytest.mark.parametrize("name", ["laws.py", "experiments.py", TUNING, "findings/families.toml"])
 def test_what_judges_is_no_part_of_a_cell_s_identity(site, name):
     before = hashes()
     (site / name).write_text("# nothing")

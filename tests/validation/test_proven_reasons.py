@@ -2,17 +2,16 @@
 
 import pytest
 
-from adapters.engine_folder import experiments_of
 from validation.cells import Slot
 from validation.running.plan import QUICK_DT
-from validation.settings.proofs import prove
+from validation.settings.proofs import experiments_on, prove
 from validation.settings.switching import reading, side_by_side
 
 
 def test_a_fast_slide_of_bullet_blames_points_that_are_dropped_and_drag():
     """The others of these reasons are proven by the command (`tests/reports/test_proving_command.py`)."""
     pytest.importorskip("pybullet")
-    own = [e for e in experiments_of("bullet") if e.family == "incline-contact-switching" and e.dimension == 3]
+    own = [e for e in experiments_on("bullet") if e.family == "incline-contact-switching"]
     assert len(own) == 2
     for proof in prove("bullet", own):
         assert proof.holds and proof.idle, proof.why_not

@@ -1,6 +1,7 @@
 """Known findings: families of rows that do not pass, each member with its value and band, each family with a reason.
 
     family    one engine, one scene, the profiles and metrics it speaks about, reason, source, releases it holds for
+    proof     of a family: a row that passes once settings switch the mechanism off (`validation.findings.proofs`)
     member    one row of the standard suite: the value that was found, and the band within which it is the same finding
 
 A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and
@@ -23,6 +24,7 @@ from packaging.specifiers import SpecifierSet
 from packaging.version import InvalidVersion
 
 from adapters import registry
+from adapters.experiment import Experiment
 from validation.cells import Slot, format_dt
 from validation.running.plan import is_standard
 
@@ -46,6 +48,8 @@ class Family:
         The mechanism in one sentence, and where it is documented, read or measured.
     releases
         Versions of the engine it holds for, as a version specifier (``>=3.2.7,<3.3``).
+    proofs
+        Experiments that show the mechanism (`validation.findings.proofs`).
     """
 
     id: str
@@ -55,6 +59,7 @@ class Family:
     reason: str
     source: str
     releases: str
+    proofs: tuple[Experiment, ...] = field(default=(), compare=False, repr=False)
 
     def covers(self, key: Key) -> bool:
         """Whether this family speaks about a row of its engine."""

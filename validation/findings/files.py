@@ -1,4 +1,4 @@
-"""Files of findings: ``families.toml`` (reasons) and ``members.csv`` (rows) in one folder per engine.
+"""Files of findings: ``families.toml`` (reasons and their proofs) and ``members.csv`` (rows) in one folder per engine.
 
 They stand in the engine's folder (`adapters.engine_folder`), ours and those of other packages alike; nothing of an
 engine is imported for them.
@@ -11,6 +11,7 @@ import json
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,9 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from adapters import registry
 from adapters.engine_folder import FINDINGS, folder_of
+from adapters.plain import one_line
 from validation.findings import Family, Finding, Findings, FindingsError, Key, Unsupported, solutions_of
+from validation.findings.proofs import proof_of
 
 FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
@@ -101,7 +104,9 @@ def _fields(path: Path, kind: str, entry: Mapping[str, Any], names: tuple[str, .
 
 
 def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
-    fields = _fields(path, "family", entry, ("id", "profiles", "scene", "metrics", "reason", "source", "releases"))
+    """Read one entry; ``proof`` may be left out."""
+    told = {name: value for name, value in entry.items() if name != "proof"}
+    fields = _fields(path, "family", told, ("id", "profiles", "scene", "metrics", "reason", "source", "releases"))
     family, label = Family(**fields), f"{path}: family {entry['id']}"
     if "*" in family.profiles and "*" in family.metrics:
         raise FindingsError(f"{label}: a reason for every profile and every metric is none; name one of them")
@@ -114,7 +119,13 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
         SpecifierSet(family.releases)
     except InvalidSpecifier:
         raise FindingsError(f"{label}: releases {family.releases!r} is no version specifier such as >=1.2,<2") from None
-    return family
+    proofs = entry.get("proof", [])
+    if not isinstance(proofs, list):
+        raise FindingsError(f"{label}: proof must be a list of tables, [[family.proof]]")
+    try:
+        return replace(family, proofs=tuple(proof_of(family, proof) for proof in proofs))
+    except ValueError as error:
+        raise FindingsError(f"{label}: {one_line(error)}") from None
 
 
 def _unsupported(path: Path, entry: Mapping[str, Any]) -> Unsupported:

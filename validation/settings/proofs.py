@@ -10,8 +10,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from adapters.engine_folder import experiments_of
 from adapters.experiment import Experiment
 from validation.cells import Observation, Slot
+from validation.findings.files import findings_of
 from validation.judging.studies import results_of, study_of
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
@@ -79,6 +81,19 @@ def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list
             wanted += _cells(slot, experiment.metric)
     seen = observe(wanted, jobs)
     return [_proof(engine, experiment, seen) for experiment in experiments]
+
+
+def experiments_on(engine: str) -> list[Experiment]:
+    """All experiments on ``engine``: the proofs of its families, and what its package states in Python.
+
+    Raises
+    ------
+    FindingsError
+        If its files of findings are wrong.
+    """
+    known = findings_of(engine)
+    proofs = [proof for family in known.families.values() for proof in family.proofs] if known else []
+    return [*proofs, *experiments_of(engine)]
 
 
 def slot_of(engine: str, experiment: Experiment) -> Slot:

@@ -1,0 +1,151 @@
+"""Experiments as they stand in files: what they share with ``[[family.proof]]``, and ``tuning.toml`` of an engine.
+
+    [candidates]            stock settings that tuning may change, each with the values that it tries
+    cone = ["elliptic", "pyramidal"]
+
+    [belongs]               settings that mean nothing without another one, and which; they are switched with it
+    kappa_elastic = "solref"
+
+    [[cured]]               what fails as shipped and passes with a better profile (`adapters.experiment.Cured`)
+    shipped = "default"
+    better = "tuned"
+    scene = "stack"
+    cells = [{}, { n = 10 }]
+
+A setting that is None stands as ``"none"``, one of several values as a list. Proofs of families are read by
+`validation.findings.proofs`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from adapters.engine import EngineError
+from adapters.experiment import Cured
+from adapters.plain import one_line
+
+#: Of a field: whether a value fits, and what it must be, in words.
+Kind = tuple[Callable[[Any], bool], str]
+Fields = Mapping[str, Kind]
+#: Stands for None, as on the command line.
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What is tuned of an engine: settings and values to try, settings that belong to others, cures to measure."""
+
+    candidates: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
+    belongs: Mapping[str, str] = field(default_factory=dict)
+    cured: tuple[Cured, ...] = ()
+
+
+def is_word(value: Any) -> bool:
+    """Whether it is a text that is not empty."""
+    return isinstance(value, str) and bool(value.strip())
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a number; true and false are none."""
+    return type(value) in (int, float)
+
+
+def is_numbers(value: Any) -> bool:
+    """Whether it is a table of numbers."""
+    return isinstance(value, dict) and all(map(is_number, value.values()))
+
+
+def is_list_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Whether it is a list of what ``fits``."""
+    return lambda value: isinstance(value, list) and all(map(fits, value))
+
+
+NAME: Kind = (is_word, "a name")
+DIMENSION: Kind = (lambda value: type(value) is int and value in (2, 3), "2 or 3")
+TABLE: Kind = (lambda value: isinstance(value, dict), "a table")
+_PARTS: Fields = {
+    "candidates": TABLE,
+    "belongs": TABLE,
+    "cured": (lambda value: isinstance(value, list), "a list of tables"),
+}
+_CURED: Fields = {
+    "shipped": NAME,
+    "better": NAME,
+    "scene": NAME,
+    "cells": (lambda value: bool(value) and is_list_of(is_numbers)(value), "a list of tables of numbers"),
+    "metrics": (is_list_of(is_word), "a list of names"),
+    "dimension": DIMENSION,
+}
+
+
+def checked(label: str, table: Any, known: Fields, needed: Collection[str] = ()) -> dict[str, Any]:
+    """Return a table that has the fields it needs, no unknown one, and in each what fits.
+
+    Raises
+    ------
+    ValueError
+        In one line that begins with ``label`` and names the field.
+    """
+    if not isinstance(table, dict):
+        raise ValueError(f"{label} must be a table")
+    for name in (*table, *needed):
+        if name not in known:
+            raise ValueError(f"{label}: {name} is no field; there are {', '.join(known)}")
+        if name not in table:
+            raise ValueError(f"{label}: {name} is missing")
+        fits, what = known[name]
+        if not fits(table[name]):
+            raise ValueError(f"{label}: {name} must be {what}")
+    return table
+
+
+def setting_of(value: Any) -> Any:
+    """Value of a setting as it stands in a file: lists are tuples there, and None is a word."""
+    if isinstance(value, list):
+        return tuple(map(setting_of, value))
+    return None if value == NONE else value
+
+
+def settings_of(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as they stand in a file, with their values."""
+    return {name: setting_of(value) for name, value in table.items()}
+
+
+def params_of(table: Mapping[str, Any]) -> dict[str, float]:
+    """Parameters of a scene as they stand in a file: numbers, whole or not."""
+    return {name: float(value) for name, value in table.items()}
+
+
+def read_tuning(path: Path) -> Tuning:
+    """Read ``tuning.toml``.
+
+    Raises
+    ------
+    EngineError
+        If it cannot be read; one line that names file and field.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return _tuning(data)
+    except (OSError, ValueError) as error:  # what is no UTF-8 or no TOML is a ValueError as well
+        raise EngineError(f"{path}: {one_line(error)}") from None
+
+
+def _tuning(data: Mapping[str, Any]) -> Tuning:
+    checked("tuning", data, _PARTS)
+    candidates, belongs = data.get("candidates", {}), data.get("belongs", {})
+    checked("candidates", candidates, dict.fromkeys(candidates, (is_list_of(lambda value: True), "a list of values")))
+    checked("belongs", belongs, dict.fromkeys(belongs, NAME))
+    cures = [
+        checked(f"cured {number}", cure, _CURED, ("shipped", "better", "scene", "cells"))
+        for number, cure in enumerate(data.get("cured", []), 1)
+    ]
+    found = [
+        Cured(**cure | {"cells": tuple(map(params_of, cure["cells"])), "metrics": tuple(cure.get("metrics", ()))})
+        for cure in cures
+    ]
+    return Tuning(settings_of(candidates), belongs, tuple(found))

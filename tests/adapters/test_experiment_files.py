@@ -1,0 +1,74 @@
+"""``tuning.toml`` of an engine's folder: what is tried, what belongs together, what is cured; what is wrong with it."""
+
+import pytest
+
+from adapters.engine import EngineError
+from adapters.experiment import Cured
+from adapters.experiment_files import Tuning, read_tuning
+
+
+@pytest.fixture
+def read(tmp_path):
+    def write(text):
+        (tmp_path / "tuning.toml").write_text(text)
+        return read_tuning(tmp_path / "tuning.toml")
+
+    return write
+
+
+CURED = '[[cured]]\nshipped = "default"\nbetter = "tuned"\nscene = "stack"\ncells = [{}]\n'
+
+
+def test_every_part_may_be_missing(read):
+    assert read("") == Tuning() == Tuning({}, {}, ())
+    assert read('[belongs]\na = "b"\n') == Tuning(belongs={"a": "b"})
+
+
+def test_values_are_read_in_their_order_and_with_their_kinds(read):
+    found = read(
+        '[candidates]\nslop = [0.1, 1]\nref = ["none", [0.5, 1.0]]\ncone = ["a", "b"]\non = [false, true]\n'
+        + CURED.replace("[{}]", "[{}, { n = 10, e = 0.5 }]")
+        + CURED.replace("stack", "impact")
+        + 'metrics = ["creep"]\ndimension = 3\n'
+    )
+    assert list(found.candidates.items()) == [
+        ("slop", (0.1, 1)), ("ref", (None, (0.5, 1.0))), ("cone", ("a", "b")), ("on", (False, True)),
+    ]  # fmt: skip
+    assert type(found.candidates["slop"][1]) is int
+    assert found.cured == (
+        Cured("default", "tuned", "stack", ({}, {"n": 10.0, "e": 0.5})),
+        Cured("default", "tuned", "impact", ({},), ("creep",), 3),
+    )
+    assert type(found.cured[0].cells[1]["n"]) is float
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("cured", "Expected '=' after a key in a key/value pair (at end of document)"),
+        ("tried = 1\n", "tuning: tried is no field; there are candidates, belongs, cured"),
+        ("candidates = 1\n", "tuning: candidates must be a table"),
+        ("[candidates]\nslop = 0.1\n", "candidates: slop must be a list of values"),
+        ("[belongs]\nslop = 0.1\n", "belongs: slop must be a name"),
+        ("[cured]\n", "tuning: cured must be a list of tables"),
+        ("cured = [1]\n", "cured 1 must be a table"),
+        (CURED + CURED.replace("scene", "scenes"),
+         "cured 2: scenes is no field; there are shipped, better, scene, cells, metrics, dimension"),
+        (CURED.replace('shipped = "default"\n', ""), "cured 1: shipped is missing"),
+        (CURED.replace("[{}]", "[]"), "cured 1: cells must be a list of tables of numbers"),
+        (CURED.replace("[{}]", '[{ n = "ten" }]'), "cured 1: cells must be a list of tables of numbers"),
+        (CURED + "metrics = [1]\n", "cured 1: metrics must be a list of names"),
+        (CURED + "dimension = 1\n", "cured 1: dimension must be 2 or 3"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line_that_names_file_and_field(read, tmp_path, text, said):
+    with pytest.raises(EngineError) as caught:
+        read(text)
+    assert str(caught.value) == f"{tmp_path / 'tuning.toml'}: {said}"
+
+
+def test_a_file_that_is_no_text_or_is_not_there_is_named(tmp_path):
+    (tmp_path / "tuning.toml").write_bytes(b"\xff\xfe")
+    for path, said in ((tmp_path / "tuning.toml", "codec"), (tmp_path / "none.toml", "No such file")):
+        with pytest.raises(EngineError, match=rf"{path.name}: .*{said}"):
+            read_tuning(path)

@@ -1,0 +1,98 @@
+"""Proofs of families as they stand in ``families.toml``: read to the last digit, refused by the name of a field."""
+
+import pytest
+
+from adapters.experiment import Experiment
+from validation.findings import FindingsError
+from validation.findings.files import FAMILIES, read
+
+FAMILY = """
+[[family]]
+id = "creeps"
+profiles = ["default", "tuned"]
+scene = "incline"
+metrics = ["creep"]
+reason = "it is soft"
+source = "its manual"
+releases = ">=1.0,<2"
+"""
+CELL = 'cell = { profile = "default", dimension = 3, metric = "creep[1]" }\n'
+PROOF = "[[family.proof]]\n" + CELL + "set = { stiff = true }\n"
+
+
+@pytest.fixture
+def proofs(tmp_path):
+    def write(*entries):
+        (tmp_path / FAMILIES).write_text(FAMILY + "".join(entries))
+        return read("nameless", tmp_path).families["creeps"].proofs
+
+    return write
+
+
+def test_a_family_may_have_no_proof_and_the_next_family_has_its_own(proofs):
+    assert proofs() == ()
+    (first,) = proofs(PROOF, FAMILY.replace("creeps", "slides"), PROOF, PROOF)
+    assert first.family == "creeps"
+
+
+def test_what_is_not_said_is_as_in_the_quick_suite_and_what_is_shown_is_the_reason(proofs):
+    own = Experiment("creeps", "it is soft", "default", "incline", "creep[1]", {"stiff": True}, dimension=3)
+    assert proofs(PROOF) == (own,)
+
+
+def test_all_that_can_be_said_is_read_with_its_kind(proofs):
+    (proof,) = proofs(
+        "[[family.proof]]\n"
+        'cell = { profile = "tuned", dimension = 2, metric = "creep", params = { e = 1, mu = 0.1 }, iterations = 4, '
+        'dt = "1/480" }\n'
+        'set = { friction = "none", solref = [0.0, -239.976], rounds = 3, slop = 1e-7, cone = "round" }\n'
+        "not = [{ rounds = 3 }, { slop = 0.0 }]\n"
+        "within = 1\n"
+    )
+    off = {"friction": None, "solref": (0.0, -239.976), "rounds": 3, "slop": 1e-7, "cone": "round"}
+    assert proof == Experiment(
+        "creeps", "it is soft", "tuned", "incline", "creep", off, {"e": 1.0, "mu": 0.1}, 2, 4,
+        ({"rounds": 3}, {"slop": 0.0}), 1.0, 1 / 480,
+    )  # fmt: skip
+    assert [type(value) for value in (*proof.params.values(), proof.off["rounds"], proof.within)] == [
+        float, float, int, float
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ('proof = "no table"\n', "proof must be a list of tables, [[family.proof]]"),
+        ("proof = [1]\n", "proof must be a table"),
+        (PROOF.replace("set", "off"), "proof: off is no field; there are cell, set, not, within"),
+        (PROOF.replace("set = { stiff = true }\n", ""), "proof: set is missing"),
+        (PROOF.replace(CELL, ""), "proof: cell is missing"),
+        (PROOF.replace("{ stiff = true }", "{}"), "proof: set must be a table of settings"),
+        (PROOF + "not = { a = 1 }\n", "proof: not must be a list of tables of settings"),
+        (PROOF + "not = [{}]\n", "proof: not must be a list of tables of settings"),
+        (PROOF + "not = [{ stiff = true }]\n", "proof: not: what is set is not what is blamed in vain"),
+        (PROOF + "within = 0.0\n", "proof: within must be a number above 0"),
+        (PROOF + "within = true\n", "proof: within must be a number above 0"),
+        (PROOF.replace(", dimension = 3", ""), "proof: cell: dimension is missing"),
+        (PROOF.replace("3", "4"), "proof: cell: dimension must be 2 or 3"),
+        (PROOF.replace("3", "true"), "proof: cell: dimension must be 2 or 3"),
+        (PROOF.replace('"default"', "7"), "proof: cell: profile must be a name"),
+        (PROOF.replace('"default"', '"soft"'), "proof: cell: the family does not speak about soft creep[1]"),
+        (PROOF.replace("creep", "drift"), "proof: cell: the family does not speak about default drift[1]"),
+        (PROOF.replace(" }", ", scene = 1 }", 1),
+         "proof: cell: scene is no field; there are profile, dimension, metric, params, iterations, dt"),
+        (PROOF.replace(" }", ", params = { e = true } }", 1), "proof: cell: params must be a table of numbers"),
+        (PROOF.replace(" }", ", iterations = 0 }", 1), "proof: cell: iterations must be a whole number above 0"),
+        (PROOF.replace(" }", ", iterations = 1.5 }", 1), "proof: cell: iterations must be a whole number above 0"),
+        (PROOF.replace(" }", ", dt = 0.01 }", 1), 'proof: cell: dt must be a step in words, "1/480"'),
+        (PROOF.replace(" }", ', dt = "soon" }', 1),
+         "proof: cell: dt: 'soon' is not a number of seconds such as 1/240 or 0.004"),
+        (PROOF.replace(" }", ', dt = "-1/2" }', 1),
+         "proof: cell: dt: -1/2 must be a positive, finite number of seconds"),
+        (PROOF + '"\\u001b[31mred" = 1\n', "proof: \\u{1b}[31mred is no field; there are cell, set, not, within"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_proof_is_one_line_that_names_family_and_field(proofs, tmp_path, entry, said):
+    with pytest.raises(FindingsError) as caught:
+        proofs(entry)
+    assert str(caught.value) == f"{tmp_path / FAMILIES}: family creeps: {said}"

@@ -1,0 +1,77 @@
+"""Proofs of families: ``[[family.proof]]`` under a family of ``families.toml``.
+
+    cell      the row that fails: profile, dimension, metric; params, iterations and dt where they are not those of the
+              scene, the profile and the quick suite
+    set       settings that switch the mechanism off
+    not       settings that another explanation would blame, each alone in vain; may be missing
+    within    how near the truth counts as a PASS, in the metric's unit; may be missing
+
+`adapters.experiment.Experiment` says what each of them means, `validation.settings.proofs` runs them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adapters.experiment import Experiment
+from adapters.experiment_files import (
+    DIMENSION,
+    NAME,
+    TABLE,
+    Fields,
+    checked,
+    is_list_of,
+    is_number,
+    is_numbers,
+    is_word,
+    params_of,
+    settings_of,
+)
+from adapters.scene import SceneError
+from validation.cells import parse_dt
+from validation.findings import Family
+
+
+def _is_settings(value: Any) -> bool:
+    return isinstance(value, dict) and bool(value)
+
+
+_CELL: Fields = {
+    "profile": NAME,
+    "dimension": DIMENSION,
+    "metric": NAME,
+    "params": (is_numbers, "a table of numbers"),
+    "iterations": (lambda value: type(value) is int and value > 0, "a whole number above 0"),
+    "dt": (is_word, 'a step in words, "1/480"'),
+}
+_PROOF: Fields = {
+    "cell": TABLE,
+    "set": (_is_settings, "a table of settings"),
+    "not": (is_list_of(_is_settings), "a list of tables of settings"),
+    "within": (lambda value: is_number(value) and value > 0, "a number above 0"),
+}
+
+
+def proof_of(family: Family, entry: Any) -> Experiment:
+    """Read one proof of a family.
+
+    Raises
+    ------
+    ValueError
+        In one line that names the field.
+    """
+    proof = checked("proof", entry, _PROOF, ("cell", "set"))
+    cell = checked("proof: cell", proof["cell"], _CELL, ("profile", "dimension", "metric"))
+    if not family.covers((cell["profile"], family.scene, "", "", "", "", cell["metric"])):
+        raise ValueError(f"proof: cell: the family does not speak about {cell['profile']} {cell['metric']}")
+    off, idle = settings_of(proof["set"]), tuple(map(settings_of, proof.get("not", [])))
+    if off in idle:
+        raise ValueError("proof: not: what is set is not what is blamed in vain")
+    try:
+        dt = parse_dt(cell["dt"]) if "dt" in cell else None
+    except SceneError as error:
+        raise ValueError(f"proof: cell: {error}") from None
+    return Experiment(
+        family.id, family.reason, cell["profile"], family.scene, cell["metric"], off, params_of(cell.get("params", {})),
+        cell["dimension"], cell.get("iterations"), idle, float(proof.get("within", 0.0)), dt,
+    )  # fmt: skip
