@@ -18,8 +18,7 @@ from telling import Sections
 
 from adapters.conformance import self_test
 from adapters.conformance.self_test import Caught
-from reference_solver.certification.self_test import JUDGED, SIZES, Corruption, Trial
-from reference_solver.hard_cases.starved import Starved
+from reference_solver.verification.self_test import JUDGED, SIZES, Corruption, Trial
 from reports import history as written
 from reports import page, speed, starved, tables
 from reports import releases as told_releases
@@ -262,9 +261,9 @@ def doctor() -> Sections:
 def starved_stacks() -> Sections:
     """The picture of stacks that too few sweeps let sink: its tiles, and its specification in both schemes."""
     rows = [
-        Starved(10, 1, 9.0, 1.6, 1.0, False), Starved(10, 20, 0.0077, 0.002, 0.15, True),
-        Starved(10, 40, 0.021, 0.002, 0.15, True), Starved(5, 20, 0.5, 0.002, 0.15, True),
-        Starved(5, 40, 1e-3, 0.0, 0.0, True), Starved(1, 100, 0.0, 0.0, 0.0, True),
+        starved.Starved(10, 1, 9.0, 1.6, 1.0, False), starved.Starved(10, 20, 0.0077, 0.002, 0.15, True),
+        starved.Starved(10, 40, 0.021, 0.002, 0.15, True), starved.Starved(5, 20, 0.5, 0.002, 0.15, True),
+        starved.Starved(5, 40, 1e-3, 0.0, 0.0, True), starved.Starved(1, 100, 0.0, 0.0, 0.0, True),
     ]  # fmt: skip
     found = Sections(
         {"tiles": {f"{k}": json.dumps(each) for k, each in enumerate(starved.table(rows).to_dict("records"))}}
