@@ -40,7 +40,7 @@ RECORDED, SPENT = 8.0, 40.0
 #: Seconds of wall time of one test.
 PATIENCE = 20
 #: Left out: they read sources or compile.
-LEFT_OUT = ("compilation", "linking", "structures", "uncompiled", "classical_bits")
+LEFT_OUT = ("compilation", "linking", "plain_numba", "structures", "uncompiled", "classical_bits")
 OTHER_WAY = {ast.Lt: ">", ast.Gt: "<", ast.LtE: ">=", ast.GtE: "<=", ast.Eq: "!=", ast.NotEq: "=="}
 
 
