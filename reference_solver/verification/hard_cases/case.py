@@ -99,8 +99,6 @@ class HardCase:
         Simulated time [s].
     judge
         Reads the answer of a run that `doubts` has let pass.
-    expects
-        Counts that a certified answer must have, by name.
     stride
         Steps between samples.
     excused
@@ -113,7 +111,6 @@ class HardCase:
     settings: Settings
     duration: float
     judge: Callable[[Run], Verdict]
-    expects: dict[str, float] = field(default_factory=dict)
     stride: int = 1
     excused: tuple[str, ...] = ()
 

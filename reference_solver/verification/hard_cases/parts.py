@@ -1,10 +1,10 @@
-"""Bodies that the hard cases share: planar floor, discs, boxes and rods."""
+"""Bodies that the hard cases share: planar floor, discs and boxes."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from reference_solver.model import Body, Box, Capsule, Disc, HalfSpace
+from reference_solver.model import Body, Box, Disc, HalfSpace
 
 #: Standard test value [m/s^2].
 GRAVITY = 9.81
@@ -24,8 +24,3 @@ def box(x: float, y: float, half: tuple[float, float] = (0.5, 0.5), mass: float 
     """Return a uniform box [m, kg]."""
     angle = fields.pop("angle", 0.0)
     return Body(Box(half), mass, mass * (half[0] ** 2 + half[1] ** 2) / 3.0, (x, y, angle), **fields)
-
-
-def rod(x: float, y: float, angle: float, half_length: float, radius: float, **fields: Any) -> Body:
-    """Return a rod of 1 kg with round ends and the inertia m l^2 / 3 of a thin one."""
-    return Body(Capsule(half_length, radius), 1.0, half_length**2 / 3.0, (x, y, angle), **fields)
