@@ -16,10 +16,8 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import config as numba_config
-from numba.core import types
-from numba.core.caching import UserProvidedCacheLocator
 
-from reference_solver.linking import Carried, Whole
+from reference_solver.structures import KNOWN
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -28,16 +26,19 @@ config: Any = numba_config
 njit: Any = numba.njit
 
 
-#: Packages that run the solver and hold no kernel: an edit there compiles nothing anew.
-WITHOUT_KERNELS = ("certification", "hard_cases")
+#: What stands beside the solver and holds no kernel: an edit there compiles nothing anew.
+WITHOUT_KERNELS = ("certificate", "verification", "geometry.py", "piles.py")
+#: The one folder in there whose functions are compiled.
+WITH_KERNELS = ("verification", "event_driven")
 
 
 def source_hash() -> str:
-    """Return 16 hex digits over path and content of all sources that kernels can stand in, and the numba version."""
+    """Return 16 hex digits over all sources that kernels can stand in, numba's version, and whether it is known."""
     root = Path(__file__).parent
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{numba.__version__} {KNOWN}".encode())
     for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] in WITHOUT_KERNELS:
+        parts = path.relative_to(root).parts
+        if parts[0] in WITHOUT_KERNELS and parts[:2] != WITH_KERNELS:
             continue
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
@@ -67,63 +68,37 @@ def cache_folder() -> Path | None:
 CACHE_FOLDER = cache_folder()
 
 
+# On a release of numba that nobody tried, kernels are compiled by its public means alone: several times as slowly.
+if KNOWN:
+    from reference_solver.linking import INNER, KERNEL, LOCATION, once_for_all_constants
+else:
+    KERNEL, INNER, LOCATION = {}, {}, {}
+
+    def once_for_all_constants(function: Any) -> Any:
+        """Return a function as it is."""
+        return function
+
+
+#: No hidden branches for divisions by zero: zero denominators are excluded by validation.
+OPTIONS: Any = {"error_model": "numpy"}
 #: How kernels are compiled that only kernels call.
-INNER_OPTIONS = {
-    "error_model": "numpy",  # no hidden zero-division branches; zero denominators are excluded by validation
-    "_nrt": False,  # kernels allocate nothing; counting references to arrays cost two thirds of the time
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
-
-
-def once_for_all_constants(function: Any) -> Any:
-    """Have calls with a constant call the function that is there for variables.
-
-    numba compiles a function anew for every constant that a call hands over: 280 of the 796 functions of the kernels in
-    space, a fourth of the time. What a constant saves at run time LLVM finds by itself where it splices the call.
-    """
-    if hasattr(function, "py_func"):
-        resolve = function.get_call_template
-
-        def get_call_template(args: Any, keywords: Any) -> Any:
-            plain = {name: types.unliteral(kind) for name, kind in dict(keywords).items()}
-            return resolve(tuple(map(types.unliteral, args)), plain)
-
-        function.get_call_template = get_call_template
-    return function
-
-
-class PerModule(UserProvidedCacheLocator):
-    """Keeps a kernel below its module's name: checkouts and installations of the same sources share machine code.
-
-    numba keeps it below a hash of where the source lies. What decides here is what the source says, and the folder's
-    name covers all of that.
-    """
-
-    def __init__(self, function: Callable[..., object], file: str) -> None:
-        super().__init__(function, file)
-        self._cache_path = str(Path(config.CACHE_DIR) / function.__module__)
-
-
-#: How numba is told of `PerModule`, by its setting ``CACHE_LOCATOR_CLASSES``.
-LOCATOR = f"{PerModule.__module__}.{PerModule.__qualname__}"
+INNER_OPTIONS: Any = OPTIONS | INNER
 
 
 def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
-    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-    if CACHE_FOLDER is not None:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(CACHE_FOLDER), LOCATOR
+    told = {} if CACHE_FOLDER is None else {"CACHE_DIR": str(CACHE_FOLDER)} | LOCATION
+    before = {name: getattr(config, name) for name in told}
     try:
+        vars(config).update(told)
         result: F = njit(
             function,
             cache=CACHE_FOLDER is not None and not inner,
-            pipeline_class=Carried if inner else Whole,
-            **(INNER_OPTIONS | {"no_cpython_wrapper": inner}),
+            **(INNER_OPTIONS if inner else OPTIONS | KERNEL),
             inline="always" if inline else "never",
         )
         return once_for_all_constants(result)
     finally:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
+        vars(config).update(before)
 
 
 def kernel(function: F) -> F:
@@ -161,5 +136,5 @@ def from_python(function: F) -> F:
 
     if not hasattr(function, "py_func"):  # not compiled: NUMBA_DISABLE_JIT
         return function
-    compiled: F = njit(call, pipeline_class=Whole)
+    compiled: F = njit(call, **KERNEL)
     return compiled

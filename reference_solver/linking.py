@@ -5,28 +5,54 @@ four hundred functions, ten calls deep, this costs several times what compiling 
 call ends as a module of its own that is neither linked, optimised nor translated; a kernel links all modules it needs,
 directly or not, and is optimised as a whole.
 
-numba has no public way to say so: this rests on its lowering pass and its code library, as of the release that
-`constraints.txt` names. Where another release differs it fails here, at import or with what is not linked.
+numba has no public way to say so: this rests on its lowering pass and its code library, as of the releases that
+`structures.TRIED` names. On any other release nothing imports this module (`compilation.py`).
 """
 
 from __future__ import annotations
 
 import copy
+import gc
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core import config as numba_config
+from numba.core import types
+from numba.core.caching import UserProvidedCacheLocator
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.cpu import CPUContext
 from numba.core.typed_passes import NativeLowering
 
-from reference_solver.compile_time import NOT_NEEDED, sparing
 from reference_solver.structure_types import Convention
 
 # numba's type hints do not know its configuration's attributes.
 config: Any = numba_config
+
+#: Passes that change nothing in kernels, each of which goes through all statements and has the lives of all variables
+#: found anew: kernels have no ``with``, no functions in functions, no expressions of arrays, nothing compiled for a
+#: constant.
+NOT_NEEDED = frozenset(
+    [
+        "WithLifting",
+        "InlineClosureLikes",
+        "RewriteDynamicRaises",
+        "MakeFunctionToJitFunction",
+        "FindLiterallyCalls",
+        "LiteralUnroll",
+        "LiteralPropagationSubPipelinePass",
+        "InlineOverloads",
+        "NopythonRewrites",
+        "DumpParforDiagnostics",
+    ]
+)
+#: Objects made between two searches for garbage while a kernel compiles: with Python's own 700 a fifth of the time went
+#: into searches through all that is being compiled (87 s of CPU for the planar located step, 69 s now, 67 s without
+#: any), for .66 GB of memory instead of .55.
+BETWEEN_COLLECTIONS = 1_000_000
 
 
 class Module(JITCodeLibrary):
@@ -149,9 +175,13 @@ class Whole(CompilerBase):
     """Compiles kernels."""
 
     def compile_extra(self, func: Any) -> Any:
-        """Compile, and all that is called, without what kernels do not need."""
-        with sparing():
+        """Compile, and all that is called, with few searches for garbage."""
+        thresholds = gc.get_threshold()
+        gc.set_threshold(max(thresholds[0], BETWEEN_COLLECTIONS) if thresholds[0] else 0, *thresholds[1:])
+        try:
             return super().compile_extra(func)
+        finally:
+            gc.set_threshold(*thresholds)
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes, the lowering apart."""
@@ -166,3 +196,44 @@ def with_lowering(state: Any, lowering: type) -> Any:
     passes._finalized = False
     passes.finalize()
     return passes
+
+
+def once_for_all_constants(function: Any) -> Any:
+    """Have calls with a constant call the function that is there for variables.
+
+    numba compiles a function anew for every constant that a call hands over: 280 of the 796 functions of the kernels in
+    space, a fourth of the time. What a constant saves at run time LLVM finds by itself where it splices the call.
+    """
+    if hasattr(function, "py_func"):
+        resolve = function.get_call_template
+
+        def get_call_template(args: Any, keywords: Any) -> Any:
+            plain = {name: types.unliteral(kind) for name, kind in dict(keywords).items()}
+            return resolve(tuple(map(types.unliteral, args)), plain)
+
+        function.get_call_template = get_call_template
+    return function
+
+
+class PerModule(UserProvidedCacheLocator):
+    """Keeps a kernel below its module's name: checkouts and installations of the same sources share machine code.
+
+    numba keeps it below a hash of where the source lies. What decides here is what the source says, and the folder's
+    name covers all of that.
+    """
+
+    def __init__(self, function: Callable[..., object], file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(Path(config.CACHE_DIR) / function.__module__)
+
+
+#: How numba is told of `PerModule`, by its settings.
+LOCATION = {"CACHE_LOCATOR_CLASSES": f"{PerModule.__module__}.{PerModule.__qualname__}"}
+
+#: What numba is told of kernels beyond what it offers to all, and of what only kernels call.
+KERNEL: Any = {
+    "pipeline_class": Whole,
+    "_nrt": False,  # kernels allocate nothing; counting references to arrays cost two thirds of the time
+    "no_cfunc_wrapper": True,
+}
+INNER: Any = KERNEL | {"pipeline_class": Carried, "no_cpython_wrapper": True}

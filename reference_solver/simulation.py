@@ -22,7 +22,6 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from reference_solver.certificate import columns, summary
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
 from reference_solver.pieces import Journal, allocate_journal, is_full, pieces_of, room_taken
@@ -30,6 +29,7 @@ from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.tally import OPENED, merge, new_tally
+from reference_solver.tally_summary import columns, summary
 
 
 class World(Protocol):

@@ -20,7 +20,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from reference_solver.linking import Whole
+from reference_solver.compilation import KERNEL, OPTIONS
 from reference_solver.simulation import WORLDS, Simulation
 
 _MONOTONIC = 1  # CLOCK_MONOTONIC, <time.h>
@@ -82,7 +82,7 @@ def _timed_loop(dimension: int) -> tuple[Any, list[str], list[str]]:
     function.args.args += [ast.arg("clock"), ast.arg("spent")]
     scope = {**vars(module), "lap": lap}
     exec(compile(ast.fix_missing_locations(tree), f"<{module.__name__} with laps>", "exec"), scope)
-    step = numba.njit(scope["step"], error_model="numpy", pipeline_class=Whole)
+    step = numba.njit(scope["step"], **OPTIONS, **KERNEL)
 
     @numba.njit
     def loop(arguments: Any, clock: Any, spent: Any) -> bool:

@@ -50,6 +50,30 @@ def test_each_package_imports_only_what_stands_to_its_left(package):
         assert not forbidden & set(imported(path)), path
 
 
+#: Who imports what tests the solver: the command that prints it. What judges runs stands in `certificate/`.
+VERIFYING = {"reports/command/certifying.py", "reports/command/fuzzing.py"}
+
+
+def test_only_the_command_that_prints_them_imports_the_solver_s_tests():
+    room = ROOT / "reference_solver" / "verification"
+    importing = {
+        path.relative_to(ROOT).as_posix()
+        for package in LINE
+        for path in (ROOT / package).rglob("*.py")
+        if room not in path.parents and any(name.startswith("reference_solver.verification") for name in named(path))
+    }
+    assert importing == VERIFYING
+
+
+def named(path):
+    """Modules that a file imports, by their whole names; of ``from a import b`` both a and a.b."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield from (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+
+
 #: Rooms of `validation`, each of which imports only what stands to its left; on the ground floor stands what all share.
 ROOMS = ["truths", "scenes", "files", "running", "records", "workers", "bench"]
 ROOMS += ["findings", "judging", "questions", "settings", "releases", "field"]
@@ -166,7 +190,7 @@ OTHER_MEANINGS = {
     ("adapters/probes.py", "slide"): "a probe",
     ("adapters/receipts.py", "slide"): "a probe",
     ("validation/bench/units.py", "pyramid"): "the pile on which iteration counts are timed",
-    ("reports/command/certifying.py", "impact"): "a part of `reference_solver.certification`",
+    ("reports/command/certifying.py", "impact"): "a part of `reference_solver.verification`",
 }
 
 
@@ -271,7 +295,7 @@ OTHER_CLAMPS = {
 def test_friction_is_clamped_in_one_place():
     """`coulomb.py` has what the law allows; elsewhere nothing is clamped but lengths and steps."""
     found = {str(path) for path, node in solver_functions() for part in ast.walk(node) if clamps(part)}
-    ours = {path for path in found if path.partition("/")[0] not in ("certification", "hard_cases", "event_driven")}
+    ours = {path for path in found if path.partition("/")[0] not in ("certificate", "verification", "geometry.py")}
     assert ours - {"coulomb.py"} == set(OTHER_CLAMPS)
     assert "coulomb.py" in ours
 
@@ -326,7 +350,7 @@ def test_the_rooms_of_the_solver_grow_only_where_somebody_says_so():
     for room, (most, before) in rooms.items():
         print(f"{room:22} {lines[room]:6} of at most {most:6}, {before:6} at 16 082")
     print(f"{'all':22} {sum(lines.values()):6}")
-    assert set(lines) >= {"planar", "spatial", "stepping", "certification"}
+    assert set(lines) >= {"planar", "spatial", "stepping", "certificate", "verification"}
     assert sum(before for _, before in rooms.values()) == 16_082
     grown = {room: lines[room] for room, (most, _) in rooms.items() if lines[room] > most}
     assert not grown, "see 'Add lines to the solver' in CONTRIBUTING.md"

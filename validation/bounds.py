@@ -26,7 +26,7 @@ from validation.metrics import OUT_OF_PLANE
 #: additions: what is left of an answer that has an exact law at every step length.
 ROUND_OFF = 1e-12
 #: Growth of a disturbance up to which a motion can be told in doubles: the horizon of the reference's certificate
-#: (`reference_solver.certification.truth.GROWTH`).
+#: (`reference_solver.certificate.truth.GROWTH`).
 GROWTH = 1e3
 #: A body slower than this share of v1 does not move: in a hundred steps it gains less than one step of free fall.
 STILL = 0.01

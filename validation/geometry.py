@@ -15,7 +15,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Box, Cylinder, HalfSpace, Hull, Shape
 from adapters.shapes import reach
-from reference_solver.certification.geometry import gap, rotation
+from reference_solver.geometry import gap, rotation
 from validation import solids
 
 #: Samples whose exact gap is asked for at a time while the deepest of a run is looked for.

@@ -14,7 +14,7 @@ from adapters.near import near_pairs
 from adapters.scene import Scene
 from adapters.shapes import reach as reach
 from adapters.trajectory import Trajectory
-from reference_solver.certification.geometry import rotation
+from reference_solver.geometry import rotation
 from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 

@@ -58,7 +58,7 @@ def _solid(shape: Shape) -> Any:
 
 def _turn(shape: Shape, pose: Array) -> Array:
     """Rotation of the solid that stands for a shape, (3, 3)."""
-    from reference_solver.certification.geometry import rotation
+    from reference_solver.geometry import rotation
 
     turn = np.asarray(rotation(pose[None]))[0]
     lying = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # z to x

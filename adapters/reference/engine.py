@@ -124,9 +124,9 @@ class ReferenceEngine(Engine):
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
     ) -> dict[str, Any] | None:
-        """Full certificate (`reference_solver.certification.truth`) of a profile that promises a solution."""
+        """Full certificate (`reference_solver.certificate.truth`) of a profile that promises a solution."""
         from reference_solver import Settings
-        from reference_solver.certification.truth import certify
+        from reference_solver.certificate.truth import certify
 
         chosen = Settings(dt=dt, **settings)
         if chosen.residual is None:

@@ -14,7 +14,7 @@ def too_far_at_the_start(scene: Scene) -> str | None:
     A place of 1e8 m is told in steps of 1.5e-8 m: a gap, an arm or a depth is known no better there. The certificate
     has a limit for it, a share of the smallest half width; it is asked here, before a run that could only be INVALID.
     """
-    from reference_solver.certificate import GATES
+    from reference_solver.tally_summary import GATES
 
     limit = next(gate.limit for gate in GATES if gate.name == "resolution")
     for body in scene.bodies:
@@ -36,8 +36,8 @@ def overlap_at_the_start(scene: Scene) -> str | None:
     Rigid bodies that share space have no motion that a law would give. The solver's certificate has a limit for it,
     a share of the smaller half width; it is asked here, before a run that could only be INVALID.
     """
-    from reference_solver.certificate import GATES
-    from reference_solver.certification.geometry import gap
+    from reference_solver.geometry import gap
+    from reference_solver.tally_summary import GATES
 
     limit = next(gate.limit for gate in GATES if gate.name == "start_overlap")
     for i, j in near_pairs(scene, np.array([[body.pose for body in scene.bodies]])):

@@ -15,7 +15,6 @@ import numpy as np
 from numba.extending import overload
 
 from reference_solver.compilation import INNER_OPTIONS, config
-from reference_solver.linking import Carried
 
 #: The bodies of either dimension: what operations are chosen by.
 Bodies: TypeAlias = Any
@@ -35,9 +34,7 @@ def operation(function: Callable[..., Any]) -> Any:
         chosen.table = table  # type: ignore[attr-defined]
         return chosen
 
-    options: Any = INNER_OPTIONS | {"pipeline_class": Carried}
-
-    @overload(function, jit_options=options, strict=False)
+    @overload(function, jit_options=INNER_OPTIONS, strict=False)
     def pick(first: Any, *others: Any) -> Any:
         found = table.get(getattr(first, "instance_class", np.recarray))
         return None if found is None else found.py_func

@@ -20,19 +20,19 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.isolation import end_with
-from reference_solver.certification import Gate, piles
-from reference_solver.certification.orders import PHASES, RATES, orders
-from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, trials
+from reference_solver.verification import Gate, piles
+from reference_solver.verification.orders import PHASES, RATES, orders
+from reference_solver.verification.self_test import JUDGED, PROMISED, SIZES, trials
 from reports.command.fuzzing import show_random
 from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
 from reports.wording import number
 
-#: Modules of `reference_solver.certification` that answer for gates, in the order in which they are measured and shown.
+#: Modules of `reference_solver.verification` that answer for gates, in the order in which they are measured and shown.
 #: The oracle comes first: it needs few kernels; the process beside it compiles the others meanwhile. What takes minutes
 #: comes before what takes seconds, so that no process ends long before the other.
 PARTS = (
-    "event_driven",
+    "event_driven.gates",
     "impact",
     "friction",
     "columns",
@@ -47,7 +47,7 @@ PARTS = (
     "turning_in_space",
     "detection",
     "metamorphic",
-    "hard_cases",
+    "hard_cases.gates",
     "self_test",
 )
 #: The part that takes more time than all others together (560 of 702 s of CPU when it was one): its runs are measured
@@ -164,7 +164,7 @@ def measured(part: str) -> list[Gate] | piles.Fall:
         return piles.fall_of(part)
     gates: list[Gate] = []
     try:
-        gates.extend(import_module(f"reference_solver.certification.{part}").gates())
+        gates.extend(import_module(f"reference_solver.verification.{part}").gates())
     except Exception as error:
         gates.append(Gate.at_most(f"{part}: could not be measured", repr(error), math.nan, 0.0, part))
     return gates

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
-from reference_solver.certification.fuzz.trial import attack
+from reference_solver.verification.fuzz.trial import attack
 from reports.wording import number
 
 #: Processes side by side, and seconds that one scene may take: compiling kernels is part of the first.

@@ -9,7 +9,7 @@ import pytest
 from adapters.near import near_pairs, start_overlap
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Pair, Polygon, Scene, Sphere
 from adapters.shapes import reach
-from reference_solver.certification.geometry import gap
+from reference_solver.geometry import gap
 
 
 def cloud(dimension, count, seed, spread, fixed=0.2):

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver import tally as entries
-from reference_solver.certificate import GATES, reasons
 from reference_solver.coulomb import cone_defect, into_cone
 from reference_solver.exact_contact import coulomb_solutions
 from reference_solver.planar.certificate import certify as certify_planar
@@ -17,6 +16,7 @@ from reference_solver.planar.certificate import open_solve as open_planar
 from reference_solver.planar.columns import GAP, PN, PT
 from reference_solver.spatial.certificate import certify as certify_spatial
 from reference_solver.spatial.certificate import open_solve as open_spatial
+from reference_solver.tally_summary import GATES, reasons
 
 DT, G = 1.0 / 240.0, 9.81
 FRAME = (1.0, 0.0, 0.0, 0.0)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.certification.audit import chains
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.audit import chains
+from reference_solver.certificate.truth import certify
 
 DIGITS, MOST = 50, 30_000
 #: Rebounds are spent below the first [m/s]; what is slower than the second across a gap below the third lies as well.

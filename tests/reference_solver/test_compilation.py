@@ -26,14 +26,37 @@ def test_the_cache_folder_is_named_after_the_sources():
     assert compilation.CACHE_FOLDER is None or compilation.source_hash() in compilation.CACHE_FOLDER.name
 
 
-def test_the_hash_covers_every_solver_source(tmp_path, monkeypatch):
-    (tmp_path / "planar").mkdir()
-    source = tmp_path / "planar" / "rows.py"
+@pytest.mark.parametrize(
+    ("file", "covered"),
+    [
+        ("model.py", True),
+        ("planar/rows.py", True),
+        ("verification/event_driven/roots.py", True),
+        ("verification/piles.py", False),
+        ("certificate/truth.py", False),
+        ("certificate/audit/run.py", False),
+        ("geometry.py", False),
+    ],
+)
+def test_the_hash_covers_every_source_in_which_kernels_can_stand(tmp_path, monkeypatch, file, covered):
+    source = tmp_path / file
+    source.parent.mkdir(parents=True, exist_ok=True)
     source.write_text("x = 1")
     monkeypatch.setattr(compilation, "__file__", str(tmp_path / "compilation.py"))
     before = compilation.source_hash()
     source.write_text("x = 2")
-    assert compilation.source_hash() != before
+    assert (compilation.source_hash() != before) == covered
+
+
+def test_what_the_hash_leaves_out_compiles_nothing():
+    """An edit there would leave machine code of what stood there before."""
+    folder = Path(compilation.__file__).parent
+    for name in compilation.WITHOUT_KERNELS:
+        found = [folder / name] if name.endswith(".py") else [*(folder / name).rglob("*.py")]
+        assert found
+        for path in found:
+            if path.relative_to(folder).parts[:2] != compilation.WITH_KERNELS:
+                assert "reference_solver.compilation" not in path.read_text(), path
 
 
 def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):

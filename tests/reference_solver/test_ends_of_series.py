@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Sphere
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.truth import certify
 from reference_solver.stepping.impacts import DRIFT_STEPS, drifts_aside, is_lowest, turns_aside
 
 G, NOISE = 9.81, 1e-12
@@ -55,8 +55,8 @@ def test_what_turns_counts_over_ten_thousand_steps_or_until_it_has_turned():
 PLANTED = """
 import json, sys
 from reference_solver import Settings, Simulation
-from reference_solver.certification.audit import ends_of_series
-from reference_solver.certification.fuzz.scenes import STRIDE, scene
+from reference_solver.certificate.audit import ends_of_series
+from reference_solver.verification.fuzz.scenes import STRIDE, scene
 from reference_solver.stepping import impacts
 
 impacts.LOWEST *= float(sys.argv[1])

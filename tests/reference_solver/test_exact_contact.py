@@ -134,3 +134,26 @@ def test_non_negative_least_squares_meets_its_optimality_conditions(seed):
 def test_arrays_that_are_no_contact_problem_are_refused(bad):
     with pytest.raises(ValueError, match="matrix"):
         coulomb_solutions(*bad, [0.1])
+
+
+def test_a_steps_contact_problem_always_has_a_solution():
+    """2000 random problems of one and two contacts on free bodies: impulses exist, several or one (E54).
+
+    W is symmetric and positive semi-definite, and q is a velocity that free bodies can have; then a solution exists
+    (D. Stewart and J. Trinkle 1996, M. Anitescu and F. Potra 1997).
+    """
+    rng = np.random.default_rng(3)
+    several = 0
+    for trial in range(2000):
+        count = 1 + trial % 2
+        levers = rng.standard_normal((2 * count, 3))
+        for c in range(count):  # normal and tangent of a contact are perpendicular unit vectors
+            angle = rng.uniform(0.0, 2.0 * math.pi)
+            levers[2 * c, :2] = math.cos(angle), math.sin(angle)
+            levers[2 * c + 1, :2] = -math.sin(angle), math.cos(angle)
+        matrix = levers @ np.diag([1.0, 1.0, rng.uniform(0.1, 10.0)]) @ levers.T
+        free = levers @ rng.standard_normal(3)  # velocities that the bodies can have
+        solutions = coulomb_solutions(matrix, free, rng.uniform(0.0, 3.0, count))
+        assert solutions
+        several += len(solutions) > 1
+    assert several > 0  # existence, not uniqueness

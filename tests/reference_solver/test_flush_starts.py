@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Polygon, Settings, Simulation
-from reference_solver.certification.relations import Change, permuted
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.relations import Change, permuted
+from reference_solver.certificate.truth import certify
 from reference_solver.needs import needs
 from reference_solver.simulation import WORLDS
 from reference_solver.tally import OPENED

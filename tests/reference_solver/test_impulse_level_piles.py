@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings, Simulation
-from reference_solver.certification.audit.run import Run
-from reference_solver.certification.piles import planar_pile
+from reference_solver.certificate.audit.run import Run
+from reference_solver.piles import planar_pile
 
 DT = 1.0 / 120.0
 

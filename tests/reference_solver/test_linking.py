@@ -1,12 +1,15 @@
 """Kernels carry all code they call, and nothing that only kernels call can be called from Python."""
 
+import gc
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from reference_solver import linking
-from reference_solver.compilation import config, inner_kernel, kernel, njit
+from reference_solver.compilation import KERNEL, config, inner_kernel, kernel, njit
+from reference_solver.structures import KNOWN
 
-pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: nothing is compiled")
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT) or not KNOWN, reason="nothing is linked")
 
 
 @inner_kernel
@@ -51,7 +54,7 @@ def test_what_only_kernels_call_refuses_python():
 def test_loops_are_neither_unrolled_nor_vectorised():
     """What kernels loop over is short."""
 
-    @njit(pipeline_class=linking.Whole)  # not kept on disk: code that was kept cannot be read
+    @njit(**KERNEL)  # not kept on disk: code that was kept cannot be read
     def total(x):
         found = 0.0
         for k in range(len(x)):
@@ -61,3 +64,31 @@ def test_loops_are_neither_unrolled_nor_vectorised():
     assert total(np.ones(5)) == 5.0
     (code,) = total.inspect_llvm().values()
     assert code.count(" fadd ") == 1 and " fadd double " in code
+
+
+def test_a_kernel_that_compiles_leaves_the_garbage_collector_as_it_was():
+    before = gc.get_threshold()
+
+    @kernel
+    def fresh(x):
+        return x + 2.0
+
+    assert fresh(1.0) == 3.0 and gc.get_threshold() == before
+    try:
+        gc.set_threshold(0)
+        assert fresh(1) == 3.0 and gc.get_threshold() == (0, *before[1:])
+        gc.set_threshold(5_000_000, 3, 4)
+        assert fresh(True) == 3.0 and gc.get_threshold() == (5_000_000, 3, 4)
+    finally:
+        gc.set_threshold(*before)
+
+
+def test_passes_that_are_left_out_are_passes_of_numba():
+    """A release that calls them otherwise would run them again, and nobody would see it."""
+    from numba.core import compiler
+
+    from reference_solver.linking import NOT_NEEDED
+
+    state = SimpleNamespace(func_ir=None, flags=compiler.Flags())
+    known = {step.__name__ for step, _ in compiler.DefaultPassBuilder.define_nopython_pipeline(state).passes}
+    assert known >= NOT_NEEDED

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reference_solver import Settings
-from reference_solver.certification import metamorphic
-from reference_solver.certification.metamorphic import ANY_PROFILE, EXACT, REFERENCE_ONLY, REVERSIBLE, Trial, change_of
-from reference_solver.certification.relations import Change, canonical_order, defect, permuted, quaternion, run, turned
-from reference_solver.certification.scenes import DT, GROWTH, SCENES, Numbers
-from reference_solver.certification.space import SPACES
+from reference_solver.certificate.relations import Change, canonical_order, defect, permuted, quaternion, run, turned
+from reference_solver.verification import metamorphic
+from reference_solver.verification.metamorphic import ANY_PROFILE, EXACT, REFERENCE_ONLY, REVERSIBLE, Trial, change_of
+from reference_solver.verification.scenes import DT, GROWTH, SCENES, Numbers
+from reference_solver.verification.space import SPACES
 
 #: Fixed seed, so that a failure is everyone's; each example steps six scenes.
 CHOSEN = settings(derandomize=True, max_examples=15)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.certification.geometry import rotation
+from reference_solver.geometry import rotation
 
 DT = 1.0 / 240.0
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")

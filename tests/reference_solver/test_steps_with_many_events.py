@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.certificate import LOCATED_OVERLAP, reasons
-from reference_solver.certification.piles import planar_pile
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.truth import certify
 from reference_solver.pieces import IMPACT, UNORDERED
+from reference_solver.piles import planar_pile
 from reference_solver.stepping.clock import (
     CLOCK_SIZE,
     EVENTS,
@@ -32,6 +31,7 @@ from reference_solver.stepping.clock import (
 )
 from reference_solver.stepping.noise import EVENT_BUDGET
 from reference_solver.tally import EVENTS_LOCATED, EXHAUSTED, STEPS_HELD, new_tally
+from reference_solver.tally_summary import LOCATED_OVERLAP, reasons
 
 DT, G = 1.0 / 240.0, 9.81
 PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)

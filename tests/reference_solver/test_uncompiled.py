@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings
-from reference_solver.certification.metamorphic import bound
-from reference_solver.certification.relations import Change, run
-from reference_solver.certification.scenes import DT, SCENES, Numbers
-from reference_solver.certification.space import SPACES
+from reference_solver.certificate.relations import Change, run
+from reference_solver.verification.metamorphic import bound
+from reference_solver.verification.scenes import DT, SCENES, Numbers
+from reference_solver.verification.space import SPACES
 
 SCRIPT = """
 import sys
 import numpy as np
 from reference_solver import Settings
-from reference_solver.certification.relations import run
-from reference_solver.certification.scenes import DT, SCENES, Numbers
-from reference_solver.certification.space import SPACES
+from reference_solver.certificate.relations import run
+from reference_solver.verification.scenes import DT, SCENES, Numbers
+from reference_solver.verification.space import SPACES
 found = {}
 for space in SPACES:
     for profile in ("classical", "reference"):

@@ -7,9 +7,9 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from reference_solver.certification import Gate, piles, rotation
-from reference_solver.certification.orders import RATES, Order
-from reference_solver.certification.self_test import JUDGED, SIZES, Corruption, Trial
+from reference_solver.verification import Gate, piles, rotation
+from reference_solver.verification.orders import RATES, Order
+from reference_solver.verification.self_test import JUDGED, SIZES, Corruption, Trial
 from reports.command import certifying, main
 
 

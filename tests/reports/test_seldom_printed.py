@@ -13,12 +13,12 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from reference_solver.hard_cases.starved import Starved
 from reports import history as written
 from reports import page, speed, starved, tables
 from reports import releases as told_releases
 from reports.command import accepting, benching, inspecting, main, piles, posing, releasing
 from reports.palette import PAPER
+from reports.starved import Starved
 from validation.bench import agreement
 from validation.bench.piles import KINDS, Lap
 from validation.catalogue import CATALOGUE

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from reference_solver.certification.self_test import JUDGED, PROMISED, SIZES, Corruption, Trial
+from reference_solver.verification.self_test import JUDGED, PROMISED, SIZES, Corruption, Trial
 from reports.command import certifying
 
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from reference_solver.hard_cases.starved import Starved
-from reports.starved import RANGE, chart, table
+from reports.starved import RANGE, Starved, chart, starved_stack, table
 
 ROWS = [
     Starved(10, 1, 9.0, 1.6, 1.0, False),
@@ -24,3 +23,12 @@ def test_a_picture_is_drawn_in_both_schemes(scheme):
     svg = vl_convert.vegalite_to_svg(chart(ROWS, scheme))
     for word in ("falls", "0.8 %", "stands", "sweeps per step"):
         assert word in svg
+
+
+def test_sweeps_that_are_too_few_bring_a_stack_down():
+    """More sweeps let it sink less; a column of n asks for n^2, ten boxes fall with one and stand with twenty."""
+    few, some, many = (starved_stack(10, sweeps) for sweeps in (1, 20, 100))
+    assert not few.stands
+    assert some.stands
+    assert many.stands
+    assert few.sunk > some.sunk > many.sunk

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
-from reference_solver.certification.geometry import rotation
+from reference_solver.geometry import rotation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.judging.rows import rows_of

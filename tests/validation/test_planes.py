@@ -48,7 +48,7 @@ def test_a_plane_is_owed_to_a_step_of_gravity_and_to_round_off_of_the_largest_nu
 
 
 def test_the_growth_that_a_plane_is_owed_is_the_horizon_of_the_certificate():
-    from reference_solver.certification import truth
+    from reference_solver.certificate import truth
 
     assert bounds.GROWTH == truth.GROWTH
 

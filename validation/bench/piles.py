@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reference_solver.certification.piles import RATE, planar_pile, spatial_pile
 from reference_solver.model import Model
+from reference_solver.piles import RATE, planar_pile, spatial_pile
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
 from validation.bench.statistics import Fit, Spread, power_law, spread

@@ -9,7 +9,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Scene
 from adapters.trajectory import Trajectory
-from reference_solver.certification.geometry import rotation
+from reference_solver.geometry import rotation
 from validation.canonical import Measured
 from validation.files import forces
 from validation.metrics import UNAVAILABLE

@@ -21,7 +21,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Body, Box, Scene
 from adapters.trajectory import Trajectory
-from reference_solver.certification.geometry import rotation
+from reference_solver.geometry import rotation
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import mass_of, pose_at, states

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Polygon, Settings, Simulation
-from reference_solver.certification.relations import Change
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.relations import Change
+from reference_solver.certificate.truth import certify
 from reference_solver.compilation import from_python
 from reference_solver.needs import needs
 from reference_solver.pieces import IMPACT, IMPULSE_LEVEL, ROCKING

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Capsule, HalfSpace, Model, Settings
-from reference_solver.certification.space import GRAVITY
-from reference_solver.certification.truth import certify
+from reference_solver.certificate.truth import certify
+from reference_solver.verification.space import GRAVITY
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

@@ -1,0 +1,202 @@
+"""The audit of a run: what it did against the model alone, by code that shares nothing with the solver.
+
+`audit` reads the pieces of a run (`reference_solver.pieces`) and a `Model`, computes masses, levers, laws and gaps
+anew, and returns one `Finding` for each check. Nothing here imports ``planar/``, ``spatial/`` or ``direct/``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_solver.certificate.audit import chains, contact, energy, motion, sharing, space, touching
+from reference_solver.certificate.audit.run import Run
+from reference_solver.model import Model
+from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
+from reference_solver.records import Record
+
+
+class Check(NamedTuple):
+    """Largest value of one quantity with which a run may pass, and what is wrong when it is exceeded."""
+
+    limit: float
+    meaning: str
+
+
+class Finding(NamedTuple):
+    """What one check measured."""
+
+    name: str
+    value: float
+    limit: float
+    meaning: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the value is within its limit; nan is not."""
+        return bool(self.value <= self.limit)
+
+    def __str__(self) -> str:
+        return f"{self.meaning}: {self.name} {self.value:.3g}, at most {self.limit:.3g}"
+
+
+#: All checks. Shares are of the contact's or body's own scale.
+CHECKS = {
+    "finite": Check(0.0, "a state or an impulse is no number"),
+    # Pieces hand over the very numbers.
+    "joined": Check(0.0, "bodies do not go on where they were"),
+    # What is left of a step below 1e-14 of it is dropped, once a step.
+    "time": Check(1e-12, "pieces do not fill the time"),
+    # Solves leave 1e-13 of their speeds and gather round-off with every sweep: 2e-11 (`certificate.GATES`), thrice.
+    "momentum": Check(1e-10, "impulses and loads do not explain a change of momentum"),
+    # As momentum, and the quadrature of a phase of fifth order: (w h)^6 of a body that turns .03 rad in a piece.
+    "spin": Check(1e-9, "moments and torques do not explain a change of angular momentum"),
+    # Free flight is a parabola, to round-off, as a share of the body.
+    "flight": Check(1e-12, "a body in free flight leaves its parabola"),
+    # What a push out of an overlap moves in one piece: a thousandth of the overlap that is allowed.
+    "path": Check(1e-9, "a body's way is not that of its velocity"),
+    # The independent integration is exact to 1e-10 of a turn of .3 rad.
+    "turn": Check(1e-9, "a body that nothing touches does not turn by Euler's equations"),
+    "prescribed": Check(1e-12, "a body that is not free does not move as prescribed"),
+    # Clamped at zero, which is exact.
+    "pull": Check(1e-14, "a contact pulls"),
+    # Clamped with four roundings; turned into world axes with as many.
+    "cone": Check(1e-12, "friction exceeds mu p_n"),
+    # A solve's residual, 1e-13, over the ratio of the two scales that it and the audit use.
+    "normal": Check(1e-9, "normal impulses do not obey restitution and complementarity"),
+    "friction": Check(1e-9, "friction does not oppose the slip"),
+    # Exact where rows stand still; a point that moves is known to as much where they turn.
+    "moment": Check(1e-9, "moments are not those of the impulses at their points"),
+    # A wedge or a lever multiplies impulses; a million times the momentum at hand is none of either.
+    "scale": Check(1e6, "an impulse is beyond any physical scale"),
+    "unknown": Check(0.0, "impulses act on bodies that their piece does not hold"),
+    # A thousandth of the overlap that is allowed.
+    "apart": Check(1e-9, "an impulse acts between bodies that do not touch"),
+    # Loss of separation along the solver's normal, as a share of the body.
+    "direction": Check(1e-9, "a contact's normal is none of its bodies"),
+    "place": Check(1e-9, "a contact's point is on no surface of its bodies"),
+    # As ``apart``, and speeds as those after a solve.
+    "stays": Check(1e-9, "a contact carries beyond where a face, an edge or a corner of its bodies ends"),
+    # Velocities of an impact's start, as shares of the speeds there.
+    "choice": Check(1e-9, "corners meet along a normal that they do not close along last"),
+    # Speeds after a solve: its residual.
+    "together": Check(1e-9, "an impact leaves out what touches as well"),
+    # Each such impact is proven from its own velocities, or is not.
+    "endless": Check(0.0, "impacts are summed up as if they had no end, and that is not so"),
+    # Coordinates must resolve the overlap that is allowed ten times over.
+    "resolution": Check(1e-7, "bodies are so far out that their places are no longer resolved"),
+    # Located impacts happen at a gap of round-off: 1e-6 of a body is what is called touching.
+    "overlap": Check(1e-6, "bodies are in each other: a contact or an impact was missed"),
+    "start": Check(1e-6, "bodies overlap at the start"),
+    # Two motions are one while they differ by no more than bodies may overlap.
+    "shared": Check(1e-6, "the motion is not determined"),
+    # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
+    "gained": Check(1e-9, "energy was gained"),
+    # As much as may be gained.
+    "lost": Check(1e-9, "energy was lost that friction does not take"),
+    # The fixed-step law gets g h wrong, the impulse-level scheme h^2, without saying where.
+    "fallback": Check(0.0, "steps went by a scheme of lower order"),
+}
+
+
+def audit(model: Model, record: Record, dt: float, located: bool = True) -> list[Finding]:
+    """Return what all checks measured of a recorded run from its start.
+
+    Parameters
+    ----------
+    model
+        What was to be simulated.
+    record
+        Of `Simulation.record` with ``pieces=True``, from the first step on.
+    dt
+        Step [s].
+    located
+        Whether steps were to be cut at events; if not, the fixed-step law is no fallback.
+
+    Raises
+    ------
+    ValueError
+        If the record has no pieces.
+    """
+    run = _run_of(model, record, dt)
+    start = np.array([body.pose for body in model.bodies], dtype=float)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return [
+            Finding(name, value, *CHECKS[name])
+            for name, value in _measured(run, start, record, located)
+            if name in CHECKS
+        ]
+
+
+def _run_of(model: Model, record: Record, dt: float) -> Run:
+    if record.pieces is None:
+        raise ValueError("record: has no pieces, record(..., pieces=True) keeps them")
+    return Run(model, record.pieces, dt)
+
+
+def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return when a recorded run of `audit` ends series of rebounds whose contacts turn meanwhile.
+
+    Times (k,) [s]; what is left out there (k,) [m]; and what that goes on by (k,) [m/s] (`left_out_by_series`). Raises
+    ValueError if the record has no pieces.
+    """
+    run = _run_of(model, record, dt)
+    ends = contact.ends_of_series(run)
+    which, place = np.unique(run.contact_owner[ends], return_inverse=True)
+    sums = [np.bincount(place, part[ends], len(which)) for part in contact.left_out_by_series(run, ends)]
+    return run.pieces.begin[which], sums[0], sums[1]
+
+
+def without_order(model: Model, record: Record, dt: float) -> np.ndarray:
+    """Return the pieces (k,) of a recorded run at which the motion hangs on round-off (`chains.without_order`).
+
+    Raises ValueError if the record has no pieces.
+    """
+    return chains.without_order(_run_of(model, record, dt))
+
+
+def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.ndarray) -> np.ndarray:
+    """Return how far (s,) impacts move bodies of which round-off decides whether they are [m] (`contact.grazes`).
+
+    Gaps below ``noise`` [m] count as none. What an impact moves until the sample after it grows as disturbances do
+    (``growth``), or as in free flight where that is more. Raises ValueError if the record has no pieces.
+    """
+    moved, growth = np.zeros(len(record.t)), np.maximum(growth, 1.0)
+    for begin, speed in zip(*contact.grazes(_run_of(model, record, dt), record.t, record.pose, noise), strict=True):
+        since = np.maximum(record.t - begin, 0.0)
+        first = int(np.searchsorted(record.t, begin, side="right"))
+        grown = np.where(since > 0.0, since[first] * growth / growth[first], 0.0)
+        moved += speed * np.maximum(since, grown)
+    return moved
+
+
+def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
+    """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
+
+    They differ where contacts share a load in more than one way and friction follows the shares (`sharing`). The
+    finding is the distance before ``until`` [s], as a share of the smallest half width.
+
+    Raises
+    ------
+    ValueError
+        If the record has no pieces.
+    """
+    run = _run_of(model, record, dt)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        apart, told = sharing.distances(run, record.t)
+    limit, meaning = CHECKS["shared"]
+    return apart, Finding("shared", float(apart[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
+
+
+def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:
+    yield from motion.measured(run, start, record)
+    yield from contact.measured(run)
+    yield from touching.measured(run)
+    yield from chains.measured(run)
+    yield from space.measured(run, start)
+    yield from energy.measured(run)
+    coarse = np.isin(run.pieces.scheme, (FIXED, IMPULSE_LEVEL)) & (run.pieces.kind == FORCES)
+    fixed = run.pieces.step[coarse]
+    yield "fallback", float(len(np.unique(fixed))) if located else 0.0

@@ -1,0 +1,350 @@
+"""The full certificate: the audit of a run, how far it is off for its finite step, and for how long that can be told.
+
+*Error.* The run is made again at half the step. A scheme of order p is off by C h^p, so that both differ by
+``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
+Halves end where the whole steps end. What a solver decides by the time that is left of a step (whether a series of
+rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with
+28 steps for each 5, or others near that ratio without a common divisor: none of them end together but the last of all,
+where the runs are compared as well. So many, because phases that the solver shortens by its own judgement of their
+error are no shorter at half the step, and at 13 for 5 hardly: their errors were up to three times what such runs told.
+Each rebound is smaller than the one before by e, and a run that leaves some out is off by as much for all steps that
+leave out as many: then it is made with 56 for 5, too, and what a series that ends may leave out (E22) is added.
+What is decided within round-off (which of two corners strikes first, whether what hardly slips does) is decided by the
+order of bodies and by signs: the mirrored world, its bodies in reverse order, is as true, and ends where the run does.
+What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
+tells that is made to a hundredth of the accuracy.
+To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
+far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
+(`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
+at once meet, or do not, as round-off has it: what that moves comes to it as well (`audit.contact`).
+
+*Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
+is made twice more far from the origin: what differs there, beyond the X of both and what coarser coordinates explain,
+refuses.
+
+*Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
+has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
+afterwards no run at this precision can, and only its laws are certified. So it is where several pairs of bodies that
+touch each other meet in one instant and round-off decides which of them comes first (E21).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count
+from math import gcd, sqrt
+from typing import Any
+
+import numpy as np
+
+from reference_solver.certificate.audit import Finding, audit, ends_of_series, grazes, shared_loads, without_order
+from reference_solver.certificate.audit.run import twist_of
+from reference_solver.certificate.relations import Change, permuted
+from reference_solver.geometry import reach, rotation
+from reference_solver.model import Array, Model
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
+from reference_solver.records import Record
+from reference_solver.settings import Settings
+from reference_solver.shapes import smallest_extent
+from reference_solver.simulation import Simulation
+
+#: Growth of a disturbance at which the horizon lies.
+GROWTH = 1e3
+#: Size of the disturbance, as a share of the fastest speed of the run: thousands of units in the last place, so that
+#: what it grows to is told from the round-off of either run.
+DISTURBANCE = 1e-12
+#: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds. In
+#: few, since an error may come and go: what topples is off while it falls, and no more once it lies.
+BLOCK, FINER, FINEST = 5, 5.618, 11.09
+#: Share of the accuracy of phases (E35) to which a run is made again: it tells what all runs are off alike, whatever
+#: their steps, since the solver judges by it how long its phases may be.
+CLOSER = 1e-2
+#: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
+SOLVE = 1e-13
+#: Distances from the origin to which the run is moved, in smallest half widths. At the second one gaps are closed some
+#: seven times as far apart as near the origin. At 30 000 a contact that lets go may chatter within them: of 125 planar
+#: scenes two came out .6 and 3 micrometres off there, and were right where they stand.
+PLACES = (30.0, 3000.0)
+#: Direction of the move: all coordinates change, none as much as another.
+AWAY = (0.83, -0.47, 0.31)
+#: Signs of the disturbance, one after the other.
+SEED = 20
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What a run may be used for.
+
+    Parameters
+    ----------
+    holds
+        Whether it may serve as truth to ``error`` until ``horizon``: every finding, and the solver's own
+        certificate, are within their limits.
+    reasons
+        What failed, one sentence each; and, where the horizon lies within the run, that only laws are certified
+        beyond it, which is no failure.
+    findings
+        All that was measured.
+    t
+        (s,) times of the samples [s].
+    error
+        (s,) bound of the distance between the run and any exact motion: of any point of any free body, for its finite
+        step, round-off, and loads that the laws do not determine [m].
+    growth
+        (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
+    horizon
+        First time at which ``growth`` reaches `GROWTH` [s]; infinite if it does not.
+    determined
+        Time until which the laws know one motion only [s]: none of how loads are shared shows in it. Infinite if at no
+        time of the run, be it beyond the horizon, two motions that obey them are visibly apart.
+    disturbed
+        (s,) way that the disturbance moves a body, over its speed [s].
+    dt
+        Step [s].
+    gap
+        Largest gap that counts as none where the run is [m].
+    grazed
+        (s,) way of bodies that meet or pass each other as such a gap decides [m].
+    light
+        What the solver says of itself (`Simulation.certificate`).
+    pose
+        (s, n, 3 | 7) poses that are certified.
+    """
+
+    holds: bool
+    reasons: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    t: Array
+    error: Array
+    growth: Array
+    horizon: float
+    determined: float
+    disturbed: Array
+    dt: float
+    gap: float
+    grazed: Array
+    light: dict[str, Any]
+    pose: Array
+
+    def error_until(self, t: float) -> float:
+        """Return the bound of the error up to the time ``t`` [m]; infinite beyond the horizon."""
+        if t >= self.horizon:
+            return float("inf")
+        return float(self.error[min(int(np.searchsorted(self.t, t)), len(self.t) - 1)])
+
+    def rounding(self, place: float) -> Array:
+        """Return what coordinates of the size ``place`` [m] move a body in any run of the scene (s,) [m].
+
+        Gaps and places are known to some units in the last place, anew in every step: that is a speed of as much in a
+        step, and moves bodies as the disturbance does, or `OTHER_SIGNS` times as far. Where a disturbance of velocities
+        dies out, places still add up the ways of all steps: each sum is rounded by half a unit, in each of two runs.
+        Bodies touch at a gap of `GAP`, wherever they are.
+        """
+        units = COORDINATE_UNITS * (1.0 + OTHER_SIGNS * self.disturbed / self.dt) + self.t / self.dt
+        steps = np.spacing(place) * units
+        grazed = sqrt((self.gap + COORDINATE_UNITS * np.spacing(place)) / self.gap) * self.grazed
+        return np.maximum.accumulate(steps + grazed + self.gap * (1.0 + np.minimum(self.growth, GROWTH)))
+
+
+#: Gaps below this share of a half width, or these units in the last place of a coordinate, are closed (E8).
+GAP, COORDINATE_UNITS = 1e-12, 10.0
+#: How many times as far as the disturbance another one of its size may move bodies: its signs are some of many.
+OTHER_SIGNS = 10.0
+#: What the end of a slip in space leaves out, as a share of the smallest half width: one below 1e-9 of a contact's
+#: reference speed, which is what loads do in a step, is taken out at once, at whatever time its step has it.
+SLIP_ENDS = 1e-11
+#: What a series of rebounds that is held may leave out, as a share of the smallest half width, until its bodies have
+#: turned by a radian (E22); and in how many steps they do, at .01 rad a step: 2.4 rad/s at 1/240 s. What it leaves out
+#: of velocities goes on from there. Where the record tells of more, by how fast it was hit last, that counts.
+SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
+
+
+def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
+    """Run ``model`` and certify the run; costs about twelve runs, or twenty, and the audit.
+
+    Raises
+    ------
+    ValueError
+        If ``steps`` is below 1 or ``stride`` below 1.
+    """
+    if steps < 1:
+        raise ValueError(f"steps: {steps!r} must be a whole number of at least 1")
+    run = Simulation(model, settings)
+    record = run.record(steps, stride, pieces=True)
+    growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
+    beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
+    unordered, several = _without_order(model, record, settings.dt)
+    if unordered < horizon:
+        horizon = unordered
+        beyond = f"round-off decides whether bodies {several} are struck together or one after the other"
+    apart, shared = shared_loads(model, record, settings.dt, horizon)
+    place = np.abs(record.pose[np.isfinite(record.pose)]).max(initial=0.0)
+    gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
+    gap += COORDINATE_UNITS * float(np.spacing(place))
+    grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
+    findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
+    light = run.certificate
+    reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
+    if not light["converged"]:
+        reasons.append("solves were used that had not converged")
+    round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
+    error = _error(model, run, record, steps, stride) + round_off
+    error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
+    within = record.t < horizon
+    if not np.isfinite(error[within]).all():
+        reasons.append("the run at half the step is no numbers")
+    # A difference of two motions that obey the laws grows as that disturbance does.
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart + grazed)
+    until = _determined(model, record.t, apart, shared.limit)
+    made = (error, growth, horizon, until, moved / size, settings.dt, gap, grazed, light, record.pose)
+    found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
+    reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
+    holds = not reasons
+    if horizon < record.t[-1]:
+        reasons.append(f"beyond {horizon:.3g} s {beyond}: only laws hold there")
+    return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def _determined(model: Model, t: Array, apart: Array, limit: float) -> float:
+    """Last time at which motions are not ``apart`` at all (s,), where they are by ``limit`` of a half width later."""
+    least = min(smallest_extent(body.shape) for body in model.bodies)
+    if not (apart > limit * (least if np.isfinite(least) else 1.0)).any():
+        return float("inf")
+    return float(t[apart <= 0.0].max(initial=0.0))
+
+
+def _first_chain(record: Record) -> float:
+    """Return when impacts first follow each other in one instant, in which bodies stay as far apart as gaps are [s]."""
+    pieces = record.pieces
+    assert pieces is not None
+    at_once = np.append((pieces.begin[1:] == pieces.begin[:-1]) & (pieces.kind[1:] == IMPACT), False)
+    found = np.flatnonzero((pieces.kind == IMPACT) & (at_once | (pieces.scheme == CHAIN)))
+    return float(pieces.begin[found[0]]) if len(found) else float("inf")
+
+
+def _without_order(model: Model, record: Record, dt: float) -> tuple[float, str]:
+    """First sample after impacts that round-off decides (E21) [s], and the numbers of their bodies."""
+    pieces, found = record.pieces, without_order(model, record, dt)
+    assert pieces is not None
+    after = np.flatnonzero(record.t > pieces.begin[found].min(initial=np.inf))
+    if not len(after):
+        return float("inf"), ""
+    first = found[np.argmin(pieces.begin[found])]
+    of_piece = slice(*pieces.first_contact[first : first + 2])
+    bodies = sorted({*pieces.body_a[of_piece].tolist(), *pieces.body_b[of_piece].tolist()})
+    return float(record.t[after[0]]), ", ".join(map(str, bodies))
+
+
+def away(model: Model, far: float) -> Change:
+    """Return the change of a world that moves it by ``far`` smallest half widths (`AWAY`)."""
+    d, least = model.dimension, min(smallest_extent(body.shape) for body in model.bodies)
+    return Change(d, shift=tuple(far * (least if np.isfinite(least) else 1.0) * x for x in AWAY[:d]))
+
+
+def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int, stride: int) -> list[str]:
+    """Where a run that holds so far comes out otherwise far from the origin: one sentence for the first such place."""
+    within = found.t < found.horizon
+    for far in PLACES:
+        change = away(model, far)
+        moved = Simulation(change.model(model), settings).record(steps, stride).pose
+        apart = distance(model, change.pose(found.pose, found.t), moved)
+        # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
+        error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
+        allowed = 2.0 * error + found.rounding(float(np.nanmax(np.abs(moved[:, :, : model.dimension]))))
+        beyond = np.flatnonzero(within & ~(apart <= allowed))
+        if len(beyond):
+            k = int(beyond[0])
+            return [
+                f"moved by {far:g} half widths it comes out otherwise: {apart[k]:.3g} m at {found.t[k]:.3g} s, at most "
+                f"{allowed[k]:.3g} m is round-off"
+            ]
+    return []
+
+
+def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
+    """Bound (s,) of what the record of ``run`` is off for its finite step [m]; the largest so far."""
+    settings = run.settings
+    half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
+    error = 2.0 * distance(model, record.pose, half.pose)
+    samples = len(record.t) - 1
+    each = min(max(BLOCK // stride, 1), samples)  # samples from one comparison to the next
+    block, blocks = each * stride, -(-samples // each)
+    # What a block ends with may have come at any time in it. The run goes on to the end of its last one.
+    until = (np.arange(samples + 1) + each - 1) // each
+    beyond = run.record(blocks * block - samples * stride, stride).pose[1:]
+    coarse = np.concatenate([record.pose, beyond])[::each]
+    ends, way, speed = ends_of_series(model, record, settings.dt)
+    leaves_out = len(ends) > 0
+    for ratio in (FINER, FINEST) if leaves_out else (FINER,):
+        more = next(k for k in count(round(ratio * block)) if gcd(k, block) == 1)
+        share = block / more
+        other = Simulation(model, replace(settings, dt=share * settings.dt)).record(blocks * more, more)
+        # What rebounds leave out need not fall with the step: then the finer run may be off by half as much.
+        off = distance(model, coarse, other.pose) * max(2.0 if leaves_out else 0.0, 1.0 / (1.0 - share))
+        off[-1] = off[-1] if np.isfinite(off[-1]) or not len(beyond) else 0.0  # ended after the last sample
+        error = np.maximum(error, off[until])
+    error = np.maximum(error, distance(model, record.pose, _mirrored(model, settings, steps, stride)))
+    if record.pieces is not None and (record.pieces.scheme == FIFTH_ORDER).any():
+        # An error that falls with the accuracy that is asked for is made a hundredth of.
+        closer = Simulation(model, replace(settings, accuracy=CLOSER * settings.accuracy)).record(steps, stride)
+        error = np.maximum(error, distance(model, record.pose, closer.pose) / (1.0 - CLOSER))
+    noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
+    least = min(smallest_extent(body.shape) for body in model.bodies)
+    if model.dimension == 3 and len(record.pieces.body_a if record.pieces else ()):
+        noise += SLIP_ENDS * least
+    for end, at_once, onward in zip(ends, way, speed, strict=True):
+        since = np.maximum(record.t - end, 0.0)
+        allowed = SERIES_ENDS * least * (1.0 + since / settings.dt / SERIES_STEPS)
+        noise += np.where(record.t >= end, np.maximum(allowed, at_once + onward * since), 0.0)
+    return np.maximum.accumulate(error + noise)
+
+
+def _mirrored(model: Model, settings: Settings, steps: int, stride: int) -> Array:
+    """Poses (s, n, 3 | 7) of the run of the mirrored world, its bodies in reverse order, as seen in this one [m]."""
+    d = model.dimension
+    mirror = Change(d, signs=(-1.0,) + (1.0,) * (d - 1))
+    backwards = list(range(len(model.bodies)))[::-1]
+    record = Simulation(mirror.model(permuted(model, backwards)), settings).record(steps, stride)
+    return mirror.pose(record.pose[:, backwards], record.t)
+
+
+def _horizon(
+    model: Model, settings: Settings, record: Record, steps: int, stride: int
+) -> tuple[Array, float, Array, float]:
+    """Growth (s,) of a disturbance of all free bodies' velocities, when it is too large, what it moves, its size."""
+    d, random = model.dimension, np.random.default_rng(SEED)
+    fastest = float(np.abs(record.twist[:, :, :d]).max())
+    size = DISTURBANCE * (fastest if np.isfinite(fastest) and fastest > 0.0 else 1.0)
+    bodies = []
+    for body in model.bodies:
+        twist = twist_of(body).copy()
+        if body.motion == "free":
+            twist[:d] += size * random.choice([-1.0, 1.0], d)
+        bodies.append(replace(body, twist=tuple(twist)))
+    other = Simulation(replace(model, bodies=bodies), settings).record(steps, stride)
+    apart = distance(model, record.pose, other.pose)
+    noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
+    free_flight = size * np.sqrt(d) * max(record.t[-1], settings.dt) + noise
+    growth = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf) / free_flight)
+    over = np.flatnonzero(growth >= GROWTH)
+    return growth, float(record.t[over[0]]) if len(over) else float("inf"), apart, size
+
+
+def distance(model: Model, one: Array, other: Array) -> Array:
+    """Return how far (s,) any point of a free body is from where it is in another run, at most [m].
+
+    Infinite where either is no number: a run that ended (E28) is as far from any other as can be.
+    """
+    d = model.dimension
+    known = np.asarray(np.isfinite(one).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2)))
+    one, other = one[known], other[known]
+    worst = np.zeros(len(one))
+    for i, body in enumerate(model.bodies):
+        if body.motion != "free":
+            continue
+        apart = np.linalg.norm(one[:, i, :d] - other[:, i, :d], axis=1)
+        turned = rotation(one[:, i]) - rotation(other[:, i])
+        worst = np.maximum(worst, apart + reach(body.shape) * np.linalg.norm(turned, ord=2, axis=(1, 2)))
+    found = np.full(len(known), np.inf)
+    found[known] = worst
+    return found

@@ -1,0 +1,153 @@
+"""X bounds what a run is off also where all runs of other steps are off alike."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certificate import truth
+from reference_solver.certificate.relations import Change
+from reference_solver.certificate.truth import certify, distance
+
+
+def lopsided_ball_between_a_box_and_a_ball():
+    """A ball of unequal moments slips along a tilted face and over a fixed ball; one slip passes 2 mm/s as it turns."""
+    q, w = (-0.6846740461593407, -0.28860825483740826, 0.6475961161859412, -0.16895560380285649), (0.0,) * 6
+    box = Box((0.4363935187051362, 0.19646771016251852, 0.2906611012818231))
+    bodies = [
+        Body(box, pose=(-0.1358862916905388, 0.06381133589678256, -0.7713232726144083, *q), twist=w, motion="fixed"),
+        Body(
+            Sphere(0.2202476248077987),
+            pose=(0.2824570447127887, -0.35253159831650444, -0.34154508874842937, 1.0, 0.0, 0.0, 0.0),
+            motion="fixed",
+        ),
+        Body(
+            Sphere(0.34606815068114544),
+            0.7278820005688768,
+            (0.02203803261020771, 0.020059730137447083, 0.01014553018010273),
+            (0.0, 0.0, 0.0, -0.6578123848631221, 0.21840045873407812, 0.5507686250999153, -0.46501400790834785),
+            (-0.08731886226016572, -0.06920952036059536, -0.0007767201432241633)
+            + (0.9953379166431144, -0.907204459176377, 1.9393388363500055),
+        ),
+    ]
+    friction = np.zeros((3, 3))
+    friction[0, 2] = friction[2, 0] = 0.10257968
+    friction[1, 2] = friction[2, 1] = 0.31466296
+    gravity = (-3.5865468287202926, -2.87909702476412, -8.66507831282504)
+    return Model(3, bodies, gravity, 0.0, friction)
+
+
+@pytest.mark.parametrize("steps", [13, 34, 55])
+def test_x_is_no_less_than_what_a_run_is_off_whose_phases_are_as_long_at_any_step(steps):
+    """Truth: phases a ten-thousandth as inaccurate, at other steps; DOP853 with modes held agrees to 4e-15 m."""
+    model, time = lopsided_ball_between_a_box_and_a_ball(), 0.1
+    truth = Simulation(model, replace(Settings.reference(time / 20), accuracy=1e-12))
+    truth.advance(20)
+    found = certify(model, Settings.reference(time / steps), steps)
+    off = float(distance(model, found.pose[-1:], truth.pose[None])[0])
+    assert found.holds and 1e-12 < off < 1e-9
+    assert off <= found.error[-1] < 1e-8
+
+
+def test_a_smaller_accuracy_costs_steps_and_gains_digits():
+    model = lopsided_ball_between_a_box_and_a_ball()
+    ends = []
+    for accuracy in (1e-12, 1e-10, 1e-8):
+        simulation = Simulation(model, replace(Settings.reference(0.005), accuracy=accuracy))
+        simulation.advance(20)
+        ends.append(simulation.pose)
+    near, far = (float(distance(model, end[None], ends[0][None])[0]) for end in ends[1:])
+    assert near < 1e-2 * far
+
+
+def test_an_accuracy_that_no_phase_can_have_is_refused():
+    with pytest.raises(ValueError, match="accuracy"):
+        replace(Settings.reference(0.01), accuracy=1e-13)
+
+
+def test_a_run_that_comes_out_otherwise_far_from_the_origin_is_refused(monkeypatch):
+    """Gravity a millionth stronger there. Where nothing is, what is left is round-off, and X is what it was."""
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.7, 0.0), (1.0, -1.0, 3.0))
+    model = Model(2, [floor, disc], (0.0, -9.81), 0.8, 0.1)
+    found = certify(model, Settings.reference(1.0 / 240.0), 60)
+    assert found.holds
+
+    class Heavier(Change):
+        def model(self, old):
+            moved = super().model(old)
+            return replace(moved, gravity=tuple(1.000001 * g for g in moved.gravity))
+
+    plain = truth.away
+    monkeypatch.setattr(truth, "away", lambda model, far: Heavier(2, shift=plain(model, far).shift))
+    other = certify(model, Settings.reference(1.0 / 240.0), 60)
+    assert not other.holds and "moved by 30 half widths" in other.reasons[0]
+    assert (other.error == found.error).all()
+
+
+def over_the_edge(d, large, r, v, e, way):
+    """A ball that rolls off a table, at whose end a fixed ball of radius ``large`` stands as high as the table."""
+    flat, still = ((0.0,), (0.0,)) if d == 2 else ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    def at(x, up):
+        return (x, up) if d == 2 else (x, 0.0, up)
+
+    table = Body(Box(at(2.0, 0.5) if d == 2 else (2.0, 1.0, 0.5)), pose=at(-2.0, -0.5) + flat, motion="fixed")
+    ball, inertia = (Disc, 0.5 * r * r) if d == 2 else (Sphere, (0.4 * r * r,) * 3)
+    spin = (-v / r,) if d == 2 else (0.0, v / r, 0.0)
+    below = Body(ball(large), pose=at(0.0, -large) + flat, twist=at(0.0, 0.0) + still, motion="fixed")
+    bodies = [table, below, Body(ball(r), 1.0, inertia, at(-way, r) + flat, at(v, 0.0) + spin)]
+    return Model(d, bodies, at(0.0, -9.81), e, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("d", "large", "r", "v", "e", "rate"),
+    [
+        (2, 2.0, 0.05, 9.0, 0.4, 240),
+        (2, 0.3, 0.1, 5.0, 0.7, 500),
+        (2, 4.0, 0.5, 25.0, 0.2, 120),
+        (2, 1.0, 0.3, 5.5, 0.0, 250),
+        (3, 2.0, 0.1, 9.0, 0.6, 240),
+        (3, 1.0, 0.02, 10.0, 0.5, 240),
+    ],
+)
+def test_a_ball_that_flies_off_an_edge_is_no_further_off_than_x(d, large, r, v, e, rate):
+    """Faster than sqrt(g (R + r)) it leaves both at once. What meets within a gap that counts as none is in X."""
+    way = 0.61
+    model, left = over_the_edge(d, large, r, v, e, way), way / v
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.08) * rate))
+    assert found.holds, found.reasons
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.hypot(found.pose[:, 2, 0] + way - v * found.t, found.pose[:, 2, d - 1] - r + 0.5 * 9.81 * flown**2)
+    within = found.t < found.horizon
+    assert within[found.t < left].all()
+    assert (off <= found.error)[within].all()
+    assert found.error[within].max() < 1e-4 * r
+
+
+def test_what_meets_as_round_off_has_it_is_more_than_other_runs_tell(monkeypatch):
+    """Planted: X without it is too small where a ball flies off an edge."""
+    way, v, r, rate = 0.93, 10.0, 0.02, 240
+    model, left = over_the_edge(2, 1.0, r, v, 0.5, way), way / v
+    monkeypatch.setattr(truth, "grazes", lambda model, record, dt, noise, growth: np.zeros(len(record.t)))
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.1) * rate))
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.abs(found.pose[:, 2, 1] - r + 0.5 * 9.81 * flown**2)
+    assert (off > found.error).any()
+
+
+@pytest.mark.parametrize("shift", [(300.0, -70.0), (1000.0, 1000.0)])
+def test_what_meets_within_a_gap_that_coordinates_round_is_in_x(shift):
+    """Gaps count as none up to their round-off, which is that of the place."""
+    way, v, r, rate = 0.93, 10.0, 0.02, 240
+    model, left = Change(2, shift=shift).model(over_the_edge(2, 1.0, r, v, 0.5, way)), way / v
+    found = certify(model, Settings.reference(1.0 / rate), int((left + 0.1) * rate))
+    flown = np.maximum(found.t - left, 0.0)
+    off = np.abs(found.pose[:, 2, 1] - shift[1] - r + 0.5 * 9.81 * flown**2)
+    assert not found.holds or (off <= found.error)[found.t < found.horizon].all()
+
+
+def test_a_world_without_free_bodies_is_certified():
+    still = Body(Disc(0.1), pose=(0.0, 0.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
+    assert certify(Model(2, [still], (0.0, 0.0), 0.0, 0.0), Settings.reference(0.01), 5).holds

@@ -1,0 +1,36 @@
+"""Every gate that the oracle answers for holds; the rod gas is the longest of them."""
+
+import pytest
+
+from reference_solver.verification import Gate
+from reference_solver.verification.event_driven import gates
+
+PARTS = (
+    "bounce",
+    "elastic_bounces",
+    "galperin",
+    "closing_wall",
+    "billiard",
+    "two_bodies",
+    "ball_on_ball",
+    "chain",
+    "cradle",
+    "collapse",
+    "painleve",
+    "kane",
+    "slide_to_roll",
+    pytest.param("rod_gas", marks=pytest.mark.long),  # half a minute of CPU; `crosscheck certify` measures it
+)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_gate_holds(part):
+    rows = list(getattr(gates, part)())
+    assert rows
+    assert [row for row in rows if not row.holds] == []
+
+
+def test_a_gate_is_failed_by_what_is_not_a_number():
+    assert not Gate.at_most("", "", float("nan"), 1.0, "").holds
+    assert not Gate.at_most("", "", -2.0, 1.0, "").holds
+    assert not Gate.exactly("", "", 3140, 3141, "").holds
