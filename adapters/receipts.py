@@ -55,6 +55,9 @@ QUANTITIES = (
     "turn",
 )
 
+#: What hangs on how a solver copes with friction. Above `MOST_FRICTION` some stop early, and soft pyramids let bodies
+#: sink: what comes of that is measured and told, and a failure of the engine where a check sees it.
+RUBBED = ("restitution", "friction", "friction_impulse")
 #: Band of everything an engine gets exactly, in roundings: 1e-12 of a double number.
 ROUNDINGS = 1e-12 / 2.0**-52
 #: What a profile's own solve may leave of friction, as a share of the coefficient, unless it declares more: what a
@@ -119,6 +122,8 @@ def receipts(
         told = declared.get(quantity)
         if told is None:
             told = Declared(_asked(quantity, needs), *_default_band(quantity, case, declared))
+        if quantity in RUBBED and needs.friction > MOST_FRICTION:
+            told = replace(told, band=UNTOLD, because=f"{told.because}; above a friction of 1 left to the checks")
         if iterations is not None:
             told = _starved(quantity, told, case, iterations, quantity in declared)
         slips.append(_receipt(quantity, _asked(quantity, needs), told, samples.get(quantity, ()), silent.get(quantity)))

@@ -18,7 +18,7 @@ from reference_solver.certification.geometry import rotation
 from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
-UNAVAILABLE = "the engine does not report contact impulses"
+UNAVAILABLE = "the engine does not tell the impulses of these contacts"
 #: Said of a force where no step was recorded with its contacts.
 NOT_RECORDED = "contacts were not recorded"
 #: By what a quantity that is known step by step is told; its spread is the standard deviation.

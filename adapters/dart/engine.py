@@ -102,7 +102,7 @@ class DartEngine(Engine):
                 return f"{body.name}.motion: the adapter moves no body as prescribed"
         boxes = sum(isinstance(body.shape, Box) and body.motion == "free" for body in scene.bodies)
         if profile in CONES and boxes > MOST_BOXES:
-            return f"bodies: {boxes} boxes, and steps of more than {MOST_BOXES} take {profile} minutes"
+            return f"bodies: {boxes} free boxes; of more than {MOST_BOXES} {profile} takes minutes"
         if restitutions(scene) is None:
             return "pairs: restitution of a pair is a product of two factors here, this table has none"
         if frictions(scene) is None:
