@@ -21,7 +21,7 @@ from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
-from adapters.probes import REBOUND_SPEED
+from adapters.probes import MOST_FRICTION, REBOUND_SPEED
 from adapters.scene import Box, Scene
 from adapters.settings import checked_step
 
@@ -131,7 +131,7 @@ class DartEngine(Engine):
         """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""
         smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} is taken as none")
         told = dict.fromkeys(("friction", "friction_impulse"), smooth) if needs.friction <= SMOOTH else {}
-        if needs.regime != "impact":
+        if needs.regime != "impact" or (profile in CONES and needs.friction > MOST_FRICTION):
             return told
         if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED

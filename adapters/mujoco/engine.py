@@ -15,13 +15,14 @@ from types import MappingProxyType
 from typing import Any, final
 
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.combination import MINVAL
 from adapters.mujoco.model import read
 from adapters.mujoco.moving import moved
 from adapters.mujoco.options import own_kinds
 from adapters.mujoco.pairs import contact_law
 from adapters.mujoco.pasting import snippet, words
-from adapters.mujoco.profiles import PROFILES, check_settings
+from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD, SMALLEST_FRICTION
@@ -29,16 +30,8 @@ from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import (
-    LANDING_LEAD,
-    LANDING_SPEED,
-    MOST_FRICTION,
-    REBOUND_LEAD,
-    REBOUND_SPEED,
-    REBOUND_TIME,
-    STEPS,
-)
-from adapters.receipts import IMPULSE_SHARE
+from adapters.probes import LANDING_LEAD, LANDING_SPEED, MOST_FRICTION, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
+from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
 from adapters.settings import Check
 from adapters.stepping import step_count
@@ -162,17 +155,18 @@ class MujocoEngine(Engine):
         return MujocoSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Rebound as shipped, over all phases of a step; sums of forces; RK4's fall."""
+        """Rebound as shipped, over all phases of a step; friction of a box that hops; sums of forces; RK4's fall."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
         own_laws = "rounds" not in settings  # the matched profile has Newton's and Coulomb's
         declared = {"impulse": _impulses(settings, needs.friction, dt)}
         if settings["integrator"] == "RK4":
             declared |= _second_order_fall()
-        if own_laws and settings["solref"] != "reflect" and needs.regime == "impact":
+        elif own_laws and needs.friction > 0.0 and not BROUGHT & set(settings):
+            declared |= _friction(settings, needs, dt)
+        rebounds = needs.regime == "impact" and needs.friction <= MOST_FRICTION  # above, balls sink through pyramids
+        if own_laws and settings["solref"] != "reflect" and rebounds:
             law = contact_law(settings, needs.restitution, needs.friction, dt)
-            # From the step in which a ball of the probe touches to the probe's end: a soft one is still on its way.
-            touched = (step_count((REBOUND_LEAD + 4) * dt + REBOUND_TIME, dt) - REBOUND_LEAD - 1.5) * dt
-            ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES, touched) for k in range(PHASES)]
+            ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
             because = "spring and damper with force >= 0: the phase of the step decides, e has no say"
             # Between two of the phases the rebound changes by no more than between them and their neighbours.
@@ -212,6 +206,29 @@ def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declar
         band += 6.0 * 2.0**-52 * 16.0 * deep / ((1.0 - deep) * 2.0 * mu * mu)
         because += "; and to the round-off of stiff edges of friction pyramids"
     return Declared(1.0, band, because)
+
+
+def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:
+    """Friction over load of the box that the probe slides, by the law of its contacts, where that is not mu.
+
+    Normal and friction are one convex problem: what stops a slip lifts the box. While it slides or flies that leaves mu
+    what it is. Above mu = 1 or so the box is thrown up and turned, lands on an edge, and there a pyramid's edges across
+    the slip, or an edge that stops, carry load without as much friction. Newton stops at a tolerance in each step
+    (`adapters.mujoco.predictions.solver_error`); a start that is off by it says how much that matters.
+    """
+    case = Case(needs.dimension, needs.restitution, needs.friction, dt, 0.0)
+    scene, steps = slide(case), step_count(SLIDE_TIME, dt)
+    box, speed = BoxOnFace.of(settings, scene, dt), scene.bodies[1].twist[0]
+    off = math.sqrt(12.0 * float(settings["tolerance"])) * dt
+    ratios = []
+    for k in (0.0, 1.0, -1.0) if off else (0.0,):
+        (forwards, upwards, _) = box.motion(steps, speed + k * off)[-1][1]
+        ratios.append((speed + k * off - forwards) / (upwards - scene.gravity[-1] * steps * dt))
+    if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
+        return {}  # as asked
+    band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)
+    because = "contact is convex: what stops a slip lifts the box; a landing has less friction than mu of its load"
+    return dict.fromkeys(("friction", "friction_impulse"), Declared(ratios[0], band, because))
 
 
 def _second_order_fall() -> dict[str, Declared]:

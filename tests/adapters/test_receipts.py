@@ -517,19 +517,14 @@ def test_what_a_solver_makes_of_a_friction_above_one_is_measured_and_left_to_che
     assert slip.measured == pytest.approx(0.99 * friction, rel=1e-3) and slip.holds != breaks
 
 
-@pytest.mark.parametrize("friction", [0.5, 3.0, 10.0, 50.0])
+@pytest.mark.parametrize("friction", [0.5, 3.0, 10.0, 50.0, 1000.0])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
-def test_a_rebound_is_declared_as_far_as_the_probe_sees_it(friction, dt):
+def test_balls_that_sink_through_soft_pyramids_break_no_measurement(friction, dt):
     """Edges of a pyramid of much friction are so soft that balls are still on their way in when the probe ends."""
     pytest.importorskip("mujoco")
     asked = replace(IMPACT, dimension=3, friction=friction, restitution=0.5)
-    engine = find("mujoco").engine
-    slip, told = (
-        by_quantity(receipts(engine, "default", asked, dt))["restitution"],
-        engine.declares("default", asked, dt),
-    )
-    assert slip.holds and (slip.declared < 0.0) == (friction >= 10.0)
-    assert abs(slip.measured - told["restitution"].value) <= told["restitution"].band
+    slip = by_quantity(receipts(find("mujoco").engine, "default", asked, dt))["restitution"]
+    assert slip.holds and (slip.measured < 0.0) == (friction >= 10.0)
 
 
 @pytest.mark.parametrize("friction", [0.0, 1e-5, 0.3])
