@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.cures import decided_by, is_standard, search_command, told_cures
+from reports.cures import can_be_searched, decided_by, is_standard, search_command, told_cures
 from reports.findings import REFUSED, has_answer, severity
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
@@ -169,6 +169,8 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
         name: group for name, group in own.items()
         if name != profile and is_ranked(row["engine"], name) and {*map(_case, failed)} <= {*map(_case, group)}
     }  # fmt: skip
+    silent = [name for name, group in others.items() if not any(map(has_answer, group))]
+    others = {name: group for name, group in others.items() if name not in silent}
     good = [name for name, group in others.items() if not _failing(group)]
     listed = told_cures(row["engine"], row["engine_version"], row["scene"], profile, dimensions)
     if good:
@@ -176,11 +178,12 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
         by = {name: decided_by(*which, name) for name in good} if dimensions and not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
         return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
-    unlisted = [] if listed else [f"{search_command(row)} searches for settings"]
+    unlisted = [] if listed or not can_be_searched(row) else [f"{search_command(row)} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None:
-        return "; ".join(["no other profile was run in this case", *listed, *unlisted])
+        none = f"{' and '.join(silent)} gave no answer" if silent else "no other profile was run in this case"
+        return "; ".join([none, *listed, *unlisted])
     if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])

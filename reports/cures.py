@@ -155,7 +155,7 @@ def told_cure(row: Mapping[str, Any]) -> str:
     """
     cure = _listed(row)
     if cure is None:
-        return f"not searched for in this case: {search_command(row)}" if _can_be_searched(row) else ""
+        return f"not searched for in this case: {search_command(row)}" if can_be_searched(row) else ""
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
     if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
@@ -177,7 +177,7 @@ def cure_of(row: Mapping[str, Any]) -> Cure | None:
     return replace(here, changes={name: wanted[name] for name in cure.changes if name in wanted})
 
 
-def _can_be_searched(row: Mapping[str, Any]) -> bool:
+def can_be_searched(row: Mapping[str, Any]) -> bool:
     """Whether a row is of the profile that `search` starts from, in a cell that ran at its own iterations."""
     brought = resolve(row["scene"]).brings.get(row["engine"])
     start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")

@@ -18,7 +18,11 @@ from reference_solver.geometry import rotation
 from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
-UNAVAILABLE = "the engine does not report contact impulses"
+UNAVAILABLE = "the engine does not tell the impulses of these contacts"
+#: Said of single contacts of bodies with edges, of a planar scene on an engine that lives in space.
+SEVERAL = "a corner of the plane is an edge in space, with contacts at both its ends"
+#: Reasons for which a number is not told that are no fault of the motion.
+UNTOLD = (UNAVAILABLE, SEVERAL)
 #: Said of a force where no step was recorded with its contacts.
 NOT_RECORDED = "contacts were not recorded"
 #: By what a quantity that is known step by step is told; its spread is the standard deviation.

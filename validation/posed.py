@@ -49,7 +49,8 @@ def is_known(argument: str) -> bool:
 def pinned(argument: str, drop: bool = False) -> str:
     """Name of a scene that stays what it is: a file's name gets the hash of its text.
 
-    A model's text is what `validation.files.model_files` makes of it; with ``drop`` what has no place is left out.
+    A model's text is what `validation.files.model_files` makes of it; with ``drop`` what has no place is left out, and
+    a name that is pinned already means the text that it was pinned with.
 
     Raises
     ------
@@ -69,7 +70,8 @@ def pinned(argument: str, drop: bool = False) -> str:
         from validation.files import model_files
 
         try:
-            text = model_files.text_of(text, Path(path).suffix, drop)
+            # A hash is of a text that somebody has read before: it says whether something was left out.
+            text = model_files.text_of(text, Path(path).suffix, drop or wanted is not None)
         except SceneError as error:  # who reads a text does not know the name of its file
             raise SceneError(f"{path}: {str(error).removeprefix('model: ')}") from None
     digest = _digest(text)

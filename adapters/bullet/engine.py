@@ -22,6 +22,7 @@ from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, S
 from adapters.meeting import meeting_pairs
 from adapters.needs import Needs
 from adapters.probes import (
+    MOST_FRICTION,
     REBOUND_LEAD,
     REBOUND_RADIUS,
     REBOUND_SPEED,
@@ -176,7 +177,7 @@ class BulletEngine(Engine):
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
         law = law_of(profile, needs, dt)
-        declared = _sliding(profile, law, needs, dt) if needs.friction > 0.0 else {}
+        declared = _sliding(profile, law, needs, dt) if 0.0 < needs.friction <= MOST_FRICTION else {}
         if profile == "one":
             declared["restitution"] = _gain(law, needs.restitution, dt)
         if profile != "default":

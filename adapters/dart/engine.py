@@ -21,7 +21,7 @@ from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
-from adapters.probes import REBOUND_SPEED
+from adapters.probes import MOST_FRICTION, REBOUND_SPEED
 from adapters.scene import Box, Scene
 from adapters.settings import checked_step
 
@@ -102,7 +102,7 @@ class DartEngine(Engine):
                 return f"{body.name}.motion: the adapter moves no body as prescribed"
         boxes = sum(isinstance(body.shape, Box) and body.motion == "free" for body in scene.bodies)
         if profile in CONES and boxes > MOST_BOXES:
-            return f"bodies: {boxes} boxes, and steps of more than {MOST_BOXES} take {profile} minutes"
+            return f"bodies: {boxes} free boxes; of more than {MOST_BOXES} {profile} takes minutes"
         if restitutions(scene) is None:
             return "pairs: restitution of a pair is a product of two factors here, this table has none"
         if frictions(scene) is None:
@@ -131,7 +131,7 @@ class DartEngine(Engine):
         """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""
         smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} is taken as none")
         told = dict.fromkeys(("friction", "friction_impulse"), smooth) if needs.friction <= SMOOTH else {}
-        if needs.regime != "impact":
+        if needs.regime != "impact" or (profile in CONES and needs.friction > MOST_FRICTION):
             return told
         if needs.restitution * REBOUND_SPEED <= THRESHOLD:
             half = 0.5 * PUSH_OUT / REBOUND_SPEED

@@ -163,7 +163,8 @@ class MujocoEngine(Engine):
             declared |= _second_order_fall()
         elif own_laws and needs.friction > 0.0 and not BROUGHT & set(settings):
             declared |= _friction(settings, needs, dt)
-        if own_laws and settings["solref"] != "reflect" and needs.regime == "impact":
+        rebounds = needs.regime == "impact" and needs.friction <= MOST_FRICTION  # above, balls sink through pyramids
+        if own_laws and settings["solref"] != "reflect" and rebounds:
             law = contact_law(settings, needs.restitution, needs.friction, dt)
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))

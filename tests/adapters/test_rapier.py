@@ -12,6 +12,7 @@ from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.rapier import RapierEngine
+from adapters.receipts import receipts
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling
@@ -87,6 +88,15 @@ def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
     fast = replace(resting(), bodies=(FLOOR, box), gravity=(0.0, 0.0, 0.0), duration=5 * DT)
     assert drive(fast).twist[-1, 1, 0] == pytest.approx(400.0, rel=1e-6)
     assert drive(fast, "tuned").twist[-1, 1, 0] == pytest.approx(500.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned"])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000, 1 / 2000])
+def test_roundings_of_a_spin_in_all_small_steps_break_no_measurement(profile, dt):
+    slips = receipts(ENGINE, profile, needs(resting()), dt)
+    assert [slip.quantity for slip in slips if not slip.holds] == []
+    (spin,) = (slip for slip in slips if slip.quantity == "angular_damping")
+    assert spin.band < 0.01  # drag of 1 % a second would be seen
 
 
 def test_loads_act_in_every_step():

@@ -489,6 +489,44 @@ def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, prof
     assert [slip.quantity for slip in receipts(found.engine, profile, asked, dt) if not slip.holds] == []
 
 
+@pytest.mark.parametrize("friction", [5.0, 10.0, 100.0])
+@pytest.mark.parametrize("asked", [REST, IMPACT], ids=["rest", "impact"])
+def test_cones_that_are_not_solved_to_their_end_break_no_measurement(asked, friction):
+    pytest.importorskip("dartpy")
+    asked = replace(asked, dimension=3, friction=friction)
+    assert all(slip.holds for slip in receipts(find("dart").engine, "fbf", asked, DT))
+
+
+@pytest.mark.parametrize("profile", ["tuned", "one"])
+def test_points_that_come_and_go_under_a_box_of_much_friction_break_no_measurement(profile):
+    pytest.importorskip("pybullet")
+    asked = replace(REST, dimension=3, friction=10.0)
+    assert all(slip.holds for slip in receipts(find("bullet").engine, profile, asked, 1 / 1000))
+
+
+@pytest.mark.parametrize(("friction", "breaks"), [(0.5, True), (1.0, True), (1.5, False), (40.0, False)])
+def test_what_a_solver_makes_of_a_friction_above_one_is_measured_and_left_to_checks(toy_class, friction, breaks):
+    """A weight more than the body's own brakes it: solvers stop early there, which is a fault of theirs."""
+
+    class Early(toy_class):
+        def build(self, scene, dt, settings):
+            less = tuple(replace(pair, friction=0.99 * pair.friction) for pair in scene.pairs)
+            return super().build(replace(scene, pairs=less), dt, settings)
+
+    slip = by_quantity(receipts(Early(), "default", replace(REST, friction=friction), DT))["friction"]
+    assert slip.measured == pytest.approx(0.99 * friction, rel=1e-3) and slip.holds != breaks
+
+
+@pytest.mark.parametrize("friction", [0.5, 3.0, 10.0, 50.0, 1000.0])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
+def test_balls_that_sink_through_soft_pyramids_break_no_measurement(friction, dt):
+    """Edges of a pyramid of much friction are so soft that balls are still on their way in when the probe ends."""
+    pytest.importorskip("mujoco")
+    asked = replace(IMPACT, dimension=3, friction=friction, restitution=0.5)
+    slip = by_quantity(receipts(find("mujoco").engine, "default", asked, dt))["restitution"]
+    assert slip.holds and (slip.measured < 0.0) == (friction >= 10.0)
+
+
 @pytest.mark.parametrize("friction", [0.0, 1e-5, 0.3])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 2000, 1 / 10000])
 def test_forces_of_stiff_friction_pyramids_are_told_to_their_round_off_at_any_step(friction, dt):

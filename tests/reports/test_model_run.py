@@ -182,6 +182,21 @@ def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
     assert "line 4: <body> 'door': a hinge joint holds it; bodies of a scene are free or fixed: left out" in left.stderr
 
 
+def test_a_name_with_its_hash_means_what_was_left_out_when_it_was_made(monkeypatch):
+    """Printed commands have such names: a command without --drop must find the same scene."""
+    from adapters.scene import SceneError
+
+    path = str(MODELS / "refused_hinge.xml")
+    monkeypatch.setattr(posed, "_texts", {})
+    name = posed.pinned(path, drop=True)
+    posed._texts.clear()  # as in another process
+    assert posed.pinned(name) == name
+    with pytest.raises(SceneError, match="--drop leaves it out"):
+        posed.pinned(path)
+    with pytest.raises(SceneError, match="has changed since"):
+        posed.pinned(f"{path}@00000000")
+
+
 def test_a_model_that_is_exported_comes_back_as_the_scene_it_was(tmp_path):
     pytest.importorskip("pymunk")
     path = tmp_path / "column.xml"

@@ -514,3 +514,19 @@ def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp
         for command in ("crosscheck findings", "crosscheck explain ID", "crosscheck report --open"):
             assert any(line.startswith(f"  {command}{said} ") for line in lines)
         assert said or not any("--out" in line for line in lines)
+
+
+def test_a_profile_whose_measurement_is_broken_is_no_profile_that_does_no_better():
+    rows = [row("impact", 2, "mujoco", "default", "known", 0.1), row("impact", 2, "mujoco", "tuned", "known", 0.1)]
+    assert answers(rows)[0].cure.startswith("no other profile does better")
+    rows[1] |= {"outcome": "invalid", "physics": None, "standing": None, "reason": "receipt mass"}
+    assert answers(rows)[0].cure.startswith("tuned gave no answer")
+
+
+@pytest.mark.parametrize(
+    ("engine", "profile", "searched"),
+    [("mujoco", "default", True), ("mujoco", "tuned", False), ("reference", "classical", False)],
+)
+def test_a_search_is_offered_only_where_it_starts_from_the_profile_that_fails(engine, profile, searched):
+    (answer,) = answers([row("impact", 2, engine, profile, "known", 0.1, e=0.77, v=1.0)])
+    assert ("crosscheck cure" in answer.cure) == searched

@@ -9,12 +9,12 @@ import pytest
 from adapters.engine import Contacts
 from adapters.needs import needs
 from adapters.registry import load
-from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 from validation.files.quantities import quantity, unit
 from validation.files.scene_files import canonical_from_text
-from validation.metrics import NOT_RECORDED, UNAVAILABLE, forces, over_time
+from validation.metrics import NOT_RECORDED, SEVERAL, UNAVAILABLE, forces, over_time
 
 DT, DURATION = 0.25, 4.0
 FLOOR, BALL, TOP = range(3)
@@ -179,6 +179,24 @@ quantity = "table/hand.fz"
 value = "g"
 tolerance = "0.001 * g"
 """
+
+
+@pytest.mark.parametrize("name", ["contacts", "contact_fy"])
+def test_single_contacts_of_a_box_are_not_those_of_the_plane_where_it_was_run_in_space(name):
+    """A corner in the plane is an edge in space, with a contact at both ends: neither number nor forces compare."""
+    planar, lifted = told(STEPS), replace(told(STEPS), out_of_plane=0.0)
+    scene = scene_of()
+    for made, is_told in ((scene, True), (with_a_box(scene), False)):
+        for record, plane in ((planar, True), (lifted, False)):
+            value, why = quantity(made, record, f"floor/ball.{name}", None, "mean")
+            assert (value is not None) == (is_told or plane) and (why == SEVERAL) == (value is None)
+    for whole in ("floor/ball.fy", "floor/ball.overlap_without_force"):  # sums are those of the plane
+        assert quantity(with_a_box(scene), lifted, whole, None, "mean")[0] is not None
+
+
+def with_a_box(scene):
+    box = replace(scene.bodies[BALL], shape=Box((0.5, 0.5)))
+    return replace(scene, bodies=(scene.bodies[FLOOR], box, scene.bodies[TOP]))
 
 
 def stated(tmp_path, text):

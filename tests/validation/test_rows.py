@@ -14,7 +14,7 @@ from validation.cells import Observation, Outcome, Slot
 from validation.findings import FindingsError
 from validation.judging import predicting, rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
-from validation.metrics import UNAVAILABLE
+from validation.metrics import UNTOLD
 from validation.posed import pinned
 
 #: A box below the edge of the friction cone: one check, its creep.
@@ -418,8 +418,9 @@ def test_of_an_engine_without_a_list_only_cells_that_are_lost_are_alarms(tmp_pat
 
 
 def test_a_force_that_an_engine_does_not_tell_is_no_failure_of_a_file(tmp_path):
-    told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, UNAVAILABLE)})[OWN_CHECK]
-    assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)
-    assert told.reason == UNAVAILABLE
+    for why in UNTOLD:
+        told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, why)})[OWN_CHECK]
+        assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)
+        assert told.reason == why
     lost = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, "the value is inf, not a finite number")})[OWN_CHECK]
     assert lost.alarming and lost.outcome == "ok"

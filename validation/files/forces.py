@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from adapters.engine import Array, Contacts
 from adapters.scene import Scene
+from adapters.shapes import ROUND
 from adapters.trajectory import Trajectory
 from validation import metrics
 from validation.canonical import Measured
@@ -65,6 +66,8 @@ def told(
     elif what == "overlap_without_force":
         assert partner is not None
         series = _unloaded(scene, trajectory, body, partner)[chosen]
+    elif trajectory.out_of_plane is not None and not _meets_in_points(scene, body, others):
+        return None, metrics.SEVERAL
     else:
         rows, step = _touching(trajectory, body, others, chosen)
         if what == "contacts":
@@ -75,6 +78,12 @@ def told(
             sign = np.where(rows.b == body, 1.0, -1.0)
             series = sign * rows.impulse[:, _axis(what)] / trajectory.dt
     return metrics.over_time("", series, (by,))[f"[{by}]"]
+
+
+def _meets_in_points(scene: Scene, body: int, others: Sequence[int]) -> bool:
+    """Whether all contacts of a body are single points in space as they are in the plane: one of each two is round."""
+    round_ones = [isinstance(each.shape, ROUND) for each in scene.bodies]
+    return round_ones[body] or all(round_ones[other] for other in others if other != body)
 
 
 def window_of(trajectory: Trajectory, at: float | None, length: float) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from validation.judging.verdicts import (
     judge_divergence,
     judge_physics,
 )
-from validation.metrics import UNAVAILABLE
+from validation.metrics import UNTOLD
 from validation.posed import is_file, is_model, resolve
 
 #: Standings and outcomes that make the command exit 1.
@@ -173,7 +173,7 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
     doubt = _doubt(observation, check)
     if doubt:
         observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
-    if value is None and why == UNAVAILABLE and observation.outcome is Outcome.OK and is_file(observation.slot.scene):
+    if value is None and why in UNTOLD and observation.outcome is Outcome.OK and is_file(observation.slot.scene):
         # What an engine does not tell is no fault of its motion; in the catalogue it is listed which engines do not.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = _verdict(observation, scene, check, value, why, ready)

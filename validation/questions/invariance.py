@@ -33,7 +33,7 @@ from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from validation.canonical import CanonicalScene
 from validation.cells import Slot, numbers_of, settings_of
-from validation.metrics import UNAVAILABLE
+from validation.metrics import UNTOLD
 from validation.posed import resolve
 from validation.running.apart import Apart
 
@@ -537,7 +537,7 @@ def judged(relation: str, base: Metrics, answer: Metrics | str, allowances: Allo
     worst = Change(relation)
     for name, (value, _) in base.items():
         other, why = answer.get(name, (None, ""))
-        if value is None or (other is None and why == UNAVAILABLE):
+        if value is None or (other is None and why in UNTOLD):
             continue
         allowed = allowances.of(name, value)
         change = math.inf if other is None else abs(other - value)

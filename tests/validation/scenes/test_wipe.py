@@ -138,6 +138,6 @@ def test_a_hand_that_gives_way_fails():
 def test_what_an_engine_does_not_tell_cannot_be_said():
     canonical, scene = made()
     measured = canonical.measure(scene, changed(held(scene), np.nan, np.nan))
-    assert {measured[name] for name in ALL} == {(None, "the engine does not report contact impulses")}
+    assert {measured[name] for name in ALL} == {(None, "the engine does not tell the impulses of these contacts")}
     measured = canonical.measure(scene, replace(held(scene), contacts=None))
     assert {measured[name] for name in ALL} == {(None, "contacts were not recorded")}
