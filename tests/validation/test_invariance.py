@@ -42,6 +42,7 @@ def start_of(scene):
     return Trajectory(np.array([0.0]), pose[None], twist[None], None, 0.01, "completed"), d
 
 
+@pytest.mark.few(60)
 @pytest.mark.parametrize("relation", [each for each in RELATIONS if each.name not in ("again", "fresh process")],
                          ids=lambda each: each.name)  # fmt: skip
 @pytest.mark.parametrize(("name", "dimension"), LINES)

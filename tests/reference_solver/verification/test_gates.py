@@ -75,6 +75,7 @@ def named(call):
     return "-".join(str(getattr(part, "name", getattr(part, "__name__", part))) for part in call)
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("call", IN_BOTH, ids=named)
 def test_gate_holds_in_both_dimensions(call, space):
@@ -84,6 +85,7 @@ def test_gate_holds_in_both_dimensions(call, space):
     assert [row for row in rows if not row.holds] == []
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("call", ALONE, ids=named)
 def test_gate_holds(call):
     function, *arguments = call

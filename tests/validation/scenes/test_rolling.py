@@ -114,6 +114,7 @@ def test_integrated_friction_moves_a_ball_as_the_formula_says(name, dimension, p
         assert measured[metric][0] == pytest.approx(truth, abs=1e-5 if metric == "rolling_place" else 1e-7), metric
 
 
+@pytest.mark.few(54)
 @pytest.mark.parametrize("late", [0.0, 1.0])
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
