@@ -41,6 +41,7 @@ def test_two():
     return pytester.runpytest_subprocess(*OPTIONS, "reports")
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("line", "told"),
     [
@@ -63,6 +64,7 @@ def test_what_is_swallowed_is_told(pytester, line, told):
     result.stdout.fnmatch_lines([f"*{told}*", "ERROR *test_planted.py::test_one*"])
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "line",
     [

@@ -59,6 +59,7 @@ def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
     assert told["readback"] == "RuntimeError: no world today"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_expected_failures_are_told_and_an_unexpected_pass_is_a_failure(toy_class):
     class Known(Spoilt):
@@ -101,6 +102,7 @@ def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_cla
     assert told["receipt gravity"].status == told["states"].status == told["contacts"].status == "ok"
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("name", registry.names())
 def test_our_adapters_conform(name):
     found = registry.find(name)
@@ -112,6 +114,7 @@ def test_our_adapters_conform(name):
         assert {finding.status for finding in findings} == {"ok"} and not found.engine.expected
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_a_fault_that_no_receipt_sees_is_found(toy):
     found = failing(check_adapter(toy("world shared with another")))
@@ -119,6 +122,7 @@ def test_a_fault_that_no_receipt_sees_is_found(toy):
     assert not [name for name in found if name.startswith("receipt")]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
     found = failing(check_adapter(toy("impulse of the wrong body")))

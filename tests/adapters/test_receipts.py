@@ -527,6 +527,7 @@ def test_balls_that_sink_through_soft_pyramids_break_no_measurement(friction, dt
     assert slip.holds and (slip.measured < 0.0) == (friction >= 10.0)
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("friction", [0.0, 1e-5, 0.3])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 2000, 1 / 10000])
 def test_forces_of_stiff_friction_pyramids_are_told_to_their_round_off_at_any_step(friction, dt):

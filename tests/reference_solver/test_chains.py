@@ -296,7 +296,15 @@ def judged_by_seed(seed, d):
     return *judged(row, d, turn=float(rng.choice([0.0, rng.uniform(-3.0, 3.0)]))), row.contacts
 
 
-@pytest.mark.parametrize(("d", "seeds"), [(2, range(120)), (3, range(120, 200))])
+@pytest.mark.parametrize(
+    ("d", "seeds"),
+    [
+        (2, range(20)),
+        (3, range(120, 135)),
+        pytest.param(2, range(20, 120), marks=pytest.mark.long),
+        pytest.param(3, range(135, 200), marks=pytest.mark.long),
+    ],
+)
 def test_no_row_of_balls_is_certified_and_wrong(d, seeds):
     """And four of five with two contacts are certified. What is refused says why."""
     short, wrong = [], []

@@ -157,6 +157,7 @@ def missed(problem, impulse):
     return worst / np.abs(impulse).max()
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("method", METHODS)

@@ -26,6 +26,7 @@ def trials(draw, dimension):
     return Trial(numbers, vector, powers, draw(st.integers(0, 999)))
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize(
     ("relation", "profile"),

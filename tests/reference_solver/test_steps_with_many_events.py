@@ -66,6 +66,7 @@ def pile(dimension, seed, restitution):
     return Simulation(Model(dimension, [*fixed, *boxes], gravity, restitution, 0.5), Settings.reference(DT))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_jammed_piles_obey_all_laws_but_for_an_overlap_that_is_told(dimension, restitution):

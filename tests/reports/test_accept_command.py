@@ -177,6 +177,7 @@ def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):
 # ---- the exit status of a run says whether there is an alarm -------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findings):
     findings.mkdir()
     (findings / files.FAMILIES).write_text(FAMILY)

@@ -94,6 +94,7 @@ def test_a_bad_call_exits_with_two_and_one_line(tmp_path, monkeypatch, arguments
     assert result.exit_code == 2 and said in result.stderr and "Traceback" not in result.output
 
 
+@pytest.mark.long
 def test_a_profile_names_the_stages_of_a_step():
     result = call("profile", "stack", "--param", "n=2", "--steps", "50", "--json")
     assert result.exit_code == 0, result.stderr
@@ -129,6 +130,7 @@ def asked(monkeypatch):
     return found
 
 
+@pytest.mark.long
 def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_path, asked):
     pytest.importorskip("pymunk")
     out, who = tmp_path / "out", ["--engine", "chipmunk", "--profile", "tuned", "--dim", "2"]

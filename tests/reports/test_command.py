@@ -184,6 +184,7 @@ def test_two_runs_into_fresh_folders_agree_to_the_last_bit_with_any_number_of_jo
     assert tables[0] == tables[1]
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(sys.platform != "linux", reason="kills a process group")
 @pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGKILL])
 def test_what_finished_survives_and_the_same_command_resumes(tmp_path, blow):

@@ -75,6 +75,7 @@ def test_the_command_writes_the_page_and_prints_its_path(page_folder, tmp_path):
     assert (tmp_path / "r.html").read_text().startswith("<!doctype html>")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("found", [True, False])
 def test_the_page_is_opened_where_that_is_asked_for(page_folder, tmp_path, monkeypatch, found):
     opened, path = [], tmp_path / "page.html"

@@ -160,6 +160,7 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
     assert done.stderr == ""
 
 
+@pytest.mark.few(3)
 @pytest.mark.skipif(sys.platform == "win32", reason="closes streams by >&-, which is a word of POSIX shells alone")
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
@@ -212,6 +213,7 @@ sys.meta_path.insert(0, Hidden())
 """
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [

@@ -353,6 +353,7 @@ def test_a_single_setting_that_leaves_more_than_half_of_the_error_is_not_told_be
     assert (changes, value is not None) == (({"c": 1}, True) if told else ({}, False))
 
 
+@pytest.mark.long
 def test_a_real_engine_is_cured_by_what_its_sheet_says():
     """Chipmunk's box hops as it starts to slide, by an overlap that it is not given at the start."""
     pytest.importorskip("pymunk")
@@ -478,6 +479,7 @@ MODEL = """
 """
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "text"), [("crate.toml", BOX), ("crate.xml", MODEL)])
 def test_a_file_is_mended_by_the_smallest_change_first(tmp_path, name, text, monkeypatch):
     """With a friction of 6 or 7 MuJoCo's pyramid lets a box sink by a third of its size: the round cone is enough."""

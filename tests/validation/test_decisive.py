@@ -96,6 +96,7 @@ def test_every_cure_is_listed_with_the_settings_that_its_profile_changes_today(e
             assert part.without > 1.0 or part.decides != NEEDED
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("engine", "scene"), [("chipmunk", "stack"), ("bullet", "incline")])
 def test_what_is_listed_comes_out_again(engine, scene):
     if find(engine).engine is None:

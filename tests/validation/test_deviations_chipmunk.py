@@ -37,6 +37,7 @@ def law_for(profile: str, scene: str, metric: str) -> Deviation:
     return found
 
 
+@pytest.mark.few(10)
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 217, 1 / 960])
 @pytest.mark.parametrize(("e", "height"), [(0.0, 1.0), (0.47, 0.613), (0.8, 1.0371), (0.93, 2.19), (1.0, 1.07)])

@@ -70,6 +70,7 @@ CELLS = [
 ]
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize(("name", "params", "profile", "dimension", "off"), CELLS)
 def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, profile, dimension, off):
     canonical = CATALOGUE[name]
@@ -176,6 +177,7 @@ def test_blocks_of_another_problem_are_not_predicted(profile, params):
     assert leaning_law(profile, "drift")(scene, DT, measure) is None
 
 
+@pytest.mark.long
 def test_springs_twice_as_stiff_would_tip_the_blocks_otherwise(monkeypatch):
     scene, measure = CATALOGUE["overhang"].scene(2, {"margin": 1e-6}), CATALOGUE["overhang"].measure
     value, band = leaning_law("tuned", "drift")(scene, DT, measure)

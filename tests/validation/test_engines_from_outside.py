@@ -200,6 +200,7 @@ BROKEN_LAWS = [
 ]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("code", "said"), BROKEN_LAWS)
 def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_without_them(site, tmp_path, code, said):
     (site / "laws.py").write_text(code)
@@ -213,6 +214,7 @@ def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_wit
     assert ",fail,new," in row and "its laws cannot be had" in row and said in row, done.output
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("answer", "said"),
     [("1 / 0", "ZeroDivisionError"), ("(float('nan'), 1.0)", "predicts nan"), ("(1.0, -1.0)", "predicts 1 +- -1"),
@@ -231,6 +233,7 @@ DEVIATIONS = (Deviation("toy", ("default",), "stack", "penetration", lambda *ask
     assert "law: toy stack/penetration: " in row and said in row and ",new," in row
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("code", "said"),
     [("raise RuntimeError('torn')", "torn"), ("EXPERIMENTS = ('one',)", "no Experiment"),

@@ -26,6 +26,7 @@ def test_there_are_twenty_and_each_has_a_source_a_symptom_and_a_check_that_its_s
         assert note.cure or note.said != CURED
 
 
+@pytest.mark.long
 def test_what_our_run_says_is_what_the_notes_say():
     """All cells of all notes: 5 s of CPU."""
     if not HERE:

@@ -27,6 +27,7 @@ def assert_whole(scene, motion):
         assert len(motion.contacts.step) == len(offset) - 1
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_law_measures_whole_motions(engine):
     """Of the last two quick cells of each scene; the numbers themselves stand in the tables of laws."""

@@ -29,6 +29,7 @@ def compiled():
     return {(kernel.py_func.__module__, kernel.__name__, kinds) for kernel in found for kinds in kernel.overloads}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_whole_cells_call_no_kernel_that_first_steps_left_alone(dimension):
     """One cell of each scene and profile of the quick suite, moved by an ulp: run once, not again for a certificate."""

@@ -178,6 +178,7 @@ def test_the_first_contact_with_a_wall_is_found_however_fast_a_body_turns(name, 
     assert met >= 5
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("turn", [0.0, 4.0, 30.0])
 @pytest.mark.parametrize(
     ("first", "second"),

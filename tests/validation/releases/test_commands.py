@@ -39,6 +39,7 @@ def test_bisect_finds_the_planted_change_in_two_questions_and_says_what_did_not_
     assert "1.0.0: 0.5" in text and "--all asks every release" in text
 
 
+@pytest.mark.long
 def test_the_commands_that_it_prints_reproduce_the_two_cells(call):
     done = call("bisect", "toy", "1.0.0..1.2.0", "impact", "--check", "rebound_ratio", *CELL, "--json")
     again, compare = (shlex.split(command)[1:] for command in json.loads(done.stdout)["commands"])
@@ -48,6 +49,7 @@ def test_the_commands_that_it_prints_reproduce_the_two_cells(call):
     assert "rebound_ratio: 0.5 (pass) -> 0.3" in compared.stdout and "toy 1.0.0 -> 1.2.0" in compared.stdout
 
 
+@pytest.mark.long
 def test_all_asks_every_release_and_only_then_says_that_it_is_the_only_change(call):
     done = call("bisect", "toy", "1.0.0,1.1.0,1.2.0", "impact", "--check", "rebound_ratio", *CELL, "--all")
     assert "the only change of this row: every release was asked" in done.stdout
@@ -59,11 +61,13 @@ def test_nothing_changed_is_said_and_is_no_alarm(call):
     assert "is the same in 1.0.0 and 1.2.0" in done.stdout
 
 
+@pytest.mark.long
 def test_an_end_that_does_not_answer_is_incomplete(call):
     done = call("bisect", "toy", "1.0.0,1.1.0", "impact", "--check", "rebound_ratio", *CELL, status=4)
     assert "1.1.0 cannot be asked: cannot be imported" in done.stdout
 
 
+@pytest.mark.long
 def test_releases_says_what_moved_and_that_one_did_not_answer(call):
     done = call("releases", "toy", "1.0.0..1.2.0", "impact", *CELL, status=4)
     assert re.search(r"1\.1\.0 +- +- +- +- +- +cannot be imported", done.stdout)

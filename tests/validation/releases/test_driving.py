@@ -214,6 +214,7 @@ def test_nothing_goes_on_in_an_environment_when_its_run_is_killed(toy, own_cache
 OLD = {"mujoco": "3.2.7", "chipmunk": "6.11.1", "bullet": "3.2.6"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", OLD)
 def test_a_real_old_release_is_installed_and_answers(engine, store, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

@@ -140,6 +140,7 @@ def test_a_yardstick_is_milliseconds_of_cpu_time():
 # ---- on real environments of tiny releases -------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatch):
     def call(*more):
         registry.find.cache_clear()

@@ -76,6 +76,7 @@ def failing(canonical, scene, trajectory):
 # ---- two balls ----
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("ratio", "v1", "v2"), [(1.0, 4.0, -2.0), (3.0, 4.0, -2.0), (0.1, 1.0, 0.0)])
 def test_two_balls_swap_what_springs_between_them_swap(ratio, v1, v2):
     _, scene, truth = made("head_on", ratio=ratio, e=1.0, v1=v1, v2=v2)
@@ -342,6 +343,7 @@ def test_one_pass_over_the_corners_fails(size):
 # ---- impacts one after the other ----
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
 def test_the_small_ball_is_thrown_as_springs_throw_it(ratio):
     _, scene, truth = made("stacked_balls", ratio=ratio, e=1.0)
@@ -434,6 +436,7 @@ def test_impacts_count_the_digits_of_pi(ratio, count):
     )
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0])
 def test_the_closed_form_is_what_springs_between_ball_ball_and_wall_make(ratio):
     _, scene, truth = made("galperin", ratio=ratio)

@@ -23,6 +23,7 @@ PARTS = (
 )
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("part", PARTS)
 def test_gate_holds(part):
     rows = list(getattr(gates, part)())

@@ -172,6 +172,7 @@ def test_spheres_collide_as_discs_do():
     assert space.pose[:, [0, 2]] == pytest.approx(plane.pose[:, :2], abs=1e-12)
 
 
+@pytest.mark.long
 def test_more_contacts_at_once_than_can_be_enumerated_end_a_run_with_its_reason():
     row = [disc(float(k), vx=0.0 if k else 1.0) for k in range(14)]
     with pytest.raises(LeavesClosedForm, match="13 contacts at once, enumeration ends at 12"):
