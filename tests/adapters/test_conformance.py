@@ -40,6 +40,7 @@ def test_items_are_one_per_check_and_fail_with_the_finding(toy):
     assert {item.name: item for item in healthy}["receipt mass"].hold().status == "ok"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_findings_are_one_line_each(toy):
     for finding in check_adapter(toy("nothing read back")):

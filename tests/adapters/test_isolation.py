@@ -84,6 +84,7 @@ def test_a_child_answers_as_often_as_it_is_asked_until_it_is_stopped(child):
         child.receive(PATIENCE)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize(
     ("order", "said"),
     [

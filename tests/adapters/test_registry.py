@@ -216,6 +216,7 @@ def test_every_setting_has_one_name_a_reason_and_a_source_that_are_words(name: s
                 assert setting.because and setting.name.isidentifier(), setting
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("name", "reason"),
     [

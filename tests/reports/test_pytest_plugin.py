@@ -108,6 +108,7 @@ def test_a_finding_of_other_releases_that_still_fails_is_expected_but_not_strict
     assert "as listed for <1.0" in output
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("options", "said"),
     [(("--crosscheck", "toi"), "did you mean 'toy'"),

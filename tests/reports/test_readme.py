@@ -164,7 +164,7 @@ def test_every_command_of_the_readme_is_run_or_says_why_not():
     assert all(len(reason) > 20 for reason in NOT_RUN.values())
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("line", SAID)
 def test_a_command_of_the_readme_runs(results, monkeypatch, line):
     monkeypatch.chdir(results)

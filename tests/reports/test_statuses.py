@@ -137,6 +137,7 @@ def test_a_named_engine_that_is_missing_is_said_and_has_a_status(plugins, tmp_pa
     assert "broken was named, but did not run" in result.stderr
 
 
+@pytest.mark.few(1)
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full on this system")
 @pytest.mark.parametrize("arguments", [["list", "scenes"], ["describe", "bounce", "--json"], ["--help"]])
 def test_a_full_stdout_is_said_in_one_line(arguments):
@@ -192,6 +193,7 @@ def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):
     assert all("\n" not in a["error"] for a in answers if "error" in a)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no ulimit on Windows")
 def test_a_shell_that_allows_too_little_memory_is_told_so_and_stores_no_crashes(tmp_path):
     command = [sys.executable, "-m", "reports.command", *SMALL, "--out", str(tmp_path)]

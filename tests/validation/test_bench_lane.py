@@ -225,6 +225,7 @@ def test_a_unit_closes_when_its_interval_is_narrow(clockwork):
     assert max(t.round for t in timed([unit("one")], replace(PATIENT, width=0.0))) == PATIENT.most - 1
 
 
+@pytest.mark.long
 def test_a_series_ends_where_a_pile_takes_too_long(clockwork):
     sizes = size_units([("clockwork", "one")], [2], [], [], [1, 2, 3])
     steps = {1: 10, 3: 12000, 6: 10}  # 1 ms, 1.2 s: the limit of 1 s leaves room for a busy machine

@@ -192,6 +192,7 @@ SPATIAL = {
 }  # fmt: skip
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("world", [PLANAR, SPATIAL], ids=["plane", "space"])
 def test_a_puck_slides_outwards_on_a_face_that_turns(tmp_path, world):
     """Without friction s'' = omega^2 s along the face: s = s0 cosh(omega t) + v0/omega sinh(omega t)."""

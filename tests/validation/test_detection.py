@@ -94,7 +94,7 @@ GUARDED = {
 }
 
 
-@pytest.mark.few(2)
+@pytest.mark.long
 @pytest.mark.parametrize("name", GUARDED)
 def test_what_no_parameter_makes_is_seen_by_the_check_that_is_there_for_it(seen, name):
     fault, size = GUARDED[name]

@@ -217,6 +217,7 @@ def fails(found):
     return {metric for metric, (value, check) in found.items() if not abs(value - check.truth) <= check.bound}
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("speed", [0.1, 0.03, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 0.002, 1 / 1000])
 @pytest.mark.parametrize("profile", ["default", "tuned"])

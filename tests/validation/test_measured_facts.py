@@ -235,7 +235,7 @@ def seen():
 MEASURED = [(engine, fact) for engine in ("chipmunk", "bullet", "mujoco") for fact in facts_of(engine)]
 
 
-@pytest.mark.few(30)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("engine", "fact"), [pytest.param(*each, id=f"{each[0]}-{each[1].says}") for each in MEASURED if each[1].scene]
 )

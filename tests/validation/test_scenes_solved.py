@@ -37,6 +37,7 @@ def of_the_suite(name):
                 yield solved(name, dimension, variation.params)
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("name", sorted(CATALOGUE.keys() - REFUSED))
 def test_what_finds_every_event_passes_and_stands_where_the_ghost_is(name):
     canonical = CATALOGUE[name]

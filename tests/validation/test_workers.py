@@ -24,7 +24,7 @@ def evil(profile):
     return Slot("impact", (), 2, "evil", profile, DT)
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("profile", "outcome", "reason"),
     [

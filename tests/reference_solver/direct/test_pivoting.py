@@ -16,6 +16,7 @@ SOLVED = 1e-13
 PIVOTED = 1e-11
 
 
+@pytest.mark.few(30)
 @pytest.mark.parametrize("attempt", range(COVERINGS))
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("seed", range(10))

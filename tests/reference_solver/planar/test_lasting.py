@@ -174,6 +174,7 @@ def test_a_phase_that_an_impact_cuts_ends_where_bodies_touch(rate, half, lean, s
     assert np.abs(low).max() <= 4.0 * np.finfo(float).eps * half[0]
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     "end, rate, form", [(1, 0.5, "corner"), (1, -0.5, "edge"), (-1, -0.5, "corner"), (-1, 0.5, "edge")]
 )

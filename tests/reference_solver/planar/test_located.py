@@ -36,6 +36,7 @@ def test_a_dropped_disc_follows_its_parabolas_until_it_rests(build, dt, e):
     assert simulation.certificate["holds"], simulation.certificate["reasons"]
 
 
+@pytest.mark.long
 def test_ten_thousand_elastic_bounces_keep_energy(build):
     simulation = build.simulation([build.floor(), build.disc(0.0, 1.5)], Settings.reference(build.dt), DOWN, 1.0)
     simulation.advance(math.ceil(20_000 * math.sqrt(2.0 / G) / build.dt))

@@ -76,6 +76,7 @@ def test_a_release_that_cannot_be_installed_is_a_row_with_its_reason(toy, store)
     assert "there is no wheel of toyphysics 1.5.0" in observation.reason
 
 
+@pytest.mark.long
 def test_what_is_stored_is_not_asked_again_but_what_was_missing_is(toy, store):
     asked = []
     for version in ("1.0.0", "1.1.0", "1.0.0", "1.1.0"):

@@ -166,6 +166,7 @@ def test_a_receipt_that_is_none_is_no_environment(own_cache):
     assert environments.found() == []
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="no such locks")
 def test_the_lock_ends_with_its_process(own_cache, tmp_path):
     mark = tmp_path / "installed"
