@@ -132,6 +132,7 @@ def processes():
             continue
 
 
+@pytest.mark.long
 def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty, tmp_path):
     hanging = [faulty_slot("hang", v=float(v)) for v in range(1, 6)]
     elsewhere = Slot("bounce", (), 2, "faulty", "none", DT)

@@ -60,6 +60,7 @@ def test_never():
 """
 
 
+@pytest.mark.long
 def test_a_change_is_noticed_where_a_test_fails_that_passes_without_it(tools, tmp_path):
     pytest.importorskip("coverage")
     faults, mutants = tools("faults"), tools("mutants")

@@ -44,6 +44,7 @@ def test_the_timed_steps_reach_the_same_bits(dimension):
     assert all(seconds < 1.0 for seconds in stages.values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", [planar, spatial])
 def test_every_call_of_the_step_is_a_stage_in_its_order(module):
     dimension = 2 if module is planar else 3

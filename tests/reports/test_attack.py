@@ -82,6 +82,7 @@ CELLS = {
 WITHOUT = {"impulse": set(), "friction": {"impact"}}
 
 
+@pytest.mark.long
 def test_a_fault_of_two_per_cent_cannot_be_accepted(attacked, request):
     out, call = str(attacked / "out"), CliRunner().invoke
     common = ["--engine", "attacked", "--profile", "tuned", "--dim", "2", "--jobs", "1", "--out", out]

@@ -86,6 +86,7 @@ def serve_badly(connection):
         connection.send_bytes(json.dumps(answer(seed, dimension)).encode())
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="children are guarded by a fork")
 def test_a_scene_that_hangs_or_kills_its_process_stops_no_other(monkeypatch):
     monkeypatch.setattr(fuzzing, "serve", serve_badly)

@@ -133,6 +133,7 @@ def test_waiting_is_not_charged_but_is_seen_in_wall_time(clockwork):
         assert timing.seconds < 0.01 < 0.02 <= timing.wall_seconds
 
 
+@pytest.mark.long
 def test_an_abort_or_a_hang_voids_its_own_unit_only(clockwork):
     units = [unit("one"), unit("abort"), unit("two"), unit("raise"), unit("hang")]
     # Three seconds without an answer are a hang: the healthy units answer in milliseconds, a start takes a second.

@@ -129,6 +129,7 @@ def test_a_study_has_the_rows_of_the_local_pool_and_runs_no_cell_twice(tmp_path)
     assert ran == sorted(asked) and {event["event"] for event in events} == {"begun", "ended"}
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_takes_nothing_along_and_every_cell_is_accounted_for(cluster, undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, cluster.address)
@@ -144,6 +145,7 @@ def test_a_worker_that_dies_takes_nothing_along_and_every_cell_is_accounted_for(
     assert begun and lost and again <= {cell for event in lost for cell in event["cells"]}
 
 
+@pytest.mark.long
 def test_a_scheduler_that_dies_loses_nothing_and_the_same_command_goes_on(cluster, undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, cluster.address)
@@ -159,6 +161,7 @@ def test_a_scheduler_that_dies_loses_nothing_and_the_same_command_goes_on(cluste
     assert bits(out) == undisturbed
 
 
+@pytest.mark.long
 def test_a_parent_that_is_killed_goes_on_where_it_was(undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, "local:1")

@@ -60,24 +60,28 @@ def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
     assert (home / "output").read_text() == "comment=crosscheck-out/comment.md\n"
 
 
+@pytest.mark.long
 def test_a_build_that_lost_a_verdict_fails_and_its_comment_says_which(job):
     home = job("3.0", 1)
     comment = (home / "crosscheck-out" / "comment.md").read_text()
     assert "verdict flipped" in comment and "`rebound_ratio`" in comment and "worse" in comment
 
 
+@pytest.mark.long
 def test_never_fails_for_no_change(job):
     """The toy has no findings, so what fails is new to nobody: only the comparison would fail the job."""
     home = job("3.0", 0, FAIL_ON="never")
     assert "verdict flipped" in (home / "crosscheck-out" / "comment.md").read_text()
 
 
+@pytest.mark.long
 def test_without_a_base_nothing_is_installed_or_compared(job):
     home = job("3.0", 0, BASE="")
     assert not (home / "crosscheck-out" / "base.json").exists()
     assert (home / "crosscheck-out" / "comment.md").read_text() == ""
 
 
+@pytest.mark.long
 def test_a_base_that_does_not_answer_is_no_comparison_that_found_nothing(job):
     """1.1.0 cannot be imported: its library is missing."""
     home = job('float("inf")', 4, BASE="1.1.0")
