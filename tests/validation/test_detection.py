@@ -40,7 +40,7 @@ def test_two_per_cent_of_impulses_or_friction_break_a_receipt_of_every_engine_an
 
 @pytest.fixture(scope="module")
 def detected():
-    """Every fault in the scenes that tests below name; all others are asked by `make test-long`.
+    """Every fault in the scenes that tests below name; all others are asked by `make test-all`.
 
     A blind spot is asked at half of its step and a quarter, as its test needs; the table that is committed has our
     solver's, down to a 128th.

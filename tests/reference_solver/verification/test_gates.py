@@ -19,7 +19,7 @@ from reference_solver.verification import (
 from reference_solver.verification.space import SPACES
 from reference_solver.verification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 
-#: Piles of half a minute of CPU or more each: `crosscheck certify` measures them, and `make test-long`.
+#: Piles of half a minute of CPU or more each: `crosscheck certify` measures them, and `make test-all`.
 LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes", "50 boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
