@@ -228,7 +228,7 @@ MORE_UNSUPPORTED = UNSUPPORTED.replace('id = "planar"', 'id = "again"')
         (FAMILY + FAMILY, HEAD, "{families}: family creeps stands twice"),
         (UNSUPPORTED.replace("3", "1"), HEAD,
          "{families}: unsupported planar: dimension must be 2 or 3, or missing for both"),
-        (MORE_UNSUPPORTED.replace('"it is planar"', "7"), HEAD, "{families}: unsupported again: reason is missing"),
+        (MORE_UNSUPPORTED.replace('"it is planar"', "7"), HEAD, "{families}: unsupported again: reason must be a text"),
         (UNSUPPORTED + 'params = { far = "far" }\n', HEAD,
          "{families}: unsupported planar: params must be a table of numbers"),
         (FAMILY, "a,b\n", "{members}: the first line must be "

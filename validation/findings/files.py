@@ -20,6 +20,7 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from adapters import registry
 from adapters.engine_folder import FINDINGS, folder_of
+from adapters.experiment_files import NAME, Fields, Kind, checked, is_list_of, is_numbers, is_word, params_of
 from adapters.plain import one_line
 from validation.findings import Family, Finding, Findings, FindingsError, Key, Unsupported, solutions_of
 from validation.findings.proofs import proof_of
@@ -57,6 +58,14 @@ def brought_by_ours(engine: str) -> bool:
     return entry is not None and registry.is_ours(entry)
 
 
+#: Whether a value fits, and what it must be.
+_NAMES: Kind = (lambda value: bool(value) and is_list_of(is_word)(value), "a list of names")
+#: Fields of families and of what is unsupported that are no names.
+_BOTH: Kind = (lambda value: value in (0, 2, 3), "2 or 3, or missing for both")
+_TEXT: Kind = (is_word, "a text")
+_KINDS: Fields = {"profiles": _NAMES, "metrics": _NAMES, "dimension": _BOTH, "reason": _TEXT, "source": _TEXT}
+
+
 def read(engine: str, folder: Path) -> Findings:
     """Read and check the findings of ``engine`` in ``folder``.
 
@@ -82,25 +91,15 @@ def read(engine: str, folder: Path) -> Findings:
 
 def _fields(path: Path, kind: str, entry: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """Check that exactly ``names`` are there, that lists are tuples of words, and that nothing is empty."""
-    label = f"{path}: {kind} {entry.get('id', '?')}"
-    for name in entry:
-        if name not in names:
-            raise FindingsError(f"{label}: {name} is no field; there are {', '.join(names)}")
-    out: dict[str, Any] = {}
-    for name in names:
-        value = entry.get(name)
-        if name in ("profiles", "metrics"):
-            if not isinstance(value, list) or not value or not all(isinstance(word, str) for word in value):
-                raise FindingsError(f"{label}: {name} must be a list of names")
-            value = tuple(value)
-        elif name == "dimension":
-            value = 0 if value is None else value
-            if value not in (0, 2, 3):
-                raise FindingsError(f"{label}: dimension must be 2 or 3, or missing for both")
-        elif not isinstance(value, str) or not value.strip():
-            raise FindingsError(f"{label}: {name} is missing")
-        out[name] = value
-    return out
+    known = {name: _KINDS.get(name, NAME) for name in names}
+    needed = [name for name in names if name != "dimension"]
+    given = {name: value for name, value in entry.items() if not isinstance(value, str) or value.strip()}
+    try:
+        checked(f"{path}: {kind} {entry.get('id', '?')}", given, known, needed)
+    except ValueError as error:
+        raise FindingsError(str(error)) from None
+    out = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    return {"dimension": 0, **out} if "dimension" in names else out
 
 
 def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
@@ -133,9 +132,9 @@ def _unsupported(path: Path, entry: Mapping[str, Any]) -> Unsupported:
     told = {name: value for name, value in entry.items() if name != "params"}
     fields = _fields(path, "unsupported", told, ("id", "profiles", "scene", "dimension", "reason", "source"))
     params = entry.get("params", {})
-    if not isinstance(params, dict) or not all(type(value) in (int, float) for value in params.values()):
+    if not is_numbers(params):
         raise FindingsError(f"{path}: unsupported {entry['id']}: params must be a table of numbers")
-    return Unsupported(**fields, params=tuple(sorted((name, float(value)) for name, value in params.items())))
+    return Unsupported(**fields, params=tuple(sorted(params_of(params).items())))
 
 
 def _members(engine: str, path: Path, families: Mapping[str, Family]) -> dict[Key, Finding]:
