@@ -18,6 +18,7 @@ from importlib.resources import files
 from typing import Any
 
 import jinja2
+import minify_html
 from markupsafe import Markup
 
 from reports.answers import Answer, answers
@@ -26,7 +27,6 @@ from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
 from reports.page.families import families
 from reports.page.scenes import scene_sections
-from reports.page.slimming import small_html
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, symbols
 from reports.wording import missing_text, number
@@ -47,12 +47,12 @@ def render(source: Source) -> str:
     style = Markup(
         _text("page.css") + engine_style(list(dict(source.named))) + symbols(source.named)
     )  # ours: nothing in it comes from a run
-    script = Markup("\n".join(_text(name) for name in SCRIPTS))
+    script = Markup("\n".join(_text(name) for name in SCRIPTS).strip())
     wrong = answers(source.rows)
     first = first_answers(source, wrong)
     choices = choosing.choices(source)
     shown = replay.replays(source)
-    return small_html(
+    page = (
         _environment()
         .get_template("page.html.j2")
         .render(
@@ -87,6 +87,7 @@ def render(source: Source) -> str:
             beside=[*unranked(source.columns), *leaving(source.rows)],
         )
     )
+    return minify_html.minify(page)  # style and scripts stay as they are: the policy holds their hashes
 
 
 def first_answers(source: Source, wrong: Sequence[Answer]) -> list[Answer]:

@@ -18,7 +18,6 @@ import pandas as pd
 import vl_convert
 from markupsafe import Markup
 
-from reports.page.slimming import small_svg
 from reports.palette import colours_of, dash_of, shape_of
 
 WIDTH, HEIGHT = 330, 250
@@ -43,21 +42,24 @@ _CONFIG: dict[str, Any] = {
     "text": {"color": "currentColor", "fontSize": 11.5},
     "rule": {"color": "currentColor"},
 }  # fmt: skip
-_EMPTY = re.compile(r'<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>')
-_LONG = re.compile(r"-?\d+\.\d{3,}(?:e-?\d+)?")
-_NOISE = re.compile(r' (?:pointer-events="none"|opacity="1"|stroke-miterlimit="10"|fill-opacity="1")')
+#: What no reader is given, for a chart is a picture with one name, and what SVG takes for granted.
+_UNREAD = re.compile(
+    r' (?:class|role|aria-hidden|aria-roledescription|pointer-events|stroke-miterlimit|font-family)="[^"]*"'
+    r'| (?:opacity|fill-opacity|stroke-width)="1"| transform="translate\(0,0\)"| aria-label="[XY]-axis[^"]*"'
+    r'|<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>'
+)
+#: Where a part is and how long it is: tenths of a pixel are seen.
+_PLACE = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
+_LONG = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
 
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
     spec = chart.to_dict(validate=False)  # a tenth of a second each; a wrong one would not draw
     spec["config"] = _CONFIG
-    text = vl_convert.vegalite_to_svg(spec)
-    text = _NOISE.sub("", _EMPTY.sub("", text))
-    text = _LONG.sub(lambda m: f"{float(m.group()):.2f}".rstrip("0").rstrip("."), text)
-    name = Markup.escape(title)
-    head = f'<svg role="img" aria-label="{name}" '
-    return Markup(small_svg(text.replace("<svg ", head, 1).replace(' class="marks"', "", 1)))
+    text = _UNREAD.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
+    text = _PLACE.sub(lambda place: _LONG.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
+    return Markup(text.replace("<svg", f'<svg role="img" aria-label="{Markup.escape(title)}"', 1))
 
 
 def log_axis(low: float, high: float) -> list[float]:

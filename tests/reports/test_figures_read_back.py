@@ -30,26 +30,25 @@ def drawn(of, dt=1 / 240):
 
 
 def corners(path):
-    """Corners of a path whose moves are told in any of SVG's short forms [px]."""
+    """Corners of a path of straight lines [px]; a step along an axis is told by one number."""
     place, found = np.zeros(2), []
-    for kind, text in re.findall(r"([MLmlHhVv])([^MLmlHhVv]*)", path):
-        values = [float(x) for x in re.findall(r"-?\d*\.?\d+(?:e-?\d+)?", text)]
-        step = 1 if kind in "HhVv" else 2
-        for k in range(0, len(values), step):
-            own = values[k : k + step]
-            if kind in "Hh":
-                own = [own[0], 0.0 if kind == "h" else place[1]]
-            elif kind in "Vv":
-                own = [0.0 if kind == "v" else place[0], own[0]]
-            place = np.array(own) if kind in "MLHV" else place + own
-            found.append(place)
+    for kind, text in re.findall(r"([MLhv])([^MLhvZ]*)", path):
+        values = [float(x) for x in re.findall(r"-?[\d.]+", text)]
+        place = np.array(values) if kind in "ML" else place + (values * np.eye(2)["hv".index(kind)])
+        found.append(place)
     return np.array(found)
 
 
 def lines(tree):
-    return {
-        node.get("data-is"): corners(node.get("d")) for node in tree.iter() if node.get("data-is") and node.get("d")
-    }
+    """Corners of what is drawn with a name and is no point, whose outline has arcs."""
+    named = [node for node in tree.iter() if node.get("data-is") and "A" not in node.get("d", "A")]
+    return {node.get("data-is"): corners(node.get("d")) + moved(node) for node in named}
+
+
+def moved(node):
+    """Where a part is moved to [px]."""
+    found = re.fullmatch(r"translate\((.*),(.*)\)", node.get("transform", "translate(0,0)"))
+    return np.array(found.groups(), float)
 
 
 def test_errors_over_iterations_lie_on_logarithmic_axes_and_what_is_exact_lies_in_the_gutter():
@@ -63,7 +62,7 @@ def test_errors_over_iterations_lie_on_logarithmic_axes_and_what_is_exact_lies_i
     decade = one[1, 1] - one[0, 1]
     assert decade > 20.0 and one[2, 1] - one[1, 1] == pytest.approx(decade, abs=0.2)  # down is less
     assert other[0, 1] == other[1, 1] == one[0, 1]
-    (gutter,) = [corners(n.get("d")) for n in tree.iter() if n.get("fill-opacity") == "0.07"]
+    (gutter,) = [corners(n.get("d")) for n in tree.iter() if n.get("opacity") == "0.07"]
     top, bottom = gutter[:, 1].min(), gutter[:, 1].max()
     assert top < other[2, 1] < bottom
     assert one[0, 1] + decade * math.log10(0.5 / figures.EXACT) <= top + 0.5 * decade
@@ -125,13 +124,12 @@ def test_times_are_drawn_with_the_interval_in_which_their_median_lies():
         for engine, factor in spread.items() for cost, error in ((1e-3, 0.1), (1e-2, 0.01))
     ])  # fmt: skip
     tree = ElementTree.fromstring(str(figures.work_precision(points, "impact", 2).picture))
-    marks = {(node.get("data-is").partition("/")[0], float(node.get("cy"))): float(node.get("cx"))
-             for node in tree.iter() if node.get("cx")}  # fmt: skip
+    points = [node for node in tree.iter() if node.get("data-is") and "A" in node.get("d", "")]
+    marks = {(node.get("data-is").partition("/")[0], moved(node)[1]): moved(node)[0] for node in points}
     assert len(marks) == 4
     decade = max(marks.values()) - min(marks.values())
-    (group,) = (node for node in tree.iter() if node.get("stroke-width") == "1.6")
-    bars = {(node.get("data-is").partition("/")[0], end[0, 1]): end[:, 0]
-            for node in group for end in [corners(node.get("d"))]}  # fmt: skip
+    bars = {(node.get("data-is").partition("/")[0], moved(node)[1]): moved(node)[0] + [0.0, float(node.get("x2"))]
+            for node in tree.iter() if node.get("stroke-width") == "1.6"}  # fmt: skip
     assert set(bars) == set(marks)
     for (engine, height), (low, high) in bars.items():
         here = decade * math.log10(spread[engine])

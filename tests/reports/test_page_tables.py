@@ -13,7 +13,6 @@ from reports.matrix import Field
 from reports.page import cost, fairness
 from reports.page.charts import log_scale
 from reports.page.conclusions import NAMED, scenes_text
-from reports.page.slimming import small_svg
 from reports.page.verdicts import family_mark
 from reports.spread import spread_lines
 from reports.wording import MARKS
@@ -88,12 +87,6 @@ def test_a_logarithmic_scale_has_room_at_both_ends_and_ticks_inside(values):
     assert low < min(values) <= max(values) < high and high / low >= 10.0
     assert min(values) / low == pytest.approx(high / max(values)), "as much room below as above"
     assert ticks and all(low <= tick <= high for tick in ticks)
-
-
-def test_only_the_ground_of_a_picture_that_is_drawn_by_nothing_is_left_out():
-    ground = "M0,0h40.5v20h-40.5Z"
-    assert "h40" not in small_svg(f'<svg role="img"><path d="{ground}"/><path d="M0,0L9,9" stroke="red"/></svg>')
-    assert "h40" in small_svg(f'<svg role="img"><path d="{ground}" fill="red"/></svg>')
 
 
 def test_scenes_are_named_while_a_sentence_can_hold_them():
