@@ -324,6 +324,8 @@ class CanonicalScene:
     ----------
     name, version, title
         Identity; a change of physics is a new version.
+    symptoms
+        What people see and say where an engine fails on it, in their words: `validation.field.symptoms` finds it.
     figure
         ASCII drawing with the law.
     law
@@ -396,6 +398,7 @@ class CanonicalScene:
     sampling: Callable[[Scene], Sampling]
     track: Callable[[Scene], Track | None] = lambda scene: None
     family: str = "others"
+    symptoms: tuple[str, ...] = ()
     quick: tuple[Variation, ...] = (Variation({}),)
     standard: tuple[Variation, ...] = ()
     full: tuple[Variation, ...] = ()

@@ -1,21 +1,105 @@
-"""``field``: public questions and bug reports, run again."""
+"""``ask``: from a symptom to the scene that shows it and to a fix; ``field``: public reports, run again."""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
+from collections.abc import Sequence
+from dataclasses import asdict
 
 import click
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from adapters import registry
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
+from reports.cures import cure_paste, cure_text, nothing_to_paste
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import Finding, ask, matching
+from validation.field.symptoms import matches, stems
+from validation.posed import resolve
+from validation.settings.cures import Cure, cures_of
 from validation.settings.switching import Reading
+
+#: Scenes that are named beside the best one.
+OTHERS = 3
+
+
+@main.command("ask")
+@click.argument("words", nargs=-1, required=True)
+@AS_JSON
+def ask_command(words: tuple[str, ...], as_json: bool) -> None:
+    """Find the scene that shows a symptom, how wrong engines are there as shipped, and a fix.
+
+    WORDS are yours, such as: grip slips; my ball does not bounce; or the number of a known report. Name an engine for
+    the lines to paste. Nothing is run: the numbers are those of the tables of fixes.
+    """
+    text = " ".join(words)
+    known = {facts.package.lower(): name for name in registry.names() if (facts := registry.facts(name))}
+    known |= {name: name for name in registry.names()}
+    named = list(dict.fromkeys(known[word] for word in text.lower().split() if word in known))
+    said = " ".join(word for word in text.split() if word.lower() not in known)
+    found = matches(said, named)
+    if not found:
+        told = f"nothing is known of {said!r}; see crosscheck list scenes, and crosscheck field for known reports"
+        raise click.BadParameter(told, param_hint="WORDS")
+    best, others = found[0], [other.scene for other in found[1:] if other.scene][:OTHERS]
+    about = [best.report.engine] if best.report and "#" in text else named
+    fixes = _fixes(best.scene, about)
+    missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
+    if as_json:
+        plain = {
+            "scene": best.scene, "command": best.command, "words": best.words, "missed": missed, "others": others,
+            "report": best.report.source if best.report else None,
+            "fixes": [{**asdict(fix), "paste": cure_paste(fix)} for fix in fixes],
+        }  # fmt: skip
+        click.echo(json.dumps(plain, indent=1, default=str))
+        return
+    console = terminal()
+    console.print(Text(best.command or f"{best.scene}: {resolve(best.scene).title}", style="bold"), soft_wrap=True)
+    if missed:
+        console.print(Text(f"nothing is known of: {', '.join(missed)}", style="dim"))
+    if best.report:
+        console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
+    if best.scene:
+        _show_fixes(best.scene, about, fixes, console)
+    if others:
+        near = (f"{name} ({resolve(name).title.lower()})" for name in others)
+        console.print(Text(f"or: {'; '.join(near)}", style="dim"))
+
+
+def _fixes(scene: str, engines: Sequence[str]) -> list[Cure]:
+    """What is on record of engines as shipped on a scene: one fix each, in space where the scene is spatial too."""
+    found = []
+    for engine in engines or registry.names():
+        own = [cure for (name, _), cure in cures_of(engine).items() if name == scene]
+        found += [max(own, key=lambda cure: cure.dimension)] if own else []
+    return found
+
+
+def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console: Console) -> None:
+    for fix in fixes:
+        console.print()
+        console.print(Text(f"{fix.engine} as shipped: {fix.failing} of {fix.judged} checks fail", style="bold"))
+        kind = "fix" if 2 * fix.left <= fix.failing else "best setting found"
+        console.print(Text(cure_text(fix, f"{kind} in {fix.dimension}-D" if fix.helps else f"{fix.dimension}-D")))
+        if fix.helps and fix.engine in named:
+            console.print(Text(cure_paste(fix) or nothing_to_paste(fix)), soft_wrap=True)
+    for engine in named:
+        if engine not in {fix.engine for fix in fixes}:
+            console.print(
+                Text(f"{engine}: {'no failure is on record' if cures_of(engine) else 'has no table of fixes'}")
+            )
+    console.print()
+    console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
+    helped = [fix.engine for fix in fixes if fix.helps and fix.engine not in named]
+    if helped:
+        console.print(Text(f"for lines to paste, add the engine: {', '.join(helped)}"))
 
 
 @main.command("field")

@@ -60,6 +60,7 @@ RUN = {
         "run bounce --param e=.8 --engine mujoco --profile default --dim 2",
     ],
     "crosscheck run my-scene.toml": ["run my-scene.toml --engine chipmunk --profile tuned --out elsewhere"],
+    "crosscheck ask grip slips mujoco": ["ask grip slips mujoco"],
     "crosscheck show": ["show"],
     "crosscheck findings --engine mujoco": [
         "findings --engine mujoco", "findings --scene bounce --profile default", "findings --new", "findings --all"
@@ -82,6 +83,7 @@ RUN = {
 #: What each of them must say of that folder.
 SAID = {
     "run my-scene.toml --engine chipmunk --profile tuned --out elsewhere": "box.mass: 2 kg, its density times its area",
+    "ask grip slips mujoco": 'cone="elliptic"',
     "show": "default 2-D",
     "findings --engine mujoco": "mujoco/default bounce",
     "findings --scene bounce --profile default": "mujoco/default bounce",

@@ -210,6 +210,7 @@ SCENE = CanonicalScene(
     family="stacks and statics",
     version=1,
     title="Arch of three stones: it stands or gives way",
+    symptoms=("an arch collapses",),
     figure=__doc__ or "",
     law="stands if mu >= cot(beta)/(2 R + 1), N = W/(2 sin(beta)); else gives way, A = g (k - mu R)/(R + k cot(beta))",
     dimensions=(2,),

@@ -249,6 +249,12 @@ SCENE = CanonicalScene(
     name="bounce",
     version=1,
     title="Dropped ball, from the first bounce to rest",
+    symptoms=(
+        "my ball does not bounce",
+        "a ball bounces higher and higher",
+        "a ball loses height at each bounce",
+        "bouncing stops too early or never",
+    ),
     family="rebound",
     figure=__doc__ or "",
     law="h_n = e^(2n) h0,  t_rest = sqrt(2 h0/g) (1 + e)/(1 - e)",

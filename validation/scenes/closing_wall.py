@@ -135,6 +135,7 @@ SCENE = CanonicalScene(
     family="many impacts",
     version=1,
     title="Ball between a wall and a plate that closes in",
+    symptoms=("a moving wall or kinematic body hits objects wrongly",),
     figure=__doc__ or "",
     law="v_n = v_0 + 2 n V after n blows of the plate; (v_n - V) L_n is kept",
     dimensions=(2, 3),

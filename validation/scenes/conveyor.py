@@ -91,6 +91,7 @@ SCENE = CanonicalScene(
     family="friction",
     version=1,
     title="Box that is set down on a running belt",
+    symptoms=("a conveyor belt carries objects at the wrong speed",),
     figure=__doc__ or "",
     law="x = V t - V^2/(2 mu g) once it goes with the belt, after V/(mu g)",
     dimensions=(2, 3),

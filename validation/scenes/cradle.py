@@ -120,6 +120,7 @@ SCENE = CanonicalScene(
     name="cradle",
     version=1,
     title="Newton's cradle, with gaps and touching",
+    symptoms=("Newton's cradle moves all of its balls",),
     family="rebound",
     figure=__doc__ or "",
     law="with gaps (0, ..., 0, v); touching: momentum and energy",

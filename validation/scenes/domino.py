@@ -277,6 +277,7 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Domino that is pushed against the next one",
+    symptoms=("dominoes fall too fast or too slowly",),
     figure=__doc__ or "",
     law="goes over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); hands on (1 + e)/2 of its spin where sin(theta) = gap/height",
     dimensions=(2,),

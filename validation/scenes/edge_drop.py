@@ -119,6 +119,7 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Tilted box that lands on an edge",
+    symptoms=("a box that lands on its edge sinks in or hops",),
     figure=__doc__ or "",
     law="J = m (1 + e) v/(1 + l^2/i^2),  v' = J/m - v,  w' = l J/I, no twist",
     dimensions=(2, 3),

@@ -50,6 +50,10 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Box that slides to a stop far away from the origin",
+    symptoms=(
+        "it behaves otherwise far away from the origin",
+        "a large world loses precision",
+    ),
     figure=__doc__ or "",
     law="d = v^2/(2 mu g), wherever it is",
     dimensions=(2, 3),

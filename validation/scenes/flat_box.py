@@ -115,6 +115,7 @@ SCENE = CanonicalScene(
     name="flat_box",
     version=1,
     title="Box that lands flat, on all corners at once",
+    symptoms=("a box that lands flat starts to spin or tips over",),
     family="rebound",
     figure=__doc__ or "",
     law="v+ = -e v-, no spin: the corners' impulses are solved together",

@@ -120,6 +120,10 @@ SCENE = CanonicalScene(
     name="head_on",
     version=1,
     title="Two balls meet head-on, of any ratio of masses",
+    symptoms=(
+        "momentum is lost in a collision of two balls",
+        "bodies rebound although restitution is zero",
+    ),
     family="rebound",
     figure=__doc__ or "",
     law="v1' = v1 - (1 + e) r/(1 + r) (v1 - v2),  v2' = v2 + (1 + e)/(1 + r) (v1 - v2)",

@@ -46,6 +46,10 @@ SCENE = CanonicalScene(
     name="heavy_on_light",
     version=1,
     title="Heavy box on a light one, in equilibrium",
+    symptoms=(
+        "a heavy object sinks into a light one",
+        "a large mass ratio is unstable",
+    ),
     family="stacks and statics",
     figure=__doc__ or "",
     law="nothing moves; each interface carries the weight above it, whatever the ratio of masses",

@@ -125,6 +125,11 @@ SCENE = CanonicalScene(
     name="impact",
     version=1,
     title="Ball against an immovable floor, no gravity",
+    symptoms=(
+        "restitution has no effect",
+        "a slow ball sticks to the wall",
+        "it rebounds too slowly",
+    ),
     family="rebound",
     figure=__doc__ or "",
     law="v+ = -e v-,  J = m (1 + e) v",

@@ -146,6 +146,11 @@ SCENE = CanonicalScene(
     name="incline",
     version=1,
     title="Box on an incline, from sticking to sliding",
+    symptoms=(
+        "a box slides down a slope although friction should hold it",
+        "static friction does not hold",
+        "objects creep downhill on a ramp",
+    ),
     family="friction",
     figure=__doc__ or "",
     law="sticks if tan(theta) <= mu, else a = g (sin(theta) - mu cos(theta))",

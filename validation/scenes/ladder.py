@@ -151,6 +151,7 @@ SCENE = CanonicalScene(
     family="stacks and statics",
     version=1,
     title="Ladder on a smooth wall: it stands or slides down",
+    symptoms=("a ladder slides although it should stand",),
     figure=__doc__ or "",
     law="stands if mu >= (cot(lean) - w/L)/2, which is the load on the wall over the weight; else slides down",
     dimensions=(2,),

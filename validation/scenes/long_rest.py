@@ -89,6 +89,7 @@ SCENE = CanonicalScene(
     family="stacks and statics",
     version=1,
     title="Short column that rests for a long time",
+    symptoms=("a resting object drifts away over time",),
     figure=__doc__ or "",
     law="nothing drifts, sinks or turns, however long it stands",
     dimensions=(2, 3),

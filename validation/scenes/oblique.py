@@ -128,6 +128,7 @@ SCENE = CanonicalScene(
     name="oblique",
     version=1,
     title="Ball thrown at the floor with spin",
+    symptoms=("spin after a bounce is wrong",),
     family="rebound",
     figure=__doc__ or "",
     law="grips if |v - w r| k/(1 + k) <= mu (1 + e) v_n, and rolls off; else slips by mu (1 + e) v_n",

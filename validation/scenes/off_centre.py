@@ -286,6 +286,7 @@ SCENE = CanonicalScene(
     name="off_centre",
     version=1,
     title="Ball strikes a free bar beside its centre",
+    symptoms=("a hit beside the centre gives the wrong spin",),
     family="rebound",
     figure=__doc__ or "",
     law="J = (1 + e) (v - V - d w)/(1/m + 1/M + d^2/I),  spin' = w + d J/I",

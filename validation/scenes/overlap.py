@@ -108,6 +108,10 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Two balls that start inside each other",
+    symptoms=(
+        "objects that start inside each other explode",
+        "overlapping bodies fly apart",
+    ),
     figure=__doc__ or "",
     law="no speed comes of an overlap, the common centre stays; an overlap is no spring",
     dimensions=(2, 3),

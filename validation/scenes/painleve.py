@@ -220,6 +220,7 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Rod that is pushed along the floor: it slides or jams",
+    symptoms=("a pushed rod chatters, jams or hops",),
     figure=__doc__ or "",
     law="jams at once where mu > (1 + 3 c^2)/(3 s c), with w = -b v/(i^2 + a^2 + b^2); else slides",
     dimensions=(2,),

@@ -135,6 +135,7 @@ SCENE = CanonicalScene(
     name="pair_matrix",
     version=1,
     title="Two balls between two faces: four pairs of materials",
+    symptoms=("friction or restitution of two materials is combined wrongly",),
     family="materials",
     figure=__doc__ or "",
     law="each pair bounces with its own e and slips with its own mu, whatever its bodies do in other pairs",

@@ -112,6 +112,11 @@ SCENE = CanonicalScene(
     name="pinch",
     version=1,
     title="Box held between a wall and a pad that presses on it",
+    symptoms=(
+        "my grip slips",
+        "the gripper drops its object",
+        "a grasped object creeps out of the fingers",
+    ),
     family="grip and force",
     figure=__doc__ or "",
     law="sticks if W <= 2 mu N: creep 0, the wall carries N, wall and pad carry W, at every step",

@@ -79,6 +79,10 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Box that starts sunk into the floor",
+    symptoms=(
+        "penetration pops out and throws the body into the air",
+        "a sunk body jumps out of the floor",
+    ),
     figure=__doc__ or "",
     law="comes up to the floor and no higher: correcting a place is no motion",
     dimensions=(2, 3),

@@ -122,6 +122,7 @@ SCENE = CanonicalScene(
     family="grip and force",
     version=1,
     title="Box pressed onto the floor and pushed along it",
+    symptoms=("a pushed box starts to move too early or too late",),
     figure=__doc__ or "",
     law="sticks if F <= mu (W + N), and the floor bears both; else a = (F - mu (W + N))/m",
     dimensions=(2, 3),

@@ -70,6 +70,7 @@ SCENE = CanonicalScene(
     family="stacks and statics",
     version=1,
     title="Wall of boxes, each over a gap, in equilibrium",
+    symptoms=("a wall or pyramid of boxes collapses",),
     figure=__doc__ or "",
     law="nothing moves; the contacts below a row carry the weight above them, however they share it",
     dimensions=(2, 3),

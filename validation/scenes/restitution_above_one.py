@@ -113,6 +113,10 @@ SCENE = CanonicalScene(
     family="rebound",
     version=1,
     title="Ball between plates that throw it back faster",
+    symptoms=(
+        "objects are thrown back faster than they came",
+        "energy grows at each collision",
+    ),
     figure=__doc__ or "",
     law="v_n = e^n v after n blows, for whoever takes e > 1",
     dimensions=(2,),

@@ -99,6 +99,10 @@ SCENE = CanonicalScene(
     name="roll_incline",
     version=1,
     title="Ball that rolls down an incline",
+    symptoms=(
+        "a wheel or ball rolls too slowly or too fast down a slope",
+        "there is rolling resistance that nobody set",
+    ),
     family="friction",
     figure=__doc__ or "",
     law="a = g sin(theta)/(1 + k) if mu >= tan(theta) k/(1 + k), else g (sin(theta) - mu cos(theta))",

@@ -86,6 +86,7 @@ SCENE = CanonicalScene(
     name="rolling_spin",
     version=1,
     title="Ball that rolls and spins about the vertical",
+    symptoms=("a spinning ball slows down or stops spinning",),
     family="turning",
     figure=__doc__ or "",
     law="spin about the normal and speed of rolling last for ever: friction at a point takes from neither",

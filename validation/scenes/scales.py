@@ -108,6 +108,10 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="The same scene in millimetres and in kilometres",
+    symptoms=(
+        "small or tiny objects behave otherwise than large ones",
+        "units of millimetres give other results",
+    ),
     figure=__doc__ or "",
     law="stops after v^2/(2 mu g), rises to e^2 of its fall: in units of L the same whatever L and the mass are",
     dimensions=(2, 3),

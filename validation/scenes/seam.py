@@ -50,6 +50,10 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Box that slides over the seams of flush plates",
+    symptoms=(
+        "an object trips or stumbles at the seam between two tiles",
+        "ghost collisions at internal edges of a flat floor",
+    ),
     figure=__doc__ or "",
     law="d = v^2/(2 mu g), straight on and level, as on one face",
     dimensions=(2, 3),

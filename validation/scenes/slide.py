@@ -67,6 +67,11 @@ SCENE = CanonicalScene(
     name="slide",
     version=1,
     title="Box that slides to a stop, in any heading",
+    symptoms=(
+        "the braking distance is wrong",
+        "friction depends on the direction or heading",
+        "an object slides too far",
+    ),
     family="friction",
     figure=__doc__ or "",
     law="d = v^2/(2 mu g), straight on; friction does not know the heading, and is mu m g at every step",

@@ -158,6 +158,10 @@ SCENE = CanonicalScene(
     name="slide_to_roll",
     version=1,
     title="Ball that slides until it rolls",
+    symptoms=(
+        "a ball slips instead of rolling",
+        "a rolling ball curves",
+    ),
     family="friction",
     figure=__doc__ or "",
     law="v' = v/(1 + k) after t = v k/((1 + k) mu g), then no loss",

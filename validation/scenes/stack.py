@@ -100,6 +100,12 @@ SCENE = CanonicalScene(
     name="stack",
     version=1,
     title="Column of boxes in equilibrium",
+    symptoms=(
+        "my stack creeps, sinks or falls over",
+        "stacked boxes jitter, drift or slide apart",
+        "boxes sink into each other",
+        "a tower never comes to rest",
+    ),
     family="stacks and statics",
     figure=__doc__ or "",
     law="nothing moves; interface i carries the weight above it, at every step",

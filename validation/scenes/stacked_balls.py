@@ -171,6 +171,7 @@ SCENE = CanonicalScene(
     name="stacked_balls",
     version=1,
     title="Small ball on a large one: thrown back up to three times as fast",
+    symptoms=("a ball dropped on a ball is thrown back too slowly",),
     family="rebound",
     figure=__doc__ or "",
     law="v_m = v (M e + M e (1 + e) - m)/(M + m)",

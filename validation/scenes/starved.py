@@ -125,6 +125,7 @@ SCENE = CanonicalScene(
     name="starved",
     version=1,
     title="Row of balls pressed against a wall, with too few sweeps",
+    symptoms=("a row or heap is squeezed with too few solver iterations",),
     family="hard",
     figure=__doc__ or "",
     law="nothing moves; every contact carries the press",

@@ -110,6 +110,11 @@ SCENE = CanonicalScene(
     name="thin_wall",
     version=1,
     title="Fast ball against a thin plate",
+    symptoms=(
+        "fast things pass through walls",
+        "a projectile tunnels through a thin plate",
+        "objects fall through the floor",
+    ),
     family="hard",
     figure=__doc__ or "",
     law="v+ = -e v- at any speed and thickness",

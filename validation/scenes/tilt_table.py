@@ -154,6 +154,7 @@ SCENE = CanonicalScene(
     family="stacks and statics",
     version=1,
     title="Block on a tilted table: stays, slides or topples",
+    symptoms=("a block topples instead of sliding",),
     figure=__doc__ or "",
     law="stays if tan(theta) <= min(mu, width/height); else slides or topples, whichever limit is met first",
     dimensions=(2, 3),

@@ -179,6 +179,10 @@ SCENE = CanonicalScene(
     name="tumble",
     version=1,
     title="Box that turns over its middle axis in free space",
+    symptoms=(
+        "a body that spins freely gains or loses energy",
+        "the gyroscopic term is missing",
+    ),
     family="turning",
     figure=__doc__ or "",
     law="L and E are kept; spin about the middle axis turns over after K(m)/n",

@@ -127,6 +127,7 @@ SCENE = CanonicalScene(
     name="v_groove",
     version=1,
     title="Ball in a groove, at rest on two smooth planes",
+    symptoms=("the load is shared wrongly between two walls",),
     family="stacks and statics",
     figure=__doc__ or "",
     law="N_left = m g sin(b)/sin(a + b),  N_right = m g sin(a)/sin(a + b)",

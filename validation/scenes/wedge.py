@@ -176,6 +176,7 @@ SCENE = CanonicalScene(
     family="friction",
     version=1,
     title="Block on a wedge that gives way",
+    symptoms=("a block on a movable ramp slides wrongly",),
     figure=__doc__ or "",
     law="A = N (sin(alpha) - mu cos(alpha))/M, N = m g cos(alpha)/(1 + (m/M) sin(alpha) (sin(alpha) - mu cos(alpha)))",
     dimensions=(2,),

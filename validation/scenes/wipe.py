@@ -108,6 +108,10 @@ SCENE = CanonicalScene(
     name="wipe",
     version=1,
     title="Hand on a moving table, held by a stop",
+    symptoms=(
+        "contact forces jump, flicker or are noisy",
+        "a touch or force sensor reads a wrong force",
+    ),
     family="grip and force",
     figure=__doc__ or "",
     law="N = m g, friction mu m g, the stop carries mu m g, at every step",

@@ -1,0 +1,97 @@
+"""``ask``: a symptom in plain words leads to the scene that shows it, to how wrong an engine is, and to a fix."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main
+from reports.cures import cure_paste
+from validation.catalogue import CATALOGUE
+from validation.field import notes
+from validation.field.symptoms import matches, stem
+from validation.settings.cures import cures_of
+
+#: Words of users that no scene has as they stand -> the scene that is about it.
+ASKED = {
+    "my ball does not bounce": "bounce",
+    "grip slips": "pinch",
+    "objects are slipping out of my gripper": "pinch",
+    "my stack creeps": "stack",
+    "boxes are sinking into one another": "stack",
+    "fast things pass through": "thin_wall",
+    "a shot is tunnelling through plates": "thin_wall",
+    "forces jump": "wipe",
+    "noisy contact force sensor": "wipe",
+    "crate creeps down a ramp": "incline",
+    "tiny objects behave differently": "scales",
+    "stumbling over seams between floor tiles": "seam",
+    "overlapping bodies explode at the start": "overlap",
+    "large mass ratio": "heavy_on_light",
+}
+
+
+def asked(*words, status=0):
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["ask", *words])
+    assert result.exit_code == status, result.output
+    return result.output
+
+
+@pytest.mark.parametrize("words", ASKED)
+def test_words_of_a_user_lead_to_the_scene(words):
+    assert matches(words)[0].scene == ASKED[words]
+    assert asked(*words.split()).startswith(f"{ASKED[words]}: {CATALOGUE[ASKED[words]].title}"[:80])
+
+
+@pytest.mark.parametrize("scene", [name for name, scene in CATALOGUE.items() if scene.symptoms])
+def test_each_symptom_leads_to_its_own_scene(scene):
+    assert [matches(text)[0].scene for text in CATALOGUE[scene].symptoms] == [scene] * len(CATALOGUE[scene].symptoms)
+
+
+@pytest.mark.parametrize("note", notes(), ids=lambda note: note.source)
+def test_the_number_of_a_known_report_finds_it(note):
+    short = note.source.split("/")[1]
+    found = matches(short)[0]
+    assert found.scene == note.scene and found.report.source.endswith(short)
+
+
+def test_a_word_is_known_in_all_its_forms():
+    for words in ("slip slips slipped slipping", "bounce bounces bouncing", "sink sinks sinking", "box boxes",
+                  "jitter jitters jittering", "penetrates penetrating penetration", "grip gripper grips"):  # fmt: skip
+        assert len({stem(word) for word in words.split()}) == 1, words
+
+
+def test_an_engine_that_is_named_gets_its_numbers_and_the_lines_to_paste():
+    said, fix = asked("grip", "slips", "mujoco"), cures_of("mujoco")["pinch", 3]
+    assert f"{fix.failing} of {fix.judged} checks fail" in said and "bullet" not in said
+    assert all(line in said for line in cure_paste(fix).splitlines()), "as `cure` prints them, unbroken"
+    assert said.count("\n") <= 24, "one screen"
+    without = asked("grip", "slips")
+    assert cure_paste(fix).splitlines()[0] not in without and "add the engine: bullet, mujoco" in without
+
+
+def test_names_of_packages_are_names_of_engines():
+    assert asked("stack", "sinks", "pymunk") == asked("stack", "sinks", "chipmunk")
+
+
+def test_a_question_about_releases_leads_to_the_command_that_answers_it():
+    assert asked("results", "changed", "with", "a", "release").startswith("crosscheck bisect ")
+
+
+def test_what_is_not_known_is_said():
+    assert "nothing is known of 'quantum'" in asked("quantum", status=2)
+    assert "nothing is known of ''" in asked("mujoco", status=2)
+    assert "nothing is known of: quantum" in asked("grip", "slips", "quantum")
+    assert "box2d: has no table of fixes" in asked("sinks", "box2d")
+
+
+def test_a_setting_that_leaves_most_failures_is_not_called_a_fix():
+    fix = cures_of("mujoco")["wipe", 3]
+    assert 2 * fix.left > fix.failing, "or choose another scene for this test"
+    assert "best setting found in 3-D" in asked("forces", "jump", "mujoco")
+
+
+def test_json_has_all_of_it():
+    found = json.loads(asked("mujoco#239", "--json"))
+    assert found["scene"] == "pinch" and found["report"] == "google-deepmind/mujoco#239"
+    assert [fix["engine"] for fix in found["fixes"]] == ["mujoco"] and "elliptic" in found["fixes"][0]["paste"]
