@@ -39,7 +39,7 @@ from validation.records.store import SCATTER_TITLE, Store
 SHOWN = 12
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck accept latest --engine ENGINE")
 @click.argument("run", default="latest")
 @click.option("--engine", required=True, metavar="E", help="Whose findings to write.")
 @click.option("--family", "families", multiple=True, metavar="ID", help="Accept this family (repeat for more).")
@@ -47,14 +47,15 @@ SHOWN = 12
 @AS_JSON
 @OUT
 def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
-    """List rows of RUN that do not pass as findings, each with its value and band, each family with its reason.
+    """Add failing checks of a run to the list of known failures.
 
-    Cells that fail are run again from starts moved by some units in the last place: their scatter is the band. Where
-    that is too wide to see a finding pass, or come nearer to a third, twelve more starts are asked. Shows
-    every family that would change. Those named by --family are accepted; for the others a terminal is asked.
-    Without one, families that are not named stay as they are listed, and no cell is run again for them. Rows that a
-    deviation law covers and misses, rows whose receipts do not hold and rows of a profile that promises a solution
-    are refused; what did not run stays as it is listed.
+    Each check of RUN is listed with its value and band, each family with its reason. Cells that fail are run again
+    from starts moved by some units in the last place: their scatter is the band. Where that is too wide to see a
+    finding pass, or come nearer to a third, twelve more starts are asked. Shows every family that would change.
+    Those named by --family are accepted; for the others a terminal is asked. Without one, families that are not
+    named stay as they are listed, and no cell is run again for them. Rows that a deviation law covers and misses,
+    rows whose receipts do not hold and rows of a profile that promises a solution are refused; what did not run
+    stays as it is listed.
 
     Exits with 1 if a row is refused, a family that changed is not accepted or a row outside those that are named is
     new or drifted. Read the diff before you commit it: a

@@ -30,11 +30,11 @@ from validation.settings.switching import Reading
 OTHERS = 3
 
 
-@main.command("ask")
+@main.command("ask", epilog="Example: crosscheck ask my ball does not bounce")
 @click.argument("words", nargs=-1, required=True)
 @AS_JSON
 def ask_command(words: tuple[str, ...], as_json: bool) -> None:
-    """Find the scene that shows a symptom, how wrong engines are there as shipped, and a fix.
+    """Find a scene and a fix from a symptom in your words.
 
     WORDS are yours, such as: grip slips; my ball does not bounce; or the number of a known report. Name an engine for
     the lines to paste. Nothing is run: the numbers are those of the tables of fixes.
@@ -102,15 +102,16 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console
         console.print(Text(f"for lines to paste, add the engine: {', '.join(helped)}"))
 
 
-@main.command("field")
+@main.command("field", epilog="Example: crosscheck field stack")
 @click.argument("words", nargs=-1)
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--commands", is_flag=True, help="Print the command of every note.")
 @AS_JSON
 def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:
-    """Run what people asked or reported in public, and say whether it is so on the engines that are installed.
+    """Run public questions and bug reports again.
 
-    WORDS choose notes by repository, engine or scene; all by default. Exits with 1 if a note is no longer true.
+    Says whether each is so on the engines that are installed. WORDS choose notes by repository, engine or scene;
+    all by default. Exits with 1 if a note is no longer true.
     """
     chosen = matching(words)
     if not chosen:

@@ -42,7 +42,7 @@ from validation.workers import TIMEOUT
 AGREEMENT = 0.9
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck bench stack")
 @selection
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes for the errors; 0: one per core.")
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
@@ -57,11 +57,12 @@ AGREEMENT = 0.9
 @AS_JSON
 @OUT
 def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
-    """Measure errors and times of SCENES over steps and iterations; time at equal error, scaling, overhead.
+    """Measure error against time, over steps and iterations.
 
-    Errors come first, in worker processes; then everything is timed in a lane of its own. --quick takes under two
-    minutes on two cores, --full up to two hours (piles of a thousand boxes). With --against, exits with 1 if fewer
-    than 90 % of the ratios agree. With --piles what the reference costs in piles, against its own fixed steps.
+    Prints time at equal error, scaling and overhead of SCENES. Errors come first, in worker processes; then everything
+    is timed in a lane of its own. --quick takes under two minutes on two cores, --full up to two hours (piles of a
+    thousand boxes). With --against, exits with 1 if fewer than 90 % of the ratios agree. With --piles what the
+    reference costs in piles, against its own fixed steps.
     """
     console = terminal(stderr=True)
     if piles is not None:
@@ -196,7 +197,7 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
     return f"  {what} {row['params_text']} x{row['iterations']:g}: {first}, now {second}"
 
 
-@main.command("profile")
+@main.command("profile", epilog="Example: crosscheck profile stack")
 @click.argument("scene")
 @click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
 @click.option("--profile", help="Profile of the reference solver; by default the one that promises a solution.")
@@ -207,9 +208,10 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
 def profile_(
     scene: str, param: tuple[str, ...], profile: str | None, dim: int, dt: str, steps: int, as_json: bool
 ) -> None:
-    """Say where the time of the reference solver's steps goes: the median time of each stage of a step.
+    """Show where the time of the solver's steps goes.
 
-    SCENE is a scene of the catalogue, such as pyramid (--param rows=13).
+    Prints the median time of each stage of a step. SCENE is a scene of the catalogue, such as pyramid (--param
+    rows=13).
     """
     from reference_solver.timeline import timeline
 

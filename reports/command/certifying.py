@@ -59,7 +59,7 @@ WORKERS = 2
 WIDTH = 150
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck certify")
 @AS_JSON
 @click.option("--order", is_flag=True, help="Show how errors fall with the step instead: fitted orders.")
 @click.option(
@@ -72,10 +72,11 @@ WIDTH = 150
 def certify(
     as_json: bool, order: bool, self_test: bool, count: int | None, seed: int, dim: tuple[int, ...], chains: bool
 ) -> None:
-    """Measure every gate of the reference solver and its oracle; exits with 1 if one does not hold.
+    """Test the reference solver against its gates.
 
-    With --random scenes are drawn, certified and run again mirrored, moved, with other steps and so on: what is
-    certified and differs is a defect, and fails; what is refused is told with the condition.
+    The gates of its oracle are measured as well. Exits with 1 if one does not hold. With --random scenes are drawn,
+    certified and run again mirrored, moved, with other steps and so on: what is certified and differs is a defect,
+    and fails; what is refused is told with the condition.
     """
     console = terminal(stderr=True)
     if not console.is_terminal:

@@ -12,7 +12,7 @@ from reports.command.group import AS_JSON, OUT, main
 from validation.judging.comparison import FAIL_ON, Kind, by_seriousness, compare_rows, compare_speeds, failing
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck compare latest crosscheck-out/rows.jsonl")
 @click.argument("before", metavar="A")
 @click.argument("after", metavar="B")
 @click.option("--only-regressed", is_flag=True, help="Show only what got worse.")
@@ -31,10 +31,10 @@ def compare(
     as_json: bool,
     out: Path,
 ) -> None:
-    """Say what changed from run A to run B: verdict flips first, then errors, then speed.
+    """Show what changed between two runs.
 
-    A and B are run ids in OUT, releases that were run into it (myengine==3.2.7), results folders (FOLDER or
-    FOLDER:RUN), or .jsonl files of rows.
+    Changes from A to B: verdict flips first, then errors, then speed. A and B are run ids in OUT, releases that
+    were run into it (myengine==3.2.7), results folders (FOLDER or FOLDER:RUN), or .jsonl files of rows.
     """
     a, b = rendering.load_side(before, out), rendering.load_side(after, out)
     changes = sorted(compare_rows(a.rows, b.rows) + compare_speeds(a.ratios, b.ratios), key=by_seriousness)

@@ -26,7 +26,7 @@ from validation.posed import is_file, resolve
 from validation.settings.cures import Cure, Unsearched, cures_of, search, write
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck cure ENGINE pinch")
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @click.option("--param", multiple=True, metavar="NAME=VALUE", help="One case: fix a parameter of the scene.")
@@ -45,13 +45,14 @@ def cure(
     keep: bool,
     as_json: bool,
 ) -> None:
-    """Search which stock settings of ENGINE mend what it gets wrong as shipped on SCENES (all by default).
+    """Search stock settings that fix a scene, and their cost.
 
-    Each setting alone, pairs with the best one, other profiles with what can be left out of them: what mends most
-    checks and breaks none is shown with error and cost before and after, and as lines to paste. Seconds to a minute a
-    scene. A scene's standard cells are asked, in two sizes at two steps. With --param, --dt, or a file (a scene, or a
-    model as its own engine runs it) that case alone is, at its step. With --keep the table of the engine is kept,
-    which `run`, `show`, `explain` and the report read.
+    The search is for what ENGINE gets wrong as shipped on SCENES (all by default). It tries each setting alone, pairs
+    with the best one, and other profiles with what can be left out of them. What mends most checks and breaks none
+    is shown with error and cost before and after, and as lines to paste. Seconds to a minute a scene. A scene's
+    standard cells are asked, in two sizes at two steps. With --param, --dt, or a file (a scene, or a model as its
+    own engine runs it) that case alone is, at its step. With --keep the table of the engine is kept, which `run`,
+    `show`, `explain` and the report read.
     """
     if profile_of(engine, "shipped") is None:
         load(engine)  # says that there is no such engine, if so

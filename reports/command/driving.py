@@ -25,7 +25,7 @@ from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes
 FEW = 6
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck frontier thin_wall")
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
 @click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
@@ -44,11 +44,12 @@ def frontier(
     commands: bool,
     as_json: bool,
 ) -> None:
-    """Bisect how far each engine and profile can be driven until a scene no longer happens.
+    """Find how far a scene can be driven until an engine fails.
 
-    Largest step, stack height, mass ratio, overlap, spin and impact speed, fewest iterations: each as a bracket of one
-    cell that survives and one that does not, with how it ended and the commands that run both again. SCENES that
-    declare no such axis are refused. Exits with 4 if a named engine is not here.
+    Bisects for each engine and profile: largest step, stack height, mass ratio, overlap, spin and impact speed,
+    fewest iterations: each as a bracket of one cell that survives and one that does not, with how it ended and the
+    commands that run both again. SCENES that declare no such axis are refused. Exits with 4 if a named engine is
+    not here.
     """
     names = list(dict.fromkeys(scene.name for pattern in scenes for scene in matching(pattern)))
     known = dict.fromkeys(name for name, _ in axes())

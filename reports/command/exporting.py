@@ -26,7 +26,7 @@ from validation.running.plan import QUICK_DT
 _OF_A_CELL = ("output", "engine", "profile", "param", "set", "dim", "dt", "iterations")
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck export bounce --engine ENGINE --to python -o bug.py")
 @click.argument("named", metavar="[RUN]...|SCENE", nargs=-1, shell_complete=scene_names)
 @click.option("--parquet", "target", type=FOLDER, metavar="FOLDER", help="Write the RUNs as Parquet files there.")
 @click.option("--all", "every", is_flag=True, help="With --parquet: all runs, not the latest.")
@@ -42,10 +42,10 @@ _OF_A_CELL = ("output", "engine", "profile", "param", "set", "dim", "dt", "itera
 @AS_JSON
 @OUT
 def export(named: tuple[str, ...], as_json: bool, out: Path, **options: Any) -> None:
-    """Write results for other tools, or a cell as a script that runs without this project.
+    """Write a case as a script of its engine, or results as tables.
 
-    With --parquet: RUNs (the latest by default) as judged rows, raw metrics and kept trajectories. With --to: the
-    cell of SCENE on --engine for a bug report; it ends in the same bits.
+    The script runs without this project. With --parquet: RUNs (the latest by default) as judged rows, raw metrics
+    and kept trajectories. With --to: the cell of SCENE on --engine for a bug report; it ends in the same bits.
     """
     if (options["target"] is None) == (options["form"] is None):
         raise SceneError("export: say --parquet FOLDER for results, or --to FORMAT for a cell")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import sys
 from typing import Any, NoReturn
@@ -31,6 +32,20 @@ OUT = click.option(
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 
 
+#: Commands in the order of work.
+SECTIONS = {
+    "Start here": ("run", "ask", "show", "explain", "report"),
+    "Look closer": (
+        "findings", "describe", "list", "compare", "bench", "frontier", "residuals", "nulls", "field"
+    ),
+    "Your own scene, model or engine": ("sweep", "cure", "export", "new-adapter", "check-adapter"),
+    "Since which release": ("releases", "bisect", "dashboard"),
+    "Maintain results, lists and settings": ("accept", "tune", "bundle", "merge", "prune", "doctor"),
+    "The reference solver": ("certify", "profile"),
+    "Seldom needed": ("compile", "run-cell", "schema"),
+}  # fmt: skip
+
+
 class _Group(click.Group):
     """Prints what goes wrong as one line; the status says whose fault it was (`reports.command.statuses`)."""
 
@@ -57,6 +72,16 @@ class _Group(click.Group):
         except OSError as error:
             _silence_stdout()
             _leave(f"{error.filename or 'the output'}: {error.strerror or error}", statuses.RESULTS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write all commands by `SECTIONS`, each with the first line of its help and never cut."""
+        width = max(map(len, self.commands))
+        for section, names in SECTIONS.items():
+            with formatter.section(section):
+                lines = [(name.ljust(width), inspect.getdoc(self.commands[name].callback)) for name in names]
+                formatter.write_dl([(name, (told or "").partition("\n")[0]) for name, told in lines])
+        formatter.write_paragraph()
+        formatter.write_text("crosscheck COMMAND --help has options and an example.")
 
     def invoke(self, ctx: click.Context) -> Any:
         try:

@@ -19,15 +19,16 @@ from validation.questions.nulls import NULLS, nulls_of
 from validation.running.plan import QUICK_DT
 
 
-@main.command("nulls")
+@main.command("nulls", epilog="Example: crosscheck nulls impact")
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
 @click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
 @AS_JSON
 def nulls(scenes: tuple[str, ...], param: tuple[str, ...], dim: tuple[int, ...], as_json: bool) -> None:
-    """Show what no engine at all makes of SCENES (all by default): nothing moves, nothing touches, what touches sticks.
+    """Score trivial answers that need no engine.
 
-    An engine's skill in a check is 1 - error/error of the best of them; `explain` and the report say it of a row.
+    The answers are: nothing moves, nothing touches, what touches sticks. An engine's skill in a check is
+    1 - error/error of the best of them; `explain` and the report say it of a row.
     """
     rows: list[dict[str, Any]] = []
     for scene in dict.fromkeys(scene.name for pattern in scenes or ("*",) for scene in matching(pattern)):

@@ -22,7 +22,7 @@ from validation.questions.detection import Detected, detection, lines, only_by_r
 from validation.records.store import Store
 
 
-@main.command("list")
+@main.command("list", epilog="Example: crosscheck list scenes")
 @click.argument("what", type=click.Choice(["scenes", "suites", "engines", "checks", "runs"]))
 @click.option("--reasons", is_flag=True, help="Of checks: why each tolerance is what it is.")
 @click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
@@ -33,11 +33,11 @@ from validation.records.store import Store
 def list_(
     what: str, reasons: bool, sensitivity: bool, engine: str | None, profile: str | None, as_json: bool, out: Path
 ) -> None:
-    """List scenes, the cells of each in every suite, engines, checks, or the runs in OUT.
+    """List scenes, suites, engines, checks or runs.
 
     With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
-    receipt; takes three minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an engine
-    that is named gets only its own.
+    receipt; takes three minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an
+    engine that is named gets only its own.
     """
     data: list[Any]
     found = Detected([], [])
@@ -73,11 +73,14 @@ def list_(
         tables.listed(what, data, terminal(), reasons)
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck describe bounce")
 @click.argument("name", shell_complete=names_of_either)
 @AS_JSON
 def describe(name: str, as_json: bool) -> None:
-    """Describe a scene or an engine: law, parameters, checks with reasons; profiles, settings, quirks."""
+    """Describe a scene or an engine.
+
+    Of a scene: law, parameters, checks with reasons. Of an engine: profiles, settings, quirks.
+    """
     data = listing.describe(name)
     if as_json:
         click.echo(json.dumps(data, indent=1, default=str))
@@ -85,10 +88,13 @@ def describe(name: str, as_json: bool) -> None:
         tables.described(data, terminal())
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck doctor")
 @AS_JSON
 def doctor(as_json: bool) -> None:
-    """Check the installation: engines, versions, CPU, caches, and whose packages are on this path."""
+    """Check the installation.
+
+    Prints engines, versions, CPU, caches, and packages on this path whose names are ours.
+    """
     data = listing.doctor()
     if as_json:
         click.echo(json.dumps(data, indent=1))
@@ -97,15 +103,15 @@ def doctor(as_json: bool) -> None:
     sys.exit(1 if any("is not ours" in problem for problem in data["problems"]) else 0)
 
 
-@main.command("check-adapter")
+@main.command("check-adapter", epilog="Example: crosscheck check-adapter myengine")
 @click.argument("name", shell_complete=engine_names, required=False)
 @click.option("--self-test", "testing", is_flag=True, help="Plant faults in a toy engine: does its check catch each?")
 @AS_JSON
 def check_adapter_(name: str | None, testing: bool, as_json: bool) -> None:
-    """Run the conformance checks on the adapter of an engine; exits with 1 if it breaks one.
+    """Test an adapter for conformance.
 
-    A check whose scenes the engine refuses is refused, which is no pass; one that the adapter lists as an expected
-    failure is told as such, and as an unexpected pass if it holds.
+    Exits with 1 if it breaks a check. A check whose scenes the engine refuses is refused, which is no pass; one
+    that the adapter lists as an expected failure is told as such, and as an unexpected pass if it holds.
     """
     if testing == (name is not None):
         raise click.UsageError("name an engine, or give --self-test")
@@ -140,12 +146,15 @@ def _self_test(as_json: bool) -> NoReturn:
     sys.exit(1 if missed else 0)
 
 
-@main.command("new-adapter")
+@main.command("new-adapter", epilog="Example: crosscheck new-adapter myengine")
 @click.argument("name")
 @click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
 @AS_JSON
 def new_adapter(name: str, into: Path, as_json: bool) -> None:
-    """Write a small package for an engine of your own: it works, and its test runs the conformance checks."""
+    """Write a package for an engine of your own.
+
+    It works as it is, and its test runs the conformance checks.
+    """
     from adapters.new_adapter import write_package
 
     written = [str(path) for path in write_package(name, into)]

@@ -16,12 +16,15 @@ from validation.records.keeping import merge as merge_stores
 from validation.records.store import Store
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck merge other-out")
 @click.argument("sources", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
 @AS_JSON
 @OUT
 def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
-    """Add the runs of other STOREs (results folders) to OUT; no row is lost, none is there twice."""
+    """Add the runs of other folders to this one.
+
+    STOREs are results folders. Runs that OUT has already are skipped.
+    """
     told = {}
     for source in sources:
         Store(source, create=False).close()  # all of them must be there before the first is merged
@@ -39,7 +42,7 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
         click.echo(line + (f"; {plural(found['differing'], 'row')} differ, ours stay" if found["differing"] else ""))
 
 
-@main.command("prune")
+@main.command("prune", epilog="Example: crosscheck prune --keep 50 --dry-run")
 @click.option("--keep", type=click.IntRange(1), help="Of runs with the same title, keep this many.")
 @click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Runs older than this go.")
 @click.option("--unfinished", is_flag=True, help="Interrupted runs go.")
@@ -50,7 +53,10 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
 def prune_(
     keep: int | None, days: float | None, unfinished: bool, recordings: bool, dry_run: bool, as_json: bool, out: Path
 ) -> None:
-    """Delete runs from OUT by rules; the newest finished run of each title always stays."""
+    """Delete old runs.
+
+    Rules choose them; the newest finished run of each title always stays in OUT.
+    """
     rules = Rules(keep, days, unfinished, recordings)
     if rules == Rules():
         raise SceneError("prune: name a rule: --keep, --older-than, --unfinished or --recordings")

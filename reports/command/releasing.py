@@ -58,7 +58,7 @@ def _cells(command: Command) -> Command:
     return command
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck releases ENGINE latest stack")
 @click.argument("engine", required=False, shell_complete=engine_names)
 @click.argument("which", metavar="A..B|LIST|latest", required=False)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
@@ -80,9 +80,10 @@ def releases(
     out: Path,
     **options: Any,
 ) -> None:
-    """Run SCENES on releases A..B (or a LIST such as 3.0.0,3.1.6, or latest) of ENGINE, say what moved and when.
+    """Run scenes on releases of an engine.
 
-    Each release gets an environment of its own, made once; what is stored in OUT is not run again. Exits with 4 if a
+    A..B is a range; a LIST such as 3.0.0,3.1.6, or latest, is taken as well. Prints what moved, and when. Each
+    release gets an environment of its own, made once; what is stored in OUT is not run again. Exits with 4 if a
     release did not answer: it cannot be installed, imported or driven here, and its rows say why.
     """
     if listed or remove:
@@ -172,7 +173,7 @@ def _with_floors(
     return out
 
 
-@main.command("bisect")
+@main.command("bisect", epilog="Example: crosscheck bisect ENGINE A..B stack --check drift")
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("which", metavar="A..B")
 @click.argument("scene", shell_complete=scene_names)
@@ -184,10 +185,11 @@ def _with_floors(
 def bisect_(
     engine: str, which: str, scene: str, check: str, every: bool, as_json: bool, out: Path, **options: Any
 ) -> None:
-    """Find the release between A and B of ENGINE in which CHECK of SCENE flips, or moves beyond its noise floor.
+    """Find the release that changed a check.
 
-    Of the cells that differ between A and B the most serious one is followed; log2(n) releases are asked, and those
-    that are stored need not run. Exits with 4 if A or B does not answer.
+    CHECK of SCENE flips, or moves beyond its noise floor, between releases A and B of ENGINE. Of the cells that
+    differ between A and B the most serious one is followed; log2(n) releases are asked, and those that are stored
+    need not run. Exits with 4 if A or B does not answer.
     """
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     store = Store(out)

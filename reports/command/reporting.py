@@ -19,16 +19,17 @@ from reports.wording import missing_text, plural
 from validation.records.store import MissingError, Store
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck report --open")
 @click.argument("run", default="latest")
 @click.option("-o", "--output", type=FILE, help="File to write; OUT/report.html by default.")
 @click.option("--open", "show", is_flag=True, help="Also open it in the browser.")
 @AS_JSON
 @OUT
 def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) -> None:
-    """Write the report of RUN (the latest by default) as one HTML file that needs no network.
+    """Write the report of a run as one HTML page.
 
-    The last bench in the same store, if there is one, becomes its part about speed.
+    RUN is the latest by default. The page needs no network. The last bench in the same store, if there is one,
+    becomes its part about speed.
     """
     path = writable(output or out / "report.html", "output")
     with extra("report"):
@@ -47,15 +48,16 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
         click.echo(f"crosscheck: open: no browser was found; the report is {path}", err=True)
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck dashboard")
 @click.option("-o", "--output", type=FILE, help="File to write; OUT/dashboard.html by default.")
 @click.option("--open", "show", is_flag=True, help="Also open it in the browser.")
 @AS_JSON
 @OUT
 def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None:
-    """Write one HTML file over all runs and releases in OUT: errors, times, and where they moved.
+    """Write one HTML page about all runs and releases.
 
-    Runs are judged once; what was judged is kept beside the results.
+    The page shows errors, times, and where they moved, for all runs in OUT. Runs are judged once; what was judged is
+    kept beside the results.
     """
     path = writable(output or out / "dashboard.html", "output")
     with extra("dashboard"):
@@ -86,13 +88,16 @@ def _made(commits: Sequence[str]) -> str:
     return f" of {len(known)} commits, {known[0]} to {known[-1]}"
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck bundle")
 @click.argument("run", default="latest")
 @click.option("-o", "--output", type=FILE, help="File to write; OUT/crosscheck-<run>.zip by default.")
 @AS_JSON
 @OUT
 def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
-    """Write RUN (the latest by default) as one archive: raw rows, environment, report, citation, checksums."""
+    """Write a run as one archive.
+
+    RUN is the latest by default. The archive has raw rows, environment, report, citation and checksums.
+    """
     with extra("bundle"):
         from reports.bundle import write_bundle
     store = Store(out, create=False)

@@ -37,7 +37,7 @@ from validation.running.plan import slots
 from validation.workers import TIMEOUT, run_cells
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck run bounce --param e=0.7 --dt 1/240")
 @selection
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
@@ -54,15 +54,17 @@ from validation.workers import TIMEOUT, run_cells
 @AS_JSON
 @OUT
 def run(out: Path, as_json: bool, **options: Any) -> None:
-    """Run SCENES (names, globs or files; all by default) and judge them; models as well (.xml, .urdf, .sdf).
+    """Run scenes on engines and judge every check.
 
-    With --invariance nothing is stored or judged against a truth: the representative cell of each scene, engine and
-    profile is run again with bodies renumbered, the world turned, mirrored, carried along or moved away, with a body
-    out of reach, in the same and in a fresh process; exits with 1 if that changes an answer.
+    SCENES are names, globs, scene files or models (.xml, .urdf, .sdf); all by default. With --invariance nothing is
+    stored or judged against a truth: the representative cell of each scene, engine and profile is run again with
+    bodies renumbered, the world turned, mirrored, carried along or moved away, with a body out of reach, in the
+    same and in a fresh process; exits with 1 if that changes an answer.
 
     Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
-    if not all of it ran. A number that a scene file states and an engine misses is new. Of models, and of engines that
-    have no list of findings, FAIL and INVALID are shown and are no alarm. With --strict any FAIL or INVALID is one.
+    if not all of it ran. A number that a scene file states and an engine misses is new. Of models, and of engines
+    that have no list of findings, FAIL and INVALID are shown and are no alarm. With --strict any FAIL or INVALID is
+    one.
     """
     console = terminal(stderr=True)
     for name in ("junit", "markdown"):
@@ -121,29 +123,31 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
     show(plain, console, files=written.values(), out=out)
 
 
-@main.command("compile")
+@main.command("compile", epilog="Example: crosscheck compile")
 @selection
 @AS_JSON
 def compile_kernels(as_json: bool, **options: Any) -> None:
-    """Compile what the engines of these cells compile at their first steps, and nothing else.
+    """Compile the solver's kernels.
 
-    `run` and `bench` do so by themselves; tests that run side by side would each compile the same.
+    Compiles what the engines of these cells compile at their first steps, and nothing else. `run` and `bench` do so by
+    themselves; tests that run side by side would each compile the same.
     """
     done = warm_up(slots(request_from(options)), 0, terminal(stderr=True))
     if as_json:
         click.echo(json.dumps({"compiled": done}))
 
 
-@main.command("run-cell")
+@main.command("run-cell", epilog="Example: crosscheck run-cell < slots.json")
 @click.option("--batch", is_flag=True, help="Read one JSON object per line, write one observation per line.")
 @click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
 @click.option("--jobs", default=1, show_default=True, type=JOBS, help="Worker processes.")
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
-    """Run slots given as JSON on stdin, print observations as JSON on stdout; for any scheduler to drive.
+    """Run cells given as JSON, for a scheduler.
 
-    With --batch a first line {"scenes": {...}} hands over the texts of scene files, by their pinned names, so that the
-    files need not be here; every other line gets an answer: an observation, or {"line": N, "error": "..."} for a line
-    that is no slot or whose cell was left. Exits with 2 if a line was wrong, with 4 if a cell was left.
+    Slots are read from stdin, observations written to stdout. With --batch a first line {"scenes": {...}} hands
+    over the texts of scene files, by their pinned names, so that the files need not be here; every other line gets
+    an answer: an observation, or {"line": N, "error": "..."} for a line that is no slot or whose cell was left.
+    Exits with 2 if a line was wrong, with 4 if a cell was left.
     """
     text = sys.stdin.buffer.read().decode(errors="replace")
     cells: dict[Slot, int] = {}

@@ -10,7 +10,7 @@ import click
 from reports.command.group import main
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck schema")
 @click.option(
     "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write instead of the terminal."
 )

@@ -119,13 +119,16 @@ def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
     return [row.as_dict() for row in rows_of(run, observations)]
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck show --all")
 @click.argument("run", default="latest")
 @click.option("--all", "every", is_flag=True, help="Every scene, where there are so many that families are shown.")
 @AS_JSON
 @OUT
 def show(run: str, every: bool, as_json: bool, out: Path) -> None:
-    """Show RUN (the latest by default) as `run` did at its end: matrix, short answers, where the details are."""
+    """Show the verdicts of a run again.
+
+    RUN is the latest by default; it is shown as `run` showed it: matrix, short answers, where the details are.
+    """
     rows, kept, costs = load(out, run)
     if as_json:
         click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
@@ -153,7 +156,7 @@ def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
     }
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck findings --scene bounce")
 @click.argument("run", default="latest")
 @click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
 @click.option("--scene", multiple=True, metavar="S", shell_complete=scene_names, help="Only this scene.")
@@ -166,11 +169,12 @@ def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
 def findings(
     run: str, every: bool, as_json: bool, out: Path, new: bool, prove: str | None, **wanted: Sequence[str]
 ) -> None:
-    """List the rows of RUN (the latest by default) that do not pass, by family, the most serious first.
+    """List the checks of a run that fail, by cause.
 
-    A family is one engine, profile, scene, kind of metric and standing; it is shown by its worst row. With --prove,
-    the mechanism that a reason names is switched off on rows that fail because of it: they must pass, and must go on
-    failing with what else might be blamed. Exits with 1 if an experiment does not show what it says.
+    RUN is the latest by default; the most serious causes come first. A family is one engine, profile, scene, kind
+    of metric and standing; it is shown by its worst row. With --prove, the mechanism that a reason names is
+    switched off on rows that fail because of it: they must pass, and must go on failing with what else might be
+    blamed. Exits with 1 if an experiment does not show what it says.
     """
     if prove:
         prove_and_show(prove, wanted["engine"], as_json)
@@ -251,14 +255,14 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
     console.print(table, highlight=False)
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck explain ENGINE/default/bounce")
 @click.argument("row", shell_complete=row_ids)
 @click.option("--run", default="latest", show_default=True, help="Which run.")
 @SET
 @AS_JSON
 @OUT
 def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) -> None:
-    """Say everything about one ROW: what was asked and measured, the truth, the tolerance and why, what cures it.
+    """Explain one check: values, truth, tolerance, cause and fix.
 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
     row there; SCENE may be the path of a scene file. With --set the row is that of PROFILE with these settings.

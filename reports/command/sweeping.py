@@ -25,7 +25,7 @@ from validation.records.store import Store
 from validation.workers import TIMEOUT
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck sweep bounce --grid e=0:1:50")
 @selection
 @click.option("--grid", multiple=True, metavar="N=LOW:HIGH:COUNT[:log]", help="Every one of COUNT values.")
 @click.option("--list", "lists", multiple=True, metavar="N=A,B,C", help="Every value named.")
@@ -43,10 +43,11 @@ from validation.workers import TIMEOUT
 @AS_JSON
 @OUT
 def sweep(out: Path, as_json: bool, **options: Any) -> None:
-    """Run a study: SCENES over parameters, one line of a table per cell.
+    """Run scenes over grids of parameters, into one table.
 
-    Grids and lists are crossed with each other and with --samples points. FAILs are what a study looks for, so they
-    are no alarm: it exits with 1 if cells are INVALID, CRASHED, TIMED OUT or missing, with 4 if not all of it ran.
+    One line of the table per cell. Grids and lists are crossed with each other and with --samples points. FAILs are
+    what a study looks for, so they are no alarm: it exits with 1 if cells are INVALID, CRASHED, TIMED OUT or
+    missing, with 4 if not all of it ran.
     """
     console = terminal(stderr=True)
     files = {"csv": options["csv_file"] or out / "sweep.csv", "parquet": options["parquet"]}

@@ -29,7 +29,7 @@ def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, .
     return names
 
 
-@main.command()
+@main.command(epilog="Example: crosscheck tune ENGINE")
 @click.argument("engine")
 @click.option("--profile", help="Profile to start from; the tuned one by default.")
 @click.option("--group", multiple=True, callback=known_groups, help="Scenes of one kind; all by default.")
@@ -46,10 +46,11 @@ def tune(
     which: bool,
     as_json: bool,
 ) -> None:
-    """Search stock settings of ENGINE that do better than a profile of it on all scenes of a kind.
+    """Search better stock settings for a profile.
 
-    Changes nothing: what is found is adopted in the adapter, with its reason. Exits with 1 if something better was
-    found, so that a release of an engine that has better settings shows.
+    Looks for settings of ENGINE that do better than the profile on all scenes of a kind. Changes nothing: what is found
+    is adopted in the adapter, with its reason. Exits with 1 if something better was found, so that a release of an
+    engine that has better settings shows.
 
     With --decisive: each setting that a cure changes is switched alone and left out, and what came out is written to
     decisive.csv in the engine's folder, which the report and `explain` read. Exits with 1 if other settings decide

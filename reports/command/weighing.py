@@ -19,13 +19,14 @@ from validation.running.apart import Apart
 from validation.running.plan import slots
 
 
-@main.command("residuals")
+@main.command("residuals", epilog="Example: crosscheck residuals pinch")
 @selection
 @AS_JSON
 def residuals(as_json: bool, **options: Any) -> None:
-    """Measure how far the contacts that engines report break the laws of contact, on the representative cells.
+    """Check reported contact forces against the laws of contact.
 
-    Shares of the largest impulse of the run (works: times the fastest contact); a word where an engine reports none.
+    The representative cell of each scene is run. Numbers are shares of the largest impulse of the run (works: times the
+    fastest contact); a word where an engine reports none.
     """
     cells = cells_of(slots(request_from(options)), bool(options["param"] or options["iterations"] or options["dt"]))
     progress = terminal(stderr=True)

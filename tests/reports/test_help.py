@@ -1,0 +1,35 @@
+"""Help leads from the first command to the rare ones: whole lines, and an example that can be typed."""
+
+import shlex
+
+import pytest
+from click.testing import CliRunner
+
+from reports.command import main
+from reports.command.group import SECTIONS
+
+
+def helped(*words):
+    return CliRunner(env={"COLUMNS": "80"}).invoke(main, [*words, "--help"]).output
+
+
+def test_every_command_stands_in_one_section_with_a_whole_line():
+    listed = [name for names in SECTIONS.values() for name in names]
+    assert sorted(listed) == sorted(main.commands)
+    lines = helped().splitlines()
+    for name in listed:
+        (line,) = [line for line in lines if line.split()[:1] == [name]]
+        assert line.endswith(".") and "..." not in line and len(line) <= 80
+    assert [line[:-1] for line in lines if line.endswith(":")][1:] == list(SECTIONS)
+
+
+@pytest.mark.parametrize("name", main.commands)
+def test_the_example_of_a_command_has_its_arguments_and_options(name):
+    command = main.commands[name]
+    said, _, example = command.epilog.partition(": ")
+    assert said == "Example" and " ".join(helped(name).split()).endswith(example)
+    first, second, *words = shlex.split(example.partition(" < ")[0])
+    assert (first, second) == ("crosscheck", name)
+    for word in words:
+        assert not word.startswith("-") or any(word in each.opts + each.secondary_opts for each in command.params), word
+    command.make_context(name, [word.replace("ENGINE", "reference") for word in words], resilient_parsing=True)
