@@ -10,7 +10,7 @@ CONSTRAINTS ?= -c constraints.txt
 comma := ,
 EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
-.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants detection tables size nightly clean
+.PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants detection tables size nightly docs clean
 
 setup: $(STAMP)
 
@@ -68,6 +68,11 @@ size:
 # An engine made by CONTRIBUTING's recipe, from our wheel in a fresh environment; some 80 s of CPU.
 recipe: $(STAMP)
 	CROSSCHECK_RECIPE=1 $(BIN)/python -m pytest tests/adapters/test_outside_the_checkout.py -n 0 -s
+
+# The documentation, without a network, into docs/_build/html; a warning is an error.
+docs: $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]" -c constraints.txt
+	$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html
 
 # Engines that are set apart, beside those of `all`; whatever is run afterwards asks them too.
 extras: $(STAMP)

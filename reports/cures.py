@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -274,6 +274,15 @@ def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
     """The cell that a cure is told of, with settings replaced."""
     params = tuple(sorted(cure.params.items()))
     return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
+
+
+def listed(scene: str, engines: Iterable[str]) -> list[Cure]:
+    """What is on record of engines as shipped on a scene: one each, in space where the engine has it there too."""
+    found = []
+    for engine in engines:
+        own = [cure for (name, _), cure in cures_of(engine).items() if name == scene]
+        found += [max(own, key=lambda cure: cure.dimension)] if own else []
+    return found
 
 
 def cure_paste(cure: Cure) -> str:

@@ -17,7 +17,7 @@ from adapters import registry
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.cures import cure_paste, cure_text, nothing_to_paste
+from reports.cures import cure_paste, cure_text, listed, nothing_to_paste
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import Finding, ask, matching
@@ -50,7 +50,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
         raise click.BadParameter(told, param_hint="WORDS")
     best, others = found[0], [other.scene for other in found[1:] if other.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
-    fixes = _fixes(best.scene, about)
+    fixes = listed(best.scene, about or registry.names())
     missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
     if as_json:
         plain = {
@@ -71,15 +71,6 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     if others:
         near = (f"{name} ({resolve(name).title.lower()})" for name in others)
         console.print(Text(f"or: {'; '.join(near)}", style="dim"))
-
-
-def _fixes(scene: str, engines: Sequence[str]) -> list[Cure]:
-    """What is on record of engines as shipped on a scene: one fix each, in space where the scene is spatial too."""
-    found = []
-    for engine in engines or registry.names():
-        own = [cure for (name, _), cure in cures_of(engine).items() if name == scene]
-        found += [max(own, key=lambda cure: cure.dimension)] if own else []
-    return found
 
 
 def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console: Console) -> None:

@@ -1,0 +1,33 @@
+"""Sphinx settings of the documentation: ``make docs`` builds it into docs/_build without a network."""
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import pages
+
+project = "contact-crosscheck"
+author = "the contact-crosscheck developers"
+version = release = version_of("contact-crosscheck")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_click"]
+exclude_patterns = ["_build", "templates"]
+myst_heading_anchors = 3
+# The theory of the solver is kept beside its code, where links between headings are those of GitHub.
+suppress_warnings = ["myst.header", "myst.xref_missing"]
+numpydoc_show_class_members = False
+autodoc_typehints = "none"
+html_theme = "pydata_sphinx_theme"
+html_title = "contact-crosscheck"
+html_theme_options = {"navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
+smartquotes = False  # options begin with two hyphens
+html_sidebars = {name: [] for name in ("index", "start", "symptoms", "method")}
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
+html_show_sourcelink = False
+html_extra_path = ["../reports/published"]
+
+
+def setup(app):
+    """Write the pages that are made from scenes, engines and fixes before anything is read."""
+    app.connect("builder-inited", lambda app: pages.write(Path(app.srcdir)))

@@ -1,0 +1,121 @@
+"""Pages that are made from what the project knows: scenes, engines, and fixes by symptom."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from adapters import registry
+from reports.cures import cure_paste, cure_text, listed
+from reports.listing import describe
+from reports.wording import markdown, number
+from validation.catalogue import CATALOGUE
+
+PUBLISHED = Path(__file__).parents[1] / "reports" / "published" / "report.html"
+ROWS = re.compile(r'download="?rows\.json\.gz"? href="data:application/gzip;base64,([^"]*)"')
+
+
+def write(folder: Path) -> None:
+    """Write all of them below ``folder``; what has not changed is left alone."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder / "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "md": lambda text: markdown(str(text)).replace("\n", " ").replace("*", "\\*"),
+        "number": number,
+    }
+    passes = passed()
+    for name, values in made(passes):
+        path, template = folder / f"{name}.md", name.split("/")[0] if "index" not in name else name.replace("/", "-")
+        text = environment.get_template(f"{template}.md.j2").render(values)
+        path.parent.mkdir(exist_ok=True)
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def plain(text: object) -> str:
+    """Text that Markdown shows as it is, on one line."""
+    return markdown(str(text)).replace("\n", " ").replace("*", "\\*").replace("_", "\\_")
+
+
+def parts(figure: str) -> list[tuple[bool, str]]:
+    """Parts of a figure's text between blank lines: whether each is drawn, and its text; drawings are joined."""
+    found: list[tuple[bool, str]] = []
+    for part in re.split(r"\n\s*\n", figure.strip("\n")):
+        drawn = part.startswith(" ")
+        if found and found[-1][0] and drawn:
+            found[-1] = (True, f"{found[-1][1]}\n\n{part}")
+        else:
+            found.append((drawn, part if drawn else " ".join(part.split())))
+    return [(drawn, textwrap.dedent(text) if drawn else text) for drawn, text in found]
+
+
+def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name of each page, and what its template is given."""
+    groups: dict[str, list[Any]] = {}
+    for scene in CATALOGUE.values():
+        groups.setdefault(scene.family, []).append(scene)
+        own = passes[passes.scene == scene.name]
+        more = {"symptoms": scene.symptoms, "passes": own.to_dict("records"), "fixes": fixes(scene.name)}
+        yield f"scenes/{scene.name}", describe(scene.name) | more | {"figure": parts(scene.figure)}
+    yield "scenes/index", {"groups": groups}
+    engines = [name for name in registry.names() if registry.find(name).engine is not None]
+    for name in engines:
+        yield f"engines/{name}", describe(name) | {"settings": settings(describe(name)["profiles"])}
+    yield (
+        "engines/index",
+        {
+            "engines": {name: registry.facts(name) for name in engines},
+            "others": {name: registry.facts(name) for name in registry.names() if name not in engines},
+        },
+    )
+    yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
+
+
+def passed() -> pd.DataFrame:
+    """Checks judged and failed of each scene, engine and profile in the published report."""
+    (packed,) = ROWS.findall(PUBLISHED.read_text(encoding="utf-8"))
+    rows = pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(packed))))
+    rows = rows[rows.iterations.isna() & rows.physics.isin(["pass", "fail"])]
+    rows["failed"] = rows.physics == "fail"
+    found = rows.groupby(["scene", "engine", "profile", "dimension"], sort=False)["failed"].agg(["size", "sum"])
+    return found.reset_index().rename(columns={"size": "judged", "sum": "failed"})
+
+
+def fixes(scene: str) -> list[dict[str, Any]]:
+    """What is on record of engines as shipped on a scene: what mends it, in words and as lines to paste."""
+    return [
+        {
+            "cure": cure,
+            "text": cure_text(cure, f"in {cure.dimension}-D"),
+            "paste": cure_paste(cure) if cure.helps else "",
+        }
+        for cure in listed(scene, registry.names())
+    ]
+
+
+def settings(profiles: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Settings of each profile with the scenes in which they hold; none where it is all of them."""
+    found = {}
+    for profile, scenes in profiles.items():
+        where: dict[tuple[str, str, str], list[str]] = {}
+        for scene, own in scenes.items():
+            for each in own:
+                where.setdefault((each["name"], str(each["value"]), each["because"]), []).append(scene)
+        found[profile] = [
+            {"name": name, "value": value, "because": because, "scenes": [] if len(own) == len(scenes) else own}
+            for (name, value, because), own in where.items()
+        ]
+    return found
