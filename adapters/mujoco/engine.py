@@ -88,8 +88,8 @@ class MujocoEngine(Engine):
             Quirk(
                 "a mocap body has no velocity in contacts",
                 "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; solvers "
-                "stop by the mass of all that moves, so that its share is taken off tolerances: it pushes like a mocap "
-                "body whose speed is known",
+                "stop by the mass of all that moves, so that tolerances are multiplied by the free bodies' share; "
+                "it then pushes like a mocap body whose speed is known",
                 f"{DOC}, modeling: mocap bodies; engine_solver.c, mj_solPrimal",
             ),
             Quirk(

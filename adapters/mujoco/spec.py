@@ -85,7 +85,8 @@ class Spec:
         """Let solvers stop as they would beside mocap bodies: by what free bodies gain.
 
         They stop where a step gains less than a tolerance times the sum of all moving masses and moments, with
-        prescribed ones at once. [engine_solver.c, mj_solPrimal]
+        prescribed ones at once. What touches no prescribed body is solved apart, and more strictly than it would be.
+        [engine_solver.c, mj_solPrimal; from 3.3.6 on it is the sum of an island, and ``stat.meaninertia`` is not read]
         """
         moving = [body for body in self.scene.bodies if has_joint(body)]
         free = sum(3.0 * body.mass + sum(moments(body)) for body in moving if body.motion == "free")
