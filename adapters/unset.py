@@ -207,18 +207,18 @@ def sleep(make: Make, rolls: bool = False) -> float:
     return math.inf
 
 
-def reach(sees: Callable[[float], bool]) -> float:
-    """Largest gap at which a ball and the ground have a contact [m]; 0 where they need an overlap.
+def reach(holds: Callable[[float], bool]) -> float:
+    """Largest number below `RADIUS` up to which something holds; 0 where it does for none.
 
     Parameters
     ----------
-    sees
-        Whether there is a contact at a gap [m].
+    holds
+        Whether it holds at a number, such as whether there is a contact at a gap [m].
     """
     low, high = 0.0, RADIUS
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if sees(middle) else (low, middle)
+        low, high = (middle, high) if holds(middle) else (low, middle)
     return low
 
 

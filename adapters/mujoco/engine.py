@@ -87,9 +87,10 @@ class MujocoEngine(Engine):
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; forces of "
-                "its contacts that contradict the momentum of what it pushes are not told",
-                f"{DOC}, modeling: mocap bodies",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; solvers "
+                "stop by the mass of all that moves, so that tolerances are multiplied by the free bodies' share; "
+                "it then pushes like a mocap body whose speed is known",
+                f"{DOC}, modeling: mocap bodies; engine_solver.c, mj_solPrimal",
             ),
             Quirk(
                 "corners of a mesh are kept in single precision",

@@ -109,7 +109,6 @@ class Mjcf:
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
         self._contact = ElementTree.Element("contact")
         self._actuator = ElementTree.Element("actuator")
-        self.stat = SimpleNamespace(meaninertia=None)
         self._meshes: list[ElementTree.Element] = []
         self._keys: list[ElementTree.Element] = []
 
@@ -166,8 +165,6 @@ class Mjcf:
             said = {name.removeprefix("mjDSBL_").lower(): "disable" for name in off}
             said |= {name.removeprefix("mjENBL_").lower(): "enable" for name in on}
             ElementTree.SubElement(option, "flag", said)
-        if self.stat.meaninertia is not None:
-            ElementTree.SubElement(self._root, "statistic", _text({"meaninertia": self.stat.meaninertia}))
         if self._meshes:
             ElementTree.SubElement(self._root, "asset").extend(self._meshes)
         self.worldbody.finish()

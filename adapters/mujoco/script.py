@@ -10,7 +10,7 @@ from adapters.mujoco.matched import SECOND_HALF, loop_lines
 from adapters.mujoco.moving import is_moved_face, script_lines
 from adapters.mujoco.profiles import check_settings
 from adapters.mujoco.releases import Mjcf
-from adapters.mujoco.spec import Spec, has_joint, mean_inertia, start
+from adapters.mujoco.spec import Spec, has_joint, start
 from adapters.scene import Scene
 from adapters.script import constants, imports, literal, stepped, text, velocity
 
@@ -37,7 +37,6 @@ def _model(scene: Scene, dt: float, settings: Mapping[str, Any], key: bool) -> s
     check_settings(settings)
     written = Mjcf(mujoco)
     Spec(scene, dt, settings, written)
-    written.stat.meaninertia = mean_inertia(scene)
     if key:
         for i, body in enumerate(scene.bodies):
             if body.is_loaded:

@@ -16,6 +16,8 @@ SOLREF = (0.02, 1.0)
 SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
 #: Most Newton steps in a step, and the gain at which they end.
 ITERATIONS, TOLERANCE = 100, 1e-8
+#: The gain at which sweeps against slip end, where there are any.
+NOSLIP_TOLERANCE = 1e-6
 
 #: Impedances are clamped to this range (mjMINIMP, mjMAXIMP), friction coefficients from below (mjMINMU).
 IMPEDANCE_RANGE = (0.0001, 0.9999)

@@ -7,7 +7,6 @@ with: it lags the pose by one step.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, final
 
@@ -18,9 +17,7 @@ from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
-from adapters.mujoco.shipped import IMPEDANCE_RANGE
 from adapters.mujoco.spec import Spec, has_joint, rotation, start
-from adapters.receipts import IMPULSE_SHARE
 from adapters.scene import Scene
 
 
@@ -38,7 +35,6 @@ class MujocoSimulation(Simulation):
         self._data = mujoco.MjData(self._model)
         self._moving = [i for i, body in enumerate(scene.bodies) if has_joint(body)]
         driven = [(row, scene.bodies[i]) for row, i in enumerate(self._moving)]
-        self._pushed = any(scene.bodies[i].motion == "prescribed" for i in self._moving)
         self._driven = [(6 * row, body) for row, body in driven if body.course is not None]
         self._moved = Moved(scene, dt, self._model, self._data) if moved(scene) else None
         self._matched = Matched(mujoco, scene, settings, self._model, self._data) if "rounds" in settings else None
@@ -118,8 +114,7 @@ class MujocoSimulation(Simulation):
     def contacts(self) -> Contacts:
         """Contacts and gaps at the start of the last step, impulses of that step.
 
-        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN). Nor are those on
-        a body whose momentum contradicts them (`_contradicted`).
+        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN).
         """
         contact, count = self._data.contact, self._data.ncon
         if not count:
@@ -131,31 +126,9 @@ class MujocoSimulation(Simulation):
         one_solve = self._settings["integrator"] != "RK4"
         impulse = self._dt * (force[:, None, :3] @ frame)[:, 0] if one_solve else np.full((count, 3), np.nan)
         first, second = self._body_of_geom[contact.geom].T
-        if self._pushed:
-            wrong = self._contradicted()
-            impulse[np.isin(first, wrong) | np.isin(second, wrong)] = np.nan
         turned = np.where(first < second, 1.0, -1.0)[:, None]
         pair = np.minimum(first, second), np.maximum(first, second)
         return Contacts(*pair, contact.pos.copy(), turned * frame[:, 0], turned * impulse, contact.dist.copy())
-
-    def _contradicted(self) -> Array:
-        """Free bodies whose acceleration the forces of the last solve do not give, by index.
-
-        A prescribed body is a free one of 1e15 times the mass: Newton's steps end at a gain that is small beside its
-        share of the cost, and with it the others' forces may be anything. Elsewhere they and the momentum differ by up
-        to ``sqrt(2 n tolerance / (1 - d))`` m/s^2 of n unknowns (`adapters.mujoco.engine._impulses`), and by the share
-        that any solve is granted.
-        """
-        deep = min(float(self._settings["solimp"][1]), IMPEDANCE_RANGE[1])
-        most = math.sqrt(2.0 * self._model.nv * float(self._settings["tolerance"]) / (1.0 - deep))
-        bodies = [self._scene.bodies[i] for i in self._moving]
-        free = np.array([body.motion == "free" for body in bodies])
-        mass = np.array([body.mass for body in bodies])
-        off, load = (
-            np.abs(force.reshape(-1, 6)[:, :3]).max(axis=1) / mass
-            for force in (self._residual(), self._data.qfrc_smooth)
-        )
-        return np.array(self._moving)[free & ~(off <= most + IMPULSE_SHARE * load)]
 
     def _residual(self) -> Array:
         """``M a`` less loads and contacts of the last solve, (nv,) [N, N m]."""

@@ -15,6 +15,7 @@ from adapters.mujoco.options import set_own
 from adapters.mujoco.pairs import pair_solref, pair_solreffriction
 from adapters.mujoco.profiles import own_settings
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
+from adapters.mujoco.shipped import NOSLIP_TOLERANCE
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
@@ -75,9 +76,25 @@ class Spec:
         self.heavy_moment = PRESCRIBED_MASS * max((max(moments(b)) for b in free), default=1.0)
         for index, body in enumerate(scene.bodies):
             self._body(index, body)
+        self._tolerances()
         if self.shared is None:
             for a, b, material in scene.contact_pairs():
                 self._pair(a, b, material.restitution, material.friction)
+
+    def _tolerances(self) -> None:
+        """Let solvers stop as they would beside mocap bodies: by what free bodies gain.
+
+        They stop where a step gains less than a tolerance times the sum of all moving masses and moments, with
+        prescribed ones at once. What touches no prescribed body is solved apart, and more strictly than it would be.
+        [engine_solver.c, mj_solPrimal; from 3.3.6 on it is the sum of an island, and ``stat.meaninertia`` is not read]
+        """
+        moving = [body for body in self.scene.bodies if has_joint(body)]
+        free = sum(3.0 * body.mass + sum(moments(body)) for body in moving if body.motion == "free")
+        driven = sum(body.motion == "prescribed" for body in moving)
+        if driven:
+            share = free / (free + driven * 3.0 * (self.heavy + self.heavy_moment))
+            self.spec.option.tolerance = share * self.settings["tolerance"]
+            self.spec.option.noslip_tolerance = share * self.settings.get("noslip_tolerance", NOSLIP_TOLERANCE)
 
     def _options(self) -> None:
         mj, option, settings = self.mujoco, self.spec.option, self.settings
@@ -175,25 +192,9 @@ class Spec:
     def compile(self) -> Any:
         """Model; MuJoCo's complaint becomes one line."""
         try:
-            model = self.spec.compile()
+            return self.spec.compile()
         except ValueError as error:
             raise EngineError(f"scene: MuJoCo does not compile it: {' '.join(str(error).split())}") from None
-        told = mean_inertia(self.scene)
-        if told is not None:
-            model.stat.meaninertia = told
-        return model
-
-
-def mean_inertia(scene: Scene) -> float | None:
-    """Mean inertia of the free bodies, where MuJoCo's own would count a prescribed one; None elsewhere.
-
-    The solver stops by the mean inertia; one that counts a prescribed body would stop it at once.
-    """
-    if not any(body.motion == "prescribed" and has_joint(body) for body in scene.bodies):
-        return None
-    free = [b for b in scene.bodies if b.motion == "free"]
-    inertias = [x for b in free for x in (*(b.mass,) * 3, *moments(b))]
-    return sum(inertias) / max(1, len(inertias)) or 1.0
 
 
 def start(scene: Scene, dt: float) -> tuple[list[float], list[float]]:

@@ -265,7 +265,8 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
     """Explain one check: values, truth, tolerance, cause and fix.
 
     ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
-    row there; SCENE may be the path of a scene file. With --set the row is that of PROFILE with these settings.
+    row there; SCENE may be a scene file, by its path or its name. With --set the row is that of PROFILE with these
+    settings.
     """
     asked, row = row, _with_own(row, set)
     kept = observed(out, run)
@@ -277,6 +278,7 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
         _check_own(asked, set, {observation.slot.scene for observation in kept.observations})
         raise
     better, paste, said, differing = _cure(rows, observations, found)
+    again = reproduce(found["slot"]) + at(out)
     if as_json:
         plain = [
             {"name": c.name, "before": c.before, "after": c.after, "because": c.because, "role": c.role}
@@ -289,7 +291,7 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
                 {
                     **found,
                     "id": row_id(found),
-                    "command": reproduce(found["slot"]),
+                    "command": again,
                     "cure": cure,
                     "skill": worth,
                     "skill_against": against,
@@ -298,7 +300,7 @@ def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) 
             )
         )
         return
-    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, terminal())
+    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, again, terminal())
 
 
 def _with_own(row: str, sets: Sequence[str]) -> str:
@@ -350,10 +352,23 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
 
 
 def scene_of(told: str, scenes: Collection[str]) -> str:
-    """The scene of a run that is meant: a scene file by its path alone as well, without the hash of what it said."""
+    """The scene of a run that is meant.
+
+    A scene file is meant by its path as well, without the hash of what it said, or by its name alone, with or without
+    its ending.
+
+    Raises
+    ------
+    SceneError
+        If several files of the run have that name.
+    """
     if told in scenes:
         return told
-    return next((scene for scene in scenes if is_file(scene) and scene.rpartition("@")[0] == told), told)
+    paths = {scene.rpartition("@")[0]: scene for scene in scenes if is_file(scene)}
+    named = [path for path in sorted(paths) if told in (Path(path).name, Path(path).stem)]
+    if told not in paths and len(named) > 1:
+        raise SceneError(f"scene: this run has several files called {told!r}: {', '.join(named)}")
+    return paths.get(told, paths[named[0]] if named else told)
 
 
 def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
@@ -454,7 +469,13 @@ def _measured_text(row: Plain) -> str:
 
 
 def _print_explanation(
-    row: Plain, beside: str, better: str, fixed: tuple[str, str], differing: Sequence[Change], console: Console
+    row: Plain,
+    beside: str,
+    better: str,
+    fixed: tuple[str, str],
+    differing: Sequence[Change],
+    again: str,
+    console: Console,
 ) -> None:
     iterations = "the profile's own" if row["iterations"] is None else str(row["iterations"])
     asked = ", ".join(filter(None, (f"{row['scene']} {row['dimension']}-D", params_text(row["params"]))))
@@ -480,7 +501,7 @@ def _print_explanation(
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     told = told_cure(row) if mark_of(row) != "pass" else ""
     lines += [("smallest" if better else "cure", told)] if told else []
-    lines.append(("again", reproduce(row["slot"])))
+    lines.append(("again", again))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
     console.print(table)

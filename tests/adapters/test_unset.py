@@ -102,16 +102,18 @@ def test_every_engine_says_what_it_does_with_nothing_set_and_where_that_is_docum
     assert any("friction of" in row.what for row in rows) and any("restitution of" in row.what for row in rows)
 
 
-@pytest.mark.parametrize("engine", HERE)
+@pytest.mark.parametrize("engine", OURS)
 def test_what_is_measured_with_nothing_set_is_what_is_documented(engine):
     """A release that does otherwise, or a document that is misread, fails here."""
+    if engine not in HERE:
+        pytest.skip(f"{engine} is not installed here: {registry.find(engine).reason}")
     measured = [row for row in unset_of(engine) if row.measure is not None]
     for row in measured:
         found = row.measure()
         assert not math.isnan(found), row.what
         if row.value is not None:
             assert found == row.value or abs(found - row.value) <= row.within, (row.what, found, row.value)
-    assert measured or engine in ("physx", "drake", "newton")
+    assert len(measured) >= 5 or engine == "newton"
 
 
 def test_the_table_says_what_was_measured_and_what_differs(monkeypatch):
@@ -151,7 +153,7 @@ def test_describe_measures_when_it_is_asked_and_lists_what_can_be_set(engine):
     told = json.loads(CliRunner().invoke(main, ["describe", engine, "--json"]).output)
     assert {row["what"]: row["agrees"] for row in told["unset"]}
     assert all(row["agrees"] is not False for row in told["unset"])
-    if registry.load(engine).name not in ("physx", "drake", "newton"):
+    if engine != "newton":
         assert sum(row["measured"] is not None for row in told["unset"]) >= 5
     assert {each["name"] for each in told["settable"]} == set(registry.load(engine).settable())
 

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
+from adapters.scene import SceneError
 from reports.answers import answers, choices
 from reports.command import main, showing
 from reports.findings import finding_line, grouped
@@ -462,12 +463,25 @@ def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(tw
         ("toy/tuned//my/a b.toml", {"scene": "/my/a b.toml@0123abcd"}),
         ("toy/tuned//my/a b.toml/x[floor/box.fy]", {"scene": "/my/a b.toml@0123abcd", "metric": "x[floor/box.fy]"}),
         ("toy/tuned/drop.json/energy_growth", {"scene": "drop.json@89abcdef", "metric": "energy_growth"}),
+        ("toy/tuned/drop/energy_growth", {"scene": "drop.json@89abcdef", "metric": "energy_growth"}),
+        ("toy/tuned/a b", {"scene": "/my/a b.toml@0123abcd"}),
+        ("toy/tuned/a b.toml/x[floor/box.fy]", {"scene": "/my/a b.toml@0123abcd", "metric": "x[floor/box.fy]"}),
+        ("toy/tuned/bounce/bounce", {"scene": "bounce", "metric": "bounce"}),  # ours, not the file of that name
+        ("toy/tuned/two.toml", {"scene": "two.toml@22222222"}),  # a path, and the name of another file
+        ("toy/tuned/my/a b", {"scene": "my", "metric": "a b"}),
     ],
 )  # fmt: skip
-def test_a_row_is_named_by_the_path_of_its_scene_file_as_well(name, found):
+def test_a_row_is_named_by_the_path_or_the_name_of_its_scene_file_as_well(name, found):
     """Paths have slashes, and a hash that nobody types."""
-    scenes = {"bounce", "/my/a b.toml@0123abcd", "drop.json@89abcdef"}
+    scenes = {"bounce", "/my/a b.toml@0123abcd", "drop.json@89abcdef", "/my/bounce.toml@11111111",
+              "two.toml@22222222", "/my/two.toml@33333333"}  # fmt: skip
     assert showing.named_by(name, scenes) == {"engine": "toy", "profile": "tuned", **found}
+
+
+def test_a_name_that_several_scene_files_of_a_run_have_is_refused_with_their_paths():
+    scenes = {"/my/ball.toml@0123abcd", "/your/ball.json@89abcdef"}
+    with pytest.raises(SceneError, match=r"several files called 'ball': /my/ball\.toml, /your/ball\.json"):
+        showing.named_by("toy/tuned/ball/energy_growth", scenes)
 
 
 def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
@@ -481,6 +495,10 @@ def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
     assert call("run", str(path), "--engine", "chipmunk", "--profile", "tuned", "--out", out).exit_code == 0
     told = json.loads(call("explain", f"chipmunk/tuned/{path}/energy_growth", "--json", "--out", out).stdout)
     assert told["metric"] == "energy_growth" and told["scene"].startswith(f"{path}@")
+    assert told["command"].endswith(f" --dt 1/240 --out {out}")
+    shown = call("explain", "chipmunk/tuned/a b/energy_growth", "--out", out).stdout
+    assert told["id"] in shown and "".join(f"--out {out}".split()) in "".join(shown.split())
+    assert json.loads(call("explain", "chipmunk/tuned/a b", "--json", "--out", out).stdout)["scene"] == told["scene"]
     found = call("findings", "--scene", str(path), "--out", out)
     assert (found.exit_code, found.stdout) == (0, "no such row fails\n")
 
