@@ -432,7 +432,7 @@ def test_documents_that_tests_cite_are_in_the_repository():
     document = re.compile(
         r"[\w./-]+\.(?:md|py|toml|txt|csv|html|pdf|ipynb)\b|fact sheet|lab book|appendix|dossier", re.I
     )
-    folders = [ROOT / name for name in (*LINE, "tests")]
+    folders = [ROOT / name for name in (*LINE, "tests", "docs")]
     there = {path.name for path in (*ROOT.glob("*"), *(path for folder in folders for path in folder.rglob("*")))}
     cited = []
     for path in sorted((ROOT / "tests").rglob("*.py")):

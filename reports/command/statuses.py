@@ -1,4 +1,4 @@
-"""Exit statuses of the command: one table, which the README shows and a test compares.
+"""Exit statuses of the command: one table, which the documentation shows and a test compares.
 
 Where several hold, the first in this order counts: the call, the results, the verdicts, completeness.
 """
@@ -18,7 +18,7 @@ INCOMPLETE = 4
 #: Ctrl-C; what finished is kept, the same command resumes.
 INTERRUPTED = 130
 
-#: Status -> what it says, as the README has it.
+#: Status -> what it says, as docs/reference/status.md has it.
 MEANING = {
     FINE: "everything asked for ran, nothing is alarming",
     ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check; "

@@ -1,4 +1,4 @@
-"""Exit statuses: one table, in the README as in the code, and each one reached by what it says."""
+"""Exit statuses: one table, in the documentation as in the code, and each one reached by what it says."""
 
 import json
 import os
@@ -29,8 +29,8 @@ def one_line(result):
     return lines[0]
 
 
-def test_the_readme_has_the_table_of_the_code():
-    rows = dict(re.findall(r"^\| (\d+) \| (.+?) \|$", (ROOT / "README.md").read_text(), re.MULTILINE))
+def test_the_documentation_has_the_table_of_the_code():
+    rows = dict(re.findall(r"^\| (\d+) \| (.+?) \|$", (ROOT / "docs/reference/status.md").read_text(), re.MULTILINE))
     assert {int(status): meaning for status, meaning in rows.items()} == statuses.MEANING
 
 
