@@ -1,4 +1,4 @@
-"""What the shell offers at the Tab key: scenes, engines, ids of rows. docs/reference/status.md says how to switch it on.
+"""What the shell offers at the Tab key: scenes, engines, ids of rows; docs/reference/status.md says how.
 
 A completion must never fail nor import an engine: it reads names only, and says nothing where it cannot.
 """

@@ -123,7 +123,7 @@ NOT_RUN = {
     "crosscheck cure mujoco stack --param mu=10 --param n=2": "seconds of search: a file is in test_cures.py there",
     "crosscheck frontier thin_wall": "a minute on all engines: run by tests/validation/test_frontier.py",
     "crosscheck run pinch --invariance": "a minute on all engines: run by tests/validation/test_invariance.py",
-    "crosscheck run pinch --engine mujoco --set cone=elliptic --set impratio=10": "run on Chipmunk by test_set_option.py",
+    "crosscheck run pinch --engine mujoco --set cone=elliptic --set impratio=10": "on Chipmunk by test_set_option.py",
     "crosscheck residuals pinch": "runs every engine: run by tests/validation/test_residuals.py",
     "crosscheck field": "all its notes are asked by tests/validation/test_field.py",
     "crosscheck run model.xml": "every engine: run by tests/reports/test_model_run.py on models of its own",
