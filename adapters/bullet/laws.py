@@ -22,6 +22,7 @@ from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from adapters.unswept import passing_law, shoved_law
@@ -88,21 +89,8 @@ def _scale(scene: Scene, metric: str) -> float:
     return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
 
 
-class _Held:
-    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-
-    def __hash__(self) -> int:
-        return hash(self.scene.hash())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and self.scene == other.scene
-
-
 @lru_cache(maxsize=4096)
-def _predictions(profile: str, held: _Held, dt: float, measure: Measure) -> dict[str, Prediction]:
+def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[str, Prediction]:
     """Value and band of every metric that can be predicted."""
     scene = held.scene
     law = law_of(profile, needs(scene), dt)
@@ -129,7 +117,7 @@ def _ball_law(profile: str, metric: str) -> Law:
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         if not _is_one_ball_over_a_floor(scene):
             return None
-        return _predictions(profile, _Held(scene), dt, measure).get(metric)
+        return _predictions(profile, Held(scene), dt, measure).get(metric)
 
     return law
 
