@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.box2d.profiles import checked
-from adapters.box2d.simulation import single
 from adapters.ground import reach
+from adapters.meeting import common_material
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 from adapters.script import constants, imports, literal, materials, stepped, text
 
@@ -17,16 +16,15 @@ _MAKERS = {"free": "CreateDynamicBody", "fixed": "CreateStaticBody", "prescribed
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with Box2D; see `adapters.engine.Writer`."""
-    chosen = checked(settings)
-    units, alike = float(chosen["units_per_metre"]), single(scene)
+    units, alike = float(settings["units_per_metre"]), common_material(scene)
     gravity = _scaled(scene.gravity, units)
     lines = [*imports(scene, "import Box2D"), *constants(dt, steps)]
     lines += [f"UNITS = {units!r}  # lengths are handed over in 1/UNITS m", ""]
     lines += [f"world = Box2D.b2World(gravity={literal(gravity)})"]
-    lines += [f"world.continuousPhysics = {chosen['continuous']!r}", "bodies = {}", ""]
+    lines += [f"world.continuousPhysics = {settings['continuous']!r}", "bodies = {}", ""]
     for index, body in enumerate(scene.bodies):
-        lines += [*_made(index, body, scene, chosen, alike or (0.0, 0.0)), ""]
-    early = bool(chosen["early_restitution"])
+        lines += [*_made(index, body, scene, settings, alike or (0.0, 0.0)), ""]
+    early = bool(settings["early_restitution"])
     own = materials(scene) if early or alike is None else []
     if own:
         lines += [*own, *_LISTENER]
@@ -42,7 +40,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
             held = f"bodies[{body.name!r}]"
             loads.append(f"{held}.ApplyForceToCenter({literal(_scaled(body.force, units))}, True)")
             loads.append(f"{held}.ApplyTorque({literal(body.torque[0] * units**2)}, True)")
-    step = f"world.Step(DT, {chosen['iterations']!r}, {chosen['position_iterations']!r})"
+    step = f"world.Step(DT, {settings['iterations']!r}, {settings['position_iterations']!r})"
     return text([*lines, *_STATE, *stepped([*loads, step])])
 
 

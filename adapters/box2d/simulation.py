@@ -14,7 +14,8 @@ import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.meeting import common_material
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 
@@ -32,7 +33,7 @@ class Box2DSimulation(Simulation):
         self.world = Box2D.b2World(gravity=gravity)
         self.world.continuousPhysics = settings["continuous"]
         self.reach = reach(scene)
-        self.single = single(scene)
+        self.single = common_material(scene)
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         early = (gravity[0] * dt, gravity[1] * dt) if settings["early_restitution"] else None
         materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
@@ -133,12 +134,11 @@ class Box2DSimulation(Simulation):
     def contacts(self) -> Contacts:
         """Up to two points per pair; a pair that is swept into touch within the step has them twice."""
         per_metre = 1.0 / self.units
-        rows: list[tuple[int, int, Any, Any, Any, float]] = [
+        rows = (
             (a, b, np.multiply(point, per_metre), normal, np.multiply(impulse, per_metre), gap * per_metre)
             for a, b, point, normal, impulse, gap in self.listener.rows
-        ]
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 2)
+        )
+        return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and shapes hold."""
@@ -150,26 +150,23 @@ class Box2DSimulation(Simulation):
             "warm_starting": bool(world.warmStarting),
             "sub_stepping": bool(world.subStepping),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": body.mass,
                     "inertia": body.inertia / units**2,
                     "size": self._size(body.fixtures[0].shape),
                     "may_sleep": bool(body.sleepingAllowed),
                     "damping": [body.linearDamping, body.angularDamping],
                 }
-                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                for name, body in free_parts(self.scene, self.bodies)
             },
         }
         if self.single:
             fixtures = [body.fixtures[0] for body in self.bodies]
-            held["pairs"] = {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": max(fixtures[i].restitution, fixtures[j].restitution),
-                    "friction": math.sqrt(fixtures[i].friction * fixtures[j].friction),
-                }
-                for i, j in told_pairs(self.scene)
-            }
+            held["pairs"] = pair_materials(
+                self.scene,
+                ([own.restitution for own in fixtures], max),
+                ([own.friction for own in fixtures], lambda a, b: math.sqrt(a * b)),
+            )
         return held
 
     def _size(self, shape: Any) -> list[float]:
@@ -177,9 +174,3 @@ class Box2DSimulation(Simulation):
         if hasattr(shape, "vertices"):
             return [float(x) / self.units for x in np.max(np.abs(shape.vertices), axis=0)]
         return [float(shape.radius) / self.units]
-
-
-def single(scene: Scene) -> tuple[float, float] | None:
-    """Restitution and friction, if they are the same for all pairs: what Box2D mixes of equal numbers is the number."""
-    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
-    return found.pop() if len(found) == 1 else None

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.box2d3.profiles import checked
 from adapters.box2d3.translation import frictions, restitutions
 from adapters.ground import reach
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
@@ -17,16 +16,15 @@ _MAKERS = {"free": "create_dynamic_body", "fixed": "create_static_body", "prescr
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with pyb2d3; see `adapters.engine.Writer`."""
-    chosen = checked(settings)
-    units = float(chosen["units_per_metre"])
+    units = float(settings["units_per_metre"])
     lines = [*imports(scene, "import pyb2d3", angles=True), *constants(dt, steps)]
     lines += [f"UNITS = {units!r}  # lengths are handed over in 1/UNITS m", ""]
     lines += ["world = pyb2d3.World(", f"    gravity={literal(_scaled(scene.gravity, units))},"]
-    lines.append(f"    restitution_threshold={literal(chosen['restitution_threshold'] * units)},")
-    lines += [f"    maximum_linear_speed={literal(chosen['maximum_speed'] * units)},", ")"]
-    springs = (chosen["hertz"], chosen["damping_ratio"], chosen["push_speed"] * units)
+    lines.append(f"    restitution_threshold={literal(settings['restitution_threshold'] * units)},")
+    lines += [f"    maximum_linear_speed={literal(settings['maximum_speed'] * units)},", ")"]
+    springs = (settings["hertz"], settings["damping_ratio"], settings["push_speed"] * units)
     lines.append(f"world.set_contact_tuning{literal(springs)}")
-    lines += [f"world.continuous_enabled = {chosen['continuous']!r}", "world.sleeping_enabled = False", "bodies = {}"]
+    lines += [f"world.continuous_enabled = {settings['continuous']!r}", "world.sleeping_enabled = False", "bodies = {}"]
     own = zip(restitutions(scene) or [], frictions(scene) or [], strict=True)
     for body, numbers in zip(scene.bodies, own, strict=True):
         lines += ["", *_made(body, scene, units, numbers)]
@@ -38,7 +36,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
             held = f"bodies[{body.name!r}]"
             loads.append(f"{held}.apply_force_to_center({literal(_scaled(body.force, units))})")
             loads.append(f"{held}.apply_torque({literal(body.torque[0] * units**2)})")
-    return text([*lines, *_STATE, *stepped([*loads, f"world.step(DT, {chosen['substeps']!r})"])])
+    return text([*lines, *_STATE, *stepped([*loads, f"world.step(DT, {settings['substeps']!r})"])])
 
 
 def _scaled(v: tuple[float, ...], units: float) -> tuple[float, float]:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from adapters.box2d3.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 _UNKNOWN = (math.nan, math.nan)
@@ -133,13 +133,12 @@ class Box2D3Simulation(Simulation):
         """Points and normals of what touched in the last step; impulses and gaps are not told (NaN)."""
         from adapters.box2d3.drawing import named, touching
 
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for (x, y), normal in touching(self.pen, self.world):
             point = (x / self.units, y / self.units)
             i, j = named((point, normal), self.scene.bodies, self.before)
             rows.append((i, j, point, normal, _UNKNOWN, math.nan))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 2)
+        return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and shapes hold; the bindings do not tell springs and speeds again."""
@@ -151,23 +150,17 @@ class Box2D3Simulation(Simulation):
             "continuous": bool(world.continuous_enabled),
             "may_sleep": bool(world.sleeping_enabled),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": float(body.mass),
                     "inertia": float(body.mass_data.rotational_inertia) / units**2,
                     "damping": [float(body.linear_damping), float(body.angular_damping)],
                 }
-                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                for name, body in free_parts(self.scene, self.bodies)
             },
         }
         shapes = [body.shapes[0] for body in self.bodies]
-        held["pairs"] = {
-            f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                "restitution": max(float(shapes[i].restitution), float(shapes[j].restitution)),
-                "friction": math.sqrt(float(shapes[i].friction) * float(shapes[j].friction)),
-            }
-            for i, j in told_pairs(self.scene)
-        }
+        restitutions, frictions = [float(own.restitution) for own in shapes], [float(own.friction) for own in shapes]
+        held["pairs"] = pair_materials(self.scene, (restitutions, max), (frictions, lambda a, b: math.sqrt(a * b)))
         return held
 
     def close(self) -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import mul
 from typing import Any
 
 import numpy as np
 
 from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 from adapters.dart.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Names of the detectors' classes.
@@ -142,7 +143,7 @@ class DartSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Contacts of the last step; the force is on the first body, along a normal that points to it."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for contact in self.world.getLastCollisionResult().getContacts():
             first, second = (
                 self.index[one.getShapeFrame().getBodyNode().getName()]
@@ -150,8 +151,7 @@ class DartSimulation(Simulation):
             )
             impulse = np.multiply(self.dt, contact.force)
             rows.append((second, first, contact.point, contact.normal, impulse, -contact.penetrationDepth))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world and its bodies hold."""
@@ -164,20 +164,13 @@ class DartSimulation(Simulation):
             "may_sleep": may_sleep(self.world),
             "split_impulse": splits_impulses(held),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": node.getMass(),
                     "inertia": [float(x) for x in np.diag(node.getInertia().getMoment())],
                 }
-                for asked, node in zip(self.scene.bodies, self.nodes, strict=True)
-                if asked.motion == "free"
+                for name, node in free_parts(self.scene, self.nodes)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": self.restitutions[i] * self.restitutions[j],
-                    "friction": min(self.frictions[i], self.frictions[j]),
-                }
-                for i, j in told_pairs(self.scene)
-            },
+            "pairs": pair_materials(self.scene, (self.restitutions, mul), (self.frictions, min)),
         }
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from adapters.drake.profiles import APPROXIMATIONS, OWN
 from adapters.drake.translation import frictions, pair_of
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.readback import free_parts
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 
@@ -145,7 +146,7 @@ class DrakeSimulation(Simulation):
         if self.steps == 0:
             return Contacts.from_rows([], 3)
         found = self.plant.get_contact_results_output_port().Eval(self.context)
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for k in range(found.num_point_pair_contacts()):
             info = found.point_pair_contact_info(k)
             pair = info.point_pair()
@@ -171,8 +172,7 @@ class DrakeSimulation(Simulation):
             normal = normal / np.linalg.norm(normal)
             impulse = np.multiply(self.dt, force.translational())
             rows.append((second, first, surface.centroid(), normal, impulse, np.nan))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the plant, its bodies and their shapes hold."""
@@ -183,9 +183,7 @@ class DrakeSimulation(Simulation):
             for index in range(len(held))
         ]
         inertias = {
-            asked.name: body.CalcSpatialInertiaInBodyFrame(self.context)
-            for body, asked in zip(self.bodies, self.scene.bodies, strict=True)
-            if asked.motion == "free"
+            name: body.CalcSpatialInertiaInBodyFrame(self.context) for name, body in free_parts(self.scene, self.bodies)
         }
         return {
             "dt": float(plant.time_step()),

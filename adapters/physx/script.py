@@ -8,7 +8,6 @@ from typing import Any
 
 from adapters.drives import velocity_over
 from adapters.means import means
-from adapters.physx.profiles import checked
 from adapters.physx.translation import turn_to
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 from adapters.script import constants, imports, literal, place, stepped, text
@@ -16,19 +15,18 @@ from adapters.script import constants, imports, literal, place, stepped, text
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with SAPIEN; see `adapters.engine.Writer`."""
-    chosen = checked(settings)
     spinning = any(body.motion == "prescribed" and any(body.twist[3:]) for body in scene.bodies)
     lines = [*imports(scene, "import numpy as np", "import sapien", angles=spinning), *constants(dt, steps), ""]
     lines += [
-        f"engine = sapien.physx.PhysxEngine({chosen['tolerance_length']!r}, 0.2)  # one per process",
+        f"engine = sapien.physx.PhysxEngine({settings['tolerance_length']!r}, 0.2)  # one per process",
         "sapien.physx.set_scene_config(",
         f"    gravity=np.array({literal(scene.gravity)}, np.float32),",
-        f"    bounce_threshold={chosen['bounce_threshold']!r},",
-        f"    enable_pcm={chosen['persistent_manifolds']!r},",
-        f"    enable_tgs={chosen['solver'] == 'tgs'},",
+        f"    bounce_threshold={settings['bounce_threshold']!r},",
+        f"    enable_pcm={settings['persistent_manifolds']!r},",
+        f"    enable_tgs={settings['solver'] == 'tgs'},",
         "    enable_ccd=False,",
         "    enable_enhanced_determinism=False,",
-        f"    enable_friction_every_iteration={chosen['friction_every_iteration']!r},",
+        f"    enable_friction_every_iteration={settings['friction_every_iteration']!r},",
         "    cpu_workers=0,",
         ")",
         "system = sapien.physx.PhysxCpuSystem()",
@@ -38,7 +36,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     ]
     own = zip(means(scene, "restitution") or [], means(scene, "friction") or [], strict=True)
     for index, (body, numbers) in enumerate(zip(scene.bodies, own, strict=True)):
-        lines += ["", *_made(index, body, chosen, numbers)]
+        lines += ["", *_made(index, body, settings, numbers)]
     lines += _TURNED if spinning else []
     step = []
     for body in scene.bodies:

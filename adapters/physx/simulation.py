@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from adapters.drives import place_after, velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
 from adapters.impulses import along_normal
-from adapters.means import means
+from adapters.means import mean, means
 from adapters.physx.translation import turn_to, turned
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
 #: Worlds that live, and the size each was made for: the engine beneath them is one per process.
@@ -156,7 +157,7 @@ class PhysxSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Points with normal impulses, on the first body, along a normal that points to it; friction is not told."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for contact in self.system.get_contacts():
             first, second = (self.index[part.entity.name] for part in contact.bodies)
             rough = self.materials.get((min(first, second), max(first, second)), (0.0, 0.0))[1] > 0.0
@@ -164,17 +165,11 @@ class PhysxSimulation(Simulation):
                 normal = point.normal.astype(float)
                 impulse = along_normal(float(point.impulse @ point.normal), normal, rough)
                 rows.append((second, first, point.position, normal, impulse, float(point.separation)))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and their materials hold; the size it was made for is not told again."""
         config = self.system.config
-        parts = {
-            asked.name: part
-            for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True)
-            if asked.motion == "free"
-        }
         held = [part.collision_shapes[0].physical_material for _, part in self.bodies]
         return {
             "dt": float(self.system.timestep),
@@ -195,15 +190,11 @@ class PhysxSimulation(Simulation):
                     "push_out": float(part.max_depenetration_velocity),
                     "sleep_threshold": float(part.sleep_threshold),
                 }
-                for name, part in parts.items()
+                for name, (_, part) in free_parts(self.scene, self.bodies)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": 0.5 * float(held[i].restitution + held[j].restitution),
-                    "friction": 0.5 * float(held[i].dynamic_friction + held[j].dynamic_friction),
-                }
-                for i, j in self.materials
-            },
+            "pairs": pair_materials(
+                self.scene, ([own.restitution for own in held], mean), ([own.dynamic_friction for own in held], mean)
+            ),
         }
 
     def close(self) -> None:

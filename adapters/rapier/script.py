@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.rapier.profiles import checked
-from adapters.rapier.simulation import single
+from adapters.meeting import common_material
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.script import constants, imports, keywords, literal, materials, stepped, text
 
@@ -27,13 +26,13 @@ _KINDS = {"free": "dynamic", "fixed": "fixed", "prescribed": "kinematic_velocity
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with rapier3d; see `adapters.engine.Writer`."""
-    chosen, alike = checked(settings), single(scene)
+    alike = common_material(scene)
     lines = [*imports(scene, "import rapier3d"), *constants(dt, steps), ""]
     lines += [f"world = rapier3d.PhysicsWorld(gravity={literal(scene.gravity)})", "held = world.integration_parameters"]
-    lines += ["held.dt = DT", *(f"held.{name} = {chosen[key]!r}" for name, key in _HELD.items())]
+    lines += ["held.dt = DT", *(f"held.{name} = {settings[key]!r}" for name, key in _HELD.items())]
     for name, key in (("contact_softness", "frequency"), ("static_contact_softness", "static_frequency")):
-        lines.append(f"held.{name} = rapier3d.SpringCoefficients({chosen[key]!r}, {chosen['damping_ratio']!r})")
-    lines.append(f"held.friction_model = rapier3d.FrictionModel.{chosen['friction_model'].upper()}")
+        lines.append(f"held.{name} = rapier3d.SpringCoefficients({settings[key]!r}, {settings['damping_ratio']!r})")
+    lines.append(f"held.friction_model = rapier3d.FrictionModel.{settings['friction_model'].upper()}")
     lines += ["bodies, numbers = {}, {}", ""]
     for index, body in enumerate(scene.bodies):
         lines += [*_made(index, body, alike), ""]

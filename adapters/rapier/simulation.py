@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.impulses import along_normal
+from adapters.meeting import common_material
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 
@@ -39,7 +41,7 @@ class RapierSimulation(Simulation):
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
         self._set(rapier3d, dt, settings)
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
-        self.single = single(scene)
+        self.single = common_material(scene)
         self.index: dict[Any, int] = {}
         self.bodies = [self._made(rapier3d, index, body) for index, body in enumerate(scene.bodies)]
         if self.single is None and self.materials:
@@ -129,7 +131,7 @@ class RapierSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Up to four points per manifold, with their normal impulses; what friction gave to a manifold is not told."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for pair in self.world.narrow_phase.contact_pairs():
             i, j = self.index[pair.collider1], self.index[pair.collider2]
             rough = self.materials.get((min(i, j), max(i, j)), (0.0, 0.0))[1] > 0.0
@@ -148,8 +150,7 @@ class RapierSimulation(Simulation):
                     p, q = places[k]
                     middle = (0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.5 * (p.z + q.z))
                     rows.append((i, j, middle, normal, along_normal(point.impulse, normal, rough), point.dist))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and colliders hold."""
@@ -172,24 +173,11 @@ class RapierSimulation(Simulation):
             "friction_model": str(held.friction_model),
             "threads": self.world.num_threads,
             "bodies": {
-                asked.name: {"mass": bodies[handle].mass, "damping": bodies[handle].linear_damping}
-                for asked, handle in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                name: {"mass": bodies[handle].mass, "damping": bodies[handle].linear_damping}
+                for name, handle in free_parts(self.scene, self.bodies)
             },
         }
         if self.single:
-            restitution, friction = self.single
-            told["pairs"] = {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": restitution,
-                    "friction": friction,
-                }
-                for i, j in self.materials
-            }
+            restitutions, frictions = ([number] * len(self.bodies) for number in self.single)
+            told["pairs"] = pair_materials(self.scene, (restitutions, max), (frictions, max))
         return told
-
-
-def single(scene: Scene) -> tuple[float, float] | None:
-    """Restitution and friction, if they are the same for all pairs: what is combined of equal numbers is the number."""
-    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
-    return found.pop() if len(found) == 1 else None
