@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -20,17 +21,19 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 
 class Box2DSimulation(Simulation):
-    """One ``b2World``; bodies in the scene's order."""
+    """One ``b2World``; bodies in the scene's order.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import Box2D
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
         from adapters.box2d.listening import Listener
 
+        self.box2d = module or import_module("Box2D")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.units = float(settings["units_per_metre"])
         gravity = self._vector(scene.gravity)
-        self.world = Box2D.b2World(gravity=gravity)
+        self.world: Any = self.box2d.b2World(gravity=gravity)
         self.world.continuousPhysics = settings["continuous"]
         self.reach = reach(scene)
         self.single = common_material(scene)
@@ -50,8 +53,6 @@ class Box2DSimulation(Simulation):
         return (v[0] * self.units, v[1] * self.units)
 
     def _made(self, index: int, asked: Body) -> Any:
-        import Box2D
-
         make = {
             "free": self.world.CreateDynamicBody,
             "fixed": self.world.CreateStaticBody,
@@ -67,32 +68,30 @@ class Box2DSimulation(Simulation):
         body.userData = index
         restitution, friction = self.single or (0.0, 0.0)
         body.CreateFixture(
-            Box2D.b2FixtureDef(shape=self._shape(asked), density=1.0, restitution=restitution, friction=friction)
+            self.box2d.b2FixtureDef(shape=self._shape(asked), density=1.0, restitution=restitution, friction=friction)
         )
         if asked.motion == "free":
             assert isinstance(asked.inertia, float | int)
             inertia = asked.inertia * self.units**2
-            body.massData = Box2D.b2MassData(mass=asked.mass, I=inertia, center=(0.0, 0.0))
+            body.massData = self.box2d.b2MassData(mass=asked.mass, I=inertia, center=(0.0, 0.0))
         if asked.motion != "fixed":
             vx, vy, omega = asked.twist
             body.linearVelocity, body.angularVelocity = self._vector((vx, vy)), omega
         return body
 
     def _shape(self, asked: Body) -> Any:
-        import Box2D
-
         shape = asked.shape
         if isinstance(shape, Disc):
-            return Box2D.b2CircleShape(radius=shape.radius * self.units)
+            return self.box2d.b2CircleShape(radius=shape.radius * self.units)
         if isinstance(shape, Box):
-            made = Box2D.b2PolygonShape(box=self._vector(shape.half_extents))
+            made = self.box2d.b2PolygonShape(box=self._vector(shape.half_extents))
         else:
             assert isinstance(shape, HalfSpace)
             # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision;
             # and without a turn along an axis of the world, of which a single angle would miss by 4e-8.
             wide = self.reach * self.units
             nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
-            made = Box2D.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
+            made = self.box2d.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
         made.radius = self.settings["skin"]
         return made
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from operator import mul
 from typing import Any
 
@@ -25,24 +26,26 @@ DETECTORS = {
 
 
 class DartSimulation(Simulation):
-    """One world; bodies in the scene's order, each a skeleton of its own."""
+    """One world; bodies in the scene's order, each a skeleton of its own.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import dartpy
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        dartpy = self.dartpy = module or import_module("dartpy")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = dartpy.simulation.World()
         self.world.setTimeStep(dt)
         self.world.setGravity(list(scene.gravity))
-        detector = getattr(dartpy.collision, DETECTORS[settings["detector"]])()
-        self.world.getConstraintSolver().setCollisionDetector(detector)
+        held = self.world.getConstraintSolver()
+        held.setCollisionDetector(getattr(dartpy.collision, DETECTORS[settings["detector"]])())
         keep_awake(self.world)
-        self.solver: Any = self._solver(dartpy, settings)
+        self.solver: Any = self._solver(held, settings)
         self.reach = reach(scene)
         self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
         self.nodes: list[Any] = []
         for index, body in enumerate(scene.bodies):
-            self.nodes.append(self._made(dartpy, index, body))
+            self.nodes.append(self._made(index, body))
         self.loaded = [
             (node, list(body.force), list(body.torque))
             for node, body in zip(self.nodes, scene.bodies, strict=True)
@@ -50,9 +53,9 @@ class DartSimulation(Simulation):
         ]
         self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
 
-    def _solver(self, dartpy: Any, settings: Mapping[str, Any]) -> Any:
+    def _solver(self, held: Any, settings: Mapping[str, Any]) -> Any:
         """Make and set the solver of the contact problem, and who answers where it finds none; Dantzig's is there."""
-        held, name = self.world.getConstraintSolver(), settings["solver"]
+        dartpy, name = self.dartpy, settings["solver"]
         option = dartpy.constraint.PgsBoxedLcpSolverOption()
         # Sweeps that end above the tolerance count as failed, and what the second choice finds is taken as it is: where
         # PGS is asked for, that has to be as many sweeps.
@@ -63,7 +66,7 @@ class DartSimulation(Simulation):
         if second is not None:
             second.setOption(option)
         if name == "dantzig":
-            return held.getBoxedLcpSolver()
+            return None
         if name == "pgs":
             # Its class has no constructor in Python; every world brings one as its second choice.
             self.other = dartpy.simulation.World()
@@ -79,7 +82,8 @@ class DartSimulation(Simulation):
         held.setBoxedLcpSolver(solver)
         return solver
 
-    def _made(self, dartpy: Any, index: int, asked: Body) -> Any:
+    def _made(self, index: int, asked: Body) -> Any:
+        dartpy = self.dartpy
         skeleton = dartpy.dynamics.Skeleton(f"body {index}")
         free = asked.motion == "free"
         joint, node = skeleton.createFreeJointAndBodyNodePair() if free else skeleton.createWeldJointAndBodyNodePair()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,16 +16,16 @@ from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Spher
 
 
 class DrakeSimulation(Simulation):
-    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world."""
+    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import pydrake.all
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
-        # Its stubs know no arrays as NumPy types them.
-        drake: Any = pydrake.all
-        self.scene, self.dt, self.settings, self.drake = scene, dt, settings, drake
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        drake = self.drake = module or import_module("pydrake.all")
+        self.scene, self.dt, self.settings = scene, dt, settings
         builder = drake.DiagramBuilder()
-        self.plant, graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
+        self.plant, self.graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
         plant = self.plant
         approximation = getattr(drake.DiscreteContactApproximation, APPROXIMATIONS[settings["approximation"]])
         plant.set_discrete_contact_approximation(approximation)
@@ -38,7 +39,6 @@ class DrakeSimulation(Simulation):
         diagram = builder.Build()
         self.simulator: Any = drake.Simulator(diagram)
         self.context: Any = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
-        self.inspector: Any = graph.model_inspector()
         for body, asked in zip(self.bodies, scene.bodies, strict=True):
             if asked.motion == "free":
                 plant.SetFreeBodyPose(self.context, body, self._place(asked))
@@ -176,8 +176,8 @@ class DrakeSimulation(Simulation):
 
     def readback(self) -> dict[str, Any]:
         """What the plant, its bodies and their shapes hold."""
-        plant = self.plant
-        held = {index: self.inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
+        plant, inspector = self.plant, self.graph.model_inspector()
+        held = {index: inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
         own = [
             float(held[index].GetProperty("material", "coulomb_friction").dynamic_friction())
             for index in range(len(held))

@@ -33,10 +33,13 @@ def imported() -> ModuleType:
 
 
 class PhysxSimulation(Simulation):
-    """One CPU world; bodies in the scene's order, each an entity of its own."""
+    """One CPU world; bodies in the scene's order, each an entity of its own.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        sapien: Any = imported()
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        sapien = self.sapien = module or imported()
         self.scene, self.dt, self.settings = scene, dt, settings
         length = settings["tolerance_length"]
         if other := next((held for held in _LIVING.values() if held != length), None):
@@ -60,16 +63,16 @@ class PhysxSimulation(Simulation):
         self.world: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = []
         for index, body in enumerate(scene.bodies):
-            self.bodies.append(self._made(sapien, index, body))
+            self.bodies.append(self._made(index, body))
         self.index = {f"body {index}": index for index in range(len(scene.bodies))}
         loaded = zip(self.bodies, scene.bodies, strict=True)
-        self.loads = [(part, body.force, body.torque) for (_, part), body in loaded if body.is_loaded]
+        self.loads = [(part, body.force, body.torque) for part, body in loaded if body.is_loaded]
         self.driven = [k for k, body in enumerate(scene.bodies) if body.motion == "prescribed"]
         self.steps = 0
 
-    def _made(self, sapien: Any, index: int, asked: Body) -> tuple[Any, Any]:
-        """Entity and body of one of the scene's bodies."""
-        physx, settings = sapien.physx, self.settings
+    def _made(self, index: int, asked: Body) -> Any:
+        """Make one of the scene's bodies, in an entity of its own."""
+        sapien, physx, settings = self.sapien, self.sapien.physx, self.settings
         entity = sapien.Entity()
         entity.name = f"body {index}"
         fixed = asked.motion == "fixed"
@@ -96,7 +99,7 @@ class PhysxSimulation(Simulation):
         else:
             entity.pose = sapien.Pose(list(asked.pose[:3]), list(asked.pose[3:]))
         self.world.add_entity(entity)
-        return entity, part
+        return part
 
     def _shape(self, physx: Any, index: int, asked: Body) -> Any:
         friction = self.frictions[index]
@@ -131,22 +134,22 @@ class PhysxSimulation(Simulation):
         """Say where a prescribed body is at the end of the step that comes."""
         body, time = self.scene.bodies[k], self.steps * self.dt
         place = place_after(body, time)
-        self.bodies[k][1].kinematic_target = imported().Pose(
+        self.bodies[k].kinematic_target = self.sapien.Pose(
             list(place), list(turned(body.pose[3:], body.twist[3:], time))
         )
 
     def pose(self) -> Array:
         """See `Simulation.pose`; a half-space's own pose is the origin."""
         rows = []
-        for (entity, _), asked in zip(self.bodies, self.scene.bodies, strict=True):
-            held = entity.pose
+        for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
+            held = part.entity.pose
             rows.append(asked.pose if isinstance(asked.shape, HalfSpace) else (*held.p, *held.q))
         return np.array(rows, float)
 
     def twist(self) -> Array:
         """See `Simulation.twist`; a prescribed body's is told as soon as it has made a step."""
         rows: list[tuple[float, ...]] = []
-        for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True):
+        for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
             if asked.motion == "fixed":
                 rows.append((0.0,) * 6)
             elif asked.motion == "prescribed" and self.steps == 0:
@@ -170,7 +173,7 @@ class PhysxSimulation(Simulation):
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and their materials hold; the size it was made for is not told again."""
         config = self.system.config
-        held = [part.collision_shapes[0].physical_material for _, part in self.bodies]
+        held = [part.collision_shapes[0].physical_material for part in self.bodies]
         return {
             "dt": float(self.system.timestep),
             "gravity": [float(g) for g in config.gravity],
@@ -178,7 +181,7 @@ class PhysxSimulation(Simulation):
             "bounce_threshold": float(config.bounce_threshold),
             "friction_every_iteration": bool(config.enable_friction_every_iteration),
             "persistent_manifolds": bool(config.enable_pcm),
-            "contact_offset": [float(part.collision_shapes[0].contact_offset) for _, part in self.bodies],
+            "contact_offset": [float(part.collision_shapes[0].contact_offset) for part in self.bodies],
             "bodies": {
                 name: {
                     "mass": float(part.mass),
@@ -190,7 +193,7 @@ class PhysxSimulation(Simulation):
                     "push_out": float(part.max_depenetration_velocity),
                     "sleep_threshold": float(part.sleep_threshold),
                 }
-                for name, (_, part) in free_parts(self.scene, self.bodies)
+                for name, part in free_parts(self.scene, self.bodies)
             },
             "pairs": pair_materials(
                 self.scene, ([own.restitution for own in held], mean), ([own.dynamic_friction for own in held], mean)

@@ -32,23 +32,26 @@ class Hooks:
 
 
 class RapierSimulation(Simulation):
-    """One ``PhysicsWorld``; bodies in the scene's order."""
+    """One ``PhysicsWorld``; bodies in the scene's order.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
         # Its type stubs would be looked at only where it is installed.
-        rapier3d: Any = import_module("rapier3d")
+        rapier3d = self.rapier3d = module or import_module("rapier3d")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
-        self._set(rapier3d, dt, settings)
+        self._set(dt, settings)
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
         self.single = common_material(scene)
         self.index: dict[Any, int] = {}
-        self.bodies = [self._made(rapier3d, index, body) for index, body in enumerate(scene.bodies)]
+        self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         if self.single is None and self.materials:
             self.world.physics_hooks = Hooks(self.index, self.materials)
 
-    def _set(self, rapier3d: Any, dt: float, settings: Mapping[str, Any]) -> None:
-        held = self.world.integration_parameters
+    def _set(self, dt: float, settings: Mapping[str, Any]) -> None:
+        rapier3d, held = self.rapier3d, self.world.integration_parameters
         held.dt = dt
         held.num_solver_iterations = settings["substeps"]
         held.num_internal_pgs_iterations = settings["iterations"]
@@ -64,7 +67,8 @@ class RapierSimulation(Simulation):
         held.contact_clustering = settings["clustering"]
         held.friction_model = getattr(rapier3d.FrictionModel, settings["friction_model"].upper())
 
-    def _made(self, rapier3d: Any, index: int, asked: Body) -> Any:
+    def _made(self, index: int, asked: Body) -> Any:
+        rapier3d = self.rapier3d
         make = {
             "free": rapier3d.RigidBody.dynamic,
             "fixed": rapier3d.RigidBody.fixed,
@@ -81,7 +85,7 @@ class RapierSimulation(Simulation):
                 rapier3d.MassProperties((0.0, 0.0, 0.0), asked.mass, asked.inertia)
             )
         handle = self.world.add_body(builder)
-        collider = self.world.add_collider(self._shape(rapier3d, asked), handle)
+        collider = self.world.add_collider(self._shape(asked), handle)
         self.index[collider] = index
         body = self.world.rigid_bodies[handle]
         if asked.motion == "free":
@@ -92,7 +96,8 @@ class RapierSimulation(Simulation):
                 body.add_torque(asked.torque, True)
         return handle
 
-    def _shape(self, rapier3d: Any, asked: Body) -> Any:
+    def _shape(self, asked: Body) -> Any:
+        rapier3d = self.rapier3d
         restitution, friction = self.single or (0.0, 0.0)
         numbers = {"restitution": restitution, "friction": friction}
         if self.single is None:
