@@ -19,7 +19,7 @@ LONG = 120
 
 
 class Recording:
-    """Lines of a script, as far as they are written.
+    """Lines of a script, as far as they are written, and how calls and values are written in them.
 
     Parameters
     ----------
@@ -61,11 +61,12 @@ class Recording:
         return self.others.get(type(value)) or literal(value)
 
     def found(self, word: str, text: str, value: Any, once: bool) -> Any:
-        """A value that ``text`` gives, ``word`` being its last call or attribute; assigned to its variable."""
+        """What ``text`` gives, to go on with; ``word`` is its last call or attribute, ``once`` is said of calls."""
         name = self.names.get(word)
         if name and not text.startswith(f"{name}."):
             self.given[name] += 1
-            name += str(self.given[name]) if self.given[name] > 1 else ""
+            number = str(self.given[name]) if self.given[name] > 1 else ""
+            name = ", ".join(part + number for part in name.split(", "))
         if name is not None or (once and value is None):
             self.lines.append(f"{name} = {text}" if name else text)
         if name and "," in name:
@@ -91,17 +92,17 @@ class Recorded:
     def __setattr__(self, name: str, new: Any) -> None:
         recording, value, text = _inside(self)
         recording.lines.append(f"{text}.{name} = {recording.text(new)}")
-        setattr(value, name, real(new))
+        setattr(value, name, _real(new))
 
     def __getitem__(self, key: Any) -> Any:
         recording, value, text = _inside(self)
-        return recording.found("", f"{text}[{recording.text(key)}]", value[real(key)], False)
+        return recording.found("", f"{text}[{recording.text(key)}]", value[_real(key)], False)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Call the engine."""
         recording, value, text = _inside(self)
         arguments = [*map(recording.text, given), *(f"{key}={recording.text(new)}" for key, new in named.items())]
-        found = value(*map(real, given), **{k: real(new) for k, new in named.items()}) if recording.calls else None
+        found = value(*map(_real, given), **{k: _real(new) for k, new in named.items()}) if recording.calls else None
         call = f"{text}({', '.join(arguments)})"
         if len(call) > LONG and named:
             call = "\n    ".join([f"{text}(", *(f"{argument}," for argument in arguments)]) + "\n)"
@@ -119,11 +120,11 @@ def _inside(recorded: Recorded) -> tuple[Recording, Any, str]:
     return held["_recording"], held["_value"], held["_text"]
 
 
-def real(value: Any) -> Any:
+def _real(value: Any) -> Any:
     """An argument as the engine gets it."""
     if isinstance(value, Recorded):
         return value.__dict__["_value"]
-    return type(value)(map(real, value)) if type(value) in (list, tuple) else value
+    return type(value)(map(_real, value)) if type(value) in (list, tuple) else value
 
 
 def written(

@@ -77,6 +77,8 @@ class World:
         self.world.tag = Tag()
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         self.second = module.World([np.float64(0.5)], colour=module.RED)
+        pair = self.world.make(), self.world.make()
+        pair[1][1].colour = 2
         self.second.add(self.bodies[0], np.array([0.5]), np.array([0.1], np.float32))
 
     def _made(self, index, asked):
@@ -116,6 +118,9 @@ def test_lines_make_the_world_that_the_adapter_made():
         "bodies[\"'b'\"] = part",
         "",
         "world2 = engine.World([0.5], colour=engine.RED)",
+        "part, joint = world.make()",
+        "part2, joint2 = world.make()",
+        "joint2.colour = 2",
         "world2.add(bodies['a'], np.array((0.5,)), np.array((0.1,), np.float32))",
     ]
     assert step == ["bodies[\"'b'\"].add(0.5)", "world.step(DT)"]
