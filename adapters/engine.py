@@ -9,7 +9,7 @@ never sees a scene's truth, and contains no loop over steps: the only one is `ad
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -102,6 +102,10 @@ def _vectors(told: Sequence[Any], dimension: int) -> Array:
     return found
 
 
+#: A contact as adapters tell it: bodies by index, point, normal from the first to the second, impulse on that one, gap.
+Row = tuple[int, int, Any, Any, Any, float]
+
+
 @dataclass(frozen=True)
 class Contacts:
     """Contacts of one instant as arrays over k contacts; NaN where the engine does not say.
@@ -118,8 +122,8 @@ class Contacts:
     gap: Array
 
     @classmethod
-    def from_rows(cls, rows: Sequence[tuple[int, int, Any, Any, Any, float]], dimension: int) -> Contacts:
-        """Build from ``(a, b, point, normal, impulse, gap)`` rows; pairs are turned so that a < b."""
+    def from_rows(cls, rows: Sequence[Row], dimension: int) -> Contacts:
+        """Build from rows in their order; pairs are turned so that a < b."""
         if not rows:
             none, nowhere = np.zeros(0, np.int64), np.zeros((0, dimension))
             return cls(none, none.copy(), nowhere, nowhere.copy(), nowhere.copy(), np.zeros(0))
@@ -129,6 +133,11 @@ class Contacts:
         a, b, gap = np.minimum(i, j), np.maximum(i, j), np.array(gaps, float)
         point, normal, impulse = (_vectors(told, dimension) for told in (points, normals, impulses))
         return cls(a, b, point, sign * normal, sign * impulse, gap)
+
+    @classmethod
+    def by_pair(cls, rows: Iterable[Row], dimension: int) -> Contacts:
+        """Build from rows, sorted by pair; those of a pair stay in their order."""
+        return cls.from_rows(sorted(rows, key=lambda row: (min(row[:2]), max(row[:2]))), dimension)
 
 
 @dataclass(frozen=True)
@@ -199,6 +208,7 @@ class Simulation(ABC):
 
 ProfileRule = Callable[[Needs, float], list[Setting]]
 #: ``write(scene, dt, settings, steps)``: the run of so many steps of a scene, as a text that needs the engine alone.
+#: `Engine.check_settings` has let the settings pass.
 Writer = Callable[[Scene, float, Mapping[str, Any], int], str]
 
 

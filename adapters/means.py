@@ -13,12 +13,25 @@ from adapters.scene import Scene
 ROUNDING = 1e-12
 
 
+def mean(a: float, b: float) -> float:
+    """What such an engine makes of two bodies' numbers, in their precision."""
+    return 0.5 * float(a + b)
+
+
 def means(scene: Scene, coefficient: str) -> list[float] | None:
     """Numbers of bodies of which each pair's ``coefficient`` is the mean; None if there are none that are allowed.
 
     A restitution lies in [0, 1], a friction is not negative: a number outside would be another material to the engine.
     """
     return representable(scene, lambda pairs: _means(scene, pairs, coefficient))
+
+
+def no_means(scene: Scene) -> str | None:
+    """Why an engine that mixes so refuses a scene: a table of pairs that no numbers of bodies give; None if some do."""
+    for coefficient in ("restitution", "friction"):
+        if means(scene, coefficient) is None:
+            return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
+    return None
 
 
 def _means(scene: Scene, meetings: Sequence[Meeting], coefficient: str) -> list[float] | None:

@@ -60,6 +60,12 @@ def pairs_among(scene: Scene, chosen: Sequence[int]) -> list[Meeting]:
     return [(i, j, scene.material(names[i], names[j])) for i, j in pairs if free[i] or free[j]]
 
 
+def common_material(scene: Scene) -> tuple[float, float] | None:
+    """Restitution and friction, if all pairs have the same: engines that mix two bodies' numbers keep equal ones."""
+    found = scene.materials()
+    return found.pop() if len(found) == 1 else None
+
+
 def told_pairs(scene: Scene) -> list[tuple[int, int]]:
     """Pairs of which a readback tells the material: all, of many bodies those that can touch at the start."""
     if len(scene.bodies) > MOST_BODIES:

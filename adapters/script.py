@@ -4,7 +4,7 @@ A script is for whoever maintains the engine: it imports the engine alone and bu
 the adapter, number by number. It prints the state at the start, at every tenth of the run and at the end, as lines of
 JSON in the conventions of `adapters.scene`, so that its last line has the bits of the cell that it was written from.
 
-Each engine's folder writes its own (`adapters.engine.Engine.exports`).
+Each engine's folder writes its own (`adapters.engine.Engine.exports`); most record them (`adapters.recording`).
 """
 
 from __future__ import annotations

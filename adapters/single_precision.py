@@ -110,7 +110,7 @@ def rounded_law(metric: str, method: Method) -> Law:
     """What blows make of ``metric``, in a motion without gravity or load; None where a blow is not that simple."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        found = _motion(_Key(scene), dt, method)
+        found = _motion(Held(scene), dt, method)
         if found is None:
             return None
         motion, blows = found
@@ -169,21 +169,21 @@ def _rounded(motion: Trajectory, share: float) -> Iterator[Trajectory]:
 # ---- the motion ------------------------------------------------------------------------------------------------------
 
 
-class _Key:
-    """A scene that is kept by its hash."""
+class Held:
+    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.hash = scene, scene.hash()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.hash == other.hash
+        return isinstance(other, Held) and self.hash == other.hash
 
     def __hash__(self) -> int:
         return hash(self.hash)
 
 
 @lru_cache(maxsize=64)
-def _motion(key: _Key, dt: float, method: Method) -> tuple[Trajectory, int] | None:
+def _motion(key: Held, dt: float, method: Method) -> tuple[Trajectory, int] | None:
     """Trajectory of all steps, and the number of blows; None where nothing can be said."""
     scene = key.scene if key.scene.dimension == 3 else lift(key.scene)
     if any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies):

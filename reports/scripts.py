@@ -41,6 +41,7 @@ def written(slot: Slot, form: str) -> str:
     if refusal:
         raise EngineError(f"{slot.engine} refuses this scene: {refusal}")
     settings = {setting.name: setting.value for setting in settings_of(engine, slot, prepared.scene)}
+    engine.check_settings(settings)
     text = write(posed, slot.dt, settings, step_count(prepared.scene.duration, slot.dt))
     head = [lines(line, 1, WIDTH) for line in _head(slot)]
     if posed.dimension != prepared.scene.dimension:

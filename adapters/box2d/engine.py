@@ -12,19 +12,18 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.box2d.profiles import KINDS, PROFILES, checked
+from adapters.box2d.profiles import KINDS, PROFILES
 from adapters.box2d.script import python
 from adapters.box2d.simulation import Box2DSimulation
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
 from adapters.probes import HALF_EXTENTS, LANDING_SPEED
 from adapters.scene import Scene
-from adapters.settings import checked_step
-from adapters.single_precision import without_a_place
 
 
 @final
-class Box2DEngine(Engine):
+class Box2DEngine(CheckedEngine):
     """Planar engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -80,39 +79,11 @@ class Box2DEngine(Engine):
             ),
         ),
     )
+    module = "Box2D"
+    simulation = Box2DSimulation
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of the installed distribution."""
-        import Box2D
-
-        return str(Box2D.__version__)
-
-    def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that single precision cannot hold."""
-        return without_a_place(scene)
-
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a spatial scene, a scene that `refuses` names, a bad step or setting.
-        """
-        if scene.dimension != 2:
-            raise EngineError("dimension: box2d is planar and cannot run a spatial scene")
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
-        if reason:
-            raise EngineError(reason)
-        return Box2DSimulation(scene, dt, chosen)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """The skin around what is landed on and what lands."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.box2d.profiles import PROFILES
-from adapters.box2d.rod_on_its_end import halfway_law
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
@@ -101,20 +100,6 @@ DEVIATIONS += tuple(
     )
     for profile in PROFILES
     for metric in ("rise", "spin", "impulse")
-)
-
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d",
-        ("tuned",),
-        "kane",
-        metric,
-        halfway_law(metric, _chosen("tuned"), VELOCITY_THRESHOLD),
-        "a blow acts halfway between the corner and the floor that it is in by then, on an arm shorter by that",
-        "b2Collision.cpp, b2WorldManifold: 0.5 (cA + cB); motion in adapters/box2d/rod_on_its_end.py",
-        CHECKED_ON,
-    )
-    for metric in ("rise", "ahead", "spin", "gain")
 )
 
 DEVIATIONS += tuple(

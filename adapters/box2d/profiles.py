@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 from adapters import settings
 from adapters.box2d.shipped import (
@@ -103,8 +102,3 @@ def units(needs: Needs, dt: float) -> float:
 
 
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
-
-
-def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
-    return settings.checked("box2d", KINDS, asked)

@@ -1,95 +1,46 @@
-"""A run on Box2D 2.3 as a stand-alone script: the calls of `adapters.box2d.simulation`, with their numbers."""
+"""A run on Box2D 2.3 as a stand-alone script: what `adapters.box2d.simulation` calls, as it is recorded."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.box2d.profiles import checked
-from adapters.box2d.simulation import single
-from adapters.ground import reach
-from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.box2d.simulation import Box2DSimulation
+from adapters.meeting import common_material
+from adapters.recording import written
+from adapters.scene import HalfSpace, Scene
 from adapters.script import constants, imports, literal, materials, stepped, text
 
-_MAKERS = {"free": "CreateDynamicBody", "fixed": "CreateStaticBody", "prescribed": "CreateKinematicBody"}
+#: Variables of a script, and the calls whose values they hold.
+_NAMES = {
+    "world": "b2World",
+    "body": "CreateDynamicBody CreateStaticBody CreateKinematicBody",
+    "shape": "b2CircleShape b2PolygonShape",
+    "": "CreateFixture",
+}
 
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with Box2D; see `adapters.engine.Writer`."""
-    chosen = checked(settings)
-    units, alike = float(chosen["units_per_metre"]), single(scene)
-    gravity = _scaled(scene.gravity, units)
+    import Box2D
+
+    from adapters.box2d.listening import Listener
+
+    made, step = written(Box2DSimulation, Box2D, "Box2D", _NAMES, (scene, dt, settings), {Listener: "listener"})
     lines = [*imports(scene, "import Box2D"), *constants(dt, steps)]
-    lines += [f"UNITS = {units!r}  # lengths are handed over in 1/UNITS m", ""]
-    lines += [f"world = Box2D.b2World(gravity={literal(gravity)})"]
-    lines += [f"world.continuousPhysics = {chosen['continuous']!r}", "bodies = {}", ""]
-    for index, body in enumerate(scene.bodies):
-        lines += [*_made(index, body, scene, chosen, alike or (0.0, 0.0)), ""]
-    early = bool(chosen["early_restitution"])
-    own = materials(scene) if early or alike is None else []
+    lines += [f"UNITS = {float(settings['units_per_metre'])!r}  # lengths are handed over in 1/UNITS m", "bodies = {}"]
+    early = bool(settings["early_restitution"])
+    own = materials(scene) if early or common_material(scene) is None else []
     if own:
-        lines += [*own, *_LISTENER]
-        if early:
-            kick = tuple(g * dt for g in gravity)
-            lines += [f"    KICK = {literal(kick)}  # gravity of a step", *_EARLY]
-        lines += ["", "", "listener = world.contactListener = Listener()"]
+        kick = tuple(g * settings["units_per_metre"] * dt for g in scene.gravity)
+        lines += ["", *own, *_LISTENER]
+        lines += [f"    KICK = {literal(kick)}  # gravity of a step", *_EARLY] if early else []
+        lines += ["", "", "listener = Listener()"]
+    else:
+        made.remove("world.contactListener = listener")  # it only listens
     still = literal([body.name for body in scene.bodies if isinstance(body.shape, HalfSpace)])
-    lines.append(f"HALF_SPACES = {still}  # their pose is the origin, wherever their polygons stand")
-    loads = []
-    for body in scene.bodies:
-        if body.is_loaded:
-            held = f"bodies[{body.name!r}]"
-            loads.append(f"{held}.ApplyForceToCenter({literal(_scaled(body.force, units))}, True)")
-            loads.append(f"{held}.ApplyTorque({literal(body.torque[0] * units**2)}, True)")
-    step = f"world.Step(DT, {chosen['iterations']!r}, {chosen['position_iterations']!r})"
-    return text([*lines, *_STATE, *stepped([*loads, step])])
-
-
-def _scaled(v: tuple[float, ...], units: float) -> tuple[float, float]:
-    return v[0] * units, v[1] * units
-
-
-def _made(
-    index: int, asked: Body, scene: Scene, settings: Mapping[str, Any], numbers: tuple[float, float]
-) -> list[str]:
-    """Lines that make a body with its shape; ``numbers`` are its restitution and friction."""
-    units = float(settings["units_per_metre"])
-    if isinstance(asked.shape, HalfSpace):
-        (nx, ny), offset = asked.shape.normal, asked.shape.offset
-        turn = 0.0 if 0.0 in (nx, ny) else math.atan2(-nx, ny)
-        place = f"position={literal(_scaled((offset * nx, offset * ny), units))}, angle={literal(turn)}"
-    else:
-        x, y, theta = asked.pose
-        place = f"position={literal(_scaled((x, y), units))}, angle={literal(theta)}, allowSleep=False"
-    lines = [f"body = bodies[{asked.name!r}] = world.{_MAKERS[asked.motion]}({place})", f"body.userData = {index}"]
-    lines += _shape(asked, scene, units, settings["skin"])
-    own = f"density=1.0, restitution={literal(numbers[0])}, friction={literal(numbers[1])}"
-    lines.append(f"body.CreateFixture(Box2D.b2FixtureDef(shape=shape, {own}))")
-    if asked.motion == "free":
-        assert isinstance(asked.inertia, float | int)
-        mass, inertia = literal(asked.mass), literal(asked.inertia * units**2)
-        lines.append(f"body.massData = Box2D.b2MassData(mass={mass}, I={inertia}, center=(0.0, 0.0))")
-    if asked.motion != "fixed":
-        vx, vy, omega = asked.twist
-        velocity = literal(_scaled((vx, vy), units))
-        lines.append(f"body.linearVelocity, body.angularVelocity = {velocity}, {literal(omega)}")
-    return lines
-
-
-def _shape(asked: Body, scene: Scene, units: float, skin: float) -> list[str]:
-    """Lines that make a shape."""
-    shape = asked.shape
-    if isinstance(shape, Disc):
-        return [f"shape = Box2D.b2CircleShape(radius={literal(shape.radius * units)})"]
-    if isinstance(shape, Box):
-        box: tuple[Any, ...] = _scaled(shape.half_extents, units)
-    else:
-        assert isinstance(shape, HalfSpace)
-        wide = reach(scene) * units
-        nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
-        box = (wide, wide, (-nx * wide, -ny * wide), 0.0)
-    return [f"shape = Box2D.b2PolygonShape(box={literal(box)})", f"shape.radius = {literal(skin)}"]
+    lines += ["", *made, "", f"HALF_SPACES = {still}  # their pose is the origin, wherever their polygons stand"]
+    return text([*lines, *_STATE, *stepped(step)])
 
 
 #: Lines of what gives each pair its own material when it meets.

@@ -8,31 +8,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.meeting import common_material
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 
 class Box2DSimulation(Simulation):
-    """One ``b2World``; bodies in the scene's order."""
+    """One ``b2World``; bodies in the scene's order.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import Box2D
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
         from adapters.box2d.listening import Listener
 
+        self.box2d = module or import_module("Box2D")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.units = float(settings["units_per_metre"])
         gravity = self._vector(scene.gravity)
-        self.world = Box2D.b2World(gravity=gravity)
+        self.world: Any = self.box2d.b2World(gravity=gravity)
         self.world.continuousPhysics = settings["continuous"]
         self.reach = reach(scene)
-        self.single = single(scene)
+        self.single = common_material(scene)
         self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         early = (gravity[0] * dt, gravity[1] * dt) if settings["early_restitution"] else None
         materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
@@ -49,8 +53,6 @@ class Box2DSimulation(Simulation):
         return (v[0] * self.units, v[1] * self.units)
 
     def _made(self, index: int, asked: Body) -> Any:
-        import Box2D
-
         make = {
             "free": self.world.CreateDynamicBody,
             "fixed": self.world.CreateStaticBody,
@@ -66,32 +68,30 @@ class Box2DSimulation(Simulation):
         body.userData = index
         restitution, friction = self.single or (0.0, 0.0)
         body.CreateFixture(
-            Box2D.b2FixtureDef(shape=self._shape(asked), density=1.0, restitution=restitution, friction=friction)
+            self.box2d.b2FixtureDef(shape=self._shape(asked), density=1.0, restitution=restitution, friction=friction)
         )
         if asked.motion == "free":
             assert isinstance(asked.inertia, float | int)
             inertia = asked.inertia * self.units**2
-            body.massData = Box2D.b2MassData(mass=asked.mass, I=inertia, center=(0.0, 0.0))
+            body.massData = self.box2d.b2MassData(mass=asked.mass, I=inertia, center=(0.0, 0.0))
         if asked.motion != "fixed":
             vx, vy, omega = asked.twist
             body.linearVelocity, body.angularVelocity = self._vector((vx, vy)), omega
         return body
 
     def _shape(self, asked: Body) -> Any:
-        import Box2D
-
         shape = asked.shape
         if isinstance(shape, Disc):
-            return Box2D.b2CircleShape(radius=shape.radius * self.units)
+            return self.box2d.b2CircleShape(radius=shape.radius * self.units)
         if isinstance(shape, Box):
-            made = Box2D.b2PolygonShape(box=self._vector(shape.half_extents))
+            made = self.box2d.b2PolygonShape(box=self._vector(shape.half_extents))
         else:
             assert isinstance(shape, HalfSpace)
             # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision;
             # and without a turn along an axis of the world, of which a single angle would miss by 4e-8.
             wide = self.reach * self.units
             nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
-            made = Box2D.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
+            made = self.box2d.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
         made.radius = self.settings["skin"]
         return made
 
@@ -133,12 +133,11 @@ class Box2DSimulation(Simulation):
     def contacts(self) -> Contacts:
         """Up to two points per pair; a pair that is swept into touch within the step has them twice."""
         per_metre = 1.0 / self.units
-        rows: list[tuple[int, int, Any, Any, Any, float]] = [
+        rows = (
             (a, b, np.multiply(point, per_metre), normal, np.multiply(impulse, per_metre), gap * per_metre)
             for a, b, point, normal, impulse, gap in self.listener.rows
-        ]
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 2)
+        )
+        return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and shapes hold."""
@@ -150,26 +149,23 @@ class Box2DSimulation(Simulation):
             "warm_starting": bool(world.warmStarting),
             "sub_stepping": bool(world.subStepping),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": body.mass,
                     "inertia": body.inertia / units**2,
                     "size": self._size(body.fixtures[0].shape),
                     "may_sleep": bool(body.sleepingAllowed),
                     "damping": [body.linearDamping, body.angularDamping],
                 }
-                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                for name, body in free_parts(self.scene, self.bodies)
             },
         }
         if self.single:
             fixtures = [body.fixtures[0] for body in self.bodies]
-            held["pairs"] = {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": max(fixtures[i].restitution, fixtures[j].restitution),
-                    "friction": math.sqrt(fixtures[i].friction * fixtures[j].friction),
-                }
-                for i, j in told_pairs(self.scene)
-            }
+            held["pairs"] = pair_materials(
+                self.scene,
+                ([own.restitution for own in fixtures], max),
+                ([own.friction for own in fixtures], lambda a, b: math.sqrt(a * b)),
+            )
         return held
 
     def _size(self, shape: Any) -> list[float]:
@@ -177,9 +173,3 @@ class Box2DSimulation(Simulation):
         if hasattr(shape, "vertices"):
             return [float(x) / self.units for x in np.max(np.abs(shape.vertices), axis=0)]
         return [float(shape.radius) / self.units]
-
-
-def single(scene: Scene) -> tuple[float, float] | None:
-    """Restitution and friction, if they are the same for all pairs: what Box2D mixes of equal numbers is the number."""
-    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
-    return found.pop() if len(found) == 1 else None

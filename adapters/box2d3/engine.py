@@ -9,25 +9,23 @@ Names in the sources are those of Box2D's own files.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.box2d3.profiles import KINDS, PROFILES, TUNED_SUBSTEPS, checked
+from adapters.box2d3.profiles import KINDS, PROFILES, TUNED_SUBSTEPS
 from adapters.box2d3.releases import RELEASES
 from adapters.box2d3.script import python
 from adapters.box2d3.shipped import SUBSTEPS
 from adapters.box2d3.simulation import Box2D3Simulation
 from adapters.box2d3.translation import frictions, restitutions
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
 from adapters.scene import Scene
-from adapters.settings import checked_step
-from adapters.single_precision import without_a_place
 
 
 @final
-class Box2D3Engine(Engine):
+class Box2D3Engine(CheckedEngine):
     """Planar engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -80,16 +78,12 @@ class Box2D3Engine(Engine):
             Quirk("there is room for 128 worlds", "a world is destroyed when its run ends", "core.h, B2_MAX_WORLDS"),
         ),
     )
+    module = "pyb2d3"
+    simulation = Box2D3Simulation
     profiles = PROFILES
     releases = RELEASES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of the installed bindings, which bring their own Box2D."""
-        import pyb2d3  # noqa: F401  (a release that cannot be imported has no version)
-
-        return version("pyb2d3")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
@@ -97,27 +91,7 @@ class Box2D3Engine(Engine):
             return "pairs: restitution of a pair is the larger of two numbers here, this table has none"
         if frictions(scene) is None:
             return "pairs: friction of a pair is the root of a product of two numbers here, this table has none"
-        return without_a_place(scene)
-
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a spatial scene, a scene that `refuses` names, a bad step or setting.
-        """
-        if scene.dimension != 2:
-            raise EngineError("dimension: box2d3 is planar and cannot run a spatial scene")
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
-        if reason:
-            raise EngineError(reason)
-        return Box2D3Simulation(scene, dt, chosen)
+        return super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Nothing so far."""

@@ -8,7 +8,6 @@ from typing import Any
 
 from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES
-from adapters.box2d3.rod_on_its_end import corner_on_plane_law
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
@@ -137,22 +136,6 @@ DEVIATIONS += tuple(
         CHECKED_ON,
     )
     for profile in PROFILES
-)
-
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        "kane",
-        metric,
-        corner_on_plane_law(metric, _chosen(profile)),
-        "a rebound comes last, without friction, which knows the impulse of compression only and is solved beside it "
-        "by one sweep in each small step",
-        "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/rod_on_its_end.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for metric in ("rise", "ahead", "spin", "gain")
 )
 
 DEVIATIONS += tuple(

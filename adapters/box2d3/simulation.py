@@ -8,30 +8,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from adapters.box2d3.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 _UNKNOWN = (math.nan, math.nan)
 
 
 class Box2D3Simulation(Simulation):
-    """One world; bodies in the scene's order."""
+    """One world; bodies in the scene's order.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import pyb2d3
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
         from adapters.box2d3.drawing import Pen
 
+        self.pyb2d3 = module or import_module("pyb2d3")
         self.scene, self.dt, self.settings = scene, dt, settings
         units = self.units = float(settings["units_per_metre"])
-        self.world: Any = pyb2d3.World(
+        self.world: Any = self.pyb2d3.World(
             gravity=self._vector(scene.gravity),
             restitution_threshold=settings["restitution_threshold"] * units,
             maximum_linear_speed=settings["maximum_speed"] * units,
@@ -41,7 +44,7 @@ class Box2D3Simulation(Simulation):
         self.world.sleeping_enabled = False
         self.reach = reach(scene)
         self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
-        self.bodies = [self._made(pyb2d3, index, body) for index, body in enumerate(scene.bodies)]
+        self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         self.loads = [
             (self.bodies[i], self._vector(body.force), body.torque[0] * units**2)
             for i, body in enumerate(scene.bodies)
@@ -53,7 +56,8 @@ class Box2D3Simulation(Simulation):
     def _vector(self, v: tuple[float, ...]) -> tuple[float, float]:
         return v[0] * self.units, v[1] * self.units
 
-    def _made(self, pyb2d3: Any, index: int, asked: Body) -> Any:
+    def _made(self, index: int, asked: Body) -> Any:
+        pyb2d3 = self.pyb2d3
         make = {
             "free": self.world.create_dynamic_body,
             "fixed": self.world.create_static_body,
@@ -71,7 +75,7 @@ class Box2D3Simulation(Simulation):
         turn.c, turn.s = c, s
         body = make(position=self._vector((x, y)), rotation=turn, enable_sleep=False)
         material = pyb2d3.surface_material(restitution=self.restitutions[index], friction=self.frictions[index])
-        body.create_shape(pyb2d3.shape_def(density=1.0, material=material), self._shape(pyb2d3, asked))
+        body.create_shape(pyb2d3.shape_def(density=1.0, material=material), self._shape(asked))
         if asked.motion == "free":
             assert isinstance(asked.inertia, float | int)
             held = body.mass_data
@@ -83,8 +87,8 @@ class Box2D3Simulation(Simulation):
             body.linear_velocity, body.angular_velocity = self._vector((vx, vy)), omega
         return body
 
-    def _shape(self, pyb2d3: Any, asked: Body) -> Any:
-        shape = asked.shape
+    def _shape(self, asked: Body) -> Any:
+        pyb2d3, shape = self.pyb2d3, asked.shape
         if isinstance(shape, Disc):
             return pyb2d3.circle(radius=shape.radius * self.units)
         if isinstance(shape, Box):
@@ -133,13 +137,12 @@ class Box2D3Simulation(Simulation):
         """Points and normals of what touched in the last step; impulses and gaps are not told (NaN)."""
         from adapters.box2d3.drawing import named, touching
 
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for (x, y), normal in touching(self.pen, self.world):
             point = (x / self.units, y / self.units)
             i, j = named((point, normal), self.scene.bodies, self.before)
             rows.append((i, j, point, normal, _UNKNOWN, math.nan))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 2)
+        return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and shapes hold; the bindings do not tell springs and speeds again."""
@@ -151,23 +154,17 @@ class Box2D3Simulation(Simulation):
             "continuous": bool(world.continuous_enabled),
             "may_sleep": bool(world.sleeping_enabled),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": float(body.mass),
                     "inertia": float(body.mass_data.rotational_inertia) / units**2,
                     "damping": [float(body.linear_damping), float(body.angular_damping)],
                 }
-                for asked, body in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                for name, body in free_parts(self.scene, self.bodies)
             },
         }
         shapes = [body.shapes[0] for body in self.bodies]
-        held["pairs"] = {
-            f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                "restitution": max(float(shapes[i].restitution), float(shapes[j].restitution)),
-                "friction": math.sqrt(float(shapes[i].friction) * float(shapes[j].friction)),
-            }
-            for i, j in told_pairs(self.scene)
-        }
+        restitutions, frictions = [float(own.restitution) for own in shapes], [float(own.friction) for own in shapes]
+        held["pairs"] = pair_materials(self.scene, (restitutions, max), (frictions, lambda a, b: math.sqrt(a * b)))
         return held
 
     def close(self) -> None:

@@ -18,7 +18,8 @@ from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE, WARM_STARTING
 from adapters.bullet.simulation import BulletSimulation
 from adapters.bullet.translation import factors, moments
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.meeting import meeting_pairs
 from adapters.needs import Needs
 from adapters.probes import (
@@ -95,7 +96,7 @@ _QUIRKS = (
 )
 
 
-class BulletEngine(Engine):
+class BulletEngine(CheckedEngine):
     """Bullet 3 through PyBullet."""
 
     facts = EngineFacts(
@@ -110,13 +111,15 @@ class BulletEngine(Engine):
         colour="#12a38d",
         quirks=_QUIRKS,
     )
+    module = "pybullet"
+    simulation = BulletSimulation
     profiles = PROFILES
     kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
-        """Version of the installed wheel; PyBullet itself does not know it."""
+        """Version of the installed wheel; PyBullet itself does not know it, and prints a line where it is imported."""
         return version("pybullet")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
@@ -135,23 +138,10 @@ class BulletEngine(Engine):
                 return f"{coefficient}: bullet multiplies values of bodies, no product gives this table of pairs"
         return None
 
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
+    def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """See `CheckedEngine.checked`."""
         checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> BulletSimulation:
-        """Make a world in a new DIRECT client.
-
-        Raises
-        ------
-        EngineError
-            For a setting or a step that Bullet would ignore, or a scene that `refuses` names.
-        """
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        if refusal := self.refuses(scene, ""):
-            raise EngineError(refusal)
-        return BulletSimulation(scene, dt, settings)
+        return dict(settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: parameters of the world, of how bodies are made, and of each body; none depends on the step."""

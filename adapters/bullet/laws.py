@@ -11,18 +11,18 @@ into one of 2 v d/(g dt) in the gap; after some impacts nothing is left of sixte
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
 
 from adapters.bullet.contact_law import ContactLaw, Fall, fall
 from adapters.bullet.profiles import PROFILES, law_of
-from adapters.bullet.shipped import CHECKED_ON, RESIDUAL, SPLIT_DEPTH
+from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, exactly
 from adapters.needs import needs
-from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
+from adapters.scene import Disc, HalfSpace, Scene, Sphere
+from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from adapters.unswept import passing_law, shoved_law
@@ -37,8 +37,6 @@ SPREAD_FACTOR = 10.0
 BLURRED = 1e-4
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
-#: Velocity [m/s] by which a solve as shipped may stop short: rows that change by less.
-RESIDUAL_SPEED = math.sqrt(RESIDUAL)
 
 
 def _is_one_ball_over_a_floor(scene: Scene) -> bool:
@@ -91,21 +89,8 @@ def _scale(scene: Scene, metric: str) -> float:
     return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
 
 
-class _Held:
-    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-
-    def __hash__(self) -> int:
-        return hash(self.scene.hash())
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and self.scene == other.scene
-
-
 @lru_cache(maxsize=4096)
-def _predictions(profile: str, held: _Held, dt: float, measure: Measure) -> dict[str, Prediction]:
+def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[str, Prediction]:
     """Value and band of every metric that can be predicted."""
     scene = held.scene
     law = law_of(profile, needs(scene), dt)
@@ -132,71 +117,9 @@ def _ball_law(profile: str, metric: str) -> Law:
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         if not _is_one_ball_over_a_floor(scene):
             return None
-        return _predictions(profile, _Held(scene), dt, measure).get(metric)
+        return _predictions(profile, Held(scene), dt, measure).get(metric)
 
     return law
-
-
-def sliding_with_drag(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-    """Mean acceleration over the second half of a slide that the drag of the multibody path brakes.
-
-    It is a difference of two velocities over a window; each is known to what a solve leaves, `RESIDUAL_SPEED`. The law
-    is silent about a box that moves farther in a step than its manifold's points may drift before they are dropped:
-    what friction is then left is not predicted (listed as ``incline-contact-switching``).
-    """
-    box = scene.bodies[1].shape
-    if not isinstance(box, Box):
-        return None
-    law = law_of("default", needs(scene), dt)
-    mu = scene.material("floor", "box").friction
-    pull, weight = scene.gravity[0], -scene.gravity[-1]
-    if pull <= mu * weight:
-        return None
-    steps = step_count(scene.duration, dt)
-    speed = np.zeros(steps + 1)
-    for k in range(steps):
-        speed[k + 1] = speed[k] + (pull - mu * weight) * dt - law.drag(speed[k], dt)
-    if speed[-1] * dt > law.breaking * _bounding_radius(box):
-        return None
-    middle = (steps + 1) // 2
-    mean = (speed[-1] - speed[middle]) / ((steps - middle) * dt)
-    return float(mean), 2.0 * RESIDUAL_SPEED / ((steps - middle) * dt)
-
-
-def pulled_with_drag(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-    """Pull of a belt on a box, of which the drag of the multibody path takes its share at the box's own speed.
-
-    Silent as `sliding_with_drag` is, at the speed of the slip. A mean over a third of the ride is off by what a
-    solve leaves at both its ends.
-    """
-    belt, box = scene.bodies[0], scene.bodies[-1].shape
-    if len(scene.bodies) != 2 or not isinstance(box, Box) or any(scene.gravity[:-1]):
-        return None
-    run = math.hypot(*belt.surface_velocity)
-    law = law_of("default", needs(scene), dt)
-    if run == 0.0 or run * dt > law.breaking * _bounding_radius(box):
-        return None
-    pull = scene.material(belt.name, scene.bodies[1].name).friction * -scene.gravity[-1]
-    steps, d = step_count(scene.duration, dt), scene.dimension
-    speed = np.zeros(steps + 1)
-    for k in range(steps):
-        # Friction gives what takes the box to the belt's speed, drag made up for, but no more than its limit.
-        free = speed[k] - law.drag(speed[k], dt)
-        speed[k + 1] = min(run, free + pull * dt)
-    line = np.array(belt.surface_velocity) / run
-    pose = np.array([[body.pose for body in scene.bodies]] * (steps + 1))
-    twist = np.zeros((steps + 1, 2, 3 if d == 2 else 6))
-    pose[1:, 1, :d] += np.outer(np.cumsum(speed[1:]) * dt, line)
-    twist[:, 1, :d] = np.outer(speed, line)
-    motion = Trajectory(np.arange(steps + 1, dtype=np.float64) * dt, pose, twist, None, dt, "completed")
-    value, _ = measure(scene, motion)["pull"]
-    return None if value is None else (value, 6.0 * RESIDUAL_SPEED / scene.duration)
-
-
-def _bounding_radius(box: Box) -> float:
-    """Half diagonal [m]; a planar box is lifted as deep as it is wide or tall."""
-    half = box.half_extents
-    return math.hypot(*half) if len(half) == 3 else math.hypot(*half, max(half))
 
 
 _BALL_METRICS = {
@@ -223,42 +146,20 @@ _SOURCE = {
 }
 
 
-DEVIATIONS: tuple[Deviation, ...] = (
-    *(
-        Deviation(
-            "bullet",
-            (profile,),
-            scene,
-            exactly(metric),
-            _ball_law(profile, metric),
-            _BECAUSE[profile],
-            _SOURCE[profile],
-            CHECKED_ON,
-        )
-        for profile in ("default", "tuned", "one")
-        for scene, metrics in _BALL_METRICS.items()
-        for metric in metrics
-    ),
+DEVIATIONS: tuple[Deviation, ...] = tuple(
     Deviation(
         "bullet",
-        ("default",),
-        "incline",
-        "acceleration",
-        sliding_with_drag,
-        "drag 0.04 (1 + v) v of the multibody path brakes the slide",
-        "btMultiBody.cpp:843 (bullet3 6c888f4)",
+        (profile,),
+        scene,
+        exactly(metric),
+        _ball_law(profile, metric),
+        _BECAUSE[profile],
+        _SOURCE[profile],
         CHECKED_ON,
-    ),
-    Deviation(
-        "bullet",
-        ("default",),
-        "conveyor",
-        "pull",
-        pulled_with_drag,
-        "drag 0.04 (1 + v) v of the multibody path brakes the box as it is pulled along",
-        "btMultiBody.cpp:843 (bullet3 6c888f4)",
-        CHECKED_ON,
-    ),
+    )
+    for profile in ("default", "tuned", "one")
+    for scene, metrics in _BALL_METRICS.items()
+    for metric in metrics
 )
 
 DEVIATIONS += tuple(

@@ -29,8 +29,6 @@ RESTITUTION_THRESHOLD = 0.2
 SPLIT_DEPTH = 0.04
 #: The multibody path cuts velocities to this after a step [m/s].
 LARGEST_SPEED = 100.0
-#: A solve ends when the square of its largest change is below this [m^2/s^2].
-RESIDUAL = 1e-7
 
 #: Smallest full extent that stands still [m]; smaller ones rest at a wrong height or fall through at 1/240 s.
 SMALLEST_SIZE = 5e-3

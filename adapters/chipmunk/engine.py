@@ -13,19 +13,20 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from adapters.checked_engine import CheckedEngine
 from adapters.chipmunk.profiles import KINDS, PROFILES, SLOP_SHARE, START_SHARE, checked
-from adapters.chipmunk.releases import RELEASES, installed_version
+from adapters.chipmunk.releases import RELEASES
 from adapters.chipmunk.script import python
 from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs, needs
 from adapters.probes import SLIDE_TIME
 from adapters.receipts import IMPULSE_SHARE
 from adapters.scene import Scene
 
 
-class ChipmunkEngine(Engine):
+class ChipmunkEngine(CheckedEngine):
     """Planar engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -78,14 +79,12 @@ class ChipmunkEngine(Engine):
             Quirk("nothing is swept: a fast body passes a thin one", "the ground is 1 km thick", "cpSpaceStep.c:400"),
         ),
     )
+    module = "pymunk"
+    simulation = ChipmunkSimulation
     profiles = PROFILES
     kinds = KINDS
     releases = RELEASES
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of pymunk; strings of its own and of the bundled C library are stale in some releases."""
-        return installed_version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Pair tables that no product of two numbers can represent, and masses whose inverse overflows."""
@@ -101,27 +100,9 @@ class ChipmunkEngine(Engine):
         """Steps in which a body could pass the ground's polygon."""
         return leaves_ground(scene, dt)
 
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world; see `Engine.build`.
-
-        Raises
-        ------
-        EngineError
-            For a spatial scene, a scene that `refusal` names, or a bad step or setting.
-        """
-        if scene.dimension != 2:
-            raise EngineError("dimension: chipmunk is planar and cannot run a spatial scene")
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
-        chosen = checked(settings)
-        reason = self.refusal(scene, "", dt)
-        if reason:
-            raise EngineError(reason)
-        return ChipmunkSimulation(scene, dt, chosen)
+    def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """See `CheckedEngine.checked`."""
+        return checked(settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: attributes of the space, and how deep touching bodies start."""

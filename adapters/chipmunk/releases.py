@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Any
 
 from adapters.releases import Difference, Distribution, Releases
@@ -19,19 +18,6 @@ RELEASES = Releases(
                    "measured"),
     ),
 )  # fmt: skip
-
-
-def installed_version() -> str:
-    """Version of the installed release, from its metadata.
-
-    Raises
-    ------
-    ImportError
-        If pymunk is not installed.
-    """
-    import pymunk  # noqa: F401  (a release that cannot be imported has no version)
-
-    return version("pymunk")
 
 
 def point_impulses(arbiter: Any, count: int) -> list[tuple[float, float]]:

@@ -7,6 +7,7 @@ same instant, and free fall lags the parabola by g t dt / 2. Line numbers are th
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import mul
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from adapters.chipmunk.releases import point_impulses
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.meeting import told_pairs
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Scene
 
 
@@ -106,7 +107,7 @@ class ChipmunkSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Up to two points per pair, sorted by pair; impulses per point."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         failures: list[Exception] = []
         for i, body in enumerate(self.bodies):
             if self.scene.bodies[i].motion != "free":
@@ -123,8 +124,7 @@ class ChipmunkSimulation(Simulation):
             body.each_arbiter(collect)
         if failures:
             raise EngineError(f"contacts: {type(failures[0]).__name__}: {failures[0]}")
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 2)
+        return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
         """What the space, its bodies and shapes hold."""
@@ -140,17 +140,12 @@ class ChipmunkSimulation(Simulation):
             "sleep_time_threshold": str(space.sleep_time_threshold),
             "last_step": space.current_time_step,
             "bodies": {
-                asked.name: {"mass": body.mass, "inertia": body.moment, "size": _size(shape)}
-                for asked, body, shape in zip(self.scene.bodies, self.bodies, self.shapes, strict=True)
-                if asked.motion == "free"
+                name: {"mass": shape.body.mass, "inertia": shape.body.moment, "size": _size(shape)}
+                for name, shape in free_parts(self.scene, self.shapes)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": self.shapes[i].elasticity * self.shapes[j].elasticity,
-                    "friction": self.shapes[i].friction * self.shapes[j].friction,
-                }
-                for i, j in told_pairs(self.scene)
-            },
+            "pairs": pair_materials(
+                self.scene, ([own.elasticity for own in self.shapes], mul), ([own.friction for own in self.shapes], mul)
+            ),
         }
 
 

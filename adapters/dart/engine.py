@@ -9,25 +9,24 @@ Profiles differ in what solves the contact problem, and in nothing else.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
+from adapters.checked_engine import CheckedEngine
 from adapters.dart.profiles import CONES, KINDS, MOST_BOXES, PROFILES, checked, solved
 from adapters.dart.releases import RELEASES, refusal
 from adapters.dart.script import python
 from adapters.dart.shipped import MIXING, PUSH_OUT, SMOOTH, THRESHOLD, restitution
 from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
 from adapters.probes import MOST_FRICTION, REBOUND_SPEED
 from adapters.scene import Box, Scene
-from adapters.settings import checked_step
 
 
 @final
-class DartEngine(Engine):
+class DartEngine(CheckedEngine):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -84,16 +83,12 @@ class DartEngine(Engine):
             Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 6.20.0"),
         ),
     )
+    module = "dartpy"
+    simulation = DartSimulation
     profiles = PROFILES
     releases = RELEASES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of the installed distribution."""
-        import dartpy  # noqa: F401  (a release that cannot be imported has no version)
-
-        return version("dartpy")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse bodies that are moved as prescribed, tables that no bodies' own numbers give, and piles of cones."""
@@ -109,23 +104,13 @@ class DartEngine(Engine):
             return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
         return refusal(profile)
 
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
+    def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """See `CheckedEngine.checked`."""
+        return checked(settings)
 
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a scene that `refuses` names, a bad step or setting.
-        """
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, str(chosen["solver"]))  # the profiles of cones are named after theirs
-        if reason:
-            raise EngineError(reason)
-        return DartSimulation(scene, dt, chosen)
+    def profile_of(self, settings: Mapping[str, Any]) -> str:
+        """Name of the solver, after which the profiles of cones are named."""
+        return str(settings["solver"])
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""

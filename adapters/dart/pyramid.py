@@ -1,6 +1,6 @@
 """A box or a ball that slips over a level floor under a pyramid of friction, step by step as DART makes it.
 
-    vz  <-  vz - g dt                     and is stopped, or pushed out, where something touches: falling.py
+    vz  <-  vz - g dt                     and is stopped, or pushed out, where something touches: meeting.py
     for each axis of the floor by itself, with its slip s and the floor's push n of this step:
         j = min(mu n, m |s|/(1 + k))      k = m r^2/I of a ball, 0 of a box, which does not turn
         v <- v - j/m,  s <- s - (1 + k) j/m

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
+from operator import mul
 from typing import Any
 
 import numpy as np
 
 from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 from adapters.dart.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.ground import reach
-from adapters.meeting import told_pairs
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 #: Names of the detectors' classes.
@@ -24,24 +26,26 @@ DETECTORS = {
 
 
 class DartSimulation(Simulation):
-    """One world; bodies in the scene's order, each a skeleton of its own."""
+    """One world; bodies in the scene's order, each a skeleton of its own.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import dartpy
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        dartpy = self.dartpy = module or import_module("dartpy")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = dartpy.simulation.World()
         self.world.setTimeStep(dt)
         self.world.setGravity(list(scene.gravity))
-        detector = getattr(dartpy.collision, DETECTORS[settings["detector"]])()
-        self.world.getConstraintSolver().setCollisionDetector(detector)
+        held = self.world.getConstraintSolver()
+        held.setCollisionDetector(getattr(dartpy.collision, DETECTORS[settings["detector"]])())
         keep_awake(self.world)
-        self.solver: Any = self._solver(dartpy, settings)
+        self.solver: Any = self._solver(held, settings)
         self.reach = reach(scene)
         self.restitutions, self.frictions = restitutions(scene) or [], frictions(scene) or []
         self.nodes: list[Any] = []
         for index, body in enumerate(scene.bodies):
-            self.nodes.append(self._made(dartpy, index, body))
+            self.nodes.append(self._made(index, body))
         self.loaded = [
             (node, list(body.force), list(body.torque))
             for node, body in zip(self.nodes, scene.bodies, strict=True)
@@ -49,9 +53,9 @@ class DartSimulation(Simulation):
         ]
         self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
 
-    def _solver(self, dartpy: Any, settings: Mapping[str, Any]) -> Any:
+    def _solver(self, held: Any, settings: Mapping[str, Any]) -> Any:
         """Make and set the solver of the contact problem, and who answers where it finds none; Dantzig's is there."""
-        held, name = self.world.getConstraintSolver(), settings["solver"]
+        dartpy, name = self.dartpy, settings["solver"]
         option = dartpy.constraint.PgsBoxedLcpSolverOption()
         # Sweeps that end above the tolerance count as failed, and what the second choice finds is taken as it is: where
         # PGS is asked for, that has to be as many sweeps.
@@ -62,7 +66,7 @@ class DartSimulation(Simulation):
         if second is not None:
             second.setOption(option)
         if name == "dantzig":
-            return held.getBoxedLcpSolver()
+            return None
         if name == "pgs":
             # Its class has no constructor in Python; every world brings one as its second choice.
             self.other = dartpy.simulation.World()
@@ -78,7 +82,8 @@ class DartSimulation(Simulation):
         held.setBoxedLcpSolver(solver)
         return solver
 
-    def _made(self, dartpy: Any, index: int, asked: Body) -> Any:
+    def _made(self, index: int, asked: Body) -> Any:
+        dartpy = self.dartpy
         skeleton = dartpy.dynamics.Skeleton(f"body {index}")
         free = asked.motion == "free"
         joint, node = skeleton.createFreeJointAndBodyNodePair() if free else skeleton.createWeldJointAndBodyNodePair()
@@ -142,7 +147,7 @@ class DartSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Contacts of the last step; the force is on the first body, along a normal that points to it."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for contact in self.world.getLastCollisionResult().getContacts():
             first, second = (
                 self.index[one.getShapeFrame().getBodyNode().getName()]
@@ -150,8 +155,7 @@ class DartSimulation(Simulation):
             )
             impulse = np.multiply(self.dt, contact.force)
             rows.append((second, first, contact.point, contact.normal, impulse, -contact.penetrationDepth))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world and its bodies hold."""
@@ -164,20 +168,13 @@ class DartSimulation(Simulation):
             "may_sleep": may_sleep(self.world),
             "split_impulse": splits_impulses(held),
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": node.getMass(),
                     "inertia": [float(x) for x in np.diag(node.getInertia().getMoment())],
                 }
-                for asked, node in zip(self.scene.bodies, self.nodes, strict=True)
-                if asked.motion == "free"
+                for name, node in free_parts(self.scene, self.nodes)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": self.restitutions[i] * self.restitutions[j],
-                    "friction": min(self.frictions[i], self.frictions[j]),
-                }
-                for i, j in told_pairs(self.scene)
-            },
+            "pairs": pair_materials(self.scene, (self.restitutions, mul), (self.frictions, min)),
         }
 
 

@@ -8,24 +8,23 @@ Profiles differ in the approximation of ``j``, and in nothing else.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any, final
 
+from adapters.checked_engine import CheckedEngine
 from adapters.drake.landing import slowest_rebound
 from adapters.drake.profiles import KINDS, OWN, PROFILES, checked
 from adapters.drake.script import python
 from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
 from adapters.drake.translation import frictions
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
+from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
 from adapters.meeting import meeting_pairs
 from adapters.model import PROFILE
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
 from adapters.scene import Capsule, Cylinder, Scene, Sphere
-from adapters.settings import checked_step
 
 #: What the solver of a convex step leaves, as a share of what it changes, and of a speed [m/s]; measured 6e-6 at most.
 SOLVED_SHARE, SOLVED = 1e-5, 1e-6
@@ -55,7 +54,7 @@ def _unsound(scene: Scene) -> str | None:
 
 
 @final
-class DrakeEngine(Engine):
+class DrakeEngine(CheckedEngine):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -105,6 +104,8 @@ class DrakeEngine(Engine):
             Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 1.51.1"),
         ),
     )
+    module = "pydrake"
+    simulation = DrakeSimulation
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
@@ -117,12 +118,6 @@ class DrakeEngine(Engine):
         ),
     )
 
-    def version(self) -> str:
-        """Version of the installed distribution."""
-        import pydrake  # noqa: F401  (a release that cannot be imported has no version)
-
-        return version("drake")
-
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse restitution, moved bodies, tables that no single bodies' numbers give, and rods that touch no ball."""
         for body in scene.bodies:
@@ -134,23 +129,13 @@ class DrakeEngine(Engine):
             return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
         return None if profile == PROFILE else _unsound(scene)
 
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
+    def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """See `CheckedEngine.checked`."""
+        return checked(settings)
 
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a scene that `refuses` names, a bad step or setting.
-        """
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, PROFILE if OWN in chosen else "")
-        if reason:
-            raise EngineError(reason)
-        return DrakeSimulation(scene, dt, chosen)
+    def profile_of(self, settings: Mapping[str, Any]) -> str:
+        """Profile of a model, if it brings its bodies' own numbers."""
+        return PROFILE if OWN in settings else ""
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """What springs throw back, and friction where the approximation of contact does not keep to the load."""

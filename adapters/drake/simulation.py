@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from adapters.drake.profiles import APPROXIMATIONS, OWN
 from adapters.drake.translation import frictions, pair_of
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.readback import free_parts
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 
 class DrakeSimulation(Simulation):
-    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world."""
+    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        import pydrake.all
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
 
-        # Its stubs know no arrays as NumPy types them.
-        drake: Any = pydrake.all
-        self.scene, self.dt, self.settings, self.drake = scene, dt, settings, drake
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        drake = self.drake = module or import_module("pydrake.all")
+        self.scene, self.dt, self.settings = scene, dt, settings
         builder = drake.DiagramBuilder()
-        self.plant, graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
+        self.plant, self.graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
         plant = self.plant
         approximation = getattr(drake.DiscreteContactApproximation, APPROXIMATIONS[settings["approximation"]])
         plant.set_discrete_contact_approximation(approximation)
@@ -37,7 +39,6 @@ class DrakeSimulation(Simulation):
         diagram = builder.Build()
         self.simulator: Any = drake.Simulator(diagram)
         self.context: Any = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
-        self.inspector: Any = graph.model_inspector()
         for body, asked in zip(self.bodies, scene.bodies, strict=True):
             if asked.motion == "free":
                 plant.SetFreeBodyPose(self.context, body, self._place(asked))
@@ -145,7 +146,7 @@ class DrakeSimulation(Simulation):
         if self.steps == 0:
             return Contacts.from_rows([], 3)
         found = self.plant.get_contact_results_output_port().Eval(self.context)
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for k in range(found.num_point_pair_contacts()):
             info = found.point_pair_contact_info(k)
             pair = info.point_pair()
@@ -171,21 +172,18 @@ class DrakeSimulation(Simulation):
             normal = normal / np.linalg.norm(normal)
             impulse = np.multiply(self.dt, force.translational())
             rows.append((second, first, surface.centroid(), normal, impulse, np.nan))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the plant, its bodies and their shapes hold."""
-        plant = self.plant
-        held = {index: self.inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
+        plant, inspector = self.plant, self.graph.model_inspector()
+        held = {index: inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
         own = [
             float(held[index].GetProperty("material", "coulomb_friction").dynamic_friction())
             for index in range(len(held))
         ]
         inertias = {
-            asked.name: body.CalcSpatialInertiaInBodyFrame(self.context)
-            for body, asked in zip(self.bodies, self.scene.bodies, strict=True)
-            if asked.motion == "free"
+            name: body.CalcSpatialInertiaInBodyFrame(self.context) for name, body in free_parts(self.scene, self.bodies)
         }
         return {
             "dt": float(plant.time_step()),

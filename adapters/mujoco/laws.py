@@ -5,8 +5,6 @@ from __future__ import annotations
 from adapters.law import AskedLaw, Deviation, Law, exactly
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
-from adapters.mujoco.convex_blows import convex_blow_law, matched_blow_law
-from adapters.mujoco.leaning import leaning_law
 from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_asked, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
@@ -44,21 +42,6 @@ _BECAUSE = {
     ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
     ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
     "corners, a blow is off by 1e-4 of it",
-    (
-        "tuned",
-        "edges",
-    ): "contact is a spring: a block that stands on its edge gives by a hair, and once its weight is past "
-    "the edge it tips as a rigid one does",
-    ("tuned", "shared"): "impedance ends at 0.9999: each rebound is short of 1e-4 of it",
-    (
-        "tuned",
-        "rubbed",
-    ): "an edge is struck half-way into the overlap in which a step finds it, and normal and friction "
-    "are one convex problem: an end that slips is lifted",
-    (
-        "matched",
-        "rubbed",
-    ): "an edge is struck half-way into the overlap in which a step finds it, with an arm that is shorter by that",
 }
 #: Speeds and spins after bounces, accelerations and hops of balls.
 _ROLLING = {
@@ -73,11 +56,6 @@ _BLOWS = (
     ("tuned", "flat_box", ("rebound_ratio", "impulse")),
     ("tuned", "edge_drop", ("rise", "spin", "impulse")),
     ("tuned", "off_centre", ("ball_speed", "bar_speed", "spin", "impulse", "energy_lost")),
-)
-#: What a stack of leaning blocks shows; of how many blocks, its scene says.
-_EDGES = (
-    *("stands", "settle_time", "drift", "penetration", "kinetic_energy", "impulse_scatter"),
-    *(f"interface_impulse[{k}]" for k in range(1, 21)),
 )
 _SOURCE = "MuJoCo documentation, computation: constraint model; modeling: solver parameters, slow slippage"
 
@@ -111,16 +89,6 @@ DEVIATIONS: tuple[Deviation, ...] = (
         _deviation(profile, scene, metric, blow_law(profile, metric), "blow")
         for profile, scene, metrics in _BLOWS
         for metric in metrics
-    ),
-    *(_deviation("tuned", "overhang", metric, leaning_law("tuned", metric), "edges") for metric in _EDGES),
-    _deviation("tuned", "rack", "energy_defect", convex_blow_law("tuned", "energy_defect"), "shared"),
-    *(
-        _deviation("tuned", "kane", metric, convex_blow_law("tuned", metric), "rubbed")
-        for metric in ("rise", "ahead", "spin", "gain")
-    ),
-    *(
-        _deviation("matched", "kane", metric, matched_blow_law("matched", metric), "rubbed")
-        for metric in ("rise", "ahead", "spin", "gain")
     ),
     *(
         _deviation(profile, "slide", metric, stopping_law(profile, metric), "slide")

@@ -8,30 +8,27 @@ Overlaps of a step's end are taken back, all contacts at once; a body gets the m
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib.metadata import version
 from types import MappingProxyType
-from typing import Any, final
+from typing import final
 
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
-from adapters.means import means
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
+from adapters.means import no_means
 from adapters.needs import Needs
-from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS, checked
+from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS
 from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
 from adapters.newton.simulation import NewtonSimulation, imported
 from adapters.probes import GRAVITY, SLIDE_TIME
 from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
-from adapters.settings import checked_step
-from adapters.single_precision import without_a_place
 
 #: Most that the mass of a box is above what its corner feels, on any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 + c^2).
 LEAST_SHARE = 7.0
 
 
 @final
-class NewtonEngine(Engine):
+class NewtonEngine(CheckedEngine):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -93,39 +90,20 @@ class NewtonEngine(Engine):
             ),
         ),
     )
+    module = "newton"
+    simulation = NewtonSimulation
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
         """Version of the installed distribution."""
-        imported()  # a release that cannot be imported has no version
-        return version("newton")
+        imported()  # without the words of its first import
+        return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
-        for coefficient in ("restitution", "friction"):
-            if means(scene, coefficient) is None:
-                return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
-        return without_a_place(scene)
-
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a scene that `refuses` names, a bad step or setting.
-        """
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
-        if reason:
-            raise EngineError(reason)
-        return NewtonSimulation(scene, dt, chosen)
+        return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """What two sweeps leave of an approach, what stopping takes, and rebounds without friction."""

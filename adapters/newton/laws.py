@@ -1,4 +1,10 @@
-"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone."""
+"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone.
+
+The recurrence of its sweeps is ten times as long as a law is meant to be, and stays: it explains 1 097 rows of the
+standard suite, of 32 scenes, 643 of balls and boxes among planes and 454 of columns. As findings they would be as many
+lines, in some forty families, and hold at one step and for these parameters alone. And five families of what trembles,
+sinks through, settles late or creeps have their proof from it: the same recurrence in doubles does not.
+"""
 
 from __future__ import annotations
 

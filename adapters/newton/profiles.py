@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
@@ -85,8 +84,3 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 
 
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profile, "tuned": tuned_profile})
-
-
-def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
-    return settings.checked("newton", KINDS, asked)

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from adapters.means import means
-from adapters.newton.profiles import checked
 from adapters.newton.simulation import ALONG_X, is_driven, triangles
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 from adapters.script import constants, imports, keywords, literal, place, stepped, text, velocity
@@ -19,24 +18,23 @@ from adapters.script import constants, imports, keywords, literal, place, steppe
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with newton; see `adapters.engine.Writer`."""
-    chosen = checked(settings)
     lines = [*imports(scene, "import newton", "import numpy as np", "import warp"), *constants(dt, steps), ""]
     lines += [
         "warp.config.log_level = warp.LOG_ERROR",
         f"builder = newton.ModelBuilder(gravity={literal(tuple(float(g) for g in scene.gravity))})",
-        f"builder.rigid_gap = {chosen['gap']!r}",
+        f"builder.rigid_gap = {settings['gap']!r}",
         "# Bodies by name: Newton's number, -1 of what is fixed and belongs to its world, and the pose at the start.",
         "bodies = {}",
     ]
     own = zip(means(scene, "restitution") or [], means(scene, "friction") or [], strict=True)
     for body, numbers in zip(scene.bodies, own, strict=True):
-        lines += ["", *_made(body, chosen, numbers)]
+        lines += ["", *_made(body, settings, numbers)]
     given = {
-        "iterations": chosen["iterations"],
-        "rigid_contact_relaxation": chosen["relaxation"],
-        "rigid_contact_con_weighting": chosen["weighted"],
-        "enable_restitution": chosen["rebounds"],
-        "rigid_contact_restitution_iterations": chosen["rebound_iterations"],
+        "iterations": settings["iterations"],
+        "rigid_contact_relaxation": settings["relaxation"],
+        "rigid_contact_con_weighting": settings["weighted"],
+        "enable_restitution": settings["rebounds"],
+        "rigid_contact_restitution_iterations": settings["rebound_iterations"],
     }
     lines += ["", 'model = builder.finalize(device="cpu")']
     lines += ["solver = newton.solvers.SolverXPBD(", "    model,"]

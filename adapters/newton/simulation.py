@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.drives import place_after, velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
-from adapters.means import means
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.means import mean, means
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
 #: Turn that takes Newton's capsules, along z, to the scene's, along x (x, y, z, w).
@@ -240,7 +241,7 @@ class NewtonSimulation(Simulation):
         margins = held.rigid_contact_margin0.numpy()[:count] + held.rigid_contact_margin1.numpy()[:count]
         normals = held.rigid_contact_normal.numpy()[:count].astype(float)
         bodies = self.model.shape_body.numpy()
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for k in range(count):
             numbers = [int(bodies[shapes[side][k]]) for side in (0, 1)]
             # Overlaps are told between points within the shapes, less what these are thick; offsets lead to surfaces.
@@ -251,8 +252,7 @@ class NewtonSimulation(Simulation):
             # The force is the one on the first body; contacts that were out of reach have none.
             impulse = np.full(3, np.nan) if self.settings["rebounds"] else -self.dt * force[k]
             rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], impulse, gap))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def _world(self, number: int, point: Array) -> Array:
         if number < 0:
@@ -279,20 +279,13 @@ class NewtonSimulation(Simulation):
             "torsional": [float(x) for x in model.shape_material_mu_torsional.numpy()],
             "rolling": [float(x) for x in model.shape_material_mu_rolling.numpy()],
             "bodies": {
-                asked.name: {
+                name: {
                     "mass": float(mass[number]),
                     "inertia": [float(inertia[number][axis][axis]) for axis in range(3)],
                 }
-                for asked, number in zip(self.scene.bodies, self.numbers, strict=True)
-                if asked.motion == "free"
+                for name, number in free_parts(self.scene, self.numbers)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": 0.5 * float(restitution[i] + restitution[j]),
-                    "friction": 0.5 * float(friction[i] + friction[j]),
-                }
-                for i, j, _ in self.scene.contact_pairs()
-            },
+            "pairs": pair_materials(self.scene, (restitution, mean), (friction, mean)),
         }
 
 

@@ -8,27 +8,24 @@ Contacts are made ahead of a touch; what would not touch within the step is left
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib.metadata import version
 from types import MappingProxyType
-from typing import Any, final
+from typing import final
 
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Expected, Quirk, Scheme, Simulation
-from adapters.means import means
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
+from adapters.means import no_means
 from adapters.needs import Needs
-from adapters.physx.profiles import KINDS, PROFILES, checked
+from adapters.physx.profiles import KINDS, PROFILES
 from adapters.physx.script import python
 from adapters.physx.shipped import ANGULAR_DAMPING, BOUNCE_THRESHOLD
-from adapters.physx.simulation import PhysxSimulation
+from adapters.physx.simulation import PhysxSimulation, imported
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import ROUNDINGS
 from adapters.scene import Scene
-from adapters.settings import checked_step
-from adapters.single_precision import without_a_place
 
 
 @final
-class PhysxEngine(Engine):
+class PhysxEngine(CheckedEngine):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -93,6 +90,8 @@ class PhysxEngine(Engine):
             Quirk("bodies sleep", "no body may", "PxRigidDynamic::setSleepThreshold"),
         ),
     )
+    module = "sapien"
+    simulation = PhysxSimulation
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
@@ -107,35 +106,12 @@ class PhysxEngine(Engine):
 
     def version(self) -> str:
         """Version of the installed bindings, which bring their own PhysX."""
-        from adapters.physx.simulation import imported
-
-        imported()  # a release that cannot be imported has no version
-        return version("sapien")
+        imported()  # without the warning of its first import
+        return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
-        for coefficient in ("restitution", "friction"):
-            if means(scene, coefficient) is None:
-                return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
-        return without_a_place(scene)
-
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a scene that `refuses` names, a bad step or setting, or while a world for another size lives.
-        """
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
-        if reason:
-            raise EngineError(reason)
-        return PhysxSimulation(scene, dt, chosen)
+        return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """As shipped spins are damped and slow approaches do not rebound."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from types import MappingProxyType
-from typing import Any
 
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
@@ -97,8 +96,3 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(
         "tuned": tuned_profile,
     }
 )
-
-
-def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`."""
-    return settings.checked("physx", KINDS, asked)

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from adapters.drives import place_after, velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError, Row, Simulation
 from adapters.impulses import along_normal
-from adapters.means import means
+from adapters.means import mean, means
 from adapters.physx.translation import turn_to, turned
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
 #: Worlds that live, and the size each was made for: the engine beneath them is one per process.
@@ -32,10 +33,13 @@ def imported() -> ModuleType:
 
 
 class PhysxSimulation(Simulation):
-    """One CPU world; bodies in the scene's order, each an entity of its own."""
+    """One CPU world; bodies in the scene's order, each an entity of its own.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        sapien: Any = imported()
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
+        sapien = self.sapien = module or imported()
         self.scene, self.dt, self.settings = scene, dt, settings
         length = settings["tolerance_length"]
         if other := next((held for held in _LIVING.values() if held != length), None):
@@ -59,16 +63,16 @@ class PhysxSimulation(Simulation):
         self.world: Any = sapien.Scene([self.system])
         self.bodies: list[Any] = []
         for index, body in enumerate(scene.bodies):
-            self.bodies.append(self._made(sapien, index, body))
+            self.bodies.append(self._made(index, body))
         self.index = {f"body {index}": index for index in range(len(scene.bodies))}
         loaded = zip(self.bodies, scene.bodies, strict=True)
-        self.loads = [(part, body.force, body.torque) for (_, part), body in loaded if body.is_loaded]
+        self.loads = [(part, body.force, body.torque) for part, body in loaded if body.is_loaded]
         self.driven = [k for k, body in enumerate(scene.bodies) if body.motion == "prescribed"]
         self.steps = 0
 
-    def _made(self, sapien: Any, index: int, asked: Body) -> tuple[Any, Any]:
-        """Entity and body of one of the scene's bodies."""
-        physx, settings = sapien.physx, self.settings
+    def _made(self, index: int, asked: Body) -> Any:
+        """Make one of the scene's bodies, in an entity of its own."""
+        sapien, physx, settings = self.sapien, self.sapien.physx, self.settings
         entity = sapien.Entity()
         entity.name = f"body {index}"
         fixed = asked.motion == "fixed"
@@ -95,7 +99,7 @@ class PhysxSimulation(Simulation):
         else:
             entity.pose = sapien.Pose(list(asked.pose[:3]), list(asked.pose[3:]))
         self.world.add_entity(entity)
-        return entity, part
+        return part
 
     def _shape(self, physx: Any, index: int, asked: Body) -> Any:
         friction = self.frictions[index]
@@ -130,22 +134,22 @@ class PhysxSimulation(Simulation):
         """Say where a prescribed body is at the end of the step that comes."""
         body, time = self.scene.bodies[k], self.steps * self.dt
         place = place_after(body, time)
-        self.bodies[k][1].kinematic_target = imported().Pose(
+        self.bodies[k].kinematic_target = self.sapien.Pose(
             list(place), list(turned(body.pose[3:], body.twist[3:], time))
         )
 
     def pose(self) -> Array:
         """See `Simulation.pose`; a half-space's own pose is the origin."""
         rows = []
-        for (entity, _), asked in zip(self.bodies, self.scene.bodies, strict=True):
-            held = entity.pose
+        for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
+            held = part.entity.pose
             rows.append(asked.pose if isinstance(asked.shape, HalfSpace) else (*held.p, *held.q))
         return np.array(rows, float)
 
     def twist(self) -> Array:
         """See `Simulation.twist`; a prescribed body's is told as soon as it has made a step."""
         rows: list[tuple[float, ...]] = []
-        for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True):
+        for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
             if asked.motion == "fixed":
                 rows.append((0.0,) * 6)
             elif asked.motion == "prescribed" and self.steps == 0:
@@ -156,7 +160,7 @@ class PhysxSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Points with normal impulses, on the first body, along a normal that points to it; friction is not told."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for contact in self.system.get_contacts():
             first, second = (self.index[part.entity.name] for part in contact.bodies)
             rough = self.materials.get((min(first, second), max(first, second)), (0.0, 0.0))[1] > 0.0
@@ -164,18 +168,12 @@ class PhysxSimulation(Simulation):
                 normal = point.normal.astype(float)
                 impulse = along_normal(float(point.impulse @ point.normal), normal, rough)
                 rows.append((second, first, point.position, normal, impulse, float(point.separation)))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and their materials hold; the size it was made for is not told again."""
         config = self.system.config
-        parts = {
-            asked.name: part
-            for (_, part), asked in zip(self.bodies, self.scene.bodies, strict=True)
-            if asked.motion == "free"
-        }
-        held = [part.collision_shapes[0].physical_material for _, part in self.bodies]
+        held = [part.collision_shapes[0].physical_material for part in self.bodies]
         return {
             "dt": float(self.system.timestep),
             "gravity": [float(g) for g in config.gravity],
@@ -183,7 +181,7 @@ class PhysxSimulation(Simulation):
             "bounce_threshold": float(config.bounce_threshold),
             "friction_every_iteration": bool(config.enable_friction_every_iteration),
             "persistent_manifolds": bool(config.enable_pcm),
-            "contact_offset": [float(part.collision_shapes[0].contact_offset) for _, part in self.bodies],
+            "contact_offset": [float(part.collision_shapes[0].contact_offset) for part in self.bodies],
             "bodies": {
                 name: {
                     "mass": float(part.mass),
@@ -195,15 +193,11 @@ class PhysxSimulation(Simulation):
                     "push_out": float(part.max_depenetration_velocity),
                     "sleep_threshold": float(part.sleep_threshold),
                 }
-                for name, part in parts.items()
+                for name, part in free_parts(self.scene, self.bodies)
             },
-            "pairs": {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": 0.5 * float(held[i].restitution + held[j].restitution),
-                    "friction": 0.5 * float(held[i].dynamic_friction + held[j].dynamic_friction),
-                }
-                for i, j in self.materials
-            },
+            "pairs": pair_materials(
+                self.scene, ([own.restitution for own in held], mean), ([own.dynamic_friction for own in held], mean)
+            ),
         }
 
     def close(self) -> None:

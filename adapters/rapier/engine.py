@@ -8,25 +8,21 @@ Every number of a step belongs to all of its small steps: impulses are their sum
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib.metadata import version
 from types import MappingProxyType
-from typing import Any, final
+from typing import final
 
-from adapters.engine import Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
+from adapters.checked_engine import CheckedEngine
+from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.rapier.profiles import KINDS, PROFILES, SUBSTEPS, TUNED_SUBSTEPS, checked
+from adapters.rapier.profiles import KINDS, PROFILES, SUBSTEPS, TUNED_SUBSTEPS
 from adapters.rapier.releases import RELEASES
 from adapters.rapier.script import python
 from adapters.rapier.simulation import RapierSimulation
 from adapters.receipts import ROUNDINGS
-from adapters.scene import Scene
-from adapters.settings import checked_step
-from adapters.single_precision import without_a_place
 
 
 @final
-class RapierEngine(Engine):
+class RapierEngine(CheckedEngine):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -82,38 +78,12 @@ class RapierEngine(Engine):
             Quirk("bodies sleep", "no body may", "rapier3d, can_sleep"),
         ),
     )
+    module = "rapier3d"
+    simulation = RapierSimulation
     profiles = PROFILES
     releases = RELEASES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of the installed distribution."""
-        import rapier3d  # noqa: F401  (a release that cannot be imported has no version)
-
-        return version("rapier3d")
-
-    def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that single precision cannot hold."""
-        return without_a_place(scene)
-
-    def check_settings(self, settings: Mapping[str, Any]) -> None:
-        """See `Engine.check_settings`."""
-        checked(settings)
-
-    def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Make a world.
-
-        Raises
-        ------
-        EngineError
-            For a scene that `refuses` names, a bad step or setting.
-        """
-        dt, chosen = checked_step(dt), checked(settings)
-        reason = self.refuses(scene, "")
-        if reason:
-            raise EngineError(reason)
-        return RapierSimulation(scene, dt, chosen)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Spin but for the roundings of all small steps, which add up: each in singles, to within 2 units."""

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Simulation
+from adapters.engine import Array, Contacts, Row, Simulation
 from adapters.impulses import along_normal
+from adapters.meeting import common_material
+from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 
 
@@ -30,23 +32,26 @@ class Hooks:
 
 
 class RapierSimulation(Simulation):
-    """One ``PhysicsWorld``; bodies in the scene's order."""
+    """One ``PhysicsWorld``; bodies in the scene's order.
 
-    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
+    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    """
+
+    def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
         # Its type stubs would be looked at only where it is installed.
-        rapier3d: Any = import_module("rapier3d")
+        rapier3d = self.rapier3d = module or import_module("rapier3d")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
-        self._set(rapier3d, dt, settings)
+        self._set(dt, settings)
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
-        self.single = single(scene)
+        self.single = common_material(scene)
         self.index: dict[Any, int] = {}
-        self.bodies = [self._made(rapier3d, index, body) for index, body in enumerate(scene.bodies)]
+        self.bodies = [self._made(index, body) for index, body in enumerate(scene.bodies)]
         if self.single is None and self.materials:
             self.world.physics_hooks = Hooks(self.index, self.materials)
 
-    def _set(self, rapier3d: Any, dt: float, settings: Mapping[str, Any]) -> None:
-        held = self.world.integration_parameters
+    def _set(self, dt: float, settings: Mapping[str, Any]) -> None:
+        rapier3d, held = self.rapier3d, self.world.integration_parameters
         held.dt = dt
         held.num_solver_iterations = settings["substeps"]
         held.num_internal_pgs_iterations = settings["iterations"]
@@ -62,7 +67,8 @@ class RapierSimulation(Simulation):
         held.contact_clustering = settings["clustering"]
         held.friction_model = getattr(rapier3d.FrictionModel, settings["friction_model"].upper())
 
-    def _made(self, rapier3d: Any, index: int, asked: Body) -> Any:
+    def _made(self, index: int, asked: Body) -> Any:
+        rapier3d = self.rapier3d
         make = {
             "free": rapier3d.RigidBody.dynamic,
             "fixed": rapier3d.RigidBody.fixed,
@@ -79,7 +85,7 @@ class RapierSimulation(Simulation):
                 rapier3d.MassProperties((0.0, 0.0, 0.0), asked.mass, asked.inertia)
             )
         handle = self.world.add_body(builder)
-        collider = self.world.add_collider(self._shape(rapier3d, asked), handle)
+        collider = self.world.add_collider(self._shape(asked), handle)
         self.index[collider] = index
         body = self.world.rigid_bodies[handle]
         if asked.motion == "free":
@@ -90,7 +96,8 @@ class RapierSimulation(Simulation):
                 body.add_torque(asked.torque, True)
         return handle
 
-    def _shape(self, rapier3d: Any, asked: Body) -> Any:
+    def _shape(self, asked: Body) -> Any:
+        rapier3d = self.rapier3d
         restitution, friction = self.single or (0.0, 0.0)
         numbers = {"restitution": restitution, "friction": friction}
         if self.single is None:
@@ -129,7 +136,7 @@ class RapierSimulation(Simulation):
 
     def contacts(self) -> Contacts:
         """Up to four points per manifold, with their normal impulses; what friction gave to a manifold is not told."""
-        rows: list[tuple[int, int, Any, Any, Any, float]] = []
+        rows: list[Row] = []
         for pair in self.world.narrow_phase.contact_pairs():
             i, j = self.index[pair.collider1], self.index[pair.collider2]
             rough = self.materials.get((min(i, j), max(i, j)), (0.0, 0.0))[1] > 0.0
@@ -148,8 +155,7 @@ class RapierSimulation(Simulation):
                     p, q = places[k]
                     middle = (0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.5 * (p.z + q.z))
                     rows.append((i, j, middle, normal, along_normal(point.impulse, normal, rough), point.dist))
-        rows.sort(key=lambda row: (min(row[:2]), max(row[:2])))
-        return Contacts.from_rows(rows, 3)
+        return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
         """What the world, its bodies and colliders hold."""
@@ -172,24 +178,11 @@ class RapierSimulation(Simulation):
             "friction_model": str(held.friction_model),
             "threads": self.world.num_threads,
             "bodies": {
-                asked.name: {"mass": bodies[handle].mass, "damping": bodies[handle].linear_damping}
-                for asked, handle in zip(self.scene.bodies, self.bodies, strict=True)
-                if asked.motion == "free"
+                name: {"mass": bodies[handle].mass, "damping": bodies[handle].linear_damping}
+                for name, handle in free_parts(self.scene, self.bodies)
             },
         }
         if self.single:
-            restitution, friction = self.single
-            told["pairs"] = {
-                f"{self.scene.bodies[i].name}-{self.scene.bodies[j].name}": {
-                    "restitution": restitution,
-                    "friction": friction,
-                }
-                for i, j in self.materials
-            }
+            restitutions, frictions = ([number] * len(self.bodies) for number in self.single)
+            told["pairs"] = pair_materials(self.scene, (restitutions, max), (frictions, max))
         return told
-
-
-def single(scene: Scene) -> tuple[float, float] | None:
-    """Restitution and friction, if they are the same for all pairs: what is combined of equal numbers is the number."""
-    found = {(m.restitution, m.friction) for _, _, m in scene.contact_pairs()}
-    return found.pop() if len(found) == 1 else None

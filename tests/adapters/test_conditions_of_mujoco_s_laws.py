@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.mujoco import ball_on_face, convex_blows, motions, predictions, profiles
+from adapters.mujoco import ball_on_face, motions, predictions, profiles
 from adapters.mujoco.predictions import BLURRED, EITHER, ENOUGH, PERTURBATIONS, SPREAD_FACTOR
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
@@ -102,37 +102,6 @@ def test_a_ball_on_a_face_has_the_friction_of_that_pair_and_its_own_numbers(dime
         replace(scene, pairs=(Pair("floor", "body", 0.0, 0.0), Pair(friction=0.75))),
     ):  # fmt: skip
         assert ball_on_face._ball_on_face("tuned", other, DT) is None
-
-
-def test_convex_blows_are_told_of_settings_under_which_a_step_of_them_is_all(monkeypatch):
-    scene = replace(scene_of(2, Disc(0.5)), gravity=(0.0, 0.0))
-    sound = {"solref": "reflect", "kappa_elastic": 0.0, "kappa_plastic": 0.0, "margin": 0.0, "tolerance": 0.0,
-             "solimp": (0.875, 0.9), "solreffriction": "stick", "impratio": 1.0}  # fmt: skip
-    chosen, given, balls = {}, [], [None]
-    monkeypatch.setattr(convex_blows, "settings_of", lambda *asked: sound | chosen)
-    monkeypatch.setattr(convex_blows, "_balls", lambda *asked: (given.append(asked), balls[0])[1])
-    monkeypatch.setattr(convex_blows, "_rod", lambda scene, dt, moved, blow: ("rod", dt, moved, blow.keywords))
-    monkeypatch.setattr(convex_blows, "_told_alike", lambda scene, metric, measure, motion: (metric, motion(0.25)))
-    law = convex_blows.convex_blow_law("tuned", "spin")
-    assert law(scene, DT, None) == ("spin", ("rod", DT, 0.25, {"d": 0.875})) and given.pop()[1:] == (DT, 0.875, 0.25)
-    for more in ({"solreffriction": None}, {"impratio": 2.0}):  # a rod's end rubs by its own rule
-        chosen = more
-        assert law(scene, DT, None) == ("spin", None)
-    chosen, balls[0] = {}, "path"
-    assert law(scene, DT, None) == ("spin", "path")
-    for more in (
-        {"solref": (0.02, 1.0)}, {"kappa_elastic": 0.1}, {"kappa_plastic": 0.1}, {"margin": 1e-3}, {"tolerance": 1e-9},
-    ):  # fmt: skip
-        chosen = more
-        assert law(scene, DT, None) is None
-    chosen = {}
-    for other in (scene_of(2, Disc(0.5)), replace(scene_of(3, Sphere(0.5)), gravity=(0.0, 0.0, 0.0))):
-        assert law(other, DT, None) is None
-    matched = convex_blows.matched_blow_law("matched", "spin")
-    monkeypatch.setattr(convex_blows, "_rod", lambda scene, dt, moved, blow: (dt, moved, blow))
-    assert matched(scene, DT, None) == ("spin", (DT, 0.25, convex_blows._rigid))
-    for other in (scene_of(2, Disc(0.5)), replace(scene_of(3, Sphere(0.5)), gravity=(0.0, 0.0, 0.0))):
-        assert matched(other, DT, None) is None
 
 
 def test_where_nothing_touches_the_matched_profile_is_the_tuned_one_at_the_same_step(monkeypatch):

@@ -7,8 +7,8 @@ import pytest
 pytest.importorskip("dartpy", reason="DART is set apart: pip install 'contact-crosscheck[dart]'")
 
 from adapters.dart import DartEngine
-from adapters.dart.balls import balls_law
 from adapters.dart.laws import DEVIATIONS
+from adapters.dart.meeting import meeting_law
 from adapters.dart.profiles import CONES, MOST_BOXES, SWEEPERS, checked
 from adapters.dart.rubbing import rubbing_law
 from adapters.engine import EngineError
@@ -58,7 +58,7 @@ def test_balls_that_meet_lose_what_compliance_takes_of_every_blow(name, params, 
 def test_balls_that_rub_spin_or_fall_have_no_law_of_meeting():
     canonical = CATALOGUE["rack"]
     scene = canonical.scene(2, {"rows": 2.0})
-    law = balls_law("energy_defect")
+    law = meeting_law("energy_defect", 1e-8, 1e-8)
     assert law(scene, DT, canonical.measure) is not None
     assert law(replace(scene, gravity=(0.0, -1.0)), DT, canonical.measure) is None
     assert law(replace(scene, pairs=(replace(scene.pairs[0], friction=0.1),)), DT, canonical.measure) is None

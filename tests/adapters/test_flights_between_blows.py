@@ -8,7 +8,7 @@ import pytest
 
 from adapters import single_precision
 from adapters.scene import Body, Pair, Scene, Sphere
-from adapters.single_precision import Method, _Flight, _Key, _motion
+from adapters.single_precision import Held, Method, _Flight, _motion
 
 DT = 1 / 64
 EXACT = Method(lambda e, speed: e, 200)
@@ -24,7 +24,7 @@ def scene(*balls, e=0.5):
 
 
 def test_a_blow_on_a_sample_belongs_to_the_step_that_begins_there_and_to_no_other():
-    motion, blows = _motion(_Key(scene(ball("left", 0.0, 2.0), ball("right", 1.0, 0.0, 3.0))), DT, EXACT)
+    motion, blows = _motion(Held(scene(ball("left", 0.0, 2.0), ball("right", 1.0, 0.0, 3.0))), DT, EXACT)
     t = motion.t
     assert blows == 1 and motion.finish == "completed" and motion.dt == DT
     assert t.tolist() == [k / 64 for k in range(33)]
@@ -45,9 +45,9 @@ def test_a_blow_on_a_sample_belongs_to_the_step_that_begins_there_and_to_no_othe
 
 
 def test_where_nothing_meets_before_the_end_there_is_no_motion_to_tell():
-    assert _motion(_Key(scene(ball("left", 0.0, 1.0), ball("right", 1.0))), DT, EXACT) is None  # at the end itself
-    assert _motion(_Key(scene(ball("left", 0.0, -1.0), ball("right", 1.0))), DT, EXACT) is None
-    assert _motion(_Key(scene(ball("left", 0.0, 1.0625), ball("right", 1.0))), DT, EXACT) is not None
+    assert _motion(Held(scene(ball("left", 0.0, 1.0), ball("right", 1.0))), DT, EXACT) is None  # at the end itself
+    assert _motion(Held(scene(ball("left", 0.0, -1.0), ball("right", 1.0))), DT, EXACT) is None
+    assert _motion(Held(scene(ball("left", 0.0, 1.0625), ball("right", 1.0))), DT, EXACT) is not None
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(0.0, True), (1.0, True), (1.0 + 2.0**-20, False), (2.0, False)])

@@ -24,7 +24,7 @@ DT = 1 / 240
 #: Longest run that is asked [s]: what is kept is whether a law speaks, and of what it hangs on.
 LONGEST = 0.1
 #: Shorter where a law solves a problem of many contacts at each step.
-SHORTER = {"overhang": 0.005, "stack": 0.02}
+SHORTER = {"stack": 0.02}
 #: Longer steps, of which a scene is asked as it is [s]; no share of the run is one of them.
 LONGER = 1 / 144
 #: Rotation of all that is turned: three, four, five.

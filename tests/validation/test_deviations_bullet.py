@@ -11,16 +11,13 @@ pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
 from adapters import needs, run
 from adapters.bullet import BulletEngine
 from adapters.bullet.contact_law import ContactLaw, fall
-from adapters.bullet.laws import DEVIATIONS, pulled_with_drag, sliding_with_drag
+from adapters.bullet.laws import DEVIATIONS
 from adapters.engine_folder import covering
 from adapters.law import Deviation
 from validation.catalogue import CATALOGUE
-from validation.cells import Slot
-from validation.running.execution import execute
 
 ENGINE = BulletEngine()
 VERSION = "3.2.7"
-MEASURE = CATALOGUE["incline"].measure
 DEFAULT = ContactLaw(True, float(np.float32(0.04)), 0.08, 1e-5, 0.2, math.inf, math.inf, 100.0, 0.02)
 REST = ContactLaw(False, 0.0, 0.08, 1e-5, 1e-4, 0.0, 0.04, math.inf, 0.1)
 IMPACT = replace(REST, erp=0.0, slop=1e-6, split_depth=0.0)
@@ -113,57 +110,6 @@ def test_law_falls_silent_where_round_off_has_grown_through_the_impacts():
     # Some fifty bounces, each of which multiplies an error of the gap by about 2 erp v/(g dt) = 4.
     rows = compare("bounce", {"e": 0.95, "height": 0.77}, "one", 1 / 480)
     assert rows["rest_time"][1] is None and rows["apex[1]"][1] is not None
-
-
-# ---- incline -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("ratio", "mu", "dt"), [(1.23, 0.5, 1 / 240), (1.6, 0.3, 1 / 180), (1.4, 0.4, 1 / 333)])
-def test_drag_of_the_default_profile_predicts_the_slide(ratio, mu, dt):
-    rows = compare("incline", {"ratio": ratio, "mu": mu}, "default", dt, 3)
-    assert_predicted(rows, 1)
-    _, (centre, band), check = rows["acceleration"]
-    assert abs(check.truth - centre) > band  # and the textbook is not within its band
-
-
-def test_a_friction_that_is_half_a_percent_off_is_not_explained_by_drag():
-    """The law's band used to hold 0.7 % of the friction."""
-    for ratio in (1.1, 1.6):
-        scene = CATALOGUE["incline"].scene(3, {"ratio": ratio})
-        weaker = replace(scene, pairs=(replace(scene.pairs[0], friction=0.995 * scene.pairs[0].friction),))
-        (centre, band), (other, _) = (sliding_with_drag(each, 1 / 240, MEASURE) for each in (scene, weaker))
-        assert abs(other - centre) > 10.0 * band
-
-
-def test_the_law_of_drag_is_silent_where_a_step_is_longer_than_contact_points_may_drift():
-    """1.7 cm a step for a box of 1 m: beyond it the friction is off by up to 0.1 %, which no band of drag may hold."""
-    for ratio, dt, speaks in ((1.6, 1 / 240, True), (2.0, 1 / 240, False), (2.0, 1 / 480, True)):
-        law = sliding_with_drag(CATALOGUE["incline"].scene(3, {"ratio": ratio}), dt, MEASURE)
-        assert (law is not None) is speaks
-        if law is not None:
-            value, _ = execute(Slot("incline", (("ratio", ratio),), 3, "bullet", "default", dt)).metrics["acceleration"]
-            assert abs(value - law[0]) <= law[1]
-
-
-@pytest.mark.parametrize(("params", "dimension"), [({}, 2), ({}, 3), ({"v": 0.5, "mu": 0.1}, 3)])
-def test_drag_of_the_default_profile_predicts_the_pull_of_a_belt(params, dimension):
-    rows = compare("conveyor", params, "default", 1 / 240, dimension)
-    assert_predicted(rows, 1)
-    _, (centre, band), check = rows["pull"]
-    assert abs(check.truth - centre) > band  # and the textbook is not within its band
-
-
-def test_a_belt_of_half_a_percent_less_friction_is_not_explained_by_drag_and_a_fast_one_has_no_law():
-    canonical = CATALOGUE["conveyor"]
-    (centre, band), (other, _) = (
-        pulled_with_drag(canonical.scene(3, {"mu": mu}), 1 / 240, canonical.measure) for mu in (0.4, 0.398)
-    )
-    assert abs(other - centre) > 5.0 * band
-    assert pulled_with_drag(canonical.scene(3, {"v": 3.0}), 1 / 240, canonical.measure) is None
-
-
-def test_sticking_box_has_no_law():
-    assert compare("incline", {"ratio": 0.9}, "default", 1 / 240)["creep"][1] is None
 
 
 # ---- the laws themselves -----------------------------------------------------------------------------------------

@@ -161,7 +161,7 @@ def test_what_was_measured_of_its_cures_is_read_from_its_folder(site):
 
 
 def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_path):
-    done, rows = run(tmp_path, "stack", "--param", "n=1")
+    done, rows = run(tmp_path, "thin_wall", "--param", "v=200")
     assert done.exit_code == 0, done.output
     assert "explained" in rows and "it is late" in rows
     done, rows = run(tmp_path, "stack", "--param", "n=10")
