@@ -71,7 +71,6 @@ recipe: $(STAMP)
 
 # The documentation, without a network, into docs/_build/html; a warning is an error.
 docs: $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]" -c constraints.txt
 	$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html
 
 # Engines that are set apart, beside those of `all`; whatever is run afterwards asks them too.
