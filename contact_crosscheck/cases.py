@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from numbers import Real
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from adapters import registry
+from adapters import scene as scene_module
 from adapters.engine import Engine, EngineError
 from adapters.own_settings import own
 from adapters.plain import NAME, one_line
@@ -73,8 +74,8 @@ def run(
         Name of an installed engine (`engines`), or an engine of your own: a class or an object of
         `adapters.engine.Engine`. One of your own runs without a time limit and without protection from crashes.
     profile
-        Set of settings, by name or by role: ``as shipped`` (the default), ``tuned``, ``compromise``, ``textbook``,
-        ``exact``. On its own engine a model runs as its author made it (``model``) by default.
+        Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. By
+        default as shipped; on our own solver exact; on its own engine a model runs as its author made it (``model``).
     dimension
         2 or 3; by default the first of the scene's that the engine has itself. A 2-D scene is embedded in 3-D for an
         engine that has 3-D only.
@@ -147,6 +148,11 @@ class Result:
     observation: Observation
     trajectory: Trajectory | None
 
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies, in the order in which the trajectory has them."""
+        return [body.name for body in self._scene().bodies]
+
     @cached_property
     def rows(self) -> list[Row]:
         """The judged checks."""
@@ -166,6 +172,9 @@ class Result:
     def explain(self, metric: str | None = None) -> str:
         """Explain one check: value, truth, tolerance, cause and fix.
 
+        Where the check fails, the case runs once more with the engine's profile ``tuned``, to see whether that fixes
+        it.
+
         Parameters
         ----------
         metric
@@ -183,14 +192,27 @@ class Result:
         """
         from reports.command.showing import explanation
 
-        rows = [row.as_dict() for row in self.rows]
-        chosen = [row for row in rows if metric in (None, row["metric"])]
+        own = [row.as_dict() for row in self.rows]
+        chosen = [row for row in own if metric in (None, row["metric"])]
         if not chosen:
-            raise SceneError(f"metric: there is no {metric!r}, only {', '.join(row['metric'] for row in rows)}")
+            raise SceneError(f"metric: there is no {metric!r}, only {', '.join(row['metric'] for row in own)}")
+        row = max(chosen, key=severity)
+        others = [self._tuned] if row["physics"] == "fail" and self._tuned is not None else []
+        rows = own + [each.as_dict() for each in rows_of("", others)]
         engine = self.observation.slot.engine
         here = f"in this process only: the engine {engine!r} is in no package"
         again = here if registry.is_introduced(engine) else reproduce(self.observation.slot.as_dict())
-        return explanation(rows, [self.observation], max(chosen, key=severity), again)
+        return explanation(rows, [self.observation, *others], row, again)
+
+    @cached_property
+    def _tuned(self) -> Observation | None:
+        """The same case with the best stock settings; None where it has them, or has settings or a count of its own."""
+        slot = self.observation.slot
+        tuned = registry.profile_of(slot.engine, "tuned")
+        if tuned in (None, slot.profile) or slot.switched or slot.iterations is not None:
+            return None
+        with TemporaryDirectory() as folder:
+            return _observe(replace(slot, profile=str(tuned)), Path(folder) / "case.npz")
 
     def plot(self, what: str = "checks") -> alt.Chart | alt.LayerChart | alt.FacetChart:
         """Draw the checks, or the motion.
@@ -217,9 +239,11 @@ class Result:
 
         if what == "checks":
             return checks_chart([row.as_dict() for row in self.rows], str(self))
+        return motion_chart(self._scene(), self.trajectory, what, str(self))
+
+    def _scene(self) -> scene_module.Scene:
         slot = self.observation.slot
-        scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-        return motion_chart(scene, self.trajectory, what, str(self))
+        return resolve(slot.scene).scene(slot.dimension, dict(slot.params))
 
     def __str__(self) -> str:
         slot = self.observation.slot
@@ -263,6 +287,8 @@ def engine_named(engine: AnyEngine) -> str:
         if found.engine is None:
             raise EngineError(f"engine: {engine} is not installed: {found.reason}")
         return engine
+    if not isinstance(engine, Engine | type):
+        raise EngineError(f"engine: a {type(engine).__name__} was given; name an engine, or give one of your own")
     name = registry.introduce(engine)
     warnings.warn(UNPROTECTED.format(name), stacklevel=3)
     return name
@@ -298,12 +324,28 @@ def slot_of(
         "dt": (brought.dt if brought else QUICK_DT) if dt is None else dt,
         "iterations": iterations,
     }
-    slot = slot_from_dict(data)
+    try:
+        slot = slot_from_dict(data)
+    except SceneError as error:  # who calls knows no slot
+        raise SceneError(str(error).removeprefix("slot.")) from None
     prepared = prepare(slot)
     if name not in CATALOGUE:
         canonical.checks(prepared.scene, slot.dt)  # a scene that cannot be judged is refused before it runs
-    asked = tuple(sorted((settings or {}).items()))
+    asked = settings_from(settings)
     return slot.with_own(own_of(slot, asked)) if asked else slot
+
+
+def settings_from(settings: Mapping[str, Any] | None) -> tuple[tuple[str, Any], ...]:
+    """Settings of the caller's own, sorted by name.
+
+    Raises
+    ------
+    EngineError
+        If they are no table.
+    """
+    if settings is not None and not isinstance(settings, Mapping):
+        raise EngineError(f"settings: a {type(settings).__name__} was given; give values by name, {{'name': value}}")
+    return tuple(sorted((str(name), value) for name, value in (settings or {}).items()))
 
 
 def own_of(slot: Slot, asked: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, Any], ...]:
@@ -326,8 +368,8 @@ def profile_named(engine: str, profile: str | None, scene: CanonicalScene) -> st
     known = list(found.profiles) if found else []
     brought = scene.brings.get(engine)
     if profile is None:
-        shipped = facts.profile("shipped") if facts else None
-        return brought.profile if brought else shipped or known[0]
+        usual = (facts.profile("shipped") or facts.profile("solution")) if facts else None
+        return brought.profile if brought else usual or known[0]
     if profile in known or (brought is not None and profile == brought.profile):
         return profile
     roles = facts.roles if facts else {}

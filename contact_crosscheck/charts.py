@@ -26,6 +26,8 @@ with extra("plot"):
 MOST_SAMPLES = 4000
 #: Smallest error on a logarithmic axis: what is exact lies there.
 EXACT = 1e-16
+#: Smallest share of a tolerance that is told apart from less: nobody chooses an engine by it.
+LEAST = 1e-3
 #: Colours of what is within and beyond its tolerance, told apart under the common kinds of colour blindness.
 VERDICTS = {"pass": "#3b75af", "fail": "#d4504e"}
 
@@ -41,7 +43,7 @@ def checks_chart(rows: Sequence[Mapping[str, Any]], title: str) -> alt.LayerChar
     shown = [
         {
             "check": row["metric"],
-            "ratio": max(abs(row["error"]) / row["tolerance"], EXACT),
+            "ratio": max(abs(row["error"]) / row["tolerance"], LEAST),
             "verdict": row["physics"],
         }
         for row in rows
@@ -49,8 +51,9 @@ def checks_chart(rows: Sequence[Mapping[str, Any]], title: str) -> alt.LayerChar
     ]
     if not shown:
         raise SceneError(f"plot: no check has an error to draw: {rows[0]['reason'] if rows else 'nothing is judged'}")
-    low = min(1e-3, min(row["ratio"] for row in shown) / 2.0)
-    x = alt.X("ratio:Q", scale=alt.Scale(type="log", domainMin=low), title="error / tolerance")
+    x = alt.X(
+        "ratio:Q", scale=alt.Scale(type="log", domainMin=LEAST), title=f"error / tolerance ({LEAST:g}: that or less)"
+    )
     colour = alt.Color(
         "verdict:N", scale=alt.Scale(domain=list(VERDICTS), range=list(VERDICTS.values())), title="verdict"
     )

@@ -17,7 +17,7 @@ from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
 from contact_crosscheck.apart import apart
-from contact_crosscheck.cases import AnyEngine, dimension_for, engine_named, number_of, profile_named
+from contact_crosscheck.cases import AnyEngine, dimension_for, engine_named, number_of, profile_named, settings_from
 from contact_crosscheck.models import Scene, scene_named
 from reports import speed
 from reports.command.benching import time_units
@@ -97,6 +97,8 @@ def sweep(
         raise SceneError("sweep: no parameter has several values; give one a list, or use run")
     fixed = {name: number_of(name, value) for name, value in params.items() if name not in crossed}
     own = [engine] if isinstance(engine, str) or not isinstance(engine, Sequence) else list(engine)
+    if not own:
+        raise EngineError("engine: the list is empty")
     with apart():
         name = scene_named(scene)
         canonical = resolve(name)
@@ -143,7 +145,7 @@ def _request(
         [] if dt is None else [parse_dt(str(dt))],
         [] if iterations is None else [iterations],
         fixed,
-        sets=tuple(sorted((settings or {}).items())),
+        sets=settings_from(settings),
     )
 
 
@@ -229,7 +231,7 @@ class Bench:
 def bench(
     scene: str | os.PathLike[str] | Scene,
     *,
-    engines: Sequence[str] | None = None,
+    engines: str | Sequence[str] | None = None,
     profiles: Sequence[str] = (),
     dimension: int | None = None,
     dts: Sequence[float | str] = (),
@@ -281,16 +283,17 @@ def bench(
     >>> measured = cc.bench("stack", engines=["mujoco", "bullet"], dimension=3)
     >>> measured.plot()
     """
+    named = [engines] if isinstance(engines, str) else engines
     with apart():
         name = scene_named(scene)
-        for each in engines or ():
+        for each in named or ():
             if not isinstance(each, str) or registry.is_introduced(each):
                 raise EngineError("engines: an engine is timed in a process of its own, so it must be in a package; "
                                   "crosscheck new-adapter makes one")  # fmt: skip
             engine_named(each)
         request = Request(
             [name],
-            list(registry.usual() if engines is None else engines),
+            list(registry.usual() if named is None else named),
             list(profiles),
             [] if dimension is None else [dimension],
             [parse_dt(str(dt)) for dt in dts],
