@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pandas as pd
 
+    from adapters.engine import Engine, EngineError
+    from adapters.scene import SceneError
     from contact_crosscheck.cases import Result, run
     from contact_crosscheck.listings import engines, scenes
     from contact_crosscheck.models import Scene
@@ -27,17 +29,34 @@ if TYPE_CHECKING:
 
     __version__: str
 
-__all__ = ["Bench", "ForeignPackage", "Result", "Scene", "bench", "engines", "load", "run", "scenes", "sweep"]
+__all__ = [
+    "Bench",
+    "Engine",
+    "EngineError",
+    "ForeignPackage",
+    "Result",
+    "Scene",
+    "SceneError",
+    "bench",
+    "engines",
+    "load",
+    "run",
+    "scenes",
+    "sweep",
+]
 #: Public names that are loaded when they are used first, and the module of each.
 LATE = {
-    "run": "cases",
-    "Result": "cases",
-    "sweep": "studies",
-    "bench": "studies",
-    "Bench": "studies",
-    "engines": "listings",
-    "scenes": "listings",
-    "Scene": "models",
+    "run": "contact_crosscheck.cases",
+    "Result": "contact_crosscheck.cases",
+    "sweep": "contact_crosscheck.studies",
+    "bench": "contact_crosscheck.studies",
+    "Bench": "contact_crosscheck.studies",
+    "engines": "contact_crosscheck.listings",
+    "scenes": "contact_crosscheck.listings",
+    "Scene": "contact_crosscheck.models",
+    "Engine": "adapters.engine",
+    "EngineError": "adapters.engine",
+    "SceneError": "adapters.scene",
 }
 #: Our packages, in the order in which they may import each other.
 PACKAGES = ("reference_solver", "adapters", "validation", "reports")
@@ -87,7 +106,7 @@ def __getattr__(name: str) -> Any:
         check()
         from importlib import import_module
 
-        found = getattr(import_module(f"{__name__}.{LATE[name]}"), name)
+        found = getattr(import_module(LATE[name]), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = found

@@ -30,7 +30,7 @@ from reports.findings import severity
 from reports.wording import LABELS, mark_of, measured, params_text, quantity, reproduce
 from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Slot, format_dt, prepare, settings_of, slot_from_dict
+from validation.cells import Observation, Outcome, Slot, format_dt, prepare, settings_of, slot_from_dict
 from validation.identity import commit
 from validation.judging.rows import Row, frame, rows_of
 from validation.posed import resolve
@@ -112,21 +112,25 @@ def run(
         slot = slot_of(scene, engine_named(engine), profile, dimension, dt, iterations, settings, params)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "case.npz"
-        observation = _observe(slot, path)
+        observation = observe(slot, path)
         return Result(observation, load_trajectory(path) if path.exists() else None)
 
 
-def _observe(slot: Slot, path: Path) -> Observation:
-    """Run a slot here, or where other people's plugins run, and keep its trajectory."""
+def observe(slot: Slot, path: Path | None = None) -> Observation:
+    """Run a slot here, or where other people's plugins run; keep its trajectory at ``path``."""
     entry = registry.entry(slot.engine)
     if entry is None or registry.is_ours(entry):
-        return execute(slot, path)
+        observation = execute(slot, path)
+        # Whatever ends a case is its outcome; only here somebody may have asked for all of it to end.
+        if observation.outcome is Outcome.CRASHED and observation.reason.startswith(KeyboardInterrupt.__name__):
+            raise KeyboardInterrupt
+        return observation
     with apart():
         (observation,) = run_cells([slot], timeout=TIMEOUT, keep=lambda _: path)
     return observation
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """What came out of one case.
 
@@ -211,8 +215,7 @@ class Result:
         tuned = registry.profile_of(slot.engine, "tuned")
         if tuned in (None, slot.profile) or slot.switched or slot.iterations is not None:
             return None
-        with TemporaryDirectory() as folder:
-            return _observe(replace(slot, profile=str(tuned)), Path(folder) / "case.npz")
+        return observe(replace(slot, profile=str(tuned)))
 
     def plot(self, what: str = "checks") -> alt.Chart | alt.LayerChart | alt.FacetChart:
         """Draw the checks, or the motion.

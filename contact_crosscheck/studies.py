@@ -17,7 +17,15 @@ from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
 from contact_crosscheck.apart import apart
-from contact_crosscheck.cases import AnyEngine, dimension_for, engine_named, number_of, profile_named, settings_from
+from contact_crosscheck.cases import (
+    AnyEngine,
+    dimension_for,
+    engine_named,
+    number_of,
+    observe,
+    profile_named,
+    settings_from,
+)
 from contact_crosscheck.models import Scene, scene_named
 from reports import speed
 from reports.command.benching import time_units
@@ -34,7 +42,6 @@ from validation.posed import primary_of, resolve
 from validation.questions.nulls import with_skill
 from validation.questions.sweeping import Study, study_slots
 from validation.records.store import Store
-from validation.running.execution import execute
 from validation.running.plan import Request
 from validation.workers import TIMEOUT
 
@@ -110,7 +117,7 @@ def sweep(
     elsewhere = [slot for slot in slots if slot not in set(here)]
     if here and out is not None:
         raise EngineError(f"out: {here[0].engine} is an engine of this process alone; its results are not kept")
-    observations = [execute(slot) for slot in here]
+    observations = [observe(slot) for slot in here]
     run_id = ""
     if elsewhere:
         with apart(), _store(out) as store:
@@ -172,7 +179,7 @@ def _store(out: str | os.PathLike[str] | None) -> Iterator[Store]:
             store.close()
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Bench:
     """Errors and times of a scene on several engines, over steps and iteration counts.
 

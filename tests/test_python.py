@@ -170,6 +170,7 @@ WRONG = [
 def test_a_wrong_call_is_one_line_that_names_what_is_wrong(error, said, given):
     call = {"scene": "bounce", "engine": "chipmunk"} | given
     with pytest.raises(error) as caught:
+        assert error in (cc.SceneError, cc.EngineError)
         cc.run(call.pop("scene"), **call)
     assert str(caught.value).startswith(said) and "\n" not in str(caught.value)
 
@@ -280,6 +281,17 @@ def test_an_error_of_an_engine_of_one_s_own_is_the_outcome_of_its_case(own):
     assert result.trajectory is None and "crashed" in result._repr_html_().lower()
     with pytest.raises(SceneError, match="plot: the engine gave no motion"):
         result.plot("z")
+
+
+def test_whoever_interrupts_a_case_interrupts_all_of_it(own):
+    class Interrupted(ToyEngine):
+        def build(self, scene, dt, settings):
+            raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
+        cc.run("bounce", engine=Interrupted)
+    with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
+        cc.sweep("bounce", engine=Interrupted, e=[0.3, 0.5])
 
 
 def test_what_cannot_be_made_is_one_line(own):
