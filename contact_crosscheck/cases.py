@@ -71,8 +71,8 @@ def run(
     scene
         Name in the catalogue (`scenes`), path of a scene file or of a model, or a `Scene`.
     engine
-        Name of an installed engine (`engines`), or an engine of your own: a class or an object of
-        `adapters.engine.Engine`. One of your own runs without a time limit and without protection from crashes.
+        Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`. One of
+        your own runs without a time limit and without protection from crashes.
     profile
         Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. By
         default as shipped; on our own solver exact; on its own engine a model runs as its author made it (``model``).

@@ -46,18 +46,18 @@ results["reference"].observation.certificate["certified"]
 # %%
 curves = pd.concat(
     pd.DataFrame(
-        {
-            "time [s]": result.trajectory.t,
-            "height [m]": result.trajectory.pose[:, result.bodies.index("ball"), 1],
-            "engine": name,
-        }
+        {"t": result.trajectory.t, "height": result.trajectory.pose[:, result.bodies.index("ball"), 1], "engine": name}
     )
     for name, result in results.items()
 )
 figure = (
     alt.Chart(curves)
     .mark_line()
-    .encode(x="time [s]:Q", y=alt.Y("height [m]:Q").scale(zero=False), color=alt.Color("engine:N").title(None))
+    .encode(
+        x=alt.X("t").title("time [s]"),
+        y=alt.Y("height").title("height of the ball [m]").scale(zero=False),
+        color=alt.Color("engine").title(None),
+    )
     .properties(width=320, height=200)
 )
 figure.save("figure.pdf")
