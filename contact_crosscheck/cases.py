@@ -64,15 +64,17 @@ def run(
     settings: Mapping[str, Any] | None = None,
     **params: float,
 ) -> Result:
-    """Run one case in this process and judge it.
+    """Run one case and judge it.
+
+    Engines of this project, and one of your own, run in this process: without a time limit, and a crash ends Python.
+    Those of other packages run in a process of their own.
 
     Parameters
     ----------
     scene
         Name in the catalogue (`scenes`), path of a scene file or of a model, or a `Scene`.
     engine
-        Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`. One of
-        your own runs without a time limit and without protection from crashes.
+        Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`.
     profile
         Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. By
         default as shipped; on our own solver exact; on its own engine a model runs as its author made it (``model``).
@@ -160,7 +162,8 @@ class Result:
     @cached_property
     def rows(self) -> list[Row]:
         """The judged checks."""
-        return with_skill(rows_of("", [self.observation]))
+        with apart():  # laws of another package are looked at from outside first
+            return with_skill(rows_of("", [self.observation]))
 
     def frame(self) -> pd.DataFrame:
         """Return the judged checks, one row each, with the columns of `load`.
@@ -202,7 +205,8 @@ class Result:
             raise SceneError(f"metric: there is no {metric!r}, only {', '.join(row['metric'] for row in own)}")
         row = max(chosen, key=severity)
         others = [self._tuned] if row["physics"] == "fail" and self._tuned is not None else []
-        rows = own + [each.as_dict() for each in rows_of("", others)]
+        with apart():
+            rows = own + [each.as_dict() for each in rows_of("", others)]
         engine = self.observation.slot.engine
         here = f"in this process only: the engine {engine!r} is in no package"
         again = here if registry.is_introduced(engine) else reproduce(self.observation.slot.as_dict())

@@ -412,6 +412,18 @@ print(set(found[found["param.e"] == 0.5].state_hash) == set(result.frame().state
     assert called(tmp_path, code)[0].split() == ["begun", "True"]
 
 
+def test_a_script_without_a_guard_asks_an_engine_of_another_package(tmp_path, plugins):
+    code = f"""
+import sys
+sys.path.insert(0, {str(plugins)!r})
+import contact_crosscheck as cc
+print("begun")
+print(repr(cc.run("impact", engine="evil", profile="raise")))
+"""
+    out, _ = called(tmp_path, code)
+    assert out.count("begun") == 1 and "building failed" in out
+
+
 @pytest.mark.parametrize("name", ["mujoco"])
 def test_a_script_without_a_guard_reads_a_model(tmp_path, engine, name):
     code = f"""
