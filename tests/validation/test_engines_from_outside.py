@@ -55,7 +55,7 @@ scene = "stack"
 metrics = ["*"]
 reason = "a toy's boxes sink"
 source = "its manual"
-releases = ">=7"
+releases = ">=1"
 """
 PROOF = """
 [[family.proof]]
