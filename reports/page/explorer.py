@@ -15,17 +15,21 @@ import altair as alt
 import pandas as pd
 
 from adapters.registry import is_ranked, profile_of
-from reports.page.charts import dodged, named, styled, svg
+from reports.page.charts import dashes, dodged, named, styled, svg
 from reports.page.figures import Figure
+from reports.page.opening import SECOND, called, shown, word_of
 from reports.page.source import Plain, Source
 from reports.palette import colours_of, shape_of
 from reports.wording import number
 from validation.canonical import Restitution
-from validation.posed import resolve
 
 #: Materials that people know, with the coefficient that is usually quoted for them.
 PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
 FAINT = (0.9, 0.5)
+#: Width of a panel of restitution [px], and how far from the diagonal is not seen to leave it [restitution].
+MAP, BAND = 300, 0.02
+#: Height of a line of text in it [restitution].
+LINE = 0.065
 
 
 @dataclass(frozen=True)
@@ -56,15 +60,9 @@ class Explorer:
     scene: str
 
 
-def _shown(source: Source, series: bool) -> tuple[str, Restitution] | None:
-    """First scene of the run that shows restitution as a series of heights, or as a ratio of speeds."""
-    told = ((scene, resolve(scene).restitution) for scene in source.scenes)
-    return next(((scene, found) for scene, found in told if found and bool(found.heights) is series), None)
-
-
 def explorer(source: Source) -> Explorer | None:
     """None if no scene of the run shows restitution."""
-    bounced, struck = _shown(source, True), _shown(source, False)
+    bounced, struck = shown(source, True), shown(source, False)
     heights = _heights(source, *bounced) if bounced else {}
     rebounds = _rebounds(source, *struck) if struck else []
     if not heights and not rebounds:
@@ -82,7 +80,8 @@ def explorer(source: Source) -> Explorer | None:
     data = {"presets": PRESETS, "faint": FAINT, "apexes": apexes, "measured": measured, "series": series}
     effective = _effective(rebounds, source.columns)
     said = _answers(rebounds)
-    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds), effective, said, struck[0] if struck else "")
+    scene = struck[0] if struck else ""
+    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene), effective, said, scene)
 
 
 def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
@@ -140,41 +139,102 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     return Figure("fig-explorer", title, said, picture)
 
 
-def _maps(rebounds: Sequence[Plain]) -> list[Figure]:
-    """Effective against asked restitution, one panel per approach speed (planar, else spatial)."""
+def _maps(rebounds: Sequence[Plain], scene: str) -> list[Figure]:
+    """Measured against set restitution, one panel per approach speed (planar, else spatial), the telling one first.
+
+    It is the one in which most engines leave the diagonal; of equals the one with most points, then the fastest.
+    """
     if not rebounds:
         return []
     dimension = min(row["dimension"] for row in rebounds)
-    speeds = sorted({row["speed"] for row in rebounds})
-    return [_map([r for r in rebounds if r["speed"] == v and r["dimension"] == dimension], v) for v in speeds]
+    panels: dict[float, list[Plain]] = defaultdict(list)
+    for row in rebounds:
+        if row["dimension"] == dimension:
+            panels[row["speed"]].append(row)
+    first = max(panels, key=lambda v: (len(_leaving(panels[v])), len(panels[v]), v))
+    return [_map(panels[v], v, scene) for v in [first, *sorted(panels.keys() - {first})]]
 
 
-def _map(rows: Sequence[Plain], speed: float) -> Figure:
-    table = pd.DataFrame(
+def _leaving(rows: Sequence[Plain]) -> list[tuple[str, str]]:
+    """Engines and profiles that are seen to leave the diagonal anywhere."""
+    off = [(row["engine"], row["profile"]) for row in rows if abs(row["got"] - row["asked"]) > BAND]
+    return list(dict.fromkeys(off))
+
+
+def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
+    """One panel: a grey diagonal for all that rebound as set, and a line with its name for each that does not."""
+    off = _leaving(rows)
+    table = named(pd.DataFrame(
         {
             "engine": row["engine"], "profile": row["profile"], "asked": row["asked"], "got": row["got"],
-            "label": f"{row['engine']}/{row['profile']}: asked {row['asked']:g}, got {number(row['got'], 4)}",
+            "label": f"{row['engine']}/{row['profile']}: set {row['asked']:g}, measured {number(row['got'], 4)}",
+            "off": (row["engine"], row["profile"]) in off,
         }
         for row in rows
-    )  # fmt: skip
-    x = alt.X("asked:Q", axis=alt.Axis(title="restitution asked for", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
-              scale=alt.Scale(domain=[-0.07, 1.07], nice=False))  # fmt: skip
+    ))  # fmt: skip
+    ticks = alt.Axis(title="restitution that was set", values=[0, 0.2, 0.4, 0.6, 0.8, 1])
+    x = alt.X("asked:Q", axis=ticks, scale=alt.Scale(domain=[-0.03, 1.03], nice=False))
     top = max(1.03, float(table["got"].max()) * 1.05)
-    y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured"), scale=alt.Scale(domain=[-0.03, top], nice=False))
-    ideal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
-    line = ideal.mark_line(color="currentColor", opacity=0.18, strokeWidth=7, aria=False).encode(x=x, y=y)
+    low = min(-0.03, float(table["got"].min()) * 1.05)
+    y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
+              scale=alt.Scale(domain=[low, top], nice=False))  # fmt: skip
+    diagonal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
+    wide = 2.0 * BAND * MAP / (1.06 * math.sqrt(2.0))  # across the line, what is `BAND` above and below it
+    on, left = table[~table["off"]], table[table["off"]]
+    layers = [
+        diagonal.mark_line(color="currentColor", opacity=0.25, strokeWidth=wide, aria=False).encode(x=x, y=y),
+        alt.Chart(on).mark_point(filled=True, size=14, color="currentColor", opacity=0.6)
+        .encode(x=x, y=y, description="label:N"),
+        _words(_stayed(on, off), x, y, "currentColor"),
+    ]  # fmt: skip
     style = styled(table)
-    # Only marks stand side by side: a line that is moved would show another law.
-    table = named(table)
-    thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7)
-    points = alt.Chart(dodged(table, "asked", "got", logarithmic=False)).mark_point(filled=True, size=48, opacity=0.9)
-    chart = alt.layer(
-        line,
-        thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"], description="who:N"),
-        points.encode(x=x, y=y, description="label:N", **style),
-    ).properties(width=220, height=210)
+    if off:
+        layers.append(alt.Chart(left).mark_line(strokeWidth=2.5).encode(
+            x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"],
+            description="who:N",
+        ))  # fmt: skip
+        layers.append(alt.Chart(left).mark_point(filled=True, size=60).encode(x=x, y=y, description="label:N", **style))
+    layers += [_words(told, x, y, colour) for told, colour in _names(left)]
+    chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"
-    return Figure(f"fig-map-{speed:g}", title, "", svg(chart, f"Effective against requested restitution, {title}"))
+    caption = f"{title}, scene {scene}. Grey band: what is measured is what was set, to within {BAND:g}."
+    return Figure(f"fig-map-{speed:g}", title, caption, svg(chart, f"Restitution that was set and measured. {title}"))
+
+
+def _words(told: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
+    """Words that end at places in a panel."""
+    table = pd.DataFrame(told, columns=["asked", "got", "text"])
+    mark = alt.Chart(table).mark_text(align="right", fontSize=13, fontWeight=600, color=colour, opacity=0.9, aria=False)
+    return mark.encode(x=x, y=y, text="text:N")
+
+
+def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
+    """Names of lines above their right ends, each a line of text above the one below, with their colours."""
+    ends = left.sort_values("asked").drop_duplicates("who", keep="last").sort_values("got")
+    found: list[tuple[list[tuple[float, float, str]], str]] = []
+    height = -math.inf
+    colours = colours_of(list(ends["engine"]))
+    for end in ends.to_dict("records"):
+        height = max(end["got"] + LINE, height + LINE)
+        text = f"{called(end['engine'])} {word_of(end['profile'])}"
+        found.append(([(1.02, height, text)], colours[end["engine"]]))
+    return found
+
+
+def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
+    """Who the diagonal is, in two lines of text to the left of it."""
+    stayed = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
+    if not off:
+        said = ["every engine", "and profile"]
+    elif not stayed:
+        said = ["as it should be"]
+    else:
+        tuned = [column for column in (*stayed, *off) if word_of(column[1]) in SECOND.values()]
+        shipped = [called(engine) for engine, profile in stayed if word_of(profile) == "as shipped"]
+        others = f"{shipped[0] if len(shipped) == 1 else f'{len(shipped)} engines'} as shipped" if shipped else ""
+        mended = bool(tuned) and not set(tuned) & set(off)
+        said = [text for text in ("every tuned profile" if mended else "", others) if text] or ["everybody else"]
+    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(said)]
 
 
 def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) -> list[Effective]:

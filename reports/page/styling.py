@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from urllib.parse import quote
 
 from reports.page.verdicts import slug
-from reports.palette import colours_of, dash_of, shape_of
+from reports.palette import colours_of, dash_of, heat, shape_of
 
 _SHAPES = {
     "circle": '<circle cx="8" cy="8" r="4.2"/>',
@@ -21,6 +21,11 @@ _SHAPES = {
 def engine_style(engines: list[str]) -> str:
     """CSS that gives each engine its colour: class ``e-<name>`` sets ``--engine``."""
     return "".join(f".e-{slug(name)}{{--engine:{colour}}}" for name, colour in colours_of(engines).items())
+
+
+def heat_style() -> str:
+    """CSS of the shares that fail, in twentieths (`reports.page.verdicts.Mark.twentieths`): ``w0`` to ``w20``."""
+    return "".join(f".w{k}{{background:light-dark({heat('light', k)},{heat('dark', k)})}}" for k in range(21))
 
 
 def symbols(columns: Sequence[tuple[str, str]]) -> str:

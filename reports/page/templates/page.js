@@ -65,7 +65,8 @@ function applyFilter() {
   for (const box of boxes) box.checked = !hidden.has(box.value);
   for (const node of $$("[data-who]")) node.classList.toggle("off", hidden.has(node.dataset.who));
   for (const head of $$("[data-engine]")) {
-    const shown = names.filter((name) => name.startsWith(head.dataset.engine + "/") && !hidden.has(name)).length;
+    const own = $$(".sub", head.closest("thead")).map((sub) => sub.dataset.who);
+    const shown = own.filter((name) => name.startsWith(head.dataset.engine + "/") && !hidden.has(name)).length;
     head.classList.toggle("off", shown === 0);
     if (shown) head.colSpan = shown;
   }

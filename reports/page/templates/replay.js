@@ -252,7 +252,7 @@
       pen.fillStyle = series[0].colour;
       pen.fillRect(6, 7, 9, 9);
       pen.fillStyle = ink;
-      [...title.split("/"), ...(gone ? ["left tolerance"] : [])].forEach((line, i) => pen.fillText(line, 20, 16 + 15 * i));
+      [...title.split("/"), ...(gone ? ["out of tolerance"] : [])].forEach((line, i) => pen.fillText(line, 20, 16 + 15 * i));
       return;
     }
     const length = 10 ** Math.floor(Math.log10(140 / zoom)), pixels = zoom * length;
