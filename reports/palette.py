@@ -32,6 +32,8 @@ MARKS: Mapping[Role, tuple[str, tuple[int, ...]]] = {
     "one": ("triangle-up", (2, 2)),
     "matched": ("cross", (8, 2, 2, 2)),
 }
+#: Roles whose marks are hollow: nobody has tuned them. All others are filled.
+HOLLOW: frozenset[Role] = frozenset({"shipped", "textbook"})
 OTHER_MARK: tuple[str, tuple[int, ...]] = ("triangle-down", (1, 2))
 
 

@@ -15,11 +15,11 @@ import altair as alt
 import pandas as pd
 
 from adapters.registry import is_ranked, profile_of
-from reports.page.charts import dashes, dodged, named, styled, svg
+from reports.page.charts import POINT, dashes, dodged, named, styled, svg
 from reports.page.figures import Figure
 from reports.page.opening import SECOND, called, shown, word_of
 from reports.page.source import Plain, Source
-from reports.palette import colours_of, shape_of
+from reports.palette import HOLLOW, colours_of, role_of, shape_of
 from reports.wording import number
 from validation.canonical import Restitution
 
@@ -68,9 +68,10 @@ def explorer(source: Source) -> Explorer | None:
     if not heights and not rebounds:
         return None
     colours, own = colours_of(source.engines), [column for column in source.columns if heights.get(column)]
-    series = [
+    series: list[dict[str, Any]] = [
         {
             "name": f"{engine}/{profile}", "colour": colours[engine], "shape": shape_of(profile),
+            "hollow": role_of(profile) in HOLLOW,
             "heights": {f"{e:g}": values for e, values in sorted(heights.get((engine, profile), {}).items())},
         }
         for engine, profile in own
@@ -129,7 +130,7 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity)]
     if rows:
         table = dodged(pd.DataFrame(rows), "n", "h", logarithmic=False)
-        points = alt.Chart(table).mark_point(filled=True, size=60)
+        points = alt.Chart(table).mark_point(strokeWidth=POINT, size=60)
         layers.append(points.encode(x=x, y=y, description="label:N", **styled(table)))
     title = f"Apex heights for e = {e:g}"
     picture = svg(alt.layer(*layers).properties(width=620, height=320), title)
@@ -193,7 +194,9 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
             x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"],
             description="who:N",
         ))  # fmt: skip
-        layers.append(alt.Chart(left).mark_point(filled=True, size=60).encode(x=x, y=y, description="label:N", **style))
+        layers.append(
+            alt.Chart(left).mark_point(strokeWidth=POINT, size=60).encode(x=x, y=y, description="label:N", **style)
+        )
     layers += [_words(told, x, y, colour) for told, colour in _names(left)]
     chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"

@@ -304,6 +304,23 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
     assert content.startswith(heads[kind])
 
 
+def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, page_file):
+    with opened(browser, page_file, "#impact-2") as page:
+        figure = page.locator("#scene-impact figure.plot").first
+        title = figure.locator("svg").get_attribute("aria-label")
+        with page.expect_download() as found:
+            figure.locator("button.save:has-text('SVG')").click()
+        with page.expect_download() as talk:
+            page.locator(".talk button.save:has-text('SVG')").click()
+        saved, picture = (Path(each.value.path()).read_text() for each in (found, talk))
+    words = re.findall(r"<text[^>]*>([^<]*)</text>", saved)
+    assert title in words and {"bullet/default", "bullet/tuned"} <= set(words)
+    low, high = (float(v) for v in re.search(r'viewBox="\S+ (\S+) \S+ (\S+)"', saved).groups())
+    heights = [float(y) for y in re.findall(r'<text x="[^"]*" y="([^"]*)" fill', saved)]
+    assert len(heights) >= 3 and all(low < y < low + high for y in heights), "what is said lies in the picture"
+    assert "Restitution that was set and measured" in picture and "bullet/default</text>" not in picture
+
+
 def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file, page_source):
     with opened(browser, page_file, "#tables") as page:
         with page.expect_download() as found:
