@@ -1,4 +1,4 @@
-"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; effective against asked restitution.
+"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; restitution that was set against measured.
 
 Which metrics of which scenes show a restitution, the scenes say (`validation.canonical.Restitution`).
 """
@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import altair as alt
 import pandas as pd
 
-from adapters.registry import is_ranked, profile_of
 from reports.page.charts import POINT, dashes, dodged, named, styled, svg
 from reports.page.figures import Figure
 from reports.page.opening import SECOND, called, shown, word_of
@@ -33,20 +32,8 @@ LINE = 0.065
 
 
 @dataclass(frozen=True)
-class Effective:
-    """Restitution that an engine and profile realise where a scene asks for ``asked``."""
-
-    engine: str
-    profile: str
-    asked: float
-    low: float
-    high: float
-    speeds: str
-
-
-@dataclass(frozen=True)
 class Explorer:
-    """Data of the slider, its picture without JavaScript, the map and the table of effective restitution.
+    """Data of the slider, its picture without JavaScript, and the pictures of restitution with their scene.
 
     ``shown`` are the engines and profiles that have points in the picture.
     """
@@ -55,8 +42,6 @@ class Explorer:
     shown: list[tuple[str, str]]
     figure: Figure
     maps: list[Figure]
-    effective: list[Effective]
-    answers: list[str]
     scene: str
 
 
@@ -79,10 +64,8 @@ def explorer(source: Source) -> Explorer | None:
     measured = sorted({float(e) for entry in series for e in entry["heights"]})
     apexes = bounced[1].heights if bounced else 0
     data = {"presets": PRESETS, "faint": FAINT, "apexes": apexes, "measured": measured, "series": series}
-    effective = _effective(rebounds, source.columns)
-    said = _answers(rebounds)
     scene = struck[0] if struck else ""
-    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene), effective, said, scene)
+    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene), scene)
 
 
 def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
@@ -238,32 +221,3 @@ def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[floa
         mended = bool(tuned) and not set(tuned) & set(off)
         said = [text for text in ("every tuned profile" if mended else "", others) if text] or ["everybody else"]
     return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(said)]
-
-
-def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) -> list[Effective]:
-    """Range of measured restitution over speeds and dimensions, per engine, profile and asked value."""
-    found = []
-    for engine, profile in columns:
-        own = [row for row in rebounds if (row["engine"], row["profile"]) == (engine, profile)]
-        for e in sorted({row["asked"] for row in own}):
-            values = [(row["got"], row["speed"]) for row in own if row["asked"] == e]
-            speeds = ", ".join(f"{v:g}" for v in sorted({speed for _, speed in values}))
-            found.append(Effective(engine, profile, e, min(values)[0], max(values)[0], speeds))
-    return found
-
-
-def _answers(rebounds: Sequence[Plain]) -> list[str]:
-    """For each engine as shipped that misses: how wrong its restitution is at the scene's own values, and the cure."""
-    own = [row for row in rebounds if not row["slot"]["params"]]
-    said = []
-    for engine in dict.fromkeys(row["engine"] for row in own):
-        values = {row["profile"]: row["got"] for row in own if row["engine"] == engine}
-        shipped, asked = values.get(profile_of(engine, "shipped") or ""), own[0]["asked"]
-        if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
-            continue
-        nearer = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}
-        better = {p: v for p, v in nearer.items() if is_ranked(engine, p)}
-        best = min(better, key=lambda p: abs(better[p] - asked), default=None)
-        cure = "" if best is None else f"; profile {best} gives {number(better[best], 4)}"
-        said.append(f"{engine} as shipped rebounds with {number(shipped, 3)} where {asked:g} is asked{cure}.")
-    return said

@@ -39,7 +39,7 @@ def symbols(columns: Sequence[tuple[str, str]]) -> str:
         dash = " ".join(map(str, dash_of(profile)))
         pattern = f' stroke-dasharray="{dash}"' if dash else ""
         line = f'<path d="M-5 8h26" stroke="{colours[engine]}" stroke-width="1.4"{pattern}/>'
-        inner = "white" if role_of(profile) in HOLLOW else colours[engine]
+        inner = "none" if role_of(profile) in HOLLOW else colours[engine]
         head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-5 0 26 16" fill="{inner}">'
         mark = f'<g stroke="{colours[engine]}" stroke-width="1.5">{_SHAPES[shape_of(profile)]}</g>'
         drawn = quote(f"{head}{line}{mark}</svg>", safe=" /:=")

@@ -421,12 +421,11 @@ def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     assert all(change.because and change.before != change.after for change in cure.changes)
 
 
-def test_the_explorer_holds_measured_heights_and_says_who_rebounds_wrongly(page_source):
+def test_the_explorer_holds_measured_heights_and_names_who_rebounds_wrongly(page_source):
     found = explorer(page_source)
     tuned = next(s for s in found.data["series"] if s["name"] == "chipmunk/tuned")
     assert tuned["heights"]["0.8"][0] == pytest.approx(0.64, abs=0.02)
-    assert [text for text in found.answers if text.startswith("bullet as shipped rebounds with")]
-    assert not [text for text in found.answers if text.startswith("chipmunk")]
+    assert "Bullet as shipped" in found.maps[0].picture and "bullet/default: set " in found.maps[0].picture
     assert len(found.maps) == 1  # one approach speed ran with both
 
 
