@@ -140,12 +140,19 @@ def _settings(slot: Slot) -> dict[str, Any]:
 
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
     """What was measured to mend a scene in each of ``dimensions``, with this release, from the committed table."""
+    return [cure_text(*told) for told in known_cures(engine, version, scene, shipped, dimensions)]
+
+
+def known_cures(
+    engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]
+) -> list[tuple[Cure, str]]:
+    """The committed fixes of a scene with this release, each with its dimensions; one that is the same in both once."""
     listed = [cures_of(engine).get((scene, d)) for d in dimensions]
     known = [c for c in listed if c is not None and (c.version, c.shipped) == (version, shipped)]
     if len(known) == 2 and known[0].helps and known[0].changes == known[1].changes:  # one that is worse is told
         worse = max(known, key=lambda cure: (cure.left, cure.times or 0.0))
-        return [cure_text(worse, "2-D and 3-D")]
-    return [cure_text(cure) for cure in known]
+        return [(worse, "2-D and 3-D")]
+    return [(cure, f"{cure.dimension}-D") for cure in known]
 
 
 def told_cure(row: Mapping[str, Any]) -> str:
@@ -242,7 +249,7 @@ def cure_text(cure: Cure, where: str = "") -> str:
     settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
-    before, after, truth = _told_apart(cure.before, cure.after, cure.truth)
+    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
     aim = f" (true: {truth})" if truth not in ("0", after) else ""
     numbers = f"{cure.metric}{f' at {at}' if at else ''} {before} -> {after}{unit}{aim}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
@@ -254,7 +261,7 @@ def cure_text(cure: Cure, where: str = "") -> str:
     return f"{where} by {settings}: {numbers}{left}{cost}{alone}"
 
 
-def _told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
+def told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
     """The three numbers in the fewest digits, at least three, that tell the first two apart."""
     enough = (n for n in range(3, 18) if number(before, n) != number(after, n))
     digits = next(enough, 3)

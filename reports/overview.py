@@ -78,7 +78,7 @@ def _cell(field: Field | None) -> Text:
     return Text(f"{SHORTEST[field.mark]} {share(field.missed, field.judged)}", style=STYLES.get(field.mark, ""))
 
 
-def share(part: int, whole: int) -> str:
+def share(part: float, whole: float) -> str:
     """Per cent without digits; what is not all of it, or not nothing, never reads as if it were."""
     per_cent = 100.0 * part / whole
     if 0.0 < per_cent < 1.0:

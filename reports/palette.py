@@ -20,6 +20,8 @@ TRUTH = "currentColor"
 #: Paper and ink of the page, light and dark.
 PAPER = {"light": "#ffffff", "dark": "#15181d"}
 INK = {"light": "#1c2128", "dark": "#e3e6ea"}
+#: Where everything fails: as strong as a contrast of 4.5:1 with the ink on it allows.
+HOT = {"light": "#ec6a47", "dark": "#a5331c"}
 
 #: Role of a profile -> (point shape of Vega, dash pattern of its line).
 MARKS: Mapping[Role, tuple[str, tuple[int, ...]]] = {
@@ -30,6 +32,8 @@ MARKS: Mapping[Role, tuple[str, tuple[int, ...]]] = {
     "one": ("triangle-up", (2, 2)),
     "matched": ("cross", (8, 2, 2, 2)),
 }
+#: Roles whose marks are hollow: nobody has tuned them. All others are filled.
+HOLLOW: frozenset[Role] = frozenset({"shipped", "textbook"})
 OTHER_MARK: tuple[str, tuple[int, ...]] = ("triangle-down", (1, 2))
 
 
@@ -56,12 +60,20 @@ def dash_of(profile: str) -> tuple[int, ...]:
     return _mark_of(profile)[1]
 
 
-@cache
 def _mark_of(profile: str) -> tuple[str, tuple[int, ...]]:
-    """Mark of the first engine that gives a profile of this name a role: pictures tell profiles by name."""
-    for engine in registry.names():
-        facts = registry.facts(engine)
-        role = facts.roles.get(profile) if facts else None
-        if role is not None:
-            return MARKS[role]
-    return OTHER_MARK
+    role = role_of(profile)
+    return OTHER_MARK if role is None else MARKS[role]
+
+
+@cache
+def role_of(profile: str) -> Role | None:
+    """Role that the first engine gives a profile of this name: pictures tell profiles by name."""
+    told = (registry.facts(engine) for engine in registry.names())
+    return next((facts.roles[profile] for facts in told if facts and profile in facts.roles), None)
+
+
+def heat(scheme: str, twentieths: int) -> str:
+    """Colour of a field in which so many twentieths fail: one hue from the paper on, never faint where any fails."""
+    ends = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in (PAPER[scheme], HOT[scheme])]
+    part = 0.15 + 0.85 * twentieths / 20 if twentieths else 0.0
+    return "#" + "".join(f"{round(low + part * (high - low)):02x}" for low, high in zip(*ends, strict=True))

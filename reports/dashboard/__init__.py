@@ -8,6 +8,7 @@ unit of the same machine. Complete without JavaScript, without a request, as str
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
@@ -19,14 +20,17 @@ from markupsafe import Markup
 from reports.dashboard import drawing
 from reports.dashboard.series import Panel, by_engine
 from reports.dashboard.steps import Step
+from reports.overview import share
 from reports.page import policy
-from reports.page.styling import engine_style
+from reports.page.styling import engine_style, heat_style
 from reports.wording import number, plural
 from validation.releases.notes import explanations
 
 __all__ = ["render"]
 #: What each series runs over, in words.
 OVER = {"runs": "runs and commits", "releases": "releases"}
+#: Newest releases or runs that a grid has a column for, and steps that are said in a sentence each.
+COLUMNS, LARGEST = 24, 10
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Event:
     kind: str
     worse: bool
     text: str
+    #: Factor of a step; 1 for a flip.
+    factor: float = 1.0
     #: What the notes of a release say of such a step.
     note: str = ""
 
@@ -51,12 +57,65 @@ class Event:
         """Which run or release that is, in full."""
         return self.panel.points[self.at].title
 
+    @property
+    def sentence(self) -> str:
+        """``With toy 1.2, the error of stack 3-D (tuned) falls from 4.4 to 2.8e-15 m``; the notes of the release."""
+        engine, profile, *_ = self.panel.key
+        what = f"the {self.kind} of {self.panel.name} ({profile}) {'rises' if self.worse else 'falls'} {self.text}"
+        where = f"With {engine} {self.label}" if self.panel.over == "releases" else f"On {self.label}, {engine}"
+        return f"{where}, {what}{f': {self.note}' if self.note else ''}."
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Share of the checks of each scene that fail, release by release; ``same`` scenes never change and have no line.
+
+    A line is a scene, the anchor of its first panel, and per column the share, None where the scene did not run.
+    """
+
+    over: str
+    engine: str
+    labels: list[str]
+    lines: list[tuple[str, str, list[float | None]]]
+    same: int
+
+
+def grid(over: str, engine: str, panels: Sequence[Panel]) -> Grid:
+    """The grid of one engine over its newest `COLUMNS` releases or runs; what changes most stands first."""
+    ordered = sorted(panels, key=lambda panel: -len(panel.points))
+    labels = dict((point.title, point.label) for panel in ordered for point in panel.points)
+    shown = list(labels)[-COLUMNS:]
+    counts: dict[str, dict[str, list[int]]] = {}
+    anchors: dict[str, str] = {}
+    for panel in panels:
+        own = counts.setdefault(panel.key[2], {})
+        anchors.setdefault(panel.key[2], panel.anchor)
+        for point in panel.points:
+            cell = own.setdefault(point.title, [0, 0])
+            cell[0] += point.fails
+            cell[1] += point.judged
+    shares = {
+        scene: [own[title][0] / own[title][1] if own.get(title, [0, 0])[1] else None for title in shown]
+        for scene, own in counts.items()
+    }
+    spans = {
+        scene: max(known) - min(known)
+        for scene, line in shares.items()
+        if (known := [s for s in line if s is not None])
+    }
+    moved = sorted((scene for scene in spans if spans[scene]), key=lambda scene: -spans[scene])
+    lines = [(scene, anchors[scene], shares[scene]) for scene in moved]
+    return Grid(over, engine, [labels[title] for title in shown], lines, len(shares) - len(lines))
+
 
 def render(panels: Sequence[Panel], title: str, reports: Mapping[str, str] | None = None) -> str:
     """Return the page as HTML text; ``reports`` are addresses of reports by run."""
     engines = sorted({panel.key[0] for panel in panels})
-    style = Markup(_text("../page/templates/page.css") + _text("templates/dashboard.css") + engine_style(engines))
+    own = _text("../page/templates/page.css") + _text("templates/dashboard.css")
+    style = Markup(own + heat_style() + engine_style(engines))
     script = Markup(_text("templates/dashboard.js"))
+    panels = [panel for panel in panels if len(panel.points) > 1]
+    groups = by_engine(panels)
     found = {panel.anchor: events(panel) for panel in panels}
     every = [event for own in found.values() for event in own]
     return (
@@ -67,7 +126,10 @@ def render(panels: Sequence[Panel], title: str, reports: Mapping[str, str] | Non
             policy=policy(style, script),
             style=style,
             script=script,
-            groups=by_engine(panels),
+            groups=groups,
+            grids=[each for key, own in groups.items() if (each := grid(*key, own)).lines],
+            largest=sorted((e for e in every if e.factor != 1.0), key=lambda e: -abs(math.log(e.factor)))[:LARGEST],
+            percent=lambda part: share(part, 1.0),
             over=OVER,
             events=found,
             every=sorted(every, key=lambda e: (e.panel.over, e.panel.key[0], e.kind != "flip", e.panel.key, e.at)),
@@ -85,8 +147,8 @@ def events(panel: Panel) -> list[Event]:
     out = []
     for at in panel.flips:
         point = panel.points[at]
-        said = [f"begin to fail: {plural(point.lost, 'cell')}"] * bool(point.lost)
-        said += [f"cease to fail: {plural(point.mended, 'cell')}"] * bool(point.mended)
+        said = [f"begins to fail: {plural(point.lost, 'case')}"] * bool(point.lost)
+        said += [f"fixed: {plural(point.mended, 'case')}"] * bool(point.mended)
         out.append(Event(panel, at, "flip", bool(point.lost), ", ".join(said)))
     out += [_step(panel, at, step, "error", panel.unit) for at, step in panel.error_steps]
     out += [_step(panel, at, step, "time", f"x {panel.opponent}") for at, step in panel.time_steps]
@@ -109,8 +171,8 @@ def _noted(event: Event) -> Event:
 
 def _step(panel: Panel, at: int, step: Step, kind: str, unit: str) -> Event:
     before, after = (number(value, 3) for value in (step.before, step.after))
-    text = f"{kind} {before} -> {after} {unit}".rstrip() + f", x{number(step.factor, 3)}"
-    return Event(panel, at, kind, step.factor > 1.0, text)
+    text = f"from {before} to {after} {unit}".removesuffix(" 1").rstrip()
+    return Event(panel, at, kind, step.factor > 1.0, text, step.factor)
 
 
 def _text(name: str) -> str:

@@ -24,11 +24,11 @@ from markupsafe import Markup
 from reports.answers import Answer, answers
 from reports.matrix import leaving, unranked
 from reports.overview import families_of, worst_answers
-from reports.page import choosing, conclusions, cost, explorer, fairness, replay, takeaway, verdicts
+from reports.page import choosing, conclusions, cost, explorer, fairness, fixing, opening, replay, takeaway, verdicts
 from reports.page.families import families
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
-from reports.page.styling import engine_style, symbols
+from reports.page.styling import engine_style, heat_style, symbols
 from reports.wording import missing_text, number
 from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
@@ -45,11 +45,13 @@ SEEN = 30
 def render(source: Source) -> str:
     """Return the page of ``source`` as HTML text."""
     style = Markup(
-        _text("page.css") + engine_style(list(dict(source.named))) + symbols(source.named)
+        _text("page.css") + heat_style() + engine_style(list(dict(source.named))) + symbols(source.named)
     )  # ours: nothing in it comes from a run
     script = Markup("\n".join(_text(name) for name in SCRIPTS).strip())
     wrong = answers(source.rows)
-    first = first_answers(source, wrong)
+    sheet = fairness.fairness(source)
+    others = [answer for answer in wrong if answer.engine != sheet.solver]  # ours are told in a section of their own
+    first = first_answers(source, others)
     choices = choosing.choices(source)
     shown = replay.replays(source)
     page = (
@@ -62,12 +64,15 @@ def render(source: Source) -> str:
             style=style,
             script=script,
             facts=facts(source),
+            headline=opening.headline(source),
+            halves=opening.halves(source),
+            called=opening.called,
             cite=cite(source),
             sentences=conclusions.sentences(source),
             families=families(source),
             answers=wrong,
-            first_answers=first,
-            more_answers=[answer for answer in wrong if answer not in first],
+            first_wrongs=fixing.wrongs(source, first),
+            more_wrongs=fixing.wrongs(source, [answer for answer in others if answer not in first]),
             findings=conclusions.findings(source),
             by_reason=conclusions.by_reason,
             timed=[choice for choice in choices if choice.timed],
@@ -78,7 +83,7 @@ def render(source: Source) -> str:
             people=replay.people(source),
             explorer=explorer.explorer(source),
             speed=cost.speed(source),
-            sheet=fairness.fairness(source),
+            sheet=sheet,
             take=takeaway.takeaway(source),
             said=verdicts.SAID,
             grounds=verdicts.GROUNDS,

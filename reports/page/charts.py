@@ -18,9 +18,11 @@ import pandas as pd
 import vl_convert
 from markupsafe import Markup
 
-from reports.palette import colours_of, dash_of, shape_of
+from reports.palette import HOLLOW, colours_of, dash_of, role_of, shape_of
 
 WIDTH, HEIGHT = 330, 250
+#: Width of the outline of a point [px].
+POINT = 1.5
 #: Errors below this share of their unit are exact for whoever chooses an engine: 1e-9 and 1e-16 are one answer.
 EXACT = 1e-6
 #: Where they are drawn: in a gutter below the axis, labelled "exact".
@@ -146,12 +148,15 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def styled(table: pd.DataFrame) -> dict[str, Any]:
-    """Encodings of colour, shape and dash for the columns ``engine`` and ``profile``."""
+    """Encodings of points by the columns ``engine`` and ``profile``: colour, shape, and hollow as shipped."""
     engines, profiles = sorted(set(table["engine"])), sorted(set(table["profile"]))
     colours = colours_of(engines)
     colour = alt.Scale(domain=engines, range=[colours[name] for name in engines])
     shapes = alt.Scale(domain=profiles, range=[shape_of(name) for name in profiles])
+    hollow = alt.FieldOneOfPredicate(field="profile", oneOf=[name for name in profiles if role_of(name) in HOLLOW])
+    filled = alt.Fill("engine:N", scale=colour, legend=None)
     return {
+        "fill": alt.condition(hollow, alt.value("transparent"), filled),
         "color": alt.Color("engine:N", scale=colour, legend=None),
         "shape": alt.Shape("profile:N", scale=shapes, legend=None),
     }
@@ -187,5 +192,5 @@ def lines(
     thin = base.mark_line(strokeWidth=1.4, opacity=0.75).encode(
         x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=detail, description="who:N", **ordered
     )
-    points = base.mark_point(size=52, filled=True, opacity=0.95).encode(x=x, y=y, description="label:N", **style)
+    points = base.mark_point(size=52, strokeWidth=POINT, opacity=0.95).encode(x=x, y=y, description="label:N", **style)
     return alt.layer(*below, thin, points).properties(width=width, height=height)

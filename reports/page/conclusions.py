@@ -120,7 +120,7 @@ def departures(source: Source) -> str:
         if row["standing"] == "explained":
             groups[row["engine"], row["profile"]].append(row)
     if not groups:
-        return "No departure lies where a law of an engine predicts it."
+        return "No failure is what the contact model of an engine predicts."
     total = sum(len(group) for group in groups.values())
     parts = []
     for (engine, profile), group in sorted(groups.items(), key=lambda item: -len(item[1]))[:3]:
@@ -128,7 +128,7 @@ def departures(source: Source) -> str:
         because = Counter(_law_text(row["reason"]) for row in group).most_common(1)[0][0]
         parts.append(f"{engine}/{profile} on {scenes} ({len(group)}: {because})")
     more = f"; and {len(groups) - 3} more" if len(groups) > 3 else ""
-    return f"{total} failing values lie where a law of their engine predicts them: {'; '.join(parts)}{more}."
+    return f"{total} failures are what the engine's contact model predicts: {'; '.join(parts)}{more}."
 
 
 def _law_text(reason: str) -> str:
@@ -143,16 +143,16 @@ def wrongs(source: Source) -> str:
     said = ""
     if alarms:
         worst = max((row for row in source.rows if mark_of(row) in ALARMS), key=severity)
-        said = f"{joined(alarms)} rows need attention, first {_row_text(worst)}. "
+        said = f"{joined(alarms)} checks need attention, first {_row_text(worst)}. "
     listed = [row for row in source.rows if mark_of(row) in ("known", "fail")]
     if not listed:
         if not answering(source) and not alarms:
             return "Nothing was judged."
-        return said + ("Nothing else fails." if alarms else "No row fails without a law that explains it.")
+        return said + ("Nothing else fails." if alarms else "Every failure is what the contact model predicts.")
     worst = max(listed, key=lambda row: ratio_of(row) or 0.0)
-    unlisted = f" ({counts['fail']} of engines without a list)" if counts["fail"] else ""
+    unlisted = f" ({counts['fail']} of engines of which nothing is on record)" if counts["fail"] else ""
     head = "" if alarms else "Nothing is new, drifted, invalid or crashed. "
-    return f"{said}{head}{len(listed)} rows fail without a law{unlisted}; the largest is {_row_text(worst)}."
+    return f"{said}{head}{len(listed)} checks fail for other causes{unlisted}; the largest is {_row_text(worst)}."
 
 
 def where_text(row: Plain) -> str:
@@ -177,7 +177,7 @@ def sentences(source: Source) -> list[tuple[str, str]]:
     """Three headed sentences for the first screen."""
     return [
         ("Where they agree", agreement(source)),
-        ("Where they depart by a known law", departures(source)),
+        ("Where the contact model explains a failure", departures(source)),
         ("Where something is wrong", wrongs(source)),
     ]
 

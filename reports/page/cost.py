@@ -12,6 +12,7 @@ import pandas as pd
 
 from reports import speed as tables_of_speed
 from reports.page.charts import (
+    POINT,
     dashes,
     error_axis,
     gutter,
@@ -180,37 +181,57 @@ def _level_cell(row: Plain, column: str, ranked: bool) -> LevelCell:
 
 
 def _multiples(bench: Bench) -> list[Figure]:
-    """Small work-precision panels: the best settings of every profile, one panel per scene and dimension."""
+    """Small work-precision panels on one axis of cost: the best settings of every profile, scene by scene.
+
+    A scene that was timed in the plane and in space is shown in the plane; its own section has both.
+    """
     points = bench.tables["work_points"]
     if len(points) == 0:
         return []
     used = points[points["cost"].notna() & points["error"].notna() & points["on_front"]].copy()
     used["shown"] = gutter(used["error"])
+    x_scale, ticks = log_scale([*used["cost_low"], *used["cost_high"]], 1.3)
+    x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", ticks))
     figures = []
-    for (scene, dimension), table in used.groupby(["scene", "dimension"], sort=False):
-        figures.append(_multiple(str(scene), int(str(dimension)), table))
+    for scene, table in used.groupby("scene", sort=False):
+        dimension = int(table["dimension"].min())
+        figures.append(_multiple(str(scene), dimension, table[table["dimension"] == dimension], x))
     return figures
 
 
-def _multiple(scene: str, dimension: int, table: pd.DataFrame) -> Figure:
+def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figure:
     primary, style = primary_of(scene), styled(table)
-    x_scale, x_ticks = log_scale([*table["cost_low"], *table["cost_high"]], 1.3)
     y_scale, axis, _ = error_axis(list(table["shown"]), with_unit(primary.name, primary.unit), 3.0)
-    x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU s per simulated s", x_ticks))
     y = alt.Y("shown:Q", scale=y_scale, axis=axis)
     table = table.assign(label=[
         f"{r['engine']}/{r['profile']}, {_setting(r)}: error {number(r['error'], 2)}, {duration(r['cost'])}"
         for r in table.to_dict("records")
-    ])[["cost", "cost_low", "cost_high", "shown", "engine", "profile", "label"]]  # fmt: skip
+    ], step=table["dt"].map(format_dt))[
+        ["cost", "cost_low", "cost_high", "shown", "engine", "profile", "label", "step", "best"]
+    ]  # fmt: skip
     table = named(table)
+    on_front = table[table["best"]].sort_values("cost")
+    best, steps = (
+        alt.Chart(on_front),
+        alt.Chart(on_front.drop_duplicates("shown")),
+    )  # what is dearer and no better has none
     thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7)
-    points = alt.Chart(table).mark_point(filled=True, size=40)
+    points = alt.Chart(table).mark_point(strokeWidth=POINT, size=40)
     detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}
+    front: dict[str, Any] = {
+        "interpolate": "step-after",
+        "color": "currentColor",
+        "opacity": 0.25,
+        "strokeWidth": 5,
+        "aria": False,
+    }
     chart = alt.layer(
         *gutter_band(list(table["shown"]), y_scale, axis),
+        best.mark_line(**front).encode(x=x, y=y),
         thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), **detail),
         intervals(table, x, y, style["color"]),
         points.encode(x=x, y=y, description="label:N", **style),
+        steps.mark_text(dx=-5, dy=10, align="right", fontSize=11, aria=False).encode(x=x, y=y, text="step:N"),
     ).properties(width=215, height=180)
     title = f"{scene} {dimension}-D"
     return Figure(f"fig-multiple-{title}", title, "", svg(chart, f"Work and precision, {title}"))
@@ -244,7 +265,7 @@ def _scaling_figure(purpose: str, scene: str, dimension: int, group: pd.DataFram
     x = alt.X("x:Q", scale=x_scale, axis=power_axis(purpose, x_ticks))
     y = alt.Y("y:Q", scale=y_scale, axis=power_axis("CPU time per step [s]", y_ticks))
     thin = alt.Chart(data).mark_line(strokeWidth=1.2, opacity=0.75)
-    points = alt.Chart(data).mark_point(filled=True, size=40)
+    points = alt.Chart(data).mark_point(strokeWidth=POINT, size=40)
     bars = alt.Chart(data).mark_rule(strokeWidth=1.6, opacity=0.6)
     low = alt.Y("low:Q", scale=y_scale, axis=power_axis("CPU time per step [s]", y_ticks))
     detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}

@@ -1,4 +1,4 @@
-"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; effective against asked restitution.
+"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; restitution that was set against measured.
 
 Which metrics of which scenes show a restitution, the scenes say (`validation.canonical.Restitution`).
 """
@@ -7,42 +7,33 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import altair as alt
 import pandas as pd
 
-from adapters.registry import is_ranked, profile_of
-from reports.page.charts import dodged, named, styled, svg
+from reports.page.charts import POINT, dashes, dodged, named, styled, svg
 from reports.page.figures import Figure
+from reports.page.opening import SECOND, called, shown, word_of
 from reports.page.source import Plain, Source
-from reports.palette import colours_of, shape_of
+from reports.palette import HOLLOW, colours_of, role_of, shape_of
 from reports.wording import number
 from validation.canonical import Restitution
-from validation.posed import resolve
 
 #: Materials that people know, with the coefficient that is usually quoted for them.
 PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
 FAINT = (0.9, 0.5)
-
-
-@dataclass(frozen=True)
-class Effective:
-    """Restitution that an engine and profile realise where a scene asks for ``asked``."""
-
-    engine: str
-    profile: str
-    asked: float
-    low: float
-    high: float
-    speeds: str
+#: Width of a panel of restitution [px], and how far from the diagonal is not seen to leave it [restitution].
+MAP, BAND = 300, 0.02
+#: Height of a line of text in it [restitution].
+LINE = 0.065
 
 
 @dataclass(frozen=True)
 class Explorer:
-    """Data of the slider, its picture without JavaScript, the map and the table of effective restitution.
+    """Data of the slider, its picture without JavaScript, and the pictures of restitution with their scene.
 
     ``shown`` are the engines and profiles that have points in the picture.
     """
@@ -51,28 +42,21 @@ class Explorer:
     shown: list[tuple[str, str]]
     figure: Figure
     maps: list[Figure]
-    effective: list[Effective]
-    answers: list[str]
     scene: str
-
-
-def _shown(source: Source, series: bool) -> tuple[str, Restitution] | None:
-    """First scene of the run that shows restitution as a series of heights, or as a ratio of speeds."""
-    told = ((scene, resolve(scene).restitution) for scene in source.scenes)
-    return next(((scene, found) for scene, found in told if found and bool(found.heights) is series), None)
 
 
 def explorer(source: Source) -> Explorer | None:
     """None if no scene of the run shows restitution."""
-    bounced, struck = _shown(source, True), _shown(source, False)
+    bounced, struck = shown(source, True), shown(source, False)
     heights = _heights(source, *bounced) if bounced else {}
     rebounds = _rebounds(source, *struck) if struck else []
     if not heights and not rebounds:
         return None
     colours, own = colours_of(source.engines), [column for column in source.columns if heights.get(column)]
-    series = [
+    series: list[dict[str, Any]] = [
         {
             "name": f"{engine}/{profile}", "colour": colours[engine], "shape": shape_of(profile),
+            "hollow": role_of(profile) in HOLLOW,
             "heights": {f"{e:g}": values for e, values in sorted(heights.get((engine, profile), {}).items())},
         }
         for engine, profile in own
@@ -80,9 +64,8 @@ def explorer(source: Source) -> Explorer | None:
     measured = sorted({float(e) for entry in series for e in entry["heights"]})
     apexes = bounced[1].heights if bounced else 0
     data = {"presets": PRESETS, "faint": FAINT, "apexes": apexes, "measured": measured, "series": series}
-    effective = _effective(rebounds, source.columns)
-    said = _answers(rebounds)
-    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds), effective, said, struck[0] if struck else "")
+    scene = struck[0] if struck else ""
+    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene), scene)
 
 
 def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
@@ -130,7 +113,7 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity)]
     if rows:
         table = dodged(pd.DataFrame(rows), "n", "h", logarithmic=False)
-        points = alt.Chart(table).mark_point(filled=True, size=60)
+        points = alt.Chart(table).mark_point(strokeWidth=POINT, size=60)
         layers.append(points.encode(x=x, y=y, description="label:N", **styled(table)))
     title = f"Apex heights for e = {e:g}"
     picture = svg(alt.layer(*layers).properties(width=620, height=320), title)
@@ -140,67 +123,101 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     return Figure("fig-explorer", title, said, picture)
 
 
-def _maps(rebounds: Sequence[Plain]) -> list[Figure]:
-    """Effective against asked restitution, one panel per approach speed (planar, else spatial)."""
+def _maps(rebounds: Sequence[Plain], scene: str) -> list[Figure]:
+    """Measured against set restitution, one panel per approach speed (planar, else spatial), the telling one first.
+
+    It is the one in which most engines leave the diagonal; of equals the one with most points, then the fastest.
+    """
     if not rebounds:
         return []
     dimension = min(row["dimension"] for row in rebounds)
-    speeds = sorted({row["speed"] for row in rebounds})
-    return [_map([r for r in rebounds if r["speed"] == v and r["dimension"] == dimension], v) for v in speeds]
+    panels: dict[float, list[Plain]] = defaultdict(list)
+    for row in rebounds:
+        if row["dimension"] == dimension:
+            panels[row["speed"]].append(row)
+    first = max(panels, key=lambda v: (len(_leaving(panels[v])), len(panels[v]), v))
+    return [_map(panels[v], v, scene) for v in [first, *sorted(panels.keys() - {first})]]
 
 
-def _map(rows: Sequence[Plain], speed: float) -> Figure:
-    table = pd.DataFrame(
+def _leaving(rows: Sequence[Plain]) -> list[tuple[str, str]]:
+    """Engines and profiles that are seen to leave the diagonal anywhere."""
+    off = [(row["engine"], row["profile"]) for row in rows if abs(row["got"] - row["asked"]) > BAND]
+    return list(dict.fromkeys(off))
+
+
+def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
+    """One panel: a grey diagonal for all that rebound as set, and a line with its name for each that does not."""
+    off = _leaving(rows)
+    table = named(pd.DataFrame(
         {
             "engine": row["engine"], "profile": row["profile"], "asked": row["asked"], "got": row["got"],
-            "label": f"{row['engine']}/{row['profile']}: asked {row['asked']:g}, got {number(row['got'], 4)}",
+            "label": f"{row['engine']}/{row['profile']}: set {row['asked']:g}, measured {number(row['got'], 4)}",
+            "off": (row["engine"], row["profile"]) in off,
         }
         for row in rows
-    )  # fmt: skip
-    x = alt.X("asked:Q", axis=alt.Axis(title="restitution asked for", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
-              scale=alt.Scale(domain=[-0.07, 1.07], nice=False))  # fmt: skip
+    ))  # fmt: skip
+    ticks = alt.Axis(title="restitution that was set", values=[0, 0.2, 0.4, 0.6, 0.8, 1])
+    x = alt.X("asked:Q", axis=ticks, scale=alt.Scale(domain=[-0.03, 1.03], nice=False))
     top = max(1.03, float(table["got"].max()) * 1.05)
-    y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured"), scale=alt.Scale(domain=[-0.03, top], nice=False))
-    ideal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
-    line = ideal.mark_line(color="currentColor", opacity=0.18, strokeWidth=7, aria=False).encode(x=x, y=y)
+    low = min(-0.03, float(table["got"].min()) * 1.05)
+    y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
+              scale=alt.Scale(domain=[low, top], nice=False))  # fmt: skip
+    diagonal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
+    wide = 2.0 * BAND * MAP / (1.06 * math.sqrt(2.0))  # across the line, what is `BAND` above and below it
+    on, left = table[~table["off"]], table[table["off"]]
+    layers = [
+        diagonal.mark_line(color="currentColor", opacity=0.25, strokeWidth=wide, aria=False).encode(x=x, y=y),
+        alt.Chart(on).mark_point(filled=True, size=14, color="currentColor", opacity=0.6)
+        .encode(x=x, y=y, description="label:N"),
+        _words(_stayed(on, off), x, y, "currentColor"),
+    ]  # fmt: skip
     style = styled(table)
-    # Only marks stand side by side: a line that is moved would show another law.
-    table = named(table)
-    thin = alt.Chart(table).mark_line(strokeWidth=1.3, opacity=0.7)
-    points = alt.Chart(dodged(table, "asked", "got", logarithmic=False)).mark_point(filled=True, size=48, opacity=0.9)
-    chart = alt.layer(
-        line,
-        thin.encode(x=x, y=y, color=style["color"], detail=["engine:N", "profile:N"], description="who:N"),
-        points.encode(x=x, y=y, description="label:N", **style),
-    ).properties(width=220, height=210)
+    if off:
+        layers.append(alt.Chart(left).mark_line(strokeWidth=2.5).encode(
+            x=x, y=y, color=style["color"], strokeDash=dashes(table), detail=["engine:N", "profile:N"],
+            description="who:N",
+        ))  # fmt: skip
+        layers.append(
+            alt.Chart(left).mark_point(strokeWidth=POINT, size=60).encode(x=x, y=y, description="label:N", **style)
+        )
+    layers += [_words(told, x, y, colour) for told, colour in _names(left)]
+    chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"
-    return Figure(f"fig-map-{speed:g}", title, "", svg(chart, f"Effective against requested restitution, {title}"))
+    caption = f"{title}, scene {scene}. Grey band: what is measured is what was set, to within {BAND:g}."
+    return Figure(f"fig-map-{speed:g}", title, caption, svg(chart, f"Restitution that was set and measured. {title}"))
 
 
-def _effective(rebounds: Sequence[Plain], columns: Iterable[tuple[str, str]]) -> list[Effective]:
-    """Range of measured restitution over speeds and dimensions, per engine, profile and asked value."""
-    found = []
-    for engine, profile in columns:
-        own = [row for row in rebounds if (row["engine"], row["profile"]) == (engine, profile)]
-        for e in sorted({row["asked"] for row in own}):
-            values = [(row["got"], row["speed"]) for row in own if row["asked"] == e]
-            speeds = ", ".join(f"{v:g}" for v in sorted({speed for _, speed in values}))
-            found.append(Effective(engine, profile, e, min(values)[0], max(values)[0], speeds))
+def _words(told: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
+    """Words that end at places in a panel."""
+    table = pd.DataFrame(told, columns=["asked", "got", "text"])
+    mark = alt.Chart(table).mark_text(align="right", fontSize=13, fontWeight=600, color=colour, opacity=0.9, aria=False)
+    return mark.encode(x=x, y=y, text="text:N")
+
+
+def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
+    """Names of lines above their right ends, each a line of text above the one below, with their colours."""
+    ends = left.sort_values("asked").drop_duplicates("who", keep="last").sort_values("got")
+    found: list[tuple[list[tuple[float, float, str]], str]] = []
+    height = -math.inf
+    colours = colours_of(list(ends["engine"]))
+    for end in ends.to_dict("records"):
+        height = max(end["got"] + LINE, height + LINE)
+        text = f"{called(end['engine'])} {word_of(end['profile'])}"
+        found.append(([(1.02, height, text)], colours[end["engine"]]))
     return found
 
 
-def _answers(rebounds: Sequence[Plain]) -> list[str]:
-    """For each engine as shipped that misses: how wrong its restitution is at the scene's own values, and the cure."""
-    own = [row for row in rebounds if not row["slot"]["params"]]
-    said = []
-    for engine in dict.fromkeys(row["engine"] for row in own):
-        values = {row["profile"]: row["got"] for row in own if row["engine"] == engine}
-        shipped, asked = values.get(profile_of(engine, "shipped") or ""), own[0]["asked"]
-        if shipped is None or math.isclose(shipped, asked, abs_tol=1e-3):
-            continue
-        nearer = {p: v for p, v in values.items() if abs(v - asked) < abs(shipped - asked)}
-        better = {p: v for p, v in nearer.items() if is_ranked(engine, p)}
-        best = min(better, key=lambda p: abs(better[p] - asked), default=None)
-        cure = "" if best is None else f"; profile {best} gives {number(better[best], 4)}"
-        said.append(f"{engine} as shipped rebounds with {number(shipped, 3)} where {asked:g} is asked{cure}.")
-    return said
+def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
+    """Who the diagonal is, in two lines of text to the left of it."""
+    stayed = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
+    if not off:
+        said = ["every engine", "and profile"]
+    elif not stayed:
+        said = ["as it should be"]
+    else:
+        tuned = [column for column in (*stayed, *off) if word_of(column[1]) in SECOND.values()]
+        shipped = [called(engine) for engine, profile in stayed if word_of(profile) == "as shipped"]
+        others = f"{shipped[0] if len(shipped) == 1 else f'{len(shipped)} engines'} as shipped" if shipped else ""
+        mended = bool(tuned) and not set(tuned) & set(off)
+        said = [text for text in ("every tuned profile" if mended else "", others) if text] or ["everybody else"]
+    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(said)]

@@ -14,6 +14,7 @@ from markupsafe import Markup
 from reports.page.charts import (
     EXACT,
     HEIGHT,
+    POINT,
     WIDTH,
     dashes,
     dodged,
@@ -134,7 +135,7 @@ def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure |
     )
     plain = named(table[["cost", "cost_low", "cost_high", "shown", "engine", "profile", "label", "on_front"]])
     own = alt.Chart(plain[plain["on_front"]]).mark_line(strokeWidth=1, opacity=0.55)
-    mark = alt.Chart(plain).mark_point(size=46, filled=True, opacity=0.9)
+    mark = alt.Chart(plain).mark_point(size=46, strokeWidth=POINT, opacity=0.9)
     chart = alt.layer(
         *gutter_band(list(table["shown"]), y_scale, axis),
         front.encode(x=x, y=y),
@@ -144,8 +145,8 @@ def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure |
     ).properties(width=WIDTH, height=HEIGHT)
     title = f"{scene} {dimension}-D: {primary.name} against cost"
     caption = (
-        "Lower left is better. Bars: interval of the median time. Grey steps: the best of all engines. Lines join the "
-        "best settings of one profile."
+        "Lower left is better. Hollow: as shipped. Bars: interval of the median time. Grey steps: the best of all "
+        "engines. Lines join the best settings of one profile."
     )
     return Figure(f"fig-work-{scene}-{dimension}", title, caption, svg(chart, title))
 

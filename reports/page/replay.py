@@ -28,6 +28,7 @@ from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygo
 from adapters.shapes import reach
 from reports.page import figures
 from reports.page.figures import Figure
+from reports.page.opening import shown
 from reports.page.source import Source
 from reports.page.verdicts import slug
 from reports.palette import colours_of, dash_of
@@ -93,11 +94,12 @@ def _deflated(content: bytes) -> str:
 
 
 def replays(source: Source) -> list[Replay]:
-    """All scenes that were recorded, in the order of the run."""
+    """All scenes that were recorded: first the one that shows a rebound, then in the order of the run."""
     groups: dict[tuple[str, int], list[tuple[Slot, Recording]]] = defaultdict(list)
     for slot, recording in source.replays:
         groups[slot.scene, slot.dimension].append((slot, recording))
-    order = [line for line in source.lines if line in groups]
+    bounced, *_ = shown(source, series=True) or ("",)
+    order = sorted((line for line in source.lines if line in groups), key=lambda line: line[0] != bounced)
     drawn = {scene: dimension for scene, dimension in reversed(order)}  # a motion is drawn once, in the plane if it can
     return [_replay(source, *line, groups[line], drawn[line[0]] == line[1]) for line in order]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from urllib.parse import quote
 
 from reports.page.verdicts import slug
-from reports.palette import colours_of, dash_of, shape_of
+from reports.palette import HOLLOW, colours_of, dash_of, heat, role_of, shape_of
 
 _SHAPES = {
     "circle": '<circle cx="8" cy="8" r="4.2"/>',
@@ -23,6 +23,11 @@ def engine_style(engines: list[str]) -> str:
     return "".join(f".e-{slug(name)}{{--engine:{colour}}}" for name, colour in colours_of(engines).items())
 
 
+def heat_style() -> str:
+    """CSS of the shares that fail, in twentieths (`reports.page.verdicts.Mark.twentieths`): ``w0`` to ``w20``."""
+    return "".join(f".w{k}{{background:light-dark({heat('light', k)},{heat('dark', k)})}}" for k in range(21))
+
+
 def symbols(columns: Sequence[tuple[str, str]]) -> str:
     """CSS that puts point and line of an engine and profile, as charts have them, before its name.
 
@@ -34,7 +39,9 @@ def symbols(columns: Sequence[tuple[str, str]]) -> str:
         dash = " ".join(map(str, dash_of(profile)))
         pattern = f' stroke-dasharray="{dash}"' if dash else ""
         line = f'<path d="M-5 8h26" stroke="{colours[engine]}" stroke-width="1.4"{pattern}/>'
-        head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-5 0 26 16" fill="{colours[engine]}">'
-        drawn = quote(f"{head}{line}{_SHAPES[shape_of(profile)]}</svg>", safe=" /:=")
+        inner = "none" if role_of(profile) in HOLLOW else colours[engine]
+        head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-5 0 26 16" fill="{inner}">'
+        mark = f'<g stroke="{colours[engine]}" stroke-width="1.5">{_SHAPES[shape_of(profile)]}</g>'
+        drawn = quote(f"{head}{line}{mark}</svg>", safe=" /:=")
         rules.append(f".s{k}::before{{background-image:url('data:image/svg+xml,{drawn}')}}")
     return "".join(rules)

@@ -12,6 +12,7 @@ from itertools import takewhile
 from typing import Any
 
 from reports.matrix import UNJUDGED, Field, Matrix
+from reports.overview import share
 from reports.page.source import Source
 from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
@@ -41,17 +42,17 @@ GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.
 #: What the words mean, for the legend.
 MEANINGS = {
     "pass": "within the stated tolerance of the truth",
-    "explained": "fails, and lies where a law of the engine predicts it",
-    "known": "fails, and is listed with a reason and this value",
-    "fail": "fails; findings are not listed for this engine, or not outside the standard suite",
-    "new": "fails or has no value, and nobody knew",
-    "drifted": "left the band of its law or of what is listed",
+    "explained": "fails as the engine's contact model predicts",
+    "known": "fails; cause and value are on record",
+    "fail": "fails; nothing is on record for this engine, or only for the standard suite",
+    "new": "fails or has no value; not on record",
+    "drifted": "fails by another amount than is on record or predicted",
     "diverged": "the state exploded or stopped being finite",
     "invalid": "the profile does not realise what it declares (see receipts)",
     "crashed": "the engine raised an error or killed its process",
     "timed_out": "no answer in time",
     "missing": "planned, but the run has nothing of it",
-    "unsupported": "cannot be asked of this engine",
+    "unsupported": "not supported by this engine",
     "not_installed": "the engine is not installed here",
     "none": "the engine does not report what this needs",
 }
@@ -93,7 +94,7 @@ def times(ratio: float | None) -> str:
 
 @dataclass(frozen=True)
 class Mark:
-    """What a cell shows: mark, words after it, where it leads, the longer text, and the share that does not pass."""
+    """What a cell shows: mark, words after it, where it leads, the longer text, and the share that fails."""
 
     mark: str
     text: str
@@ -103,8 +104,13 @@ class Mark:
 
     @property
     def twentieths(self) -> int:
-        """The share, rounded up: a length that the page has a class for, as it runs no styles of single elements."""
+        """The share, rounded up: a shade that the page has a class for, as it runs no styles of single elements."""
         return math.ceil(20.0 * self.share)
+
+    @property
+    def percent(self) -> str:
+        """The share as a field of the matrix shows it; a dash where nothing was judged."""
+        return share(self.share, 1.0) if self.text else SAID[self.mark][0]
 
     @property
     def sign(self) -> str:

@@ -176,7 +176,7 @@ def test_every_judged_value_stands_in_a_table(page_source, text):
         row for row in page_source.rows if row["outcome"] != "unsupported"
     ]  # of whom it cannot be asked is said once
     assert sum(cell.strip() != ">" for cell in values) == len(judged)
-    assert text.count("Cannot be asked of chipmunk.") == 1
+    assert text.count("Not supported by chipmunk.") == 1
 
 
 def test_the_taken_away_rows_are_the_rows(elements, page_source):
@@ -294,8 +294,11 @@ def test_an_explained_failure_is_a_departure_and_an_alarm_is_wrong():
     rows[0] |= {"physics": "fail", "standing": "explained", "reason": "slop takes a share, always (predicted 1 +- 2)"}
     rows[1] |= {"physics": "fail", "standing": "new"}
     changed = sentences(Source(source.run, rows, []))
-    assert "1 failing values lie where a law" in changed[1][1] and "slop takes a share)" in changed[1][1]
-    assert changed[2][1].startswith("1 NEW rows need attention")
+    assert (
+        "1 failures are what the engine's contact model predicts" in changed[1][1]
+        and "slop takes a share)" in changed[1][1]
+    )
+    assert changed[2][1].startswith("1 NEW checks need attention")
 
 
 def test_findings_hold_every_failing_value_once(page_source):
@@ -418,12 +421,11 @@ def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     assert all(change.because and change.before != change.after for change in cure.changes)
 
 
-def test_the_explorer_holds_measured_heights_and_says_who_rebounds_wrongly(page_source):
+def test_the_explorer_holds_measured_heights_and_names_who_rebounds_wrongly(page_source):
     found = explorer(page_source)
     tuned = next(s for s in found.data["series"] if s["name"] == "chipmunk/tuned")
     assert tuned["heights"]["0.8"][0] == pytest.approx(0.64, abs=0.02)
-    assert [text for text in found.answers if text.startswith("bullet as shipped rebounds with")]
-    assert not [text for text in found.answers if text.startswith("chipmunk")]
+    assert "Bullet as shipped" in found.maps[0].picture and "bullet/default: set " in found.maps[0].picture
     assert len(found.maps) == 1  # one approach speed ran with both
 
 
@@ -536,7 +538,8 @@ def test_the_page_of_a_run_in_which_nothing_could_be_asked_claims_nothing(tmp_pa
     assert "Nothing was judged" in page
     for wrong in (
         "is within its tolerance",
-        "passes every check that it was",
+        "passes every check of",
+        "fails the most",
         "pass every check",
         "every engine has a",
     ):

@@ -96,8 +96,8 @@ def test_every_link_of_the_page_leads_somewhere(browser, page_file):
 
 def test_a_field_of_the_matrix_leads_to_its_row_and_the_row_to_its_opened_check(browser, page_file):
     with opened(browser, page_file) as page:
-        page.locator(".matrix.overall a.m", has_text="✗").first.click()
-        page.locator("div:target .matrix a.m", has_text="✗").first.click()
+        page.locator(".matrix.overall a.h", has_text="known").first.click()
+        page.locator("div:target .matrix a.h", has_text="known").first.click()
         row = page.locator("tr:target")
         assert row.is_visible() and "✗" in row.inner_text()
         page.locator(".overview", has=row).locator("thead a").first.click()
@@ -304,6 +304,23 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
     assert content.startswith(heads[kind])
 
 
+def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, page_file):
+    with opened(browser, page_file, "#impact-2") as page:
+        figure = page.locator("#scene-impact figure.plot").first
+        title = figure.locator("svg").get_attribute("aria-label")
+        with page.expect_download() as found:
+            figure.locator("button.save:has-text('SVG')").click()
+        with page.expect_download() as talk:
+            page.locator(".talk button.save:has-text('SVG')").click()
+        saved, picture = (Path(each.value.path()).read_text() for each in (found, talk))
+    words = re.findall(r"<text[^>]*>([^<]*)</text>", saved)
+    assert title in words and {"bullet/default", "bullet/tuned"} <= set(words)
+    low, high = (float(v) for v in re.search(r'viewBox="\S+ (\S+) \S+ (\S+)"', saved).groups())
+    heights = [float(y) for y in re.findall(r'<text x="[^"]*" y="([^"]*)" fill', saved)]
+    assert len(heights) >= 3 and all(low < y < low + high for y in heights), "what is said lies in the picture"
+    assert "Restitution that was set and measured" in picture and "bullet/default</text>" not in picture
+
+
 def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file, page_source):
     with opened(browser, page_file, "#tables") as page:
         with page.expect_download() as found:
@@ -367,13 +384,19 @@ def test_the_text_of_the_explorer_can_be_read_on_a_phone(browser, page_file):
     assert height > 10
 
 
-def test_on_a_phone_the_matrix_stands_before_the_filter_and_the_facts(browser, page_file):
-    with opened(browser, page_file, width=390) as page:
-        places = [
-            page.locator(f"#verdicts > {part}").first.bounding_box()["y"]
-            for part in ("h1", ".scroll", ".families", ".legend", "#filter", ".facts")
-        ]
-    assert places == sorted(places)
+@pytest.mark.parametrize("width", [390, 1280])
+def test_headline_picture_and_matrix_stand_before_the_filter_and_the_facts(browser, page_file, page_source, width):
+    parts = ("h1", ".talk svg", ".matrix.overall", ".families", "#filter", ".facts")
+    with opened(browser, page_file, width=width) as page:
+        boxes = [page.locator(f"#verdicts {part}").first.bounding_box() for part in parts]
+        hinted = page.locator(".swipe:visible").count() == 1
+    places = [box["y"] for box in boxes]
+    if width == 390:
+        assert places == sorted(places) and hinted is (len(page_source.engines) > 2)
+    else:
+        assert places[3:] == sorted(places[3:]) and max(places[:3]) < min(places[3:]) and not hinted
+        assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"], "picture and matrix stand side by side"
+        assert boxes[2]["y"] + boxes[2]["height"] < 800, "on the first screen"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -1,19 +1,19 @@
 """Tables and marks of the page, from rows made up for one thing each."""
 
 from collections import Counter
-from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
 from reports import cures as told_cures
-from reports import page
 from reports.matrix import Field
 from reports.page import cost, fairness
 from reports.page.charts import log_scale
 from reports.page.conclusions import NAMED, scenes_text
+from reports.page.styling import heat_style
 from reports.page.verdicts import family_mark
+from reports.palette import PAPER, heat
 from reports.spread import spread_lines
 from reports.wording import MARKS
 from validation.cells import Slot
@@ -156,10 +156,10 @@ def test_a_row_is_counted_for_an_entry_that_covers_it_and_by_which_it_is_known(s
 
 
 @pytest.mark.parametrize(("missed", "judged", "length"), [(0, 8, 0), (1, 289, 1), (1, 20, 1), (26, 283, 2), (8, 8, 20)])
-def test_the_bar_of_a_field_is_the_share_that_does_not_pass_and_never_nothing_where_one_does_not(
-    missed, judged, length
-):
+def test_the_shade_of_a_field_is_the_share_that_fails_and_never_paper_where_one_does(missed, judged, length):
     found = family_mark(Field(Counter({"known": missed, "pass": judged - missed})), "there")
     assert found.twentieths == length
-    drawn = (Path(page.__file__).parent / "templates" / "page.css").read_text()
-    assert not length or f".w{length} {{ --share: {5 * length}%; }}" in drawn
+    assert f".w{length}{{background:light-dark({heat('light', length)},{heat('dark', length)})}}" in heat_style()
+    assert (heat("light", length) == PAPER["light"]) is (missed == 0)
+    said = {(0, 8): "0 %", (1, 289): "<1 %", (1, 20): "5 %", (26, 283): "9 %", (8, 8): "100 %"}
+    assert found.percent == said[missed, judged]

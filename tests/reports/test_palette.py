@@ -7,7 +7,7 @@ import pytest
 
 from adapters import registry
 from adapters.engine import ROLES
-from reports.palette import MARKS, OTHERS, PAPER, colours_of, dash_of, shape_of
+from reports.palette import INK, MARKS, OTHERS, PAPER, colours_of, dash_of, heat, shape_of
 
 #: Engines that are set apart bring no colour: the band between both papers holds no more than five that stay apart.
 ENGINES = {name: colour for name, colour in colours_of(registry.names()).items() if not registry.facts(name).apart}
@@ -53,6 +53,20 @@ def test_engines_stay_apart_in_every_kind_of_vision(vision):
     seen = {name: oklab(VISION[vision] @ linear(colour)) for name, colour in ENGINES.items()}
     for a, b in combinations(seen, 2):
         assert np.linalg.norm(seen[a] - seen[b]) >= APART, (a, b)
+
+
+@pytest.mark.parametrize("scheme", PAPER)
+def test_a_share_that_fails_is_a_shade_of_one_hue_on_which_its_number_can_be_read(scheme):
+    """WCAG 2.2, 1.4.3: text needs 4.5:1, on every shade; from one shade to the next light runs one way only."""
+    shades = [heat(scheme, k) for k in range(21)]
+    assert shades[0] == PAPER[scheme]
+    for shade in shades:
+        bright, dark = sorted((luminance(shade), luminance(INK[scheme])), reverse=True)
+        assert (bright + 0.05) / (dark + 0.05) >= 4.5, shade
+    steps = np.diff([luminance(shade) for shade in shades])
+    assert np.all(steps < 0.0) if scheme == "light" else np.all(steps > 0.0)
+    hues = [np.arctan2(*oklab(linear(shade))[:0:-1]) for shade in shades[1:]]
+    assert np.ptp(hues) < np.radians(20.0)
 
 
 def test_an_engine_keeps_its_colour_in_any_company():

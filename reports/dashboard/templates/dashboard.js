@@ -51,6 +51,7 @@ function restore() {
       for (const name of fields) form.elements[name].value = "";
       apply();
     }
+    for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
     target.scrollIntoView();
   }
 }

@@ -48,7 +48,7 @@
       if (i >= bounces) return;
       /* Side by side, so that equal answers do not hide each other. */
       const at = x(i + 1) + (k - (own.length - 1) / 2) * Math.min(5.5, (0.9 * (x(1) - x(0))) / own.length);
-      const point = put("path", { d: shapes[one.shape], transform: `translate(${at},${y(h)})`, fill: one.colour, role: "graphics-symbol" });
+      const point = put("path", { d: shapes[one.shape], transform: `translate(${at},${y(h)})`, fill: one.hollow ? "transparent" : one.colour, stroke: one.colour, "stroke-width": 1.5, role: "graphics-symbol" });
       point.setAttribute("aria-label", `${one.name}: h${i + 1} = ${h} h0, exact ${(near ** (2 * i + 2)).toPrecision(4)}`);
     }));
     return near;

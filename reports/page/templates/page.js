@@ -65,7 +65,8 @@ function applyFilter() {
   for (const box of boxes) box.checked = !hidden.has(box.value);
   for (const node of $$("[data-who]")) node.classList.toggle("off", hidden.has(node.dataset.who));
   for (const head of $$("[data-engine]")) {
-    const shown = names.filter((name) => name.startsWith(head.dataset.engine + "/") && !hidden.has(name)).length;
+    const own = $$(".sub", head.closest("thead")).map((sub) => sub.dataset.who);
+    const shown = own.filter((name) => name.startsWith(head.dataset.engine + "/") && !hidden.has(name)).length;
     head.classList.toggle("off", shown === 0);
     if (shown) head.colSpan = shown;
   }
@@ -158,6 +159,27 @@ function standalone(svg) {
   paper.setAttribute("height", "100%");
   paper.setAttribute("fill", style.backgroundColor);
   copy.prepend(paper);
+  /* A picture that is taken away says what it is: its title above it, and engines and profiles below it. */
+  const [left, top, width, height] = svg.getAttribute("viewBox").split(/[\s,]+/).map(Number);
+  const key = svg.closest("section, .shot")?.querySelector(".key");
+  const say = (text, x, y, colour, weight = 400) => {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", "text");
+    for (const [name, value] of Object.entries({ x, y, fill: colour, "font-size": 12, "font-weight": weight })) made.setAttribute(name, value);
+    made.textContent = text;
+    copy.append(made);
+  };
+  const names = new Set($$("[data-is]", svg).map((mark) => mark.dataset.is.split(/[,:]/)[0]));
+  const shown = svg.closest(".talk") ? [] : $$("li", key ?? svg).map((item) => item.textContent.trim()).filter((name) => names.has(name));
+  shown.forEach((name, k) => {
+    const mark = $$("[data-is]", svg).find((one) => one.dataset.is.startsWith(name)), colour = mark.getAttribute("stroke") ?? mark.getAttribute("fill");
+    say(name, left + 6 + (k % 3) * (width / 3), top + height + 16 + 16 * Math.floor(k / 3), colour);
+  });
+  say(svg.getAttribute("aria-label"), left + 6, top - 8, "currentColor", 600);
+  const tall = height + 32 + 16 * Math.ceil(shown.length / 3);
+  copy.setAttribute("viewBox", [left, top - 24, width, tall].join(" "));
+  copy.setAttribute("width", width);
+  copy.setAttribute("height", tall);
+  for (const [name, value] of [["x", left], ["y", top - 24]]) paper.setAttribute(name, value);
   return new XMLSerializer().serializeToString(copy);
 }
 function savePng(svg, name) {

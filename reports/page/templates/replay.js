@@ -252,7 +252,7 @@
       pen.fillStyle = series[0].colour;
       pen.fillRect(6, 7, 9, 9);
       pen.fillStyle = ink;
-      [...title.split("/"), ...(gone ? ["left tolerance"] : [])].forEach((line, i) => pen.fillText(line, 20, 16 + 15 * i));
+      [...title.split("/"), ...(gone ? ["out of tolerance"] : [])].forEach((line, i) => pen.fillText(line, 20, 16 + 15 * i));
       return;
     }
     const length = 10 ** Math.floor(Math.log10(140 / zoom)), pixels = zoom * length;
@@ -327,6 +327,11 @@
       box.append(jump);
     }
   }
+  /* A frame after the first engine leaves the tolerance, where that is seen; the start if none does. */
+  function parted() {
+    const gone = show.series.map((one) => one.departure).filter((t) => t !== null);
+    return gone.length ? Math.max(0, show.t.findIndex((t) => t >= Math.min(...gone) + 0.1)) : 0;
+  }
   async function choose(id, frame = 0) {
     play(false);
     show = await load(id);
@@ -335,7 +340,7 @@
     $("plane-label").hidden = show.dimension === 2;
     listSeries();
     listJumps();
-    go(Math.min(frame, show.t.length - 1));
+    go(Math.min(frame ?? parted(), show.t.length - 1));
   }
 
   player.hidden = false;
@@ -357,7 +362,7 @@
     else return;
     event.preventDefault();
   });
-  slider.addEventListener("change", () => remember("t", slider.value === "0" ? "" : slider.value));
+  slider.addEventListener("change", () => remember("t", slider.value));
   addEventListener("filtered", () => {
     for (const data of loaded.values()) for (const one of data.series) one.shown = !hidden.has(one.name);
     if (show) { listSeries(); draw(); }
@@ -369,5 +374,5 @@
     $(id).addEventListener("change", () => remember(id, $(id).value));
   }
   if (view.has("scene")) $("scene").value = view.get("scene");
-  choose($("scene").value || $("scene").options[0].value, Number(view.get("t") ?? 0));
+  choose($("scene").value || $("scene").options[0].value, view.has("t") ? Number(view.get("t")) : null);
 })();

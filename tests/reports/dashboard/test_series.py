@@ -1,6 +1,7 @@
 """Series over runs and releases: exactly the planted steps are marked, and nothing is in series without a step."""
 
 import json
+import re
 import time
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from reports.brief import FILE, Kept, Summary, summarise
 from reports.command import main
-from reports.dashboard import events, render
+from reports.dashboard import events, grid, render
 from reports.dashboard.series import _divided, _Entry, panels
 from reports.dashboard.steps import ERROR, TIME, steps
 from validation.catalogue import CATALOGUE
@@ -96,7 +97,7 @@ def test_a_flip_is_marked_once_and_says_in_which_direction():
         entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
     (panel,) = _divided(entries, "runs")
     assert [(event.at, event.kind, event.worse) for event in events(panel)] == [(2, "flip", True), (4, "flip", False)]
-    assert [event.text for event in events(panel)] == ["begin to fail: 1 cell", "cease to fail: 1 cell"]
+    assert [event.text for event in events(panel)] == ["begins to fail: 1 case", "fixed: 1 case"]
     primary = resolve("impact").primary
     assert (panel.unit, panel.law) == (primary.unit, primary.law)
 
@@ -108,7 +109,50 @@ def test_cells_that_begin_and_cease_to_fail_at_once_are_said_in_one_line():
         entries.append(_Entry(str(k), str(k), str(k), Summary(cells, {})))
     (panel,) = _divided(entries, "runs")
     (event,) = events(panel)
-    assert (event.at, event.text) == (2, "begin to fail: 1 cell, cease to fail: 1 cell")
+    assert (event.at, event.text) == (2, "begins to fail: 1 case, fixed: 1 case")
+
+
+def released(engine, histories):
+    """Releases 1.0, 1.1, .. of an engine: per scene the error and how many of four checks fail, release by release."""
+    entries = []
+    for k, states in enumerate(zip(*histories.values(), strict=True)):
+        cells = {(engine, "tuned", scene, 2): {"s": (error, fails, 4, fails)}
+                 for scene, (error, fails) in zip(histories, states, strict=True)}  # fmt: skip
+        entries.append(_Entry(f"1.{k}", f"{engine} 1.{k}", str(k), Summary(cells, {engine: f"1.{k}"})))
+    return _divided(entries, "releases")
+
+
+HISTORY = {
+    "impact": [(0.4, 4), (0.4, 4), (0.4, 4), (1e-3, 0)],
+    "bounce": [(0.1, 0), (0.2, 1), (0.2, 1), (0.2, 1)],
+    "stack": [(0.3, 2)] * 4,
+}
+
+
+def test_the_grid_has_a_line_per_scene_that_changes_and_the_share_that_fails_release_by_release():
+    found = grid("releases", "e", released("e", HISTORY))
+    assert found.labels == ["1.0", "1.1", "1.2", "1.3"] and found.same == 1
+    assert [(scene, shares) for scene, _, shares in found.lines] == [
+        ("impact", [1.0, 1.0, 1.0, 0.0]), ("bounce", [0.0, 0.25, 0.25, 0.25])
+    ]  # fmt: skip
+
+
+def test_the_page_opens_with_the_grid_and_the_largest_steps_in_sentences():
+    panels_of = released("e", HISTORY)
+    page = render(panels_of, "generated")
+    said = re.sub(r"<[^>]+>", "", page)
+    first, second = (
+        "With e 1.3, the error of impact 2-D (tuned) falls from 0.4 to 0.001",
+        "With e 1.1, the error of bounce",
+    )
+    assert 0 < page.index('id="grid"') < page.index('id="largest"') < page.index('id="moved"')
+    assert 0 < said.index(first) < said.index(second) and "rises from 0.1 to 0.2 h0" in said
+    assert '<span class="h w20">100 %</span>' in page and '<span class="h w5">25 %</span>' in page
+
+
+def test_a_history_of_one_run_says_so_and_draws_nothing():
+    page = render(released("e", {scene: states[:1] for scene, states in HISTORY.items()}), "generated")
+    assert "One run; nothing to compare yet." in page and "<figure" not in page and "<script>" not in page
 
 
 def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():

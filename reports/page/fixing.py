@@ -1,0 +1,66 @@
+"""What is wrong with each engine, and the setting that fixes it: before, after, cost, and lines to paste."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from reports.answers import Answer, configured
+from reports.cures import changes_in_words, cure_paste, is_standard, known_cures, told_apart
+from reports.page.source import Source
+from reports.wording import mark_of, params_text
+from validation.settings.cures import Cure
+
+
+@dataclass(frozen=True)
+class Fix:
+    """Settings that mend a scene, the check that tells it before and after, and the cost in times of that before."""
+
+    where: str
+    settings: list[tuple[str, str]]
+    check: str
+    before: str
+    after: str
+    left: str
+    cost: str
+    paste: str
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What one engine and profile gets wrong in one scene, its fixes, and what its other profiles do."""
+
+    answer: Answer
+    fixes: list[Fix]
+    said: str
+
+
+def wrongs(source: Source, answers: Iterable[Answer]) -> list[Wrong]:
+    """One line per answer: with the fixes of the committed table, or the words of the answer where it has none."""
+    return [_wrong(source, answer) for answer in answers]
+
+
+def _wrong(source: Source, answer: Answer) -> Wrong:
+    rows = configured(source.of(scene=answer.scene, engine=answer.engine, profile=answer.profile))
+    dimensions = sorted({row["dimension"] for row in rows if mark_of(row) != "pass" and is_standard(row)})
+    known = known_cures(answer.engine, rows[0]["engine_version"], answer.scene, answer.profile, dimensions)
+    fixes = [_fix(cure, "" if len(known) == 1 else where) for cure, where in known if cure.helps]
+    said = answer.cure.partition("; ")[0].partition(", by ")[0].replace("->", "→")
+    tried = [cure.tried for cure, _ in known if not cure.helps]
+    return Wrong(answer, fixes, f"{said}; no setting helps ({max(tried)} tried)" if tried and not fixes else said)
+
+
+def _fix(cure: Cure, where: str) -> Fix:
+    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
+    unit = "" if cure.unit == "1" else f"\N{NO-BREAK SPACE}{cure.unit}"
+    at = params_text(cure.params)
+    return Fix(
+        where,
+        changes_in_words(cure, cure.changes),
+        f"{cure.metric}{f' at {at}' if at else ''}",
+        before + unit,
+        after + unit + (f" (true: {truth})" if truth not in ("0", after) else ""),
+        f"{cure.left} of {cure.failing} checks still fail" if cure.left else "",
+        f"{cure.times:.2g}×" if cure.times else "",
+        cure_paste(cure),
+    )
