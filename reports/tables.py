@@ -84,11 +84,16 @@ def _field(entry: Plain, name: str) -> str:
     if name == "date":
         return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
     if name == "title":
-        asked, options, narrowing = str(value).partition(" --")
-        if len(scenes := asked.partition(": ")[2].split()) > FEW:
-            asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
-        return f"{asked}{options}{narrowing}"
+        return title_of(str(value))
     return setting_text(value) if value is not None else "-"
+
+
+def title_of(title: str) -> str:
+    """A run's title, of many scenes with the first few."""
+    asked, options, narrowing = title.partition(" --")
+    if len(scenes := asked.partition(": ")[2].split()) > FEW:
+        asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
+    return f"{asked}{options}{narrowing}"
 
 
 def described(data: Plain, console: Console) -> None:

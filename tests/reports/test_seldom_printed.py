@@ -179,7 +179,7 @@ def test_a_bisection_says_what_changed_who_was_silent_and_how_to_see_it_again(ot
     again = releasing._commands("toy", "1.1", "2.0", SLOT, Path("else where"))
     lines = told_releases.found_as_text(told_releases.found_as_plain(found, "toy", VERSIONS, again)).splitlines()
     assert lines == [
-        "verdict flipped in toy 2.0: default stack 3-D n=2 at 7 iterations creep",
+        "newly failing since toy 2.0: default stack 3-D n=2 at 7 iterations creep",
         "  toy 1.1: pass",
         "  toy 2.0: fail",
         "  1.2 lies between and did not answer: it cannot be imported",

@@ -35,7 +35,7 @@ def test_bisect_finds_the_planted_change_in_two_questions_and_says_what_did_not_
     assert answered == ["1.0.0", "1.2.0"]  # two questions
     assert found["others"] is None
     text = call("bisect", "toy", "1.0.0..1.2.0", "impact", "--check", "rebound_ratio", *CELL).stdout
-    assert "verdict flipped in toy 1.2.0" in text and "1.1.0 lies between and did not answer" in text
+    assert "newly failing since toy 1.2.0" in text and "1.1.0 lies between and cannot run" in text
     assert "1.0.0: 0.5" in text and "--all asks every release" in text
 
 
