@@ -35,7 +35,7 @@ def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
 
 
 #: Headings of `_line`, and what is said of the pace where there is one.
-HEADINGS = ("release", "failed", "no result", "by round-off", "changed", "time", "")
+HEADINGS = ("release", "failed", "no result", "fixed", "changed", "time", "")
 PACE = "time: relative to the first release; median over scenes, each relative to a Python loop on the same machine"
 
 

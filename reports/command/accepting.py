@@ -149,13 +149,13 @@ def _is_of_this_code(observation: Observation) -> bool:
 
 
 def _table(engine: str, changes: Sequence[Change]) -> Table:
-    table = Table(title=f"Findings of {engine}: rows per family", title_justify="left")
-    for name in ("family", "listed", "new", "drifted", "gone", "bands", "why"):
-        table.add_column(name, justify="left" if name in ("family", "why") else "right")
+    table = Table(title=f"Known failures of {engine}: checks per cause", title_justify="left")
+    for name in ("cause", "listed", "new", "changed", "gone", "bands", "why"):
+        table.add_column(name, justify="left" if name in ("cause", "why") else "right")
     for change in changes:
         listed = len(change.same) + len(change.drifted) + len(change.gone) + len(change.bands)
         counts = (listed, len(change.new), len(change.drifted), len(change.gone), len(change.bands))
-        table.add_row(change.family.id, *map(str, counts), change.family.reason or "nobody has said why yet")
+        table.add_row(change.family.id, *map(str, counts), change.family.reason or "no reason is written yet")
     return table
 
 
@@ -169,10 +169,12 @@ def _decide(changed: Sequence[Change], named: Sequence[str], console: Console) -
             continue
         console.print(_details(change), markup=False, highlight=False)
         if not change.is_draft:
-            if click.confirm(f"{change.family.id}: is this still why: {change.family.reason}?", err=True):
+            if click.confirm(f"{change.family.id}: is this still the cause: {change.family.reason}?", err=True):
                 chosen.add(change.family.id)
             continue
-        reason = click.prompt("why do they fail (empty: leave them new)", default="", show_default=False, err=True)
+        reason = click.prompt(
+            "why do these checks fail (empty: leave them new)", default="", show_default=False, err=True
+        )
         source = click.prompt("where is that documented, read or measured", err=True) if reason.strip() else ""
         if reason.strip() and source.strip():
             written.append(replace(change.family, reason=reason.strip(), source=source.strip()))
@@ -186,8 +188,8 @@ def _on_a_terminal() -> bool:
 
 def _details(change: Change) -> str:
     """What is new, drifted and gone in a family, kind of metric by kind."""
-    lines = [f"family {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
-    for name, entries in (("new", change.new), ("drifted", change.drifted), ("gone", change.gone),
+    lines = [f"cause {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
+    for name, entries in (("new", change.new), ("changed", change.drifted), ("gone", change.gone),
                           ("with another band", change.bands)):  # fmt: skip
         kinds = Counter(f"{key[0]} {key[6].partition('[')[0]}" for key in entries)
         lines += [f"  {name}: {count} x {kind}" for kind, count in kinds.items()]
@@ -211,7 +213,7 @@ def _with_reasons(proposal: Proposal, written: Sequence[Family]) -> Proposal:
 
 def _show_refused(refused: Sequence[tuple[Row, str]]) -> None:
     for why, count in Counter(why for _, why in refused).items():
-        click.echo(f"refused: {plural(count, 'row')}: {why}", err=True)
+        click.echo(f"refused: {plural(count, 'check')}: {why}", err=True)
     for row, _ in refused[:SHOWN]:
         where = f"{row.engine}/{row.profile} {row.scene} {row.dimension}-D"
         click.echo(f"  {where} {row.slot['params']} {row.metric} {number(row.value, 6)}", err=True)

@@ -243,12 +243,12 @@ def test_rows_that_moved_between_releases_are_counted_by_what_became_of_them():
     ends = "; first `creep` (3-D n=2 at 7 iterations) pass -> fail"
     every = [(kind, worse) for kind in (Kind.FLIP, Kind.OUTCOME, Kind.ERROR) for worse in (True, False)]
     assert [written._moved([step(kind)]) for kind in every] == [
-        f"1 row {what}{ends}" for what in ("begins to fail", "ceases to fail", "ends without an answer",
-                                           "has an answer again", "changes its value", "changes its value")
+        f"1 check {what}{ends}" for what in ("begins to fail", "ceases to fail", "ends without a result",
+                                             "has a result again", "changes its value", "changes its value")
     ]  # fmt: skip
     assert written._moved([step(*every), step(*every[::-1])]) == (
-        "2 rows begin to fail, 2 rows cease to fail, 2 rows end without an answer, 2 rows have an answer again, "
-        f"4 rows change their value{ends}"
+        "2 checks begin to fail, 2 checks cease to fail, 2 checks end without a result, 2 checks have a result again, "
+        f"4 checks change their value{ends}"
     )
 
 

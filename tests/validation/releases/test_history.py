@@ -412,5 +412,5 @@ def test_the_published_page_has_a_part_per_engine_with_what_moved_or_that_nothin
     store.close()
     assert lines[0] == "# Physics over engine releases"
     assert lines[lines.index("## one") :] == [
-        "## one", "", "a table", "* two rows moved", "", "## other", "", "a table", "No row moved.",
+        "## one", "", "a table", "* two rows moved", "", "## other", "", "a table", "Nothing changed.",
     ]  # fmt: skip
