@@ -24,7 +24,7 @@ FEW = 4
 #: Said below facts that were measured without an adapter.
 AFTERWARDS = (
     "Chosen afterwards: the source leaves a value open, and it was chosen so that the measurement agrees. This "
-    "agreement is therefore no test. The conditions named in the reason of a contradiction were found afterwards as well."
+    "agreement is therefore no test. The conditions that the reason of a contradiction names were found afterwards too."
 )
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
@@ -67,9 +67,7 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
         table.add_row(*map(Text, told.values()))
     console.print(table)
     if what == "checks" and not reasons:
-        console.print(
-            Text("The reason of each tolerance: crosscheck list checks --reasons, or crosscheck describe SCENE.")
-        )
+        console.print(Text("Reasons of tolerances: --reasons, or crosscheck describe SCENE."))
     for entry in entries:
         if entry.get("reason"):
             console.print(Text(f"{entry['name']}: {entry['reason']}"))

@@ -62,9 +62,9 @@ def printed():
         tree = ast.parse(path.read_text(encoding="utf-8"))
         told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told:
-                if not NAMES.fullmatch(node.value):
-                    yield f"{path.relative_to(ROOT)}:{node.lineno}", without_code(node.value)
+            text = node.value if isinstance(node, ast.Constant) and id(node) not in told else None
+            if isinstance(text, str) and not NAMES.fullmatch(text):
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", without_code(text)
 
 
 def found(text):

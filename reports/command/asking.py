@@ -99,7 +99,7 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console
 @click.option("--commands", is_flag=True, help="Print the command of every report.")
 @AS_JSON
 def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:
-    """Run known reports again: public questions and bug reports about engines.
+    """Run known reports (public questions and bugs) again.
 
     Prints whether each is still true of the installed engines. WORDS choose reports by repository, engine or scene; all
     by default. Exits with 1 if a report is no longer true.

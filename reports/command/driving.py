@@ -49,7 +49,7 @@ def frontier(
     commands: bool,
     as_json: bool,
 ) -> None:
-    """Find the breaking points of an engine: how far a scene can be driven until it fails.
+    """Find breaking points: how far a scene goes until it fails.
 
     Bisects for each engine and profile the largest time step, stack height, mass ratio, overlap, spin and impact speed,
     and the fewest iterations. Each result is a case that still works and one that fails, with how it fails and the

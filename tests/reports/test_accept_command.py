@@ -164,7 +164,7 @@ def test_the_table_has_the_families_that_would_change_and_no_others(out, finding
 def test_an_unknown_family_is_a_wrong_call(out, findings):
     result = accept(out, "--family", "unheard-of")
     assert result.exit_code == 2
-    assert "no such family" in result.stderr
+    assert "no such cause" in result.stderr
 
 
 def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):

@@ -81,11 +81,11 @@ def test_a_change_without_a_size_says_none():
 def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
     odd = replace(BETTER, metric="a|b`c", before="<1>", after="2 & 3")
     text = as_markdown([FLIP, MILDER, odd], A, B)
-    value, flip = Kind.ERROR.value, Kind.FLIP.value
+    value, flip = Kind.ERROR.value, "newly failing"
     assert text == "\n".join([
         f"**contact-crosscheck compare**: {headline([FLIP, MILDER, odd])}", "",
         *[f"* {line}" for line in header(A, B)], "",
-        "| change | | rows | where | metric | before | after | size |",
+        "| change | | checks | where | metric | before | after | size |",
         "|---|---|---|---|---|---|---|---|",
         f"| {flip} | worse | 2 | bullet/tuned stack 2-D n=5 | `drift` | pass 1e-6 m | FAIL 3e-3 m | +2.5 tol |",
         f"| {value} |  | 1 | bullet/tuned stack 2-D n=5 | `a\\|b'c` | &lt;1&gt; | 2 &amp; 3 | -0.25 tol |", "",

@@ -105,8 +105,8 @@ def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypat
 def test_the_same_command_says_how_many_cells_and_a_profile_can_be_chosen(tmp_path):
     words = ("run", MODELS / "ball_on_floor.xml", "--engine", "mujoco", "--dry-run", "--out", tmp_path)
     assert call(*words).stdout == "8 cases\n"  # three profiles and the model's own, in the plane and in space
-    assert call(*words, "--profile", "model").stdout == "2 cells\n"
-    assert call(*words, "--profile", "model", "--dt", "1/240", "--dt", "1/480").stdout == "4 cells\n"
+    assert call(*words, "--profile", "model").stdout == "2 cases\n"
+    assert call(*words, "--profile", "model", "--dt", "1/240", "--dt", "1/480").stdout == "4 cases\n"
     assert "no chosen engine has a profile 'mine'" in call(*words, "--profile", "mine", status=(2,)).output
 
 
