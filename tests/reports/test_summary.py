@@ -543,6 +543,31 @@ def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp
         assert said or not any("--out" in line for line in lines)
 
 
+def test_what_is_shown_says_which_run_it_is_and_names_a_larger_one(tmp_path):
+    """A small run after a whole one is the latest, and is not taken for the whole one."""
+    pytest.importorskip("pymunk")
+    cells = [Slot("impact", (("e", e),), 2, "chipmunk", "tuned", 1 / 240) for e in (0.0, 0.5)]
+    store, ids = Store(tmp_path), []
+    for title, slots in (("quick: impact", cells), ("quick: impact --param e=0", cells[:1])):
+        run, _ = store.start(title, slots)
+        for slot in slots:
+            store.add(run, execute(slot))
+        store.finish(run)
+        ids.append(run.id)
+    store.close()
+    whole, latest = ids
+    for command in ("show", "findings"):
+        said = " ".join(call(command, "--out", tmp_path).stdout.split())
+        assert said.startswith(f"Run {latest}, the latest: quick: impact --param e=0 (1 case).")
+        assert f"A larger run: crosscheck {command} {whole} --out {tmp_path}." in said
+        assert f"All runs: crosscheck list runs --out {tmp_path}." in said
+    named = " ".join(call("show", whole, "--out", tmp_path).stdout.split())
+    assert named.startswith(f"Run {whole}: quick: impact (2 cases).") and "larger" not in named
+    assert f"crosscheck report --open {whole} --out {tmp_path}" in named  # the next commands are about the same run
+    alone = call("explain", "chipmunk/tuned/impact", whole, "--json", "--out", tmp_path)
+    assert alone.exit_code == 0 and json.loads(alone.stdout)["run"] == whole
+
+
 def test_a_profile_whose_measurement_is_broken_is_no_profile_that_does_no_better():
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1), row("impact", 2, "mujoco", "tuned", "known", 0.1)]
     assert answers(rows)[0].cure.startswith("no other profile does better")
