@@ -58,7 +58,7 @@ nightly: test-all soak
 
 # Lines of Python by room.
 size:
-	@for room in reference_solver adapters validation reports tests; do \
+	@for room in contact_crosscheck reference_solver adapters validation reports tests; do \
 		for part in $$room $$room/*/; do \
 			git ls-files "$${part%/}/*.py" | xargs -r cat | wc -l | xargs printf '%-40s %7d\n' "$${part%/}"; \
 		done; \

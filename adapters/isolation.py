@@ -267,12 +267,18 @@ def limit(memory: int | None) -> None:
 
 
 def _has_ended(process: Any) -> bool:
-    """Whether a process has ended by itself; it stays unwaited for, and its closed sentinel proves nothing."""
+    """Whether a process has ended by itself; its closed sentinel proves nothing.
+
+    It is not waited for here. `multiprocessing` does so for each process that has ended when it starts another one.
+    """
     if not hasattr(os, "waitid"):
         return bool(wait([process.sentinel], 0.0))
     ends = time.monotonic() + 0.5
     while wait([process.sentinel], 0.0):  # the sentinel closes a moment before the process can be waited for
-        if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+        try:
+            if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+                return True
+        except ChildProcessError:  # it has been waited for
             return True
         if time.monotonic() > ends:
             return False

@@ -6,6 +6,7 @@ import difflib
 import os
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import Any
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
 from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
@@ -18,6 +19,57 @@ REQUIRED = "CROSSCHECK_REQUIRE_ENGINES"
 
 
 _here = False
+
+
+class _Introduced(EntryPoint):
+    """Registration of an engine that this process alone knows: no package has it, so nothing is imported."""
+
+    def __init__(self, engine: Engine) -> None:
+        super().__init__(engine.name, f"here:{type(engine).__qualname__}", GROUP)
+        vars(self)["made"] = engine  # an entry point refuses to set attributes
+
+    def load(self) -> Any:
+        """What makes the engine."""
+        return lambda: vars(self)["made"]
+
+
+_introduced: dict[str, Found] = {}
+
+
+def introduce(engine: Engine | type[Engine]) -> str:
+    """Make an engine known in this process under its own name, until another of that name is introduced.
+
+    It is loaded here alone: processes that run cells do not know it. It has no folder, hence no laws and no findings.
+
+    Returns
+    -------
+    Its name.
+
+    Raises
+    ------
+    EngineError
+        If it is no engine, if it is broken, or if an installed engine has its name.
+    """
+    try:
+        made = engine() if isinstance(engine, type) else engine
+        if not isinstance(made, Engine):
+            raise TypeError(f"{type(made).__name__} is not an adapters.engine.Engine")
+        entry = _Introduced(made)
+    except Exception as error:  # whatever its own code raises
+        raise EngineError(f"engine: cannot be made: {said_by(error)}") from None
+    if entry.name in _entries():
+        raise EngineError(f"engine: an installed engine is called {one_line(entry.name, NAME)!r}; name yours otherwise")
+    found = loaded(entry)
+    if found.engine is None:
+        raise EngineError(f"engine: {one_line(entry.name, NAME)}: {found.reason}")
+    _introduced[entry.name] = found
+    find.cache_clear()
+    return entry.name
+
+
+def is_introduced(name: str) -> bool:
+    """Whether an engine is known in this process alone."""
+    return name in _introduced
 
 
 def load_engines_here() -> None:
@@ -85,6 +137,8 @@ def find(name: str) -> Found:
     EngineError
         If no such engine is registered ("did you mean").
     """
+    if name in _introduced:
+        return _introduced[name]
     registered = _entries()
     if name not in registered:
         close = difflib.get_close_matches(name, registered, n=1)
@@ -149,7 +203,7 @@ def facts(name: str) -> EngineFacts | None:
     """Constant facts of an engine, without importing the engine itself; None if its adapter cannot be loaded."""
     entry = _entries().get(name)
     if entry is None or not is_ours(entry):
-        return find(name).facts if entry else None
+        return find(name).facts if entry or is_introduced(name) else None
     return _facts(entry)
 
 
@@ -201,7 +255,7 @@ def load(name: str) -> Engine:
         If it is unknown, not installed or broken.
     """
     found = find(name)
-    if found.engine is not None and not is_ours(_entries()[name]) and not _here:
+    if found.engine is not None and not (is_introduced(name) or is_ours(_entries()[name]) or _here):
         found = loaded(_entries()[name], brought_by(_entries()[name]))
     if found.engine is None:
         raise EngineError(f"engine: {name} is not installed: {found.reason}")

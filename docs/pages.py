@@ -1,4 +1,4 @@
-"""Pages that are made from what the project knows: scenes, engines, and fixes by symptom."""
+"""Pages that are made from what the project knows: scenes, engines, fixes by symptom, and notebooks."""
 
 from __future__ import annotations
 
@@ -38,11 +38,48 @@ def write(folder: Path) -> None:
     }
     passes = passed()
     for name, values in made(passes):
-        path, template = folder / f"{name}.md", name.split("/")[0] if "index" not in name else name.replace("/", "-")
-        text = environment.get_template(f"{template}.md.j2").render(values)
-        path.parent.mkdir(exist_ok=True)
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
-            path.write_text(text, encoding="utf-8")
+        template = name.split("/")[0] if "index" not in name else name.replace("/", "-")
+        _keep(folder / f"{name}.md", environment.get_template(f"{template}.md.j2").render(values))
+    for source in sorted((folder / "notebooks").glob("*.py")):
+        text = source.read_text(encoding="utf-8")
+        _keep(source.with_suffix(".ipynb"), notebook(text))
+        _keep(source.with_suffix(".md"), page(text, source.stem))
+
+
+def _keep(path: Path, text: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def cells(text: str) -> list[tuple[str, str]]:
+    """Cells of a notebook that is kept as a script with ``# %%`` lines: ``markdown`` or ``code``, and the text."""
+    found = []
+    for part in re.split(r"^# %%", text, flags=re.MULTILINE)[1:]:
+        head, _, body = part.partition("\n")
+        kind = "markdown" if "[markdown]" in head else "code"
+        if kind == "markdown":
+            body = re.sub(r"^# ?", "", body, flags=re.MULTILINE)
+        found.append((kind, body.strip("\n")))
+    return found
+
+
+def notebook(text: str) -> str:
+    """The notebook in the format of Jupyter, without outputs."""
+    kinds: dict[str, dict[str, Any]] = {"markdown": {}, "code": {"execution_count": None, "outputs": []}}
+    own = [
+        {"cell_type": kind, "id": f"cell-{k}", "metadata": {}, "source": body, **kinds[kind]}
+        for k, (kind, body) in enumerate(cells(text))
+    ]
+    kernel = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+    return json.dumps({"cells": own, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5}, indent=1) + "\n"
+
+
+def page(text: str, name: str) -> str:
+    """The notebook as a page, with links to its script and to the notebook that Jupyter opens."""
+    title, *rest = [body if kind == "markdown" else f"```python\n{body}\n```" for kind, body in cells(text)]
+    links = f"Download: {{download}}`notebook <{name}.ipynb>`, {{download}}`script <{name}.py>`."
+    return "\n\n".join([title, links, *rest]) + "\n"
 
 
 def plain(text: object) -> str:

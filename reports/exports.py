@@ -17,7 +17,7 @@ from reports.matrix import leaving, legend, matrix_of, status_of, unranked, vers
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, is_alarming, rows_of
 from validation.questions.nulls import null_rows, with_skill
-from validation.records.store import Store
+from validation.records.store import Run, Store
 
 Plain = Mapping[str, Any]
 
@@ -25,23 +25,35 @@ Plain = Mapping[str, Any]
 def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:
     """Rows of a run as a DataFrame, judged with today's checks, laws and findings.
 
-    With ``nulls`` followed by those of the nulls, which answer without an engine (engine ``none``).
+    With ``nulls`` followed by those of the nulls, which answer without an engine (engine ``none``). Its ``attrs`` are
+    those of `described`.
 
     Raises
     ------
     StoreError
         If the folder has no results or no such run.
     """
-    rows = load_rows(folder, run)
-    return frame([*with_skill(rows), *(null_rows(rows) if nulls else ())])
+    chosen, rows = _read(folder, run)
+    table = frame([*with_skill(rows), *(null_rows(rows) if nulls else ())])
+    return described(table, chosen.id, chosen.commit, rows)
+
+
+def described(table: pd.DataFrame, run: str, commit: str, rows: Sequence[Row]) -> pd.DataFrame:
+    """The table, whose ``attrs`` say which run and commit it is of, and which version of each engine."""
+    table.attrs |= {"run": run, "commit": commit, "versions": versions_of([vars(row) for row in rows])}
+    return table
 
 
 def load_rows(folder: str | Path = "crosscheck-out", run: str = "latest") -> list[Row]:
     """Rows of a run; see `load`."""
+    return _read(folder, run)[1]
+
+
+def _read(folder: str | Path, run: str) -> tuple[Run, list[Row]]:
     store = Store(Path(folder), create=False)
     try:
         chosen = store.run(run)
-        return rows_of(chosen.id, store.observations(chosen))
+        return chosen, rows_of(chosen.id, store.observations(chosen))
     finally:
         store.close()
 

@@ -108,7 +108,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
         units = timed_units(wanted, store.observations(run))
-        _time(store, run, request.scenes, units, limits, seed, console)
+        time_units(store, run, request.scenes, units, limits, seed, console)
     store.finish(run)
     _show(store, run, out, as_json, brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
@@ -126,9 +126,10 @@ def _earlier(store: Store, name: str | None) -> Run | None:
     return found[-1]
 
 
-def _time(
+def time_units(
     store: Store, run: Run, scenes: Sequence[str], units: Sequence[Unit], limits: Limits, seed: int, console: Console
 ) -> None:
+    """Time all units in the lane and keep the times of ``run``, with how they were taken."""
     console.print(f"timing {plural(len(units), 'case')}, one at a time, in random order (seed {seed})", highlight=False)
     started, load = time.monotonic(), os.getloadavg()
     store.clear_timings(run)

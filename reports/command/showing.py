@@ -55,6 +55,8 @@ from validation.running.plan import Request, slots
 Plain = Mapping[str, Any]
 #: How far off a row is, for those that have no tolerance in units of which to say it.
 NO_RATIO = "-"
+#: Columns of an explanation that is no print: a cell of a notebook shows as many.
+TEXT = 100
 
 
 @dataclass(frozen=True)
@@ -365,6 +367,15 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
         )
         return
     _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, again, terminal())
+
+
+def explanation(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain, again: str) -> str:
+    """What `explain` prints of a row, as text; ``again`` says how to run it again."""
+    better, paste, said, differing = _cure(rows, observations, row)
+    console = terminal(width=TEXT)
+    with console.capture() as captured:
+        _print_explanation(row, _beside_the_plane(rows, row), better, (paste, said), differing, again, console)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
 def _with_own(row: str, sets: Sequence[str]) -> str:

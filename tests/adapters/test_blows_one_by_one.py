@@ -30,7 +30,7 @@ def test_a_blow_at_the_beginning_of_a_step_is_recorded_in_that_step_and_in_no_ot
     """Two equal balls, 1 m/s, half a metre apart: a blow after exactly 0.5 s, when the 33rd of these steps begins."""
     dt = 1 / 64
     scene = space(ball("left", (0.0, 2.0, 0.0), (1.0, 0.0, 0.0)), ball("right", (1.5, 2.0, 0.0), (0.0, 0.0, 0.0)))
-    motion, blows = singles._motion(singles._Key(scene), dt, EXACT)
+    motion, blows = singles._motion(singles.Held(scene), dt, EXACT)
     rows = motion.contacts.rows
     assert blows == 1 and len(rows.impulse) == 1 and motion.dt == dt and motion.finish == "completed"
     assert list(motion.contacts.step) == list(range(1, 65))
@@ -126,10 +126,10 @@ def test_rubbing_turns_and_stops_a_ball_by_coulomb_s_law():
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
     for mu, rub in ((0.1, 0.1 * 1.5), (10.0, 2.0 / 7.0 * 3.0)):
         scene = space(floor, ball("ball", (0, 0, 0.75), (3.0, 0, -1.0), mass=1.0), friction=mu)
-        motion, _ = singles._motion(singles._Key(scene), 1 / 64, EXACT)
+        motion, _ = singles._motion(singles.Held(scene), 1 / 64, EXACT)
         assert motion.twist[-1, 1] == pytest.approx((3.0 - rub, 0.0, 0.5, 0.0, rub * 0.5 / 0.1, 0.0))
         late = replace(EXACT, rebound_after_friction=True)
-        motion, _ = singles._motion(singles._Key(scene), 1 / 64, late)
+        motion, _ = singles._motion(singles.Held(scene), 1 / 64, late)
         assert motion.twist[-1, 1, 0] == pytest.approx(3.0 - min(rub, mu * 1.0))
 
 

@@ -1,5 +1,6 @@
 """Children that foreign code runs in: however one ends, its parent is told how, and nothing is left over."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -106,6 +107,14 @@ def test_how_a_child_ended_is_said_however_it_did(child, order, said, timeout):
     with pytest.raises(Lost) as lost:
         child.receive(timeout)
     assert str(lost.value) == said == child.stop()
+
+
+def test_a_child_that_has_been_waited_for_has_ended_as_it_did(child):
+    """`multiprocessing` waits for all that have ended when it starts another process."""
+    child.send(b"os.abort()")
+    assert within(PATIENCE, child.ended)
+    assert within(PATIENCE, lambda: not multiprocessing.active_children())
+    assert child.stop() == "the process was killed by SIGABRT"
 
 
 def test_a_child_that_takes_too_long_is_no_dead_one(child):

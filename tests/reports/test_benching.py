@@ -38,7 +38,7 @@ def test_units_are_timed_one_by_one_and_how_it_was_done_is_kept(monkeypatch):
     monkeypatch.setattr(benching.time, "monotonic", lambda: next(clock))
     monkeypatch.setattr(benching.os, "getloadavg", lambda: next(loads))
     out, console = printed()
-    benching._time(store, "run", ["impact", "slide"], ["u", "v", "w"], benching.QUICK, 7, console)
+    benching.time_units(store, "run", ["impact", "slide"], ["u", "v", "w"], benching.QUICK, 7, console)
     assert out.getvalue() == "timing 3 cases, one at a time, in random order (seed 7)\n"
     protocol = did.pop()[-1]
     assert did == [

@@ -202,8 +202,14 @@ def test_json_works_on_all_commands_as_the_documentation_says():
     assert without == set()
 
 
-def test_the_python_snippet_runs(tmp_path, monkeypatch, capsys):
-    (snippet,) = re.findall(r"```python\n(.*?)```", TEXT, re.S)
+SNIPPETS = re.findall(r"```python\n(.*?)```", TEXT, re.S)
+
+
+@pytest.mark.parametrize(
+    "snippet", [pytest.param(each, marks=pytest.mark.long) if "bench" in each else each for each in SNIPPETS]
+)
+def test_a_python_snippet_runs(tmp_path, monkeypatch, capsys, snippet):
+    pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
     slot = Slot("impact", (("e", 0.5),), 2, "chipmunk", "tuned", 1 / 240)
     store = Store(tmp_path / "crosscheck-out")

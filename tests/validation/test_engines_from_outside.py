@@ -36,7 +36,8 @@ from dataclasses import replace
 
 from adapters.chipmunk.laws import DEVIATIONS as LIKE_IT
 
-DEVIATIONS = tuple(replace(law, engine="toy", because="a toy's way:\\x1b[31m it is late") for law in LIKE_IT)
+OWN = {"engine": "toy", "because": "a toy's way:\\x1b[31m it is late", "versions": ("1",)}
+DEVIATIONS = tuple(replace(law, **OWN) for law in LIKE_IT)
 """
 EXPERIMENTS = """
 from adapters.experiment import Cured, Experiment
@@ -54,7 +55,7 @@ scene = "stack"
 metrics = ["*"]
 reason = "a toy's boxes sink"
 source = "its manual"
-releases = ">=7"
+releases = ">=1"
 """
 PROOF = """
 [[family.proof]]

@@ -69,10 +69,14 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 #: prediction of their size.
 #: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`, those of PhysX in
 #: `tests/adapters/test_findings_of_physx.py`, that of Drake is in `tests/adapters/test_drake.py`, those of Newton in
-#: `tests/adapters/test_newton.py`, that of Bullet in `tests/adapters/test_bullet.py`.
+#: `tests/adapters/test_newton.py`, that of Bullet in `tests/adapters/test_bullet.py`. Those of MuJoCo are closed forms
+#: in `tests/adapters/test_findings_of_mujoco.py`, those of both Box2D in `tests/adapters/test_rods_of_box2d.py`.
 MEASURED_ONLY = {
+    "box2d": {"kane-struck-half-way"},
+    "box2d3": {"kane-rebound-after-friction"},
     "bullet": {"arch-hull-grid"},
     "drake": {"shove-slanted-edge"},
+    "mujoco": {"kane-struck-half-way", "kane-struck-half-way-by-a-cone", "rack-short-rebounds"},
     "newton": {
         "bounce-late-blows",
         "card-tent-friction-of-a-sweep",

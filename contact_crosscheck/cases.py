@@ -1,0 +1,409 @@
+"""One case: a scene with parameters on one engine, profile and step, run and judged."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from functools import cached_property
+from html import escape
+from numbers import Real
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from adapters import registry
+from adapters import scene as scene_module
+from adapters.engine import Engine, EngineError
+from adapters.own_settings import own
+from adapters.plain import NAME, one_line
+from adapters.scene import SceneError
+from adapters.trajectory import Trajectory, load_trajectory
+from contact_crosscheck.apart import apart
+from contact_crosscheck.models import Scene, scene_named
+from reports.exports import described
+from reports.findings import severity
+from reports.wording import LABELS, mark_of, measured, params_text, quantity, reproduce
+from validation.canonical import CanonicalScene
+from validation.catalogue import CATALOGUE
+from validation.cells import Observation, Outcome, Slot, format_dt, prepare, settings_of, slot_from_dict
+from validation.identity import commit
+from validation.judging.rows import Row, frame, rows_of
+from validation.posed import resolve
+from validation.questions.nulls import with_skill
+from validation.running.execution import execute
+from validation.running.plan import QUICK_DT
+from validation.workers import TIMEOUT, run_cells
+
+if TYPE_CHECKING:
+    import altair as alt
+
+#: An engine by its name, or one that the caller has written.
+AnyEngine = str | Engine | type[Engine]
+#: Words for the roles of profiles, beside the roles' own names.
+ROLES = {"as shipped": "shipped", "compromise": "one", "exact": "solution"}
+#: What is said once per call where nothing protects the caller from an engine.
+UNPROTECTED = (
+    "engine: {} runs in this process, without a time limit, and its crash would end Python; crosscheck new-adapter "
+    "makes a package of an engine, which runs in processes of its own"
+)
+
+
+def run(
+    scene: str | os.PathLike[str] | Scene,
+    *,
+    engine: AnyEngine,
+    profile: str | None = None,
+    dimension: int | None = None,
+    dt: float | str | None = None,
+    iterations: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    **params: float,
+) -> Result:
+    """Run one case and judge it.
+
+    Engines of this project, and one of your own, run in this process: without a time limit, and a crash ends Python.
+    Those of other packages run in a process of their own.
+
+    Parameters
+    ----------
+    scene
+        Name in the catalogue (`scenes`), path of a scene file or of a model, or a `Scene`.
+    engine
+        Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`.
+    profile
+        Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. By
+        default as shipped; on our own solver exact; on its own engine a model runs as its author made it (``model``).
+    dimension
+        2 or 3; by default the first of the scene's that the engine has itself. A 2-D scene is embedded in 3-D for an
+        engine that has 3-D only.
+    dt
+        Step [s], also as ``"1/240"``; 1/240 by default, for a model's own profile the model's.
+    iterations
+        Replaces the iteration count of the profile.
+    settings
+        Settings of the engine by name, which replace those of the profile.
+    **params
+        Parameters of the scene; the others have their defaults.
+
+    Returns
+    -------
+    Result
+        Also where the engine refuses the scene, diverges or fails: its checks say so.
+
+    Raises
+    ------
+    SceneError
+        For an unknown scene or parameter, or a value that the scene does not take; a `ValueError`.
+    EngineError
+        For an unknown engine, profile or setting, or an engine that is not installed; a `RuntimeError`.
+
+    Examples
+    --------
+    >>> import contact_crosscheck as cc
+    >>> result = cc.run("bounce", engine="mujoco", profile="tuned", e=0.7, dt=1 / 240, dimension=3)
+    >>> result.frame()[["metric", "value", "truth", "tolerance", "physics"]]
+    >>> print(result.explain())
+    """
+    # An engine of the caller's own may need its module: only processes of others are kept from it.
+    with apart() if isinstance(engine, str) else nullcontext():
+        slot = slot_of(scene, engine_named(engine), profile, dimension, dt, iterations, settings, params)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "case.npz"
+        observation = observe(slot, path)
+        return Result(observation, load_trajectory(path) if path.exists() else None)
+
+
+def observe(slot: Slot, path: Path | None = None) -> Observation:
+    """Run a slot here, or where other people's plugins run; keep its trajectory at ``path``."""
+    entry = registry.entry(slot.engine)
+    if entry is None or registry.is_ours(entry):
+        observation = execute(slot, path)
+        # Whatever ends a case is its outcome; only here somebody may have asked for all of it to end.
+        if observation.outcome is Outcome.CRASHED and observation.reason.startswith(KeyboardInterrupt.__name__):
+            raise KeyboardInterrupt
+        return observation
+    with apart():
+        (observation,) = run_cells([slot], timeout=TIMEOUT, keep=lambda _: path)
+    return observation
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result:
+    """What came out of one case.
+
+    Parameters
+    ----------
+    observation
+        What was measured, with the settings that were used.
+    trajectory
+        Times ``t`` (s,) [s], poses ``pose`` (s, n, 3 or 7), velocities ``twist`` (s, n, 3 or 6) and ``contacts`` of all
+        bodies; None where the engine gave none.
+
+    Examples
+    --------
+    >>> import contact_crosscheck as cc
+    >>> result = cc.run("bounce", engine="chipmunk")
+    >>> result.trajectory.pose[:, 1, 1].max()  # height of the ball [m]
+    """
+
+    observation: Observation
+    trajectory: Trajectory | None
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies, in the order in which the trajectory has them."""
+        return [body.name for body in self._scene().bodies]
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The judged checks."""
+        with apart():  # laws of another package are looked at from outside first
+            return with_skill(rows_of("", [self.observation]))
+
+    def frame(self) -> pd.DataFrame:
+        """Return the judged checks, one row each, with the columns of `load`.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> checks = cc.run("slide", engine="bullet").frame()
+        >>> checks[checks.physics == "fail"][["metric", "value", "truth", "reason"]]
+        """
+        return described(frame(self.rows), "", commit(), self.rows)
+
+    def explain(self, metric: str | None = None) -> str:
+        """Explain one check: value, truth, tolerance, cause and fix.
+
+        Where the check fails, the case runs once more with the engine's profile ``tuned``, to see whether that fixes
+        it.
+
+        Parameters
+        ----------
+        metric
+            Name of the check; by default the one that is farthest off.
+
+        Raises
+        ------
+        SceneError
+            If the case has no such check.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> print(cc.run("bounce", engine="mujoco").explain("rest_time"))
+        """
+        from reports.command.showing import explanation
+
+        own = [row.as_dict() for row in self.rows]
+        chosen = [row for row in own if metric in (None, row["metric"])]
+        if not chosen:
+            raise SceneError(f"metric: there is no {metric!r}, only {', '.join(row['metric'] for row in own)}")
+        row = max(chosen, key=severity)
+        others = [self._tuned] if row["physics"] == "fail" and self._tuned is not None else []
+        with apart():
+            rows = own + [each.as_dict() for each in rows_of("", others)]
+        engine = self.observation.slot.engine
+        here = f"in this process only: the engine {engine!r} is in no package"
+        again = here if registry.is_introduced(engine) else reproduce(self.observation.slot.as_dict())
+        return explanation(rows, [self.observation, *others], row, again)
+
+    @cached_property
+    def _tuned(self) -> Observation | None:
+        """The same case with the best stock settings; None where it has them, or has settings or a count of its own."""
+        slot = self.observation.slot
+        tuned = registry.profile_of(slot.engine, "tuned")
+        if tuned in (None, slot.profile) or slot.switched or slot.iterations is not None:
+            return None
+        return observe(replace(slot, profile=str(tuned)))
+
+    def plot(self, what: str = "checks") -> alt.Chart | alt.LayerChart | alt.FacetChart:
+        """Draw the checks, or the motion.
+
+        Parameters
+        ----------
+        what
+            ``checks``: the error of each check over its tolerance. Or a component of the free bodies against time:
+            ``x``, ``y``, ``z``, ``angle`` (planar), ``vx``, ``vy``, ``vz``, ``speed``.
+
+        Raises
+        ------
+        SceneError
+            If there is no such component, or no motion to draw.
+        EngineError
+            If the libraries of the extra ``report`` are missing.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> cc.run("bounce", engine="mujoco", dimension=3).plot("z").save("bounce.svg")
+        """
+        from contact_crosscheck.charts import checks_chart, motion_chart
+
+        if what == "checks":
+            return checks_chart([row.as_dict() for row in self.rows], str(self))
+        return motion_chart(self._scene(), self.trajectory, what, str(self))
+
+    def _scene(self) -> scene_module.Scene:
+        slot = self.observation.slot
+        return resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+
+    def __str__(self) -> str:
+        slot = self.observation.slot
+        said = f"{slot.scene} {slot.dimension}-D on {slot.engine}/{slot.profile}, dt {format_dt(slot.dt)} s"
+        return f"{said}, {params_text(dict(slot.params))}" if slot.params else said
+
+    def __repr__(self) -> str:
+        judged = [row for row in self.rows if row.physics]
+        failed = sum(row.physics == "fail" for row in judged)
+        outcome = self.observation.outcome.value
+        verdict = f"{failed} of {len(judged)} checks fail" if judged else f"{outcome}: {self.observation.reason}"
+        return f"<{self}: {verdict}>"
+
+    def _repr_html_(self) -> str:
+        lines = []
+        for row in self.rows:
+            plain = row.as_dict()
+            texts = [
+                row.metric, measured(plain), quantity(row.truth, row.unit), quantity(row.tolerance, row.unit),
+                LABELS[mark_of(plain)],
+            ]  # fmt: skip
+            hint = escape("; ".join(filter(None, (row.because, row.reason))), quote=True)
+            lines.append(f'<tr title="{hint}">' + "".join(f"<td>{escape(text)}</td>" for text in texts) + "</tr>")
+        heads = "".join(f"<th>{name}</th>" for name in ("check", "value", "truth", "tolerance", "verdict"))
+        return (
+            f"<table><caption>{escape(repr(self)[1:-1])}</caption>"
+            f"<thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+        )
+
+
+def engine_named(engine: AnyEngine) -> str:
+    """Name of an engine that can be asked; one of the caller's own is made known here, with a warning.
+
+    Raises
+    ------
+    EngineError
+        If it is unknown or not installed, or no engine.
+    """
+    if isinstance(engine, str):
+        found = registry.find(engine)
+        if found.engine is None:
+            raise EngineError(f"engine: {engine} is not installed: {found.reason}")
+        return engine
+    if not isinstance(engine, Engine | type):
+        raise EngineError(f"engine: a {type(engine).__name__} was given; name an engine, or give one of your own")
+    name = registry.introduce(engine)
+    warnings.warn(UNPROTECTED.format(name), stacklevel=3)
+    return name
+
+
+def slot_of(
+    scene: str | os.PathLike[str] | Scene,
+    engine: str,
+    profile: str | None,
+    dimension: int | None,
+    dt: float | str | None,
+    iterations: int | None,
+    settings: Mapping[str, Any] | None,
+    params: Mapping[str, Any],
+) -> Slot:
+    """Say what is asked as `run-cell` would read it; see `run`.
+
+    Raises
+    ------
+    SceneError, EngineError
+        Naming what is wrong.
+    """
+    name = scene_named(scene)
+    canonical = resolve(name)
+    profile = profile_named(engine, profile, canonical)
+    brought = canonical.brought(engine, profile)
+    data = {
+        "scene": name,
+        "params": dict(canonical.minimal({key: number_of(key, value) for key, value in params.items()})),
+        "dimension": dimension_for(engine, canonical) if dimension is None else dimension,
+        "engine": engine,
+        "profile": profile,
+        "dt": (brought.dt if brought else QUICK_DT) if dt is None else dt,
+        "iterations": iterations,
+    }
+    try:
+        slot = slot_from_dict(data)
+    except SceneError as error:  # who calls knows no slot
+        raise SceneError(str(error).removeprefix("slot.")) from None
+    prepared = prepare(slot)
+    if name not in CATALOGUE:
+        canonical.checks(prepared.scene, slot.dt)  # a scene that cannot be judged is refused before it runs
+    asked = settings_from(settings)
+    return slot.with_own(own_of(slot, asked)) if asked else slot
+
+
+def settings_from(settings: Mapping[str, Any] | None) -> tuple[tuple[str, Any], ...]:
+    """Settings of the caller's own, sorted by name.
+
+    Raises
+    ------
+    EngineError
+        If they are no table.
+    """
+    if settings is not None and not isinstance(settings, Mapping):
+        raise EngineError(f"settings: a {type(settings).__name__} was given; give values by name, {{'name': value}}")
+    return tuple(sorted((str(name), value) for name, value in (settings or {}).items()))
+
+
+def own_of(slot: Slot, asked: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, Any], ...]:
+    """Settings of the caller's own as the engine takes them."""
+    engine = registry.find(slot.engine).engine
+    assert engine is not None  # `engine_named` has looked
+    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    return own(engine, asked, settings_of(engine, slot, scene))
+
+
+def profile_named(engine: str, profile: str | None, scene: CanonicalScene) -> str:
+    """Name of a profile that is given by its name or its role; by default as shipped, or as the model's author made it.
+
+    Raises
+    ------
+    EngineError
+        If the engine has no such profile.
+    """
+    found, facts = registry.find(engine).engine, registry.facts(engine)
+    known = list(found.profiles) if found else []
+    brought = scene.brings.get(engine)
+    if profile is None:
+        usual = (facts.profile("shipped") or facts.profile("solution")) if facts else None
+        return brought.profile if brought else usual or known[0]
+    if profile in known or (brought is not None and profile == brought.profile):
+        return profile
+    roles = facts.roles if facts else {}
+    fits = [name for name, role in roles.items() if role == ROLES.get(profile, profile)]
+    if not fits:
+        raise EngineError(f"profile: {engine} has no profile {one_line(profile, NAME)!r}, only {', '.join(known)}")
+    return fits[0]
+
+
+def dimension_for(engine: str, scene: CanonicalScene) -> int:
+    """First dimension of a scene that the engine has itself; the scene's first where it has none of them."""
+    facts = registry.facts(engine)
+    own_ones = facts.dimensions if facts else frozenset()
+    return next((each for each in scene.dimensions if each in own_ones), scene.dimensions[0])
+
+
+def number_of(name: str, value: Any) -> float:
+    """Value of a parameter.
+
+    Raises
+    ------
+    SceneError
+        If it is no number.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise SceneError(f"{name}: {one_line(repr(value), NAME)} is not a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise SceneError(f"{name}: the number is too large") from None

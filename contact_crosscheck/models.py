@@ -1,0 +1,144 @@
+"""Scenes of a user's own: files of this project, and models that people have for an engine."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from adapters.scene import SceneError
+from contact_crosscheck.apart import apart
+from validation.catalogue import matching
+from validation.posed import is_file, is_known, pinned, resolve
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene from a file, or of the catalogue, as `run`, `sweep` and `bench` take it.
+
+    Parameters
+    ----------
+    name
+        Name in the catalogue; of a file its path and the hash of its text, so that it stays what was read.
+
+    Examples
+    --------
+    >>> import contact_crosscheck as cc
+    >>> scene = cc.Scene.from_mjcf("model.xml")
+    >>> scene.notes
+    >>> cc.run(scene, engine="mujoco")
+    """
+
+    name: str
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], drop: bool = False) -> Scene:
+        """Read a scene file (.toml, .json) or a model (.xml, .urdf, .sdf, .world).
+
+        Parameters
+        ----------
+        drop
+            Whether to leave out what has no place in a scene; `notes` lists what was left out. Otherwise it is refused.
+
+        Raises
+        ------
+        SceneError
+            If the file cannot be read, or naming the element that has no place in a scene.
+        EngineError
+            If the engine that reads such models is not installed.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> cc.Scene.from_file("drop.toml").parameters
+        """
+        path = os.fspath(path)
+        if not is_file(path):
+            raise SceneError(f"path: {path!r} does not end in .toml, .json, .xml, .urdf, .sdf or .world")
+        with apart():
+            name = pinned(path, drop)
+            resolve(name)
+        return cls(name)
+
+    @classmethod
+    def from_mjcf(cls, path: str | os.PathLike[str], drop: bool = False) -> Scene:
+        """Read a model in MJCF (.xml); see `from_file`.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> cc.run(cc.Scene.from_mjcf("model.xml"), engine="reference")
+        """
+        return cls._of(path, drop, ".xml")
+
+    @classmethod
+    def from_urdf(cls, path: str | os.PathLike[str], drop: bool = False) -> Scene:
+        """Read a model in URDF (.urdf); see `from_file`.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> cc.Scene.from_urdf("robot.urdf", drop=True).notes
+        """
+        return cls._of(path, drop, ".urdf")
+
+    @classmethod
+    def from_sdf(cls, path: str | os.PathLike[str], drop: bool = False) -> Scene:
+        """Read a model in SDF (.sdf, .world); see `from_file`.
+
+        Examples
+        --------
+        >>> import contact_crosscheck as cc
+        >>> cc.Scene.from_sdf("box.sdf").dimensions
+        """
+        return cls._of(path, drop, ".sdf", ".world")
+
+    @classmethod
+    def _of(cls, path: str | os.PathLike[str], drop: bool, *endings: str) -> Scene:
+        if Path(path).suffix.lower() not in endings:
+            raise SceneError(f"path: {os.fspath(path)!r} does not end in {' or '.join(endings)}")
+        return cls.from_file(path, drop)
+
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return resolve(self.name).title
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        """2, 3 or both."""
+        return tuple(resolve(self.name).dimensions)
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Name, default, unit, range and meaning of each parameter."""
+        names = ["name", "default", "unit", "low", "high", "because"]
+        return pd.DataFrame(
+            [[getattr(each, name) for name in names] for each in resolve(self.name).parameters], columns=names
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was read as what, and what was left out."""
+        return tuple(resolve(self.name).notes)
+
+
+def scene_named(scene: str | os.PathLike[str] | Scene) -> str:
+    """Name of a scene that stays what it is; a file is read.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene, if several match, or as `Scene.from_file` does.
+    """
+    if isinstance(scene, Scene):
+        return scene.name
+    if not isinstance(scene, str | os.PathLike):
+        raise SceneError(f"scene: a {type(scene).__name__} was given; name a scene or a file, or give a Scene")
+    name = os.fspath(scene)
+    if is_known(name):
+        return Scene.from_file(name).name if is_file(name) else name
+    found = [each.name for each in matching(name)]
+    raise SceneError(f"scene: {name!r} means {', '.join(found)}; name one")

@@ -1,0 +1,452 @@
+"""``import contact_crosscheck as cc``: the same bits and verdicts as the command, errors of one line, two notebooks."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+import contact_crosscheck as cc
+from adapters import registry
+from adapters.conformance.toy import ToyEngine
+from adapters.engine import EngineError, EngineFacts, Scheme
+from adapters.scene import SceneError
+from reports.command import main
+from validation.records.store import MissingError
+
+ROOT = Path(__file__).parents[1]
+MODELS = Path(__file__).parent / "models"
+FREE_BALL = """
+name = "drop"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.2
+
+[[bodies]]
+name = "NAME"
+shape = { type = "disc", radius = 0.1 }
+mass = 1.0
+pose = [0.0, 1.0, 0.0]
+"""
+
+
+@pytest.fixture
+def own(monkeypatch):
+    """Engines that a test introduces are gone after it."""
+    monkeypatch.setattr(registry, "_introduced", {})
+    yield
+    registry.find.cache_clear()
+
+
+@pytest.fixture
+def engine():
+    """`engine(name)` is that name; the test is skipped where the engine is not installed."""
+
+    def named(name):
+        if registry.find(name).engine is None:
+            pytest.skip(f"{name} is not installed")
+        return name
+
+    return named
+
+
+def called(folder, code, *options, status=0):
+    """Run a script without a guard of its main module, as a user would; returns what it printed."""
+    (folder / "script.py").write_text(code)
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, *options, "script.py"]
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, timeout=540)
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stdout, done.stderr
+
+
+def drawn(chart):
+    """Records of the data of a chart, of its first layer where it has layers of their own."""
+    whole = chart.to_dict()
+    part = whole if "data" in whole else whole["layer"][0]
+    return whole["datasets"][part["data"]["name"]]
+
+
+# ---- one case --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "scene", "dimension", "params"),
+    [
+        ("chipmunk", "tuned", "bounce", 2, {"e": 0.7}),
+        ("mujoco", "default", "bounce", 3, {"e": 0.7, "height": 2.0}),
+        ("bullet", "tuned", "stack", 3, {"n": 3}),
+        ("reference", "exact", "impact", 2, {"e": 0.6}),
+    ],
+)
+def test_a_case_has_the_bits_and_verdicts_that_the_command_stores(
+    tmp_path, engine, name, profile, scene, dimension, params
+):
+    stored_profile = {"exact": registry.profile_of(name, "solution")}.get(profile, profile)
+    words = [word for key, value in params.items() for word in ("--param", f"{key}={value}")]
+    words += ["--engine", engine(name), "--profile", stored_profile, "--dim", str(dimension), "--dt", "1/240"]
+    result = CliRunner().invoke(main, ["run", scene, *words, "--jobs", "1", "--out", str(tmp_path)])
+    assert result.exit_code in (0, 1), result.output
+    stored = cc.load(tmp_path)
+    here = cc.run(scene, engine=name, profile=profile, dimension=dimension, **params).frame()
+    assert len(here) > 1
+    passing = ["run", "wall_time_s"]
+    pd.testing.assert_frame_equal(here.drop(columns=passing), stored.drop(columns=passing), check_exact=True)
+    assert set(here.state_hash) == set(stored.state_hash) != {""}
+    assert here.attrs["versions"] == stored.attrs["versions"] == {name: registry.find(name).version}
+    assert stored.attrs["run"] == stored.run[0] and here.attrs["commit"] == stored.attrs["commit"]
+
+
+def test_a_result_has_its_motion_its_table_and_its_explanation(engine):
+    result = cc.run("bounce", engine=engine("mujoco"), e=0.7, dimension=3)
+    motion = result.trajectory
+    assert motion.state_hash() == result.observation.state_hash
+    assert motion.pose.shape == (len(motion.t), len(result.bodies), 7) and motion.contacts.rows.gap.size
+    rows = result.frame()
+    html = result._repr_html_()
+    assert html.count("<tr") == 1 + len(rows) and "<table" in html and "FAIL" in html
+    text = result.explain()
+    assert "profile tuned passes this row" in text and "solref" in text
+    assert "crosscheck run bounce" in text and "force_in_flight" in result.explain("force_in_flight")
+    assert repr(result) == "<bounce 3-D on mujoco/default, dt 1/240 s, e=0.7: 6 of 8 checks fail>"
+
+
+def test_profiles_are_given_by_name_or_role_and_steps_as_numbers_or_fractions(engine):
+    name = engine("chipmunk")
+    shipped, tuned = registry.profile_of(name, "shipped"), registry.profile_of(name, "tuned")
+    asked = {None: shipped, "as shipped": shipped, "tuned": tuned, shipped: shipped}
+    for given, meant in asked.items():
+        assert cc.run("impact", engine=name, profile=given).observation.slot.profile == meant
+    slots = {cc.run("impact", engine=name, dt=dt).observation.slot for dt in (1 / 120, "1/120", np.float64(1 / 120))}
+    assert len(slots) == 1
+    assert cc.run("impact", engine=name, e=np.float64(0.5), v=3).observation.slot.params == (("e", 0.5), ("v", 3.0))
+
+
+def test_our_solver_is_exact_by_default_and_a_planar_engine_gets_the_plane(engine):
+    result = cc.run("impact", engine="reference")
+    assert result.observation.slot.profile == registry.profile_of("reference", "solution")
+    assert cc.run("impact", engine=engine("chipmunk")).observation.slot.dimension == 2
+    assert cc.run("impact", engine=engine("mujoco")).observation.slot.dimension == 3
+
+
+def test_settings_of_a_user_s_own_name_the_profile(engine):
+    result = cc.run("impact", engine=engine("mujoco"), settings={"cone": "elliptic"})
+    assert result.observation.slot.profile == "default+cone=elliptic"
+
+
+WRONG = [
+    (SceneError, "scene: there is no scene called 'bonce', did you mean 'bounce'?", {"scene": "bonce"}),
+    (SceneError, "scene: 'bounc*' means bounce; name one", {"scene": "bounc*"}),
+    (SceneError, "scene: a int was given", {"scene": 3}),
+    (SceneError, "scene: cannot read nowhere.toml", {"scene": "nowhere.toml"}),
+    (EngineError, "engine: there is no engine called 'chipmonk', did you mean 'chipmunk'?", {"engine": "chipmonk"}),
+    (EngineError, "engine: a int was given", {"engine": 3}),
+    (EngineError, "engine: cannot be made: TypeError: int is not", {"engine": int}),
+    (EngineError, "profile: chipmunk has no profile 'tund', only", {"profile": "tund"}),
+    (EngineError, "profile: chipmunk has no profile '3', only", {"profile": 3}),
+    (SceneError, "bounce.E: there is no such parameter", {"E": 0.5}),
+    (SceneError, "bounce.e: 7 must lie in [0, 1]", {"e": 7}),
+    (SceneError, "e: 'x' is not a number", {"e": "x"}),
+    (SceneError, "e: True is not a number", {"e": True}),
+    (SceneError, "e: [0.5] is not a number", {"e": [0.5]}),
+    (SceneError, "bounce.e: nan is not a finite number", {"e": float("nan")}),
+    (SceneError, "e: the number is too large", {"e": 10**400}),
+    (SceneError, "dt: 0 must be a positive, finite number", {"dt": 0}),
+    (SceneError, "dt: 'True' is not a number of seconds", {"dt": True}),
+    (SceneError, "dt: 1/1 s is longer than 0.1 s", {"dt": 1}),
+    (SceneError, "bounce.dimension: 4 is not one of", {"dimension": 4}),
+    (SceneError, "dimension: '3' must be 2 or 3", {"dimension": "3"}),
+    (SceneError, "iterations: 0 must be a whole number", {"iterations": 0}),
+    (EngineError, "settings: a int was given", {"settings": 3}),
+    (EngineError, "set: chipmunk has no setting 'nope'", {"settings": {"nope": 3}}),
+]
+
+
+@pytest.mark.parametrize(("error", "said", "given"), WRONG)
+def test_a_wrong_call_is_one_line_that_names_what_is_wrong(error, said, given):
+    call = {"scene": "bounce", "engine": "chipmunk"} | given
+    with pytest.raises(error) as caught:
+        assert error in (cc.SceneError, cc.EngineError)
+        cc.run(call.pop("scene"), **call)
+    assert str(caught.value).startswith(said) and "\n" not in str(caught.value)
+
+
+def test_what_a_result_does_not_have_is_named(engine):
+    result = cc.run("impact", engine=engine("chipmunk"))
+    with pytest.raises(SceneError, match="metric: there is no 'nope', only"):
+        result.explain("nope")
+    with pytest.raises(SceneError, match="plot: there is no 'w', only checks, x, y, angle, vx, vy, speed"):
+        result.plot("w")
+    with pytest.raises(MissingError, match="out: there are no results"):
+        cc.load("/nowhere")
+    with pytest.raises(AttributeError, match="has no attribute 'nope'"):
+        cc.nope  # noqa: B018
+    assert {"run", "Scene", "__version__"} <= set(dir(cc)) and cc.__version__[0].isdigit()
+
+
+# ---- charts ----------------------------------------------------------------------------------------------------------
+
+
+def test_charts_show_the_checks_and_the_motion(tmp_path, engine):
+    pytest.importorskip("altair")
+    result = cc.run("bounce", engine=engine("chipmunk"), e=0.5)
+    assert [row["value"] for row in drawn(result.plot("y"))] == list(result.trajectory.pose[:, 1, 1])
+    points = drawn(result.plot())
+    rows = result.frame()
+    judged = rows[rows.physics.notna()]
+    assert [point["check"] for point in points] == list(judged.metric)
+    assert [point["verdict"] for point in points] == list(judged.physics)
+    result.plot("y").save(tmp_path / "figure.pdf")
+    assert (tmp_path / "figure.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_long_motion_is_thinned_for_the_chart(engine):
+    pytest.importorskip("altair")
+    result = cc.run("bounce", engine=engine("chipmunk"), dt=1 / 4000)
+    assert len(result.trajectory.t) > 8000
+    assert 2000 <= len(drawn(result.plot("y"))) <= 4000
+
+
+def test_without_the_libraries_a_chart_says_what_to_install(monkeypatch, engine):
+    result = cc.run("impact", engine=engine("chipmunk"))
+    monkeypatch.delitem(sys.modules, "contact_crosscheck.charts", raising=False)
+    monkeypatch.setitem(sys.modules, "altair", None)
+    with pytest.raises(EngineError) as caught:
+        result.plot()
+    assert str(caught.value) == "plot: altair is missing; pip install 'contact-crosscheck[report]'"
+
+
+def test_names_from_files_and_engines_are_text_in_html(tmp_path, monkeypatch, own, engine):
+    evil = "<img src=x onerror=alert(1)>"
+    monkeypatch.chdir(tmp_path)
+    Path(f"{evil}.toml").write_text(FREE_BALL.replace("NAME", evil))
+    html = cc.run(f"{evil}.toml", engine=engine("chipmunk"))._repr_html_()
+    assert "<img" not in html and "&lt;img" in html and f"final[{evil.split()[0]}" not in html
+
+    class Hostile(ToyEngine):
+        facts = EngineFacts("<b>x</b>", evil, "numpy", frozenset({3}), Scheme("none", 1), 1 / 60)
+
+        def refuses(self, scene, profile):
+            return evil
+
+    with pytest.warns(UserWarning, match="runs in this process"):
+        html = cc.run("impact", engine=Hostile)._repr_html_()
+    assert "<img" not in html and "<b>" not in html and "&lt;b&gt;" in html
+
+
+# ---- engines of a user's own -----------------------------------------------------------------------------------------
+
+
+def test_an_engine_of_one_s_own_is_asked_like_any_other_and_warns_once(own):
+    for given in (ToyEngine, ToyEngine()):
+        with pytest.warns(UserWarning) as warned:
+            result = cc.run("bounce", engine=given, e=0.5)
+        assert len(warned) == 1 and "without a time limit" in str(warned[0].message)
+        assert warned[0].filename == __file__
+        assert result.observation.slot.engine == "toy" and (result.frame().physics != "fail").all()
+        assert "in this process only" in result.explain()
+
+
+def test_an_engine_that_is_written_anew_takes_the_place_of_the_old_one(own):
+    class Later(ToyEngine):
+        def version(self):
+            return "2.0"
+
+    with pytest.warns(UserWarning):
+        assert set(cc.run("bounce", engine=ToyEngine).frame().engine_version) == {"1.0"}
+    with pytest.warns(UserWarning):
+        assert set(cc.run("bounce", engine=Later).frame().engine_version) == {"2.0"}
+
+
+def test_no_engine_of_one_s_own_takes_the_name_of_an_installed_one(own):
+    class Taken(ToyEngine):
+        facts = EngineFacts("mujoco", "Mine", "numpy", frozenset({3}), Scheme("none", 1), 1 / 60)
+
+    with pytest.raises(EngineError, match="an installed engine is called 'mujoco'; name yours otherwise"):
+        cc.run("bounce", engine=Taken)
+
+
+def test_an_error_of_an_engine_of_one_s_own_is_the_outcome_of_its_case(own):
+    class Broken(ToyEngine):
+        def build(self, scene, dt, settings):
+            raise KeyError("no such thing")
+
+    with pytest.warns(UserWarning):
+        result = cc.run("bounce", engine=Broken)
+    assert set(result.frame().outcome) == {"crashed"} and "KeyError" in repr(result)
+    assert result.trajectory is None and "crashed" in result._repr_html_().lower()
+    with pytest.raises(SceneError, match="plot: the engine gave no motion"):
+        result.plot("z")
+
+
+def test_whoever_interrupts_a_case_interrupts_all_of_it(own):
+    class Interrupted(ToyEngine):
+        def build(self, scene, dt, settings):
+            raise KeyboardInterrupt
+
+    with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
+        cc.run("bounce", engine=Interrupted)
+    with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
+        cc.sweep("bounce", engine=Interrupted, e=[0.3, 0.5])
+
+
+def test_what_cannot_be_made_is_one_line(own):
+    class Unmade(ToyEngine):
+        def __init__(self):
+            raise ValueError("first line\nsecond line")
+
+    with pytest.raises(EngineError) as caught:
+        cc.run("bounce", engine=Unmade)
+    assert str(caught.value) == "engine: cannot be made: ValueError: first line"
+
+
+def test_an_engine_of_another_package_runs_where_it_may_die(plugins):
+    result = cc.run("impact", engine="evil", profile="abort")
+    assert result.observation.outcome.value == "crashed" and "SIGABRT" in result.observation.reason
+
+
+# ---- many cases ------------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_has_the_rows_of_its_cases(own, engine):
+    with pytest.warns(UserWarning) as warned:
+        found = cc.sweep("bounce", engine=[engine("chipmunk"), ToyEngine], e=[0.3, 0.6], height=2.0, jobs=1)
+    assert len(warned) == 1
+    assert set(found["param.e"]) == {0.3, 0.6} and set(found["param.height"]) == {2.0}
+    assert set(found.engine) == {"chipmunk", "toy"} and found.attrs["run"] == ""
+    single = cc.run("bounce", engine="chipmunk", e=0.6, height=2.0).frame()
+    same = found[(found.engine == "chipmunk") & (found["param.e"] == 0.6)]
+    assert list(same.value) == list(single.value) and list(same.physics) == list(single.physics)
+
+
+def test_a_sweep_that_is_kept_is_loaded_again(tmp_path, engine):
+    found = cc.sweep("impact", engine=engine("chipmunk"), e=np.linspace(0.0, 1.0, 3), jobs=1, out=tmp_path)
+    again = cc.load(tmp_path)
+    assert again.attrs == found.attrs and again.attrs["run"] == found.run[0]
+    pd.testing.assert_frame_equal(again, found)
+
+
+@pytest.mark.parametrize(
+    ("said", "given"),
+    [
+        ("sweep: no parameter has several values", {"e": 0.5}),
+        ("e: the list is empty", {"e": []}),
+        ("e: 'x' is not a number", {"e": [0.5, "x"]}),
+        ("bounce.e: 2 must lie in", {"e": [0.5, 2]}),
+        ("bounce.nope: there is no such parameter", {"nope": [1, 2]}),
+        ("engine: the list is empty", {"e": [0.5], "engine": []}),
+        ("bounce.dimension: 4 is not one of", {"e": [0.5], "dimension": 4}),
+    ],
+)
+def test_a_wrong_sweep_is_one_line(said, given):
+    with pytest.raises((SceneError, EngineError)) as caught:
+        cc.sweep("bounce", **({"engine": "chipmunk"} | given))
+    assert str(caught.value).startswith(said)
+
+
+def test_engines_of_one_s_own_are_neither_kept_nor_timed(tmp_path, own):
+    with pytest.warns(UserWarning), pytest.raises(EngineError, match="out: toy is an engine of this process alone"):
+        cc.sweep("bounce", engine=ToyEngine, e=[0.5], out=tmp_path)
+    for given in (ToyEngine, "toy"):
+        with pytest.raises(EngineError, match="timed in a process of its own"):
+            cc.bench("bounce", engines=[given])
+
+
+@pytest.mark.long
+def test_a_bench_measures_errors_and_times_and_draws_them(engine):
+    found = cc.bench("impact", engines=engine("chipmunk"), profiles=["tuned"], dimension=2, dts=["1/120", 1 / 240])
+    points = found.frame()
+    assert set(points.dt) == {1 / 120, 1 / 240} and (points.cost > 0.0).all() and points.error.notna().all()
+    assert len(drawn(found.plot())) == len(points)
+    assert "work points" in repr(found)
+
+
+# ---- scenes and listings ---------------------------------------------------------------------------------------------
+
+
+def test_a_model_is_a_scene(engine):
+    path = MODELS / "ball_dropped.xml"
+    scene = cc.Scene.from_mjcf(path) if registry.find(engine("mujoco")).engine else None
+    assert scene.dimensions == (2, 3) and list(scene.parameters.name) == ["duration"] and scene.notes
+    own = cc.run(scene, engine="mujoco", duration=0.3)
+    assert own.observation.slot.profile == "model" and own.observation.slot.dt == 0.001
+    by_path = cc.run(path, engine="mujoco", duration=0.3)
+    assert by_path.observation.state_hash == own.observation.state_hash
+    with pytest.raises(SceneError, match=r"does not end in \.urdf"):
+        cc.Scene.from_urdf(path)
+    with pytest.raises(SceneError, match="does not end in"):
+        cc.Scene.from_file("model.txt")
+
+
+def test_engines_and_scenes_are_tables(engine):
+    engines, scenes = cc.engines(), cc.scenes().set_index("name")
+    assert engines.set_index("name").loc[engine("chipmunk")].status == "installed"
+    assert "bounce" in scenes.index and scenes.loc["bounce"].dimensions == [2, 3]
+
+
+# ---- scripts and notebooks -------------------------------------------------------------------------------------------
+
+
+def test_a_foreign_package_is_named_before_anything_of_ours_is_loaded(tmp_path):
+    (tmp_path / "adapters").mkdir()
+    (tmp_path / "adapters" / "__init__.py").write_text("print('foreign')")
+    code = "import sys\nsys.path.insert(0, '.')\nimport contact_crosscheck as cc\ncc.run"
+    out, said = called(tmp_path, code, status=1)
+    assert "'adapters' at" in said.splitlines()[-1] and out == ""
+
+
+@pytest.mark.parametrize("name", ["chipmunk"])
+def test_a_script_without_a_guard_runs_once(tmp_path, engine, name):
+    code = f"""
+import contact_crosscheck as cc
+print("begun")
+result = cc.run("impact", engine="{engine(name)}", e=0.5)
+found = cc.sweep("impact", engine="{name}", e=[0.2, 0.5], jobs=1)
+print(set(found[found["param.e"] == 0.5].state_hash) == set(result.frame().state_hash))
+"""
+    assert called(tmp_path, code)[0].split() == ["begun", "True"]
+
+
+def test_a_script_without_a_guard_asks_an_engine_of_another_package(tmp_path, plugins):
+    code = f"""
+import sys
+sys.path.insert(0, {str(plugins)!r})
+import contact_crosscheck as cc
+print("begun")
+print(repr(cc.run("impact", engine="evil", profile="raise")))
+"""
+    out, _ = called(tmp_path, code)
+    assert out.count("begun") == 1 and "building failed" in out
+
+
+@pytest.mark.parametrize("name", ["mujoco"])
+def test_a_script_without_a_guard_reads_a_model(tmp_path, engine, name):
+    code = f"""
+import contact_crosscheck as cc
+print("begun")
+scene = cc.Scene.from_mjcf({str(MODELS / "ball_dropped.xml")!r})
+print(cc.run(scene, engine="{engine(name)}", duration=0.2).observation.outcome.value)
+"""
+    assert called(tmp_path, code)[0].split() == ["begun", "ok"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["first_look", "paper_figure"])
+def test_a_notebook_runs(tmp_path, engine, name):
+    for needed in ("mujoco", "chipmunk"):
+        engine(needed)
+    pytest.importorskip("altair")
+    code = (ROOT / "docs" / "notebooks" / f"{name}.py").read_text(encoding="utf-8")
+    if name == "paper_figure":  # a field that a chart does not find is drawn as nothing
+        code += 'figure.save("figure.svg")\n'
+    called(tmp_path, code)
+    if name == "paper_figure":
+        assert (tmp_path / "figure.pdf").read_bytes().startswith(b"%PDF")
+        lines = re.findall(r'aria-roledescription="line mark"[^>]* d="([^"]*)"', (tmp_path / "figure.svg").read_text())
+        assert len(lines) == 3 and min(line.count("L") for line in lines) > 200
+        assert len((tmp_path / "table.csv").read_text().splitlines()) == 4
