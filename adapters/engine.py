@@ -215,13 +215,13 @@ Writer = Callable[[Scene, float, Mapping[str, Any], int], str]
 #: What a profile is among those of its engine. Comparisons and marks select on it, never on a profile's name.
 Role = Literal["shipped", "textbook", "tuned", "one", "solution", "matched"]
 ROLES: Mapping[Role, str] = {
-    "shipped": "what a user gets who changes nothing",
+    "shipped": "what a user gets without changing anything",
     "textbook": "a textbook's method at a fixed cost",
     "tuned": "best stock settings, chosen by what a scene needs",
     "one": "one set of stock settings for all scenes",
-    "solution": "solves its contact problem and says whether it did; what fails there is a defect",
-    "matched": "the textbook's law in the place of the engine's own, by a loop around its solver: what it does is not "
-    "the engine's contact law; in no ranking",
+    "solution": "solves its contact problem and reports whether it did; a failure is a defect",
+    "matched": "the textbook law instead of the engine's own, by a loop around its solver. This is not the engine's "
+    "contact model, so it is not ranked",
 }
 #: Roles of profiles that are asked and shown, but neither compared nor recommended: nobody gets them by settings.
 UNRANKED: frozenset[Role] = frozenset({"matched"})

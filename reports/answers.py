@@ -1,7 +1,7 @@
-"""The short answers: which engine to use for a scene, what is wrong with whom, and what cures it.
+"""The short answers: which engine is best for a scene, what is wrong with each, and what fixes it.
 
-One line per engine and scene that fails, in words: "engine/profile bounce: rebounds at 0.105 whatever e is asked;
-tuned cures it". Everything is read off the judged rows at the profiles' own iteration counts.
+One line per engine and scene that fails, in words: "engine/profile bounce: rebounds at 0.105, whatever e is; profile
+tuned fixes it". Everything is read off the judged rows at the profiles' own iteration counts.
 """
 
 from __future__ import annotations
@@ -30,8 +30,10 @@ SAME = 0.05
 
 
 #: Said of a scene of which no engine of the run gave anything that is judged, and where none could be asked.
-UNJUDGED_SCENE = "no verdict: nothing of it is judged"
-UNASKED = "no verdict: it cannot be asked of the engines of this run"
+UNJUDGED_SCENE = "no verdict: no check of it has a tolerance"
+UNASKED = "no verdict: no engine of this run can run it"
+#: How it begins that other profiles pass where one fails.
+FIXES = r"profiles? .+? fix(es)? it\b"
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class Choice:
         """``engine/profile (0.2 ms/s), another/profile``."""
         if not self.good and not self.nearest:
             return UNJUDGED_SCENE if self.asked else UNASKED
-        return ", ".join(self.good) if self.good else f"nobody passes every row; nearest is {self.nearest}"
+        return ", ".join(self.good) if self.good else f"none passes every check; nearest: {self.nearest}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data (JSON-ready)."""
@@ -105,7 +107,7 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         names = [_named(key, own[key], dimensions[scene], price[key], untold[key]) for key in good]
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
         near = min(shares, key=lambda key: shares[key], default=None)
-        nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} rows FAIL)"
+        nearest = "" if near is None else f"{'/'.join(near)} ({len(_failing(own[near]))} of {len(own[near])} fail)"
         asked = any(row["scene"] == scene and row["outcome"] not in REFUSED for row in rows)
         found.append(Choice(scene, tuple(names), nearest, asked))
     return found
@@ -118,11 +120,11 @@ def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
 
 
 def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float, untold: int) -> str:
-    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many rows it tells no number for."""
+    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many checks have no value."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
     if untold and is_file(rows[0]["scene"]) and own >= wanted:
-        notes.append(f"{plural(untold, 'row')} not told")
+        notes.append(f"no value for {plural(untold, 'check')}")
     if math.isfinite(price):
         notes.append(f"{1e3 * price:.2g} ms/s")
     return "/".join(key) + (f" ({', '.join(notes)})" if notes else "")
@@ -163,7 +165,7 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """Which other profile passes every row, or is the nearest to it; that none is better, or that none was run."""
     failed = _failing(own[profile])
     if all(mark_of(row) == "invalid" for row in failed):
-        return "nothing is said of the engine, so that there is nothing to cure"
+        return "the measurement is broken, so it says nothing about the engine"
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed if is_standard(row)})
     others = {
         name: group for name, group in own.items()
@@ -177,18 +179,24 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
         which = (row["engine"], row["engine_version"], row["scene"], dimensions, profile)
         by = {name: decided_by(*which, name) for name in good} if dimensions and not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
-        return "; ".join([", ".join([f"{' or '.join(good)} cures it", *said]), *listed])
+        return "; ".join([", ".join([_fix(good), *said]), *listed])
     unlisted = [] if listed or not can_be_searched(row) else [f"{search_command(row)} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None:
-        none = f"{' and '.join(silent)} gave no answer" if silent else "no other profile was run in this case"
+        none = f"profile {' and '.join(silent)} gave no result" if silent else "no other profile was run in this case"
         return "; ".join([none, *listed, *unlisted])
     if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])
-    nearer = f"{best} is nearer, {len(failing)} of {len(others[best])} rows FAIL: {_wrong(others[best], failing)}"
+    nearer = f"profile {best} is nearer ({len(failing)} of {len(others[best])} fail): {_wrong(others[best], failing)}"
     return "; ".join([nearer, *listed, *unlisted])
+
+
+def _fix(profiles: Sequence[str]) -> str:
+    """``profile tuned fixes it``; see `FIXES`."""
+    one = len(profiles) == 1
+    return f"profile {profiles[0]} fixes it" if one else f"profiles {' and '.join(profiles)} fix it"
 
 
 def _case(row: Plain) -> tuple[Any, ...]:
@@ -217,7 +225,7 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
     lost = [row for row in failing if not has_answer(row)]
     if lost:
-        return f"{len(lost)} of {len(rows)} rows have no answer ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
+        return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
     kinds: dict[str, list[Plain]] = defaultdict(list)
     for row in failing:
         kinds[row["metric"].partition("[")[0]].append(row)
@@ -247,18 +255,19 @@ def _instead(row: Plain, kind: str, told_as_size: bool) -> str:
 
 
 def _constant(kind: str, rows: Sequence[Plain]) -> str:
-    """``rebounds at 0.105 whatever e is asked``: one value where the truth follows a parameter; empty if it is not."""
+    """``rebounds at 0.105, whatever e is``: one value where the truth follows a parameter; empty if it is not."""
     values, truths = [row["value"] for row in rows], [row["truth"] for row in rows]
     if None in truths or max(truths) == min(truths):
         return ""
     if max(values) - min(values) > SAME * (max(truths) - min(truths)):
         return ""
     asked = [name for name in rows[0]["params"] if _follows(rows, name)]
-    low, high = (number(value, 3) for value in (min(values), max(values)))
+    nothing = max(map(abs, values)) < NOTHING * max(map(abs, truths))
+    low, high = ("0", "0") if nothing else (number(value, 3) for value in (min(values), max(values)))
     spread = rows[0]["unit"] if rows[0]["unit"] != "1" else ""
-    value = f"{low if low == high else f'{low} to {high}'} {spread}".strip()
-    what = " ".join(["whatever", *([" and ".join(asked)] if asked else []), "is asked"])
-    return f"{spoken(rows[0]['scene'], kind, value)} {what}"
+    value = f"{low if low == high else f'{low} to {high}'} {spread if low != '0' or high != '0' else ''}".strip()
+    what = f"whatever {' and '.join(asked)} {'is' if len(asked) == 1 else 'are'}" if asked else "in every case"
+    return f"{spoken(rows[0]['scene'], kind, value)}, {what}"
 
 
 def spoken(scene: str, kind: str, value: str) -> str:

@@ -33,16 +33,16 @@ README = """contact-crosscheck, run {run}
 
 {contents}
 
-Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the rows.
+Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the checks.
 Check the files with: sha256sum -c SHA256SUMS
 """
 #: File -> what it is, in the order of the archive.
 CONTENTS = {
-    "environment.json": "machine, Python, packages, commit and plan of the run (and of the bench)",
-    "observations.jsonl": "raw measurements, one cell per line",
+    "environment.json": "machine, Python, packages, commit and plan of the run (and of the benchmark)",
+    "observations.jsonl": "raw measurements, one case per line",
     "rows.jsonl": "every judged value, one per line",
     "rows.csv": "the same as a table",
-    "timings.csv": "raw timings of the bench",
+    "timings.csv": "raw timings of the benchmark",
     "report.html": "the report, one self-contained page",
     "CITATION.cff": "how to cite this result",
 }

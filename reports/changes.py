@@ -40,9 +40,9 @@ class Side:
 
     @property
     def text(self) -> str:
-        """``20261121-101500 (commit 1a2b3c4, 7300 rows)``."""
+        """``20261121-101500 (commit 1a2b3c4, 7300 checks)``."""
         commit = f"commit {self.commit[:12]}, " if self.commit else ""
-        return f"{self.run or 'rows'} ({commit}{plural(len(self.rows), 'row')})"
+        return f"{self.run or 'checks'} ({commit}{plural(len(self.rows), 'check')})"
 
 
 def load_side(argument: str, out: Path) -> Side:
@@ -130,15 +130,26 @@ def header(a: Side, b: Side) -> list[str]:
 
 
 def headline(changes: Sequence[Change]) -> str:
-    """``2 verdict flipped (1 regressed), 3 value changed``; or that nothing changed."""
-    counts = Counter(change.kind for change in changes)
-    worse = Counter(change.kind for change in changes if change.regressed)
+    """``1 newly failing, 2 fixed, 3 value changed (1 worse)``; or that nothing changed."""
+    counts = Counter((change.kind, change.regressed) for change in changes)
     parts = []
     for kind in Kind:
-        if counts[kind]:
-            judged = "" if kind in (Kind.ADDED, Kind.REMOVED) else f" ({worse[kind]} regressed)"
-            parts.append(f"{counts[kind]} {kind.value}{judged}")
+        worse, other = counts[kind, True], counts[kind, False]
+        if kind is Kind.FLIP:
+            parts += [f"{n} {WORDS[regressed]}" for n, regressed in ((worse, True), (other, False)) if n]
+        elif worse + other:
+            judged = "" if kind in (Kind.ADDED, Kind.REMOVED) else f" ({worse} worse)"
+            parts.append(f"{worse + other} {kind.value}{judged}")
     return "; ".join(parts) or "nothing changed"
+
+
+#: What a check is that fails on one side only, by whether it got worse.
+WORDS = {True: "newly failing", False: "fixed"}
+
+
+def kind_of(kind: str, regressed: bool) -> str:
+    """``newly failing``, ``fixed``, or what else changed."""
+    return WORDS[regressed] if kind == Kind.FLIP.value else kind
 
 
 def _where(change: Change) -> str:
@@ -158,14 +169,17 @@ def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
         change, more = family.first, len(family.changes) - 1
         if change.kind in (Kind.ADDED, Kind.REMOVED):
             who = f"{change.engine}/{change.profile} {change.scene}"
-            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {plural(more + 1, 'row')}")
+            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {plural(more + 1, 'check')}")
             continue
-        trend = "regressed" if change.regressed else "improved or neutral"
-        rest = f" and {more} more like it" if more else ""
-        lines.append(
-            f"{change.kind.value} ({trend}): {_where(change)} {change.metric}: {change.before} -> {change.after} "
-            f"{_size(change)} [{change.note}]{rest} | {reproduce(change.slot)}"
-        )
+        flips = change.kind is Kind.FLIP
+        trend = "" if flips else " (worse)" if change.regressed else " (not worse)"
+        rest = f", and {more} more like it" if more else ""
+        said = [
+            f"{kind_of(change.kind.value, change.regressed)}{trend}: {_where(change)} {change.metric}:",
+            f"{change.before} -> {change.after}", _size(change), f"[{change.note}]" if change.note else "",
+        ]  # fmt: skip
+        lines.append(" ".join(filter(None, said)) + rest)
+        lines.append(f"    {reproduce(change.slot)}")
     return "\n".join(lines) + "\n"
 
 
@@ -175,12 +189,16 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
     out += [f"* {line}" for line in header(a, b)]
     found = families(changes)
     if found:
-        out += ["", "| change | | rows | where | metric | before | after | size |", "|---|---|---|---|---|---|---|---|"]
+        out += [
+            "",
+            "| change | | checks | where | metric | before | after | size |",
+            "|---|---|---|---|---|---|---|---|",
+        ]
     for family in found[:most]:
         change = family.first
         mark = "worse" if change.regressed else ""
         cells = [
-            markdown(change.kind.value),
+            markdown(kind_of(change.kind.value, change.regressed)),
             mark,
             str(len(family.changes)),
             markdown(_where(change)),

@@ -1,4 +1,4 @@
-"""What cures an engine: the settings in which a profile that passes differs from the one that does not."""
+"""What fixes an engine: the settings in which a profile that passes differs from the one that does not."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ from validation.settings.cures import Cure, asked_of, cures_of
 from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, changes_of, decisive
 from validation.settings.switching import switched
 
+#: Said where a search found nothing.
+NONE_HELPS = "no setting helps"
 #: What a setting's part in a cure is called.
 ROLES = {
     ALONE: "enough alone",
     NEEDED: "needed",
-    COMPLETES: "completes it; another might stand for it",
+    COMPLETES: "also needed, but replaceable",
     "": "not needed",
 }
 
@@ -86,7 +88,7 @@ def changes(
     found = []
     for name, setting in new.items():
         if name in now and (name not in old or old[name]["value"] != setting["value"]):
-            role = roles.get(name) or (f"belongs to {belongs[name]}" if measured and name in belongs else "")
+            role = roles.get(name) or (f"part of {belongs[name]}" if measured and name in belongs else "")
             word, value = now[name]
             found.append(Change(word, was.get(name, ("", "as shipped"))[1], value, setting["because"], role))
     return found
@@ -140,7 +142,10 @@ def _settings(slot: Slot) -> dict[str, Any]:
 
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
     """What was measured to mend a scene in each of ``dimensions``, with this release, from the committed table."""
-    return [cure_text(*told) for told in known_cures(engine, version, scene, shipped, dimensions)]
+    known = known_cures(engine, version, scene, shipped, dimensions)
+    if len(known) == 2 and not any(cure.helps for cure, _ in known):
+        return [f"{NONE_HELPS} ({', '.join(f'{cure.tried} tried in {where}' for cure, where in known)})"]
+    return [_recorded(*each) for each in known]
 
 
 def known_cures(
@@ -155,6 +160,12 @@ def known_cures(
     return [(cure, f"{cure.dimension}-D") for cure in known]
 
 
+def _recorded(cure: Cure, where: str) -> str:
+    """`cure_text`, begun by how much it fixes."""
+    what = "smallest fix, " if not cure.left else "best settings found, "
+    return (what if cure.helps else "") + cure_text(cure, where)
+
+
 def told_cure(row: Mapping[str, Any]) -> str:
     """What was measured to mend the check of one row, or that it is not among what was searched or is mended.
 
@@ -162,11 +173,11 @@ def told_cure(row: Mapping[str, Any]) -> str:
     """
     cure = _listed(row)
     if cure is None:
-        return f"not searched for in this case: {search_command(row)}" if can_be_searched(row) else ""
+        return f"none was searched for in this case; to search: {search_command(row)}" if can_be_searched(row) else ""
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
     if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
-    return f"none is known of this check; of {', '.join(kinds)} in this scene: {cure_text(cure)}"
+    return f"none is known for this check; for {', '.join(kinds)} in this scene, {cure_text(cure)}"
 
 
 def cure_of(row: Mapping[str, Any]) -> Cure | None:
@@ -242,23 +253,24 @@ def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
 
 
 def cure_text(cure: Cure, where: str = "") -> str:
-    """``2-D by cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
+    """``2-D: cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
     where = where or f"{cure.dimension}-D"
     if not cure.helps:
-        return f"{where}: none of {cure.tried} changes of its settings that were tried helps"
+        return f"{where}: {NONE_HELPS} ({cure.tried} tried)"
     settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
     unit = "" if cure.unit == "1" else f" {cure.unit}"
     at = params_text(cure.params)
     before, after, truth = told_apart(cure.before, cure.after, cure.truth)
     aim = f" (true: {truth})" if truth not in ("0", after) else ""
-    numbers = f"{cure.metric}{f' at {at}' if at else ''} {before} -> {after}{unit}{aim}"
+    numbers = f"{cure.metric}{f' at {at}:' if at else ''} {before} -> {after}{unit}{aim}"
     left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
-    cost = f", at {cure.times:.2g} times the cost" if cure.times else ""
+    times = f"{cure.times:.2g}" if cure.times else ""
+    cost = "" if not times else ", at the same cost" if times == "1" else f", at {times} times the cost"
     alone = ""
     if cure.alone:
         said = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.alone))
         alone = f"; {said} alone: {number(cure.alone_after, 3)}{unit}"
-    return f"{where} by {settings}: {numbers}{left}{cost}{alone}"
+    return f"{where}: {settings}; {numbers}{left}{cost}{alone}"
 
 
 def told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
@@ -306,10 +318,10 @@ def how_measured(engine: str, scene: str, dimension: int, before: str, after: st
     """One sentence: what decides a cure, on which checks and cells, with which release; or that nobody measured."""
     measured = decisive(engine, scene, dimension, before, after)
     if measured is None:
-        return "Which of these matters was not measured, setting by setting: they are the profiles' difference."
+        return "Which of these settings matter was not measured; they are all that differs between the profiles."
     cells = "; ".join(params_text(cell) or "defaults" for cell in measured.cells)
     what = f"{', '.join(measured.metrics) or 'all checks'} of {scene} {measured.dimension}-D at {cells}"
-    return f"Measured setting by setting ({what}; {engine} {measured.version}): it is cured by {_decided(measured)}."
+    return f"Measured setting by setting ({what}; {engine} {measured.version}). What fixes it: {_decided(measured)}."
 
 
 def pasteable(
@@ -348,7 +360,7 @@ def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str
     if cure is None and not better:
         return "", ""
     if cure is not None:
-        paste, what = cure_paste(cure), "the smallest change that was found to mend this check"
+        paste, what = cure_paste(cure), "the smallest change found that fixes this check"
     else:
         where = (row["scene"], row["dimension"], row["engine"], row["profile"], better)
         paste, what = pasteable(observations, *where, dict(_minimal(row))), f"all that profile {better} changes"
@@ -367,7 +379,7 @@ def nothing_to_paste(cure: Cure) -> str:
 def _unpasted(row: Mapping[str, Any], profile: Sequence[str]) -> str:
     engine = row["engine"]
     words = ["crosscheck", "export", row["scene"], *_case(row), "--engine", engine, *profile, "--to", "python"]
-    return f"nothing to paste: {engine} has no lines of settings; {shlex.join(words)} writes its calls"
+    return f"nothing to paste: {engine} is set by calls; {shlex.join(words)} writes them"
 
 
 def setting_text(value: Any) -> str:

@@ -13,7 +13,7 @@ import pandas as pd
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from reports.findings import finding_line, grouped
-from reports.matrix import leaving, legend, matrix_of, unranked, versions_of
+from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, is_alarming, rows_of
 from validation.questions.nulls import null_rows, with_skill
@@ -107,10 +107,11 @@ def as_markdown(rows: Sequence[Plain]) -> str:
     for line in matrix.lines:
         fields = [matrix.fields.get((line, column)) for column in matrix.columns]
         out.append(f"| {markdown(line[0])} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
-    out += ["", legend().replace("|", "\\|"), ""]
-    out += [f"{markdown(line)}\n" for line in (*unranked(matrix.columns), *leaving(rows))]
+    out += [""]
+    lines = (legend(matrix), *filter(None, [status_of(matrix)]), *unranked(matrix.columns), *leaving(rows))
+    out += [f"{markdown(line)}\n" for line in lines]
     for mark, group in grouped(rows):
-        out.append(f"**{LABELS[mark]}**: {plural(len(group), 'row')}")
+        out.append(f"**{LABELS[mark]}**: {plural(len(group), 'check')}")
         out += [f"* {markdown(finding_line(row))}" for row in group if is_alarming(row)]
     return "\n".join(out) + "\n"
 

@@ -97,7 +97,7 @@ class Family:
     @property
     def line(self) -> str:
         """One line: standing, who, what and how wrong its worst row is."""
-        count = f"{len(self.rows)} rows"
+        count = f"{len(self.rows)} checks"
         more = "" if len(self.rows) == 1 else f" ({count})" if self.mark in WHOLE else f", the worst of {count}"
         what = first_reason(self.worst) if self.mark == "invalid" else said(self.worst)
         return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {what}{more}"

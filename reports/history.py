@@ -16,13 +16,13 @@ from validation.releases.notes import explanations
 
 HEAD = """# Physics over engine releases
 
-Made by `make releases`{commit}. The same cells of every scene of the standard suite on each release,
-driven by one adapter in an environment of its own; receipts ran before each cell. A row is one check of one cell.
-*fails* counts rows outside their tolerance; *no answer* those whose cell crashed, hung or is not driven as declared:
-they fail no check and are no better for it; *mended* those that pass although they are listed as findings of other
-releases; *moved* those whose verdict flips or whose value moves beyond its noise floor: by more than from starts moved
-by the last place. `crosscheck bisect` finds each of these steps again. What the notes say of a release is set beside a
-step that it may explain; it was not proven by building that one change.
+Made by `make releases`{commit}. The same cases of every scene of the standard suite ran on each release, with one
+adapter and in an environment of its own, after property checks. A check is one measured quantity of one case.
+*failed* counts checks outside their tolerance; *no result* those whose case crashed, hung or failed a property check;
+*fixed* those that pass although they are known failures of other releases; *changed* those that began or ceased to
+fail, or whose value changed by more than its noise, which is the effect of moving the start by the last place.
+`crosscheck bisect` finds each of these steps again. Release notes are quoted beside a step that they may explain; no
+build with that one change was made to prove it.
 """
 
 
@@ -43,18 +43,18 @@ def sentences(engine: str, steps: Sequence[Step]) -> list[str]:
 
 
 def _moved(own: Sequence[Step]) -> str:
-    """``2 rows begin to fail, 14 change their value; first `drift` (3-D) 1e-9 m (pass) -> 0.1 m (fail)``."""
+    """``2 checks begin to fail, 14 change their value; first `drift` (3-D) 1e-9 m (pass) -> 0.1 m (fail)``."""
     changes = [change for step in own for change in step.family.changes]
     flips = [change.regressed for change in changes if change.kind is Kind.FLIP]
     ends = [change.regressed for change in changes if change.kind is Kind.OUTCOME]
     counts = (
         (sum(flips), "begins to fail", "begin to fail"),
         (len(flips) - sum(flips), "ceases to fail", "cease to fail"),
-        (sum(ends), "ends without an answer", "end without an answer"),
-        (len(ends) - sum(ends), "has an answer again", "have an answer again"),
+        (sum(ends), "ends without a result", "end without a result"),
+        (len(ends) - sum(ends), "has a result again", "have a result again"),
         (sum(change.kind is Kind.ERROR for change in changes), "changes its value", "change their value"),
     )
-    said = [f"{plural(count, 'row')} {one if count == 1 else more}" for count, one, more in counts if count]
+    said = [f"{plural(count, 'check')} {one if count == 1 else more}" for count, one, more in counts if count]
     first = own[0].family.first
     return f"{', '.join(said)}; first `{first.metric}` ({history.cell_of(first)}) {first.before} -> {first.after}"
 
@@ -62,14 +62,14 @@ def _moved(own: Sequence[Step]) -> str:
 def page(store: Store) -> str:
     """Markdown: of each engine in the store a table of its releases and the sentences."""
     made = {run.commit for run in store.runs() if run.title.startswith(RELEASE_TITLE) and run.plan}
-    out = [HEAD.format(commit=f"; its rows were made at {' and '.join(sorted(made))}" if all(made) and made else "")]
+    out = [HEAD.format(commit=f"; its results were made at {' and '.join(sorted(made))}" if all(made) and made else "")]
     for engine in history.engines(store):
         told = history.told(store, engine)
         steps = history.steps(told)
         out += [f"## {engine}", "", as_table(told, steps)]
         out += [f"{PACE}.", ""] if any(each.times for each in told) else []
         said = sentences(engine, steps)
-        out += [f"* {line}" for line in said] or ["No row moved."]
+        out += [f"* {line}" for line in said] or ["Nothing changed."]
         out.append("")
     return "\n".join(out)
 

@@ -18,14 +18,12 @@ from rich.text import Text
 from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
-from reports.wording import LABELS, MARKS, SHORT, mark_of
+from reports.wording import LABELS, MARKS, STATUS, mark_of
 from validation.metrics import OUT_OF_PLANE
 
 #: Colours support the words, they never replace them.
 STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
 ALARM = "bold white on red"
-#: From this width on a field says FAIL in full [columns].
-ROOMY = 100
 #: Space before a scene [columns]: one of padding, and one that the box draws as its divider.
 GAP = 2
 #: Marks of rows that have no verdict.
@@ -53,16 +51,19 @@ class Field:
         """How many of them do not pass."""
         return self.judged - self.marks["pass"]
 
-    def said(self, words: Mapping[str, str]) -> str:
-        """``FAIL known 3/24``: the worst mark in ``words``, rows that do not pass, rows judged."""
-        if self.mark not in MARKS:
-            return words[self.mark]
-        return f"{words[self.mark]} {f'{self.missed}/{self.judged}' if self.missed else self.judged}"
-
     @property
     def text(self) -> str:
-        """In full, for whoever has the room."""
-        return self.said(LABELS)
+        """``40 pass``, ``3 of 24 fail``, ``3 of 24 fail, 2 new`` where some are unexpected; ``-`` if it cannot run."""
+        if self.mark not in MARKS:
+            return LABELS[self.mark]
+        unexpected = [f", {self.marks[mark]} {STATUS[mark]}" for mark in ALARMING if self.marks[mark]]
+        counted = f"{self.missed} of {self.judged} fail" if self.missed else f"{self.judged} pass"
+        return counted + "".join(unexpected)
+
+    @property
+    def short(self) -> str:
+        """The same where there is little room: ``3/24 fail``."""
+        return self.text.replace(" of ", "/", 1)
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,8 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
         outside = sorted(each for each in of_it if each[0])
         if outside:
             _, most, scene = outside[-1]
-            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (most of all {scene}, by {most:.2g} m)")
-    return [f"Planar cells that leave their plane in space: {', '.join(told)}"] if told else []
+            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
+    return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(told)}"] if told else []
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:
@@ -142,13 +143,19 @@ def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[T
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
     body = list(_body(matrix, scenes, versions))
-    words = LABELS if width >= ROOMY else SHORT
-    texts = [[_styled(field, words) for field in fields] for _, fields in body]
-    wide = [max([len(scene), *(len(row[k]) for row in texts if row)]) for k, scene in enumerate(scenes)]
+    texts, wide = _texts(scenes, body, short=False)
+    if max((len(label) for label, _ in body), default=0) + sum(wide) + GAP * len(wide) > width:
+        texts, wide = _texts(scenes, body, short=True)
     most = width - max(wide, default=0) - GAP
     body = [(label if len(label) <= most else label.replace("+", "\n    +"), fields) for label, fields in body]
     first = max((len(line) for label, _ in body for line in label.splitlines()), default=0)
     return [_table(scenes, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
+
+
+def _texts(scenes: Sequence[str], body: Sequence[Line], short: bool) -> tuple[list[list[Text]], list[int]]:
+    """What the fields of each line say, and the width of each scene's column."""
+    texts = [[_styled(field, short) for field in fields] for _, fields in body]
+    return texts, [max([len(scene), *(len(row[k]) for row in texts if row)]) for k, scene in enumerate(scenes)]
 
 
 def _chunks(widths: Sequence[int], room: int) -> Iterator[list[int]]:
@@ -223,15 +230,15 @@ def _version(version: str) -> str:
     return version.partition("+")[0]
 
 
-def _styled(field: Field | None, words: Mapping[str, str]) -> Text:
+def _styled(field: Field | None, short: bool) -> Text:
     if field is None:
         return Text("")
     alarming = field.mark in ALARMING
-    return Text(field.said(words), style=ALARM if alarming else STYLES.get(field.mark, ""))
+    return Text(field.short if short else field.text, style=ALARM if alarming else STYLES.get(field.mark, ""))
 
 
 def sweeps_of(matrix: Matrix) -> list[str]:
-    """One line per scene whose iterations were swept: rows that do not pass, of those judged, by profile."""
+    """One line per scene whose iterations were swept: checks that fail, of those judged, by profile."""
     found = []
     for scene, counts in matrix.counts.items():
         said = []
@@ -239,30 +246,46 @@ def sweeps_of(matrix: Matrix) -> list[str]:
             shares: dict[str, list[int]] = defaultdict(list)
             for (line, column), own in matrix.swept.items():
                 if line[0] == scene and column == (engine, profile) and own.judged:
-                    shares[f"{own.missed}/{own.judged}"].append(line[1])
+                    shares[f"{own.missed} of {own.judged}"].append(line[1])
             alone = len(shares) == 1
             parts = [share if alone else f"{share} {' '.join(f'{d}-D' for d in ds)}" for share, ds in shares.items()]
             if parts:
                 said.append(f"{engine}/{profile} {' and '.join(parts)}")
         asked = ", ".join(map(str, counts))
-        found.append(f"{scene} at {asked} iterations instead of the profile's own, FAIL: {'; '.join(said)}.")
+        found.append(f"{scene} at {asked} iterations instead of the profile's own, failed checks: {'; '.join(said)}")
     return found
 
 
-def legend(short: bool = False) -> str:
-    """What the marks mean: in one line, or as short as a terminal of 80 columns wants it."""
-    if short:
-        return (
-            "pass 9: all 9 rows within tolerance. 3/9: 3 of 9 rows FAIL; expl.: as a law of\n"
-            "the engine predicts; known: listed with a reason; NEW, drifted: neither; FAIL:\n"
-            "of an engine or a file without a list. INVALID: the measurement is broken."
-        )
-    return (
-        "pass: within the stated tolerance | FAIL expl.: off as a law of the engine predicts | "
-        "FAIL known: listed with a reason | FAIL new, drifted: not listed so | FAIL: off, and nothing is listed of "
-        "this engine or file | INVALID: the measurement is broken, nothing is said of the engine | "
-        "-: cannot be asked of this engine"
-    )
+def legend(matrix: Matrix) -> str:
+    """What the numbers count, and the words beside them that occur."""
+    marks = {mark for field in matrix.fields.values() for mark in field.marks}
+    said = ["A check is one measured quantity of one case; it fails outside its tolerance."]
+    if "invalid" in marks:
+        said.append("INVALID: the measurement is broken and says nothing about the engine.")
+    if "unsupported" in marks:
+        said.append("A dash: the engine cannot run the scene.")
+    return " ".join(said)
+
+
+#: What the less obvious of the words of `reports.wording.STATUS` mean.
+MEANT = {
+    "known": "cause on record",
+    "explained": "the engine's contact model predicts them",
+    "invalid": "the measurement is broken",
+    "drifted": "value differs from the record",
+}
+
+
+def status_of(matrix: Matrix) -> str:
+    """Regression status: how many failed checks are expected and why, and how many are not; empty if none fails."""
+    marks: Counter[str] = Counter()
+    for own in (*matrix.fields.values(), *matrix.swept.values()):
+        marks.update(own.marks)
+    parts = [
+        f"{marks[mark]} {word}" + (f" ({MEANT[mark]})" if mark in MEANT else "")
+        for mark, word in STATUS.items() if marks[mark]
+    ]  # fmt: skip
+    return f"Regression status of what fails: {', '.join(parts)}." if parts else ""
 
 
 def versions_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -8,6 +8,7 @@ prints every scene, and so does the report.
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -18,21 +19,16 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.registry import is_ranked
-from reports.answers import Answer, answers, configured
+from reports.answers import FIXES, Answer, answers, configured
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
-from reports.wording import plural
+from reports.wording import MARKS, plural
 from validation.canonical import FAMILIES
 from validation.posed import resolve
 
 Plain = Mapping[str, Any]
 #: Lines of a terminal that are looked at without scrolling.
 FIRST_LOOK = 30
-#: What an alarm, or the worst standing of a share that fails, is called where there are seven columns for it.
-SHORTEST = {
-    "crashed": "CRASH", "timed_out": "TIME", "missing": "MISS", "invalid": "INVAL", "new": "NEW", "drifted": "drift",
-    "fail": "f", "known": "k", "explained": "e",
-}  # fmt: skip
 #: Profiles that are named in a line of who is nearest.
 NEAREST = 3
 
@@ -68,14 +64,15 @@ def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
 
 
 def _cell(field: Field | None) -> Text:
-    """``pass``, the share that fails with the letter of its worst standing, how many alarms, or ``-``."""
+    """``pass``, the share of checks that fail, with ``!`` where some are unexpected, or ``-``."""
     if field is None:
         return Text("")
+    if field.mark not in MARKS:
+        return Text("-", style=STYLES.get(field.mark, ""))
+    text = share(field.missed, field.judged) if field.missed else "pass"
     if field.mark in ALARMING:
-        return Text(f"{SHORTEST[field.mark]} {field.marks[field.mark]}", style=ALARM)
-    if field.mark not in SHORTEST:
-        return Text("pass" if field.mark == "pass" else "-", style=STYLES.get(field.mark, ""))
-    return Text(f"{SHORTEST[field.mark]} {share(field.missed, field.judged)}", style=STYLES.get(field.mark, ""))
+        return Text(f"{text} !", style=ALARM)
+    return Text(text, style=STYLES.get(field.mark, ""))
 
 
 def share(part: float, whole: float) -> str:
@@ -87,16 +84,14 @@ def share(part: float, whole: float) -> str:
 
 
 def legend(matrix: Matrix) -> str:
-    """What the letters mean, of those that occur."""
+    """What the numbers and signs mean, of those that occur."""
     marks = {field.mark for field in matrix.fields.values()}
-    said = ["share of the rows of all its scenes, 2-D and 3-D, that FAIL"]
-    words = {
-        "explained": "e: as laws of the engine predict",
-        "known": "k: some listed with a reason",
-        "fail": "f: of an engine without a list",
-    }
-    said += [text for mark, text in words.items() if mark in marks]
-    return "; ".join(said) + ("; -: cannot be asked" if "unsupported" in marks else "")
+    said = ["Percentage of checks that fail, over all scenes of a group, 2-D and 3-D."]
+    if marks & set(ALARMING):
+        said.append("Marked with !: some results are unexpected, as listed below.")
+    if "unsupported" in marks:
+        said.append("A dash: the engine cannot run these scenes.")
+    return " ".join(said)
 
 
 def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
@@ -111,7 +106,7 @@ def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Ite
         good = [_named(c, len(asked[name, c]), len(scenes)) for c, f in own.items() if not f.missed]
         others = sorted((f.missed / f.judged, c) for c, f in own.items() if f.missed)
         near = [f"{'/'.join(c)} {share(own[c].missed, own[c].judged)}" for _, c in others][:NEAREST]
-        said = ", ".join(good) if good else "nobody passes every row" if own else "no verdict: it cannot be asked"
+        said = ", ".join(good) if good else "none passes every check" if own else "no verdict: no engine can run it"
         yield name, said + (f"; nearest: {', '.join(near)}" if near and len(good) < NEAREST else "")
 
 
@@ -123,7 +118,7 @@ def _named(column: tuple[str, str], asked: int, scenes: int) -> str:
 def shortened(answer: Answer) -> Answer:
     """The answer without the settings that would do, where a whole profile does: ``explain`` has them."""
     cure, _, _ = answer.cure.partition("; ")
-    return replace(answer, cure=cure.partition(", by ")[0]) if " cures it" in cure else answer
+    return replace(answer, cure=cure.partition(", by ")[0]) if re.match(FIXES, cure) else answer
 
 
 def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> tuple[list[Answer], int]:

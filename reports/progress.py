@@ -42,7 +42,7 @@ def run_plan(
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
-        console.print(f"resuming run {run.id}: {len(done)} of {plural(len(slots), 'cell')} done")
+        console.print(f"resuming run {run.id}: {len(done)} of {plural(len(slots), 'case')} done")
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -64,10 +64,10 @@ def run_plan(
     shown = representatives(slots) if finish else set()
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
-        stage(console, plural(len(todo), "cell")),
+        stage(console, plural(len(todo), "case")),
         Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
     ):
-        task = progress.add_task("running cells", total=len(slots), completed=len(slots) - len(todo))
+        task = progress.add_task("running cases", total=len(slots), completed=len(slots) - len(todo))
         try:
             record = partial(store.add_recording, run)
             if cluster:
@@ -78,10 +78,10 @@ def run_plan(
                 store.add(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
         except KeyboardInterrupt:
-            console.print("interrupted: what finished is kept, the same command resumes")
+            console.print("interrupted: finished cases are kept; the same command resumes")
             raise
     for reason, count in left.items():
-        console.print(f"left: {plural(count, 'cell')}, {reason}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"not run: {plural(count, 'case')}, {reason}", markup=False, highlight=False, soft_wrap=True)
     if left:
         console.print("this run is not complete; the same command resumes it", markup=False)
     elif finish:

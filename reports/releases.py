@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from reports.changes import kind_of
 from reports.wording import at, markdown, number, plural
 from validation.judging.comparison import Change, Kind
 from validation.judging.verdicts import Physics
@@ -34,8 +35,8 @@ def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
 
 
 #: Headings of `_line`, and what is said of the pace where there is one.
-HEADINGS = ("release", "fails", "no answer", "mended", "moved", "time", "")
-PACE = "time: the first release's is 1; median over scenes, each against a loop of Python on the same machine"
+HEADINGS = ("release", "failed", "no result", "fixed", "changed", "time", "")
+PACE = "time: relative to the first release; median over scenes, each relative to a Python loop on the same machine"
 
 
 def _first(releases: Sequence[Told]) -> Told:
@@ -49,7 +50,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
     ``out`` is the folder in which the commands below find the results; None for the usual one.
     """
     rows, first = max((len(told.rows) for told in releases), default=0), _first(releases)
-    head = f"{first.engine}: {plural(len(releases), 'release')}, {plural(rows, 'row')} each"
+    head = f"{first.engine}: {plural(len(releases), 'release')}, {plural(rows, 'check')} each"
     console.print(Text(head, style="bold"))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in HEADINGS[:-1]:
@@ -63,7 +64,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
     for version in dict.fromkeys(step.after for step in steps):
         own = [step for step in steps if step.after == version]
         console.print()
-        console.print(Text(f"moved in {version}, after {own[0].before}", style="bold"))
+        console.print(Text(f"changed in {version}, after {own[0].before}", style="bold"))
         moved = Table(box=None, pad_edge=False, padding=(0, 1, 0, 1), show_header=False)
         moved.add_column(no_wrap=True)
         moved.add_column(overflow="fold")
@@ -73,7 +74,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
             moved.add_row(mark(step.family.first), sentence(step.family.first) + rest)
         console.print(moved, highlight=False)
         if len(own) > SHOWN:
-            console.print(Text(f"  ... and {len(own) - SHOWN} more kinds of rows", style="dim"))
+            console.print(Text(f"  ... and {len(own) - SHOWN} more", style="dim"))
         name = releases[0].engine
         console.print(Text(f"  crosscheck compare {name}=={own[0].before} {name}=={version}{at(out)}", style="dim"))
 
@@ -94,7 +95,7 @@ def as_markdown(releases: Sequence[Told], steps: Sequence[Step]) -> str:
     """Two tables: releases, and what moved."""
     out = [as_table(releases, steps)]
     if steps:
-        out += ["| in | after | rows | what moved | by |", "|---|---|---|---|---|"]
+        out += ["| in | after | checks | what changed | by |", "|---|---|---|---|---|"]
     for step in steps:
         first = step.family.first
         size = f"{number(first.size, 3)} tol" if first.size else ""
@@ -142,18 +143,19 @@ def found_as_text(plain: dict[str, Any]) -> str:
     change = plain["change"]
     where = f"{change['profile']} {change['scene']} {plain['cell']}"
     lines = [
-        f"{change['kind']} in {plain['engine']} {plain['after']}: {where} {change['metric']}",
+        f"{kind_of(change['kind'], change['regressed'])} since {plain['engine']} {plain['after']}: {where} "
+        f"{change['metric']}",
         f"  {plain['engine']} {plain['before']}: {change['before']}",
         f"  {plain['engine']} {plain['after']}: {change['after']}",
     ]
     for version in plain["not_asked_between"]:
-        lines.append(f"  {version} lies between and did not answer: {plain['silent'][version]}")
-    lines.append(f"asked {plural(len(plain['asked']), 'release')}: {', '.join(plain['asked'])}")
+        lines.append(f"  {version} lies between and cannot run: {plain['silent'][version]}")
+    lines.append(f"ran {plural(len(plain['asked']), 'release')}: {', '.join(plain['asked'])}")
     if plain["others"] is None:
-        lines.append("the only change? --all asks every release")
+        lines.append("whether it is the only change: --all runs every release")
     elif plain["others"]:
         others = ", ".join(f"{a} -> {b}" for a, b in plain["others"])
-        lines.append(f"not the only change of this row: also {others}")
+        lines.append(f"not the only change of this check: also {others}")
     else:
-        lines.append("the only change of this row: every release was asked")
-    return "\n".join([*lines, "to see it again:", *(f"  {command}" for command in plain["commands"])])
+        lines.append("the only change of this check: every release ran")
+    return "\n".join([*lines, "to run it again:", *(f"  {command}" for command in plain["commands"])])

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters import registry
-from reports.wording import cell, number
+from reports.wording import cell, number, plural
 from validation.bench import agreement, reading, work
 from validation.cells import Observation, Outcome, checks_of, format_dt
 from validation.judging.verdicts import judge_physics
@@ -118,8 +118,8 @@ def physics(observation: Observation) -> list[dict[str, Any]]:
 
 def key(ranked: bool) -> str:
     """What the marks in a table of costs mean; where no engine is ranked there are fewer of them."""
-    ranks = "*: cheapest; =: a tie, its interval overlaps the cheapest; " if ranked else ""
-    return f"{ranks}-: not reached; 1/240 x30: step, iterations"
+    ranks = "*: cheapest; =: no measurable difference from the cheapest; " if ranked else ""
+    return f"{ranks}-: error not reached; 1/240 x30: time step, iterations"
 
 
 def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
@@ -181,7 +181,7 @@ def duration(seconds: float) -> str:
 def overhead_table(overhead: pd.DataFrame) -> Table:
     """Cost of a step of an empty scene and of one free body, plain and with the state read after each step."""
     table = Table(
-        title="Binding: cost per step before there is any contact",
+        title="Overhead: cost of a step without contact",
         title_justify="left",
         box=SIMPLE_HEAD,
         show_edge=False,
@@ -251,8 +251,8 @@ def busy(timings: pd.DataFrame) -> str:
     if taken <= SPOILT:
         return ""
     return (
-        f"This machine was busy: for {taken:.0%} of the units wall time is more than {TAKEN:g} times CPU time. Caches "
-        "and clocks were shared, so no engine is ranked; time again on an idle machine."
+        f"The machine was busy: for {taken:.0%} of the cases wall time is more than {TAKEN:g} times CPU time. "
+        "Therefore no engine is ranked; run the benchmark again on an idle machine."
     )
 
 
@@ -261,9 +261,8 @@ def quality_line(timings: pd.DataFrame) -> str:
     used = timings[timings["void"] == ""]
     if len(used) == 0:
         return "nothing was timed"
-    narrow = (used["width"] < 0.05).mean()
     return (
-        f"{len(used)} units timed, {int(used['rounds'].sum())} timings; interval of the median under 5 % for "
-        f"{100 * narrow:.0f} %, median {100 * used['width'].median():.1f} %; {int(used['drifts'].sum())} drift; "
-        f"wall / CPU time {used['load'].median():.2f} (median); {len(timings) - len(used)} void"
+        f"{plural(len(used), 'case')} timed in {int(used['rounds'].sum())} timings, good to about "
+        f"{100 * used['width'].median():.1f} % (median); {int(used['drifts'].sum())} drifted, "
+        f"{len(timings) - len(used)} not timed; wall time / CPU time {used['load'].median():.2f} (median)"
     )

@@ -29,7 +29,7 @@ def say(console: Console, text: str) -> None:
 def _busy() -> str:
     """What a stage that takes so long on idle cores must add where they are not idle."""
     load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0, os.cpu_count() or 1
-    return f"; these are busy (load {load:.0f} on {cores}), so longer" if load > 0.5 * cores else ""
+    return f"; longer now, the machine is busy (load {load:.0f} on {cores} cores)" if load > 0.5 * cores else ""
 
 
 @contextmanager
@@ -52,9 +52,9 @@ def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
     jobs = jobs or os.cpu_count() or 1
     expected = clock(warming.estimate(jobs))
     if warming.begun:
-        say(console, "kernels are compiled; what these cells call besides is looked for")
+        say(console, "kernels are compiled; checking what else these cases need")
     else:
-        say(console, f"compiling kernels, once per version of the solver: about {expected} on idle cores{_busy()}")
+        say(console, f"compiling the solver's kernels (once): about {expected} on idle cores{_busy()}")
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with (
         stage(console, "compiled"),

@@ -1,8 +1,8 @@
 """What the terminal says of a run: the matrix first, then the short answers, then where the details are.
 
-alarms (if any) -> matrix -> which engine for which scene -> what is wrong and what cures it -> where to look
+matrix -> unexpected results (if any) -> best engine per scene -> what is wrong and what fixes it -> commands
 
-More scenes than fit a screen are told by family (`reports.overview`), unless every one is asked for.
+More scenes than fit a screen are shown by group (`reports.overview`), unless every one is asked for.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rich.text import Text
 from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
-from reports.matrix import ROOMY, leaving, legend, matrix_of, sweeps_of, tables_of, unranked, versions_of
+from reports.matrix import Matrix, leaving, legend, matrix_of, status_of, sweeps_of, tables_of, unranked, versions_of
 from reports.wording import at, plural
 
 Plain = Mapping[str, Any]
@@ -38,11 +38,13 @@ def show(
     files: Iterable[Path] = (),
     every: bool = False,
     out: Path | None = None,
+    run: str = "",
 ) -> None:
     """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene.
 
-    ``out`` is where its results lie, which the commands that are named get.
+    ``out`` is where its results lie, and ``run`` its id if it is not the latest: the commands that are named get both.
     """
+    place = at(out, run)
     matrix = matrix_of(rows)
     tables = tables_of(matrix, versions_of(rows), console.width)
     families = overview.families_of(rows)
@@ -50,44 +52,50 @@ def show(
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
     fits = console.measure(short, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
     if long and fits and not every:
-        _show_families(rows, families, short, console, out)
-        _where(rows, console, files, out, {"crosscheck show --all": "matrix and answers of every scene"})
+        _show_families(rows, families, short, console, place)
+        _where(rows, console, files, place, {"crosscheck show --all": "the same for every scene"})
         return
     for table in tables:
         console.print(table)
-    if any(row["outcome"] not in REFUSED for row in rows):
-        console.print(legend(short=console.width < ROOMY), style="dim", markup=False, highlight=False)
-    for line in (*sweeps_of(matrix), *unranked(matrix.columns), *leaving(rows)):
+    explained = [legend(matrix)] if any(row["outcome"] not in REFUSED for row in rows) else []
+    for line in (*explained, *_beside(matrix), *sweeps_of(matrix), *unranked(matrix.columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
-    _alarms(rows, console, out)
+    _alarms(rows, console, place)
     _choices(rows, console, costs)
     _answers(rows, console)
-    _where(rows, console, files, out)
+    _where(rows, console, files, place)
 
 
 def _show_families(
-    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console, out: Path | None
+    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console, place: str
 ) -> None:
     """The same by family of scenes."""
     console.print(table)
-    console.print(_folded(overview.legend(overview.by_family(rows, families)), console, ""), style="dim")
-    for line in (*unranked(matrix_of(rows).columns), *leaving(rows)):
+    matrix = matrix_of(rows)
+    explained = overview.legend(overview.by_family(rows, families))
+    for line in (explained, *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
     console.print(_folded(ran, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
-    _alarms(rows, console, out)
-    _heading("Which engine for what: who passes every row, else who fails the fewest", console)
+    _alarms(rows, console, place)
+    _heading("Best engine per group: passes every check, or fails the fewest", console)
     wide = max(map(len, families))
     for name, line in overview.choices(rows, families):
         console.print(_folded(f"{name:<{wide}}  {line}", console))
     worst, total = overview.worst_answers(rows, families)
-    _heading(f"What is wrong as shipped, and what cures it: the worst of each family, {len(worst)} of {total}", console)
+    count = f" ({len(worst)} of {total})" if len(worst) < total else ""
+    _heading(f"What is wrong as shipped, and what fixes it: the worst scene of each group{count}", console)
     for answer in worst:
         console.print(_folded(answer.line, console))
+
+
+def _beside(matrix: Matrix) -> list[str]:
+    """The regression status in one line; none where nothing fails."""
+    return list(filter(None, [status_of(matrix)]))
 
 
 def _heading(text: str, console: Console) -> None:
@@ -105,22 +113,22 @@ def _folded(text: str, console: Console, indent: str = "  ") -> Text:
     return Text(folded)
 
 
-def _alarms(rows: Sequence[Plain], console: Console, out: Path | None) -> None:
+def _alarms(rows: Sequence[Plain], console: Console, place: str) -> None:
     found = alarms(rows)
     if not found:
         return
     total = sum(len(family.rows) for family in found)
-    _heading(f"Needs attention: {total} row{'s' if total > 1 else ''} that nobody knew (exit status 1)", console)
+    _heading(f"Needs attention: {plural(total, 'unexpected result')} (exit status 1)", console)
     for family in found[:MOST_ALARMS]:
         console.print(_folded(family.line, console))
     if len(found) > MOST_ALARMS:
-        more = f"... {len(found) - MOST_ALARMS} more families: crosscheck findings --new{at(out)}"
+        more = f"... {len(found) - MOST_ALARMS} more: crosscheck findings --new{place}"
         console.print(_folded(more, console))
 
 
 def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> None:
     order = ", cheapest first" if costs else ""
-    _heading(f"Which engine for what (passes every row of the scene{order})", console)
+    _heading(f"Best engine per scene (passes every check{order})", console)
     found = choices(rows, costs)
     wide = max((len(choice.scene) for choice in found), default=0)
     for choice in found:
@@ -129,7 +137,7 @@ def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> No
 
 def _answers(rows: Sequence[Plain], console: Console) -> None:
     found = answers(rows)
-    _heading("What is wrong, and what cures it" if found else _nothing_wrong(rows), console)
+    _heading("What is wrong, and what fixes it" if found else _nothing_wrong(rows), console)
     for answer in found:
         console.print(_folded(answer.line, console))
 
@@ -137,37 +145,43 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
 def _nothing_wrong(rows: Sequence[Plain]) -> str:
     """What is said of a run in which no profile fails at its own iteration count."""
     if all(row["outcome"] in REFUSED for row in rows):
-        return "Nothing was judged: no engine of this run can be asked any of it"
+        return "Nothing was judged: no engine of this run can run any of it"
     judged = [row for row in rows if row["tolerance"] is not None and row["outcome"] not in REFUSED]
     if not judged:
-        return "Nothing was judged: no number of this run has a finite tolerance"
+        return "Nothing was judged: no check of this run has a finite tolerance"
     if any(row["physics"] != "pass" for row in judged):
-        return "Only rows at other iteration counts fail, or have no value, as is listed"
-    return "Every row that is judged passes"
+        return "Only checks at other iteration counts fail or have no value"
+    return "Every check passes"
 
 
 def _where(
     rows: Sequence[Plain],
     console: Console,
     files: Iterable[Path],
-    out: Path | None,
+    place: str,
     more: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     found = families(rows)
     failing = sum(len(family.rows) for family in found)
-    _heading("Where the details are", console)
+    _heading("Next", console)
     engine = found[0].engine if found else ""
-    commands = [*more.items(), ("crosscheck report --open", "one page about all of it")]
+    commands = [*more.items(), ("crosscheck report --open", "one HTML page")]
     if found:
         commands = [
-            ("crosscheck findings", f"{plural(failing, 'failing row')}, in {plural(len(found), 'family')}"),
-            (f"crosscheck findings --engine {engine}", "the same of one engine; --scene, --new"),
-            ("crosscheck explain ID", "one row: why, and what cures it"),
+            ("crosscheck findings", f"{plural(failing, 'failed check')} by cause"),
+            (f"crosscheck findings --engine {engine}", "of one engine"),
+            ("crosscheck explain ID", "one check: cause and fix"),
             *commands,
         ]
-    for command, what in commands:
-        # A command stays whole: it is to be copied.
-        console.print(Text(f"  {command + at(out):<38} {what}"), soft_wrap=bool(at(out)))
+    whole = [(command + place, what) for command, what in commands]
+    wide = max(len(command) for command, _ in whole)
+    for command, what in whole:
+        # A command stays whole, to be copied: where its explanation has no room beside it, it stands above.
+        if wide + max(len(other) for _, other in whole) + 4 <= console.width:
+            console.print(Text(f"  {command:<{wide}}  {what}"))
+        else:
+            console.print(Text(f"  # {what}\n  {command}"), soft_wrap=True)
     written = [str(path) for path in files]
     if written:
-        console.print(_folded(f"{plural(len(rows), 'row')} written: {', '.join(written)}", console), soft_wrap=True)
+        line = f"Written ({plural(len(rows), 'check')}): {', '.join(written)}"
+        console.print(_folded(line, console), soft_wrap=True)

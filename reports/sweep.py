@@ -1,4 +1,4 @@
-"""What the terminal says of a sweep: how many cells pass everything, engine by engine; the rest is in its table."""
+"""What the terminal prints of a sweep: how many cases pass every check, by engine; the rest is in its table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from reports.tables import grid
 
 def counted(found: pd.DataFrame) -> Table:
     """Cells of every scene, engine and profile, and how many of them pass all that is judged."""
-    shown = grid("engine/profile", "scene", "cells", "pass", "FAIL", "no answer")
+    shown = grid("engine/profile", "scene", "cases", "pass", "fail", "no result")
     for (engine, profile, scene, dimension), cells in found.groupby(
         ["engine", "profile", "scene", "dimension"], sort=False
     ):

@@ -23,8 +23,8 @@ Plain = Mapping[str, Any]
 FEW = 4
 #: Said below facts that were measured without an adapter.
 AFTERWARDS = (
-    "Chosen afterwards: the sheet leaves it open, and another choice had contradicted it; that it agrees then is no "
-    "test of it. Conditions that the reason of a contradiction names were looked for afterwards as well."
+    "Chosen afterwards: the source leaves a value open, and it was chosen so that the measurement agrees. This "
+    "agreement is therefore no test. The conditions that the reason of a contradiction names were found afterwards too."
 )
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
@@ -34,7 +34,7 @@ LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
         ("quick", "quick"),
         ("standard", "standard"),
         ("full", "full"),
-        ("cells of quick", "of_quick"),
+        ("cases of quick", "of_quick"),
     ),
     "engines": (("engine", "name"), ("version", "version"), ("profiles", "profiles"), ("status", "status")),
     "checks": (("check", "name"), ("truth", "truth"), ("tolerance", "bound"), ("because", "because")),
@@ -67,7 +67,7 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
         table.add_row(*map(Text, told.values()))
     console.print(table)
     if what == "checks" and not reasons:
-        console.print(Text("Why each tolerance is what it is: --reasons, or crosscheck describe SCENE."))
+        console.print(Text("Reasons of tolerances: --reasons, or crosscheck describe SCENE."))
     for entry in entries:
         if entry.get("reason"):
             console.print(Text(f"{entry['name']}: {entry['reason']}"))
@@ -84,11 +84,16 @@ def _field(entry: Plain, name: str) -> str:
     if name == "date":
         return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
     if name == "title":
-        asked, options, narrowing = str(value).partition(" --")
-        if len(scenes := asked.partition(": ")[2].split()) > FEW:
-            asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
-        return f"{asked}{options}{narrowing}"
+        return title_of(str(value))
     return setting_text(value) if value is not None else "-"
+
+
+def title_of(title: str) -> str:
+    """A run's title, of many scenes with the first few."""
+    asked, options, narrowing = title.partition(" --")
+    if len(scenes := asked.partition(": ")[2].split()) > FEW:
+        asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
+    return f"{asked}{options}{narrowing}"
 
 
 def described(data: Plain, console: Console) -> None:
@@ -123,7 +128,7 @@ def _scene(data: Plain, console: Console) -> None:
         table.add_row(Text(check["metric"]), truth, bound, Text("as above" if because == last else because))
         last = because
     console.print(table)
-    _heading("What it needs of an engine", console)
+    _heading("What it needs from an engine", console)
     _pairs(data["needs"], console)
 
 
@@ -146,8 +151,8 @@ def _engine(data: Plain, console: Console) -> None:
         for setting in data["settable"]:
             table.add_row(setting["name"], Text(setting["must_be"]))
         console.print(table)
-    _heading("Habits, and what the adapter does about them", console)
-    table = grid("habit", "what we do", "source")
+    _heading("Quirks, and how the adapter handles them", console)
+    table = grid("quirk", "what the adapter does", "source")
     table.columns[0].no_wrap = False
     for quirk in data["quirks"]:
         table.add_row(*(Text(quirk[name]) for name in ("what", "what_we_do", "source")))
@@ -155,8 +160,8 @@ def _engine(data: Plain, console: Console) -> None:
     for version, why in data["known_bad_versions"].items():
         console.print(Text(f"version {version} is known to be bad: {why}"))
     if data["measured"]:
-        _heading("Measured without this adapter, and what our cells say", console)
-        table = grid("measured", "", "our cell, test or reason")
+        _heading("Measured without this adapter, and by our cases", console)
+        table = grid("measured", "", "our case, test or reason")
         table.columns[0].no_wrap = False
         for fact in data["measured"]:
             table.add_row(Text(fact["says"]), Text(fact["standing"]), Text(_said_of(fact)))
@@ -245,11 +250,13 @@ def health(data: Plain, console: Console) -> None:
         table.add_row(engine["name"], engine["version"] or "-", Text(engine["reason"] or engine["status"]))
     console.print(table)
     console.print()
-    table = grid("package", "where it lies")
+    table = grid("package", "folder")
     for name, folder in data["packages"].items():
         table.add_row(name, Text(folder))
     cache = data["kernel_cache"]
-    table.add_row("compiled kernels", Text(f"{cache['folder'] or 'no folder is writable: compiled in every process'}"))
+    table.add_row(
+        "compiled kernels", Text(f"{cache['folder'] or 'no folder is writable, so every process compiles them'}")
+    )
     console.print(table)
     console.print()
     problems = data["problems"]
@@ -257,7 +264,7 @@ def health(data: Plain, console: Console) -> None:
     for problem in problems:
         console.print(Text(f"  {problem}"))
     for name, trace in data["traces"].items():
-        console.print(Text(f"\nwhere {name} raised it", style="bold"))
+        console.print(Text(f"\ntraceback of {name}", style="bold"))
         for line in trace:
             console.print(Text(f"  {line}"))
 
@@ -266,34 +273,35 @@ def sensitivity(
     entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], blind: Sequence[BlindSpot], console: Console
 ) -> None:
     """Print from which size on every check and receipt sees a planted fault, what no check of a scene sees, and why."""
-    table = grid("check or receipt", "sees a fault from this size on")
+    table = grid("check or property check", "smallest fault that it notices")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
         table.add_row(Text(entry["name"]), Text(", ".join(seen) or "none of these faults"))
     console.print(table)
     for fault, receipts in receipts_alone.items():
-        console.print(Text(f"{fault}: no check of these scenes sees it; the cell is INVALID by {', '.join(receipts)}"))
+        console.print(
+            Text(f"{fault}: no check of these scenes notices it; the case is INVALID by {', '.join(receipts)}")
+        )
     for line in (
-        "faults: told or reported 10, 1 or 0.1 % too low. 1 % of motion that is left or added is 0.01 m/s:",
-        "drift along x, climb upwards, tremble to and fro along x at every step, pull towards the middle of all",
-        "bodies; of twirl it is a turn of 0.01 rad/s. 1 % of flicker: impulses 1 % too high and too low in turn;",
-        "of lasting: 1 % of the last impulses is told on where nothing touches any more; of uneven: impulses on the",
-        "last body of the scene are 1 % too weak, and others less, by their place in the order; of damping: speeds",
-        "lose 1 % in a second; of late: what contacts do comes 0.01 s late; of order: the last body is 1 % too slow,",
-        "and those before it less, by their place in the order",
+        "Faults: values are set or reported 10, 1 or 0.1 % too low. For added motion 1 % means 0.01 m/s: drift along",
+        "x, climb upwards, tremble to and fro along x at every step, pull towards the middle of all bodies; for twirl",
+        "0.01 rad/s. flicker: impulses 1 % too high and too low in turn. lasting: 1 % of the last impulses is still",
+        "reported where nothing touches any more. uneven: impulses on the last body are 1 % too weak, on others less,",
+        "by their order. damping: speeds lose 1 % in a second. late: contacts act 0.01 s late. order: the last body",
+        "is 1 % too slow, those before it less, by their order.",
     ):
         console.print(Text(line))
-    _heading("Primary quantities that hang on a parameter and do not see 1 % of it,", console)
+    _heading("Main quantities that depend on a parameter and do not notice 1 % of it,", console)
     for line in (
-        "because it changes them by less than one step may miss, which their check must allow. Seen from: the",
-        "fault that would change them by as much. At steps of: the longest, by halves, at which the same check sees",
-        "1 %, planted and run there: it is the step that hides it. Seen by: other checks of the scene that see 1 %.",
+        "because it changes them by less than the error of one time step, which their tolerance must allow. Noticed",
+        "from: the fault that would change them by as much. At steps of: the longest, by halves, at which the same",
+        "check notices 1 %, planted and run there. Noticed by: other checks of the scene that notice 1 %.",
     ):
         console.print(Text(line))
-    table = grid("quantity", "1 % of", "changes it by", "a step may miss", "seen from", "at steps of", "seen by")
+    table = grid("quantity", "1 % of", "changes it by", "error of a step", "noticed from", "at steps of", "noticed by")
     for spot in blind:
         at = "no step" if spot.seen_at is None else f"1/{round(1.0 / spot.seen_at)} s"
         numbers = (number(spot.moved), number(spot.allowed), f"{spot.seen_from:.1f} %", at)
-        others = ", ".join(spot.seen_by) or "receipts only"
+        others = ", ".join(spot.seen_by) or "property checks only"
         table.add_row(*(Text(cell) for cell in (f"{spot.scene}/{spot.metric}", spot.fault, *numbers, others)))
     console.print(table)

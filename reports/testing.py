@@ -72,7 +72,7 @@ class Plugin:
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Name what passes here although it is listed for other releases."""
         if self.mended:
-            terminalreporter.section("crosscheck: mended")
+            terminalreporter.section("crosscheck: fixed")
             for line in self.mended:
                 terminalreporter.line(line)
 
@@ -117,7 +117,7 @@ class _Check(pytest.Item):
         """Pass, fail, or fail as it is known to; see the module's docstring."""
         row = self.plugin.row_of(self.slot, self.metric)
         if row is None:
-            raise Failed(f"there is no row of {self.metric}: the cell left no observation")
+            raise Failed(f"there is no result of {self.metric}: the case did not finish")
         self.user_properties += [("value", row.value), ("truth", row.truth), ("tolerance", row.tolerance)]
         if row.outcome == "unsupported":
             pytest.skip(row.reason)

@@ -24,18 +24,21 @@ LABELS = {
     "missing": "MISSING",
     "invalid": "INVALID",
     "diverged": "DIVERGED",
-    "new": "FAIL new",
-    "drifted": "drifted",
+    "new": "FAIL, new",
+    "drifted": "changed",
     "fail": "FAIL",
-    "known": "FAIL known",
-    "explained": "FAIL expl.",
+    "known": "FAIL, known",
+    "explained": "FAIL, explained",
     "pass": "pass",
     "unsupported": "-",
     "not_installed": "NOT INSTALLED",
     "none": "no value",
 }
-#: The same for 80 columns, where a count of failing rows says FAIL.
-SHORT = LABELS | {"new": "NEW", "known": "known", "explained": "expl.", "not_installed": "not inst."}
+#: What a number of checks with a mark is called beside how many fail: their regression status.
+STATUS = {
+    "crashed": "crashed", "timed_out": "timed out", "missing": "missing", "invalid": "INVALID", "new": "new",
+    "drifted": "changed", "fail": "without a list of known failures", "known": "known", "explained": "explained",
+}  # fmt: skip
 
 
 def mark_of(row: Mapping[str, Any]) -> str:
@@ -67,9 +70,10 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     return shlex.join(words)
 
 
-def at(out: Path | None) -> str:
-    """`` --out DIR`` of a command that is to find the same results; empty for the usual folder."""
-    return "" if out is None or out == Path("crosscheck-out") else f" --out {shlex.quote(str(out))}"
+def at(out: Path | None, run: str = "") -> str:
+    """`` RUN --out DIR`` for a command that is to find the same results; empty for the latest in the usual folder."""
+    named = f" {run}" if run else ""
+    return named + ("" if out is None or out == Path("crosscheck-out") else f" --out {shlex.quote(str(out))}")
 
 
 def profile_words(slot: Slot) -> list[str]:
@@ -99,8 +103,8 @@ def measured(row: Mapping[str, Any], digits: int = 4) -> str:
 def missing_text(missing: int, planned: int) -> str:
     """What is said of a run of which cells are missing."""
     return (
-        f"{missing} of {planned} planned cells left no observation; nothing here speaks of them. The command that "
-        "began the run resumes it."
+        f"{missing} of {planned} planned cases have no result and are left out here. The command that started the "
+        "run resumes it."
     )
 
 

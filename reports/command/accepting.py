@@ -41,25 +41,27 @@ SHOWN = 12
 
 @main.command(epilog="Example: crosscheck accept latest --engine ENGINE")
 @click.argument("run", default="latest")
-@click.option("--engine", required=True, metavar="E", help="Whose findings to write.")
-@click.option("--family", "families", multiple=True, metavar="ID", help="Accept this family (repeat for more).")
+@click.option("--engine", required=True, metavar="E", help="Engine whose list of known failures is updated.")
+@click.option(
+    "--family", "families", multiple=True, metavar="ID", help="Accept the failures with this cause (repeat for more)."
+)
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
 @AS_JSON
 @OUT
 def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
     """Add failing checks of a run to the list of known failures.
 
-    Each check of RUN is listed with its value and band, each family with its reason. Cells that fail are run again
-    from starts moved by some units in the last place: their scatter is the band. Where that is too wide to see a
-    finding pass, or come nearer to a third, twelve more starts are asked. Shows every family that would change.
-    Those named by --family are accepted; for the others a terminal is asked. Without one, families that are not
-    named stay as they are listed, and no cell is run again for them. Rows that a deviation law covers and misses,
-    rows whose receipts do not hold and rows of a profile that promises a solution are refused; what did not run
-    stays as it is listed.
+    RUN is an id that `list runs` prints; the latest by default. Each failed check is listed with its value and a band
+    around it, and with its cause. To measure the band, failed cases are run again from initial positions moved by some
+    units in the last place; if the scatter is too wide to notice an improvement, from twelve more.
 
-    Exits with 1 if a row is refused, a family that changed is not accepted or a row outside those that are named is
-    new or drifted. Read the diff before you commit it: a
-    finding is listed to be shown, not to be hidden.
+    The command shows the causes whose lists would change. Those named by --family are accepted. On a terminal you are
+    asked about the others; without a terminal they stay as they are. Refused are checks that a law of the engine should
+    predict and does not, cases whose property checks fail, and failures of an exact profile. What did not run stays
+    as it is.
+
+    Exits with 1 if a check is refused, a changed cause is not accepted, or another check is new or changed. Read the
+    diff before you commit it: a known failure is listed to be shown, not to be hidden.
     """
     registry.find(engine)
     console = terminal(stderr=True)
@@ -69,7 +71,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     proposal = propose(rows, engine, findings, about, draws)
     unknown = set(families) - {change.family.id for change in proposal.changes}
     if unknown:
-        raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such family of {engine} in {FAMILIES}")
+        raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such cause of {engine} in {FAMILIES}")
     changed = [change for change in proposal.changes if change.asks]
     if changed:
         console.print(_table(engine, changed))
@@ -87,14 +89,13 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
         click.echo(json.dumps({**said, **counts, "not_accepted": left}, indent=1))
     else:
-        click.echo(
-            f"{engine}: {plural(len(members), 'row')} of {plural(len(listed), 'family')} listed in {folder / MEMBERS}"
-        )
+        counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
+        click.echo(f"{engine}: {counted} listed in {folder / MEMBERS}")
     _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)
     if proposal.left_out:
-        click.echo(f"of no family that is named: {plural(len(proposal.left_out), 'row')} new or drifted", err=True)
+        click.echo(f"not named by --family: {plural(len(proposal.left_out), 'check')} new or changed", err=True)
     sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
 
 
@@ -148,13 +149,13 @@ def _is_of_this_code(observation: Observation) -> bool:
 
 
 def _table(engine: str, changes: Sequence[Change]) -> Table:
-    table = Table(title=f"Findings of {engine}: rows per family", title_justify="left")
-    for name in ("family", "listed", "new", "drifted", "gone", "bands", "why"):
-        table.add_column(name, justify="left" if name in ("family", "why") else "right")
+    table = Table(title=f"Known failures of {engine}: checks per cause", title_justify="left")
+    for name in ("cause", "listed", "new", "changed", "gone", "bands", "why"):
+        table.add_column(name, justify="left" if name in ("cause", "why") else "right")
     for change in changes:
         listed = len(change.same) + len(change.drifted) + len(change.gone) + len(change.bands)
         counts = (listed, len(change.new), len(change.drifted), len(change.gone), len(change.bands))
-        table.add_row(change.family.id, *map(str, counts), change.family.reason or "nobody has said why yet")
+        table.add_row(change.family.id, *map(str, counts), change.family.reason or "no reason is written yet")
     return table
 
 
@@ -168,10 +169,12 @@ def _decide(changed: Sequence[Change], named: Sequence[str], console: Console) -
             continue
         console.print(_details(change), markup=False, highlight=False)
         if not change.is_draft:
-            if click.confirm(f"{change.family.id}: is this still why: {change.family.reason}?", err=True):
+            if click.confirm(f"{change.family.id}: is this still the cause: {change.family.reason}?", err=True):
                 chosen.add(change.family.id)
             continue
-        reason = click.prompt("why do they fail (empty: leave them new)", default="", show_default=False, err=True)
+        reason = click.prompt(
+            "why do these checks fail (empty: leave them new)", default="", show_default=False, err=True
+        )
         source = click.prompt("where is that documented, read or measured", err=True) if reason.strip() else ""
         if reason.strip() and source.strip():
             written.append(replace(change.family, reason=reason.strip(), source=source.strip()))
@@ -185,8 +188,8 @@ def _on_a_terminal() -> bool:
 
 def _details(change: Change) -> str:
     """What is new, drifted and gone in a family, kind of metric by kind."""
-    lines = [f"family {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
-    for name, entries in (("new", change.new), ("drifted", change.drifted), ("gone", change.gone),
+    lines = [f"cause {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
+    for name, entries in (("new", change.new), ("changed", change.drifted), ("gone", change.gone),
                           ("with another band", change.bands)):  # fmt: skip
         kinds = Counter(f"{key[0]} {key[6].partition('[')[0]}" for key in entries)
         lines += [f"  {name}: {count} x {kind}" for kind, count in kinds.items()]
@@ -210,7 +213,7 @@ def _with_reasons(proposal: Proposal, written: Sequence[Family]) -> Proposal:
 
 def _show_refused(refused: Sequence[tuple[Row, str]]) -> None:
     for why, count in Counter(why for _, why in refused).items():
-        click.echo(f"refused: {plural(count, 'row')}: {why}", err=True)
+        click.echo(f"refused: {plural(count, 'check')}: {why}", err=True)
     for row, _ in refused[:SHOWN]:
         where = f"{row.engine}/{row.profile} {row.scene} {row.dimension}-D"
         click.echo(f"  {where} {row.slot['params']} {row.metric} {number(row.value, 6)}", err=True)

@@ -63,7 +63,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     console = terminal()
     console.print(Text(best.command or f"{best.scene}: {resolve(best.scene).title}", style="bold"), soft_wrap=True)
     if missed:
-        console.print(Text(f"nothing is known of: {', '.join(missed)}", style="dim"))
+        console.print(Text(f"no match for: {', '.join(missed)}", style="dim"))
     if best.report:
         console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
     if best.scene:
@@ -96,17 +96,17 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console
 @main.command("field", epilog="Example: crosscheck field stack")
 @click.argument("words", nargs=-1)
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
-@click.option("--commands", is_flag=True, help="Print the command of every note.")
+@click.option("--commands", is_flag=True, help="Print the command of every report.")
 @AS_JSON
 def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:
-    """Run public questions and bug reports again.
+    """Run known reports (public questions and bugs) again.
 
-    Says whether each is so on the engines that are installed. WORDS choose notes by repository, engine or scene;
-    all by default. Exits with 1 if a note is no longer true.
+    Prints whether each is still true of the installed engines. WORDS choose reports by repository, engine or scene; all
+    by default. Exits with 1 if a report is no longer true.
     """
     chosen = matching(words)
     if not chosen:
-        raise click.BadParameter(f"no note has {' or '.join(words)}", param_hint="WORDS")
+        raise click.BadParameter(f"no known report has {' or '.join(words)}", param_hint="WORDS")
     found = ask(chosen, jobs)
     if as_json:
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
@@ -118,12 +118,12 @@ def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> N
 def _show(found: list[Finding], commands: bool) -> None:
     console = terminal()
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("who asked, of what", "what was seen", "on this machine"):
+    for heading in ("report, engine", "symptom", "on this machine"):
         table.add_column(heading, overflow="fold")
     for each in found:
         note = each.note
         who = f"{_broken(note.source, console.width // 3)}\n{note.about}" + (
-            "" if note.about == note.engine else f", asked of {note.engine}"
+            "" if note.about == note.engine else f", run on {note.engine}"
         )
         table.add_row(Text(who), Text(note.symptom), Text(_said(each)))
         table.add_row("", "", "")
@@ -131,7 +131,7 @@ def _show(found: list[Finding], commands: bool) -> None:
     for each in found if commands else ():
         console.print(Text(f"{each.note.source}: {reproduce(each.note.slot.as_dict())}"), soft_wrap=True)
     if not commands:
-        console.print(Text("--commands prints the command of every note", style="dim"))
+        console.print(Text("--commands prints the command of every report", style="dim"))
 
 
 def _broken(source: str, width: int) -> str:
@@ -141,7 +141,7 @@ def _broken(source: str, width: int) -> str:
 
 def _said(each: Finding) -> str:
     note = each.note
-    text = each.now + ("" if each.as_said else f" (the note says: {note.said})")
+    text = each.now + ("" if each.as_said else f" (the report says: {note.said})")
     if each.before is not None:
         text += f"\n{note.engine}/{note.profile} {note.scene} {note.dimension}-D: {note.metric} {_number(each.before)}"
     if each.after is not None:

@@ -28,7 +28,7 @@ from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, 
 from reports.progress import run_plan
 from reports.stages import stage
 from reports.terminal import terminal
-from reports.wording import plural
+from reports.wording import at, plural
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
@@ -45,42 +45,45 @@ AGREEMENT = 0.9
 @main.command(epilog="Example: crosscheck bench stack")
 @selection
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes for the errors; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
-@click.option("--seed", type=int, help="Of the random order; drawn and printed if not given.")
-@click.option("--against", metavar="RUN", help="Compare the ratios with an earlier bench run, or 'latest'.")
-@click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
-@click.option("--fresh", is_flag=True, help="Start a new run, and run what the last run answered.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
+@click.option("--seed", type=int, help="Seed of the random order of timings; drawn and printed if not given.")
+@click.option("--against", metavar="RUN", help="Compare the time ratios with an earlier benchmark, or 'latest'.")
+@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
+@click.option("--fresh", is_flag=True, help="Start a new run, and reuse no result of an earlier one.")
 @click.option(
-    "--piles", type=click.IntRange(20), metavar="N", help="Instead: piles of 20 to N bodies, by two profiles."
+    "--piles",
+    type=click.IntRange(20),
+    metavar="N",
+    help="Instead, time the reference solver on piles of 20 to N bodies.",
 )
-@click.option("--brief", is_flag=True, help="Print no tables: they stand in OUT/bench and in the report.")
+@click.option("--brief", is_flag=True, help="Print no tables; they are in OUT/bench and in the report.")
 @AS_JSON
 @OUT
 def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
     """Measure error against time, over steps and iterations.
 
-    Prints time at equal error, scaling and overhead of SCENES. Errors come first, in worker processes; then everything
-    is timed in a lane of its own. --quick takes under two minutes on two cores, --full up to two hours (piles of a
-    thousand boxes). With --against, exits with 1 if fewer than 90 % of the ratios agree. With --piles what the
-    reference costs in piles, against its own fixed steps.
+    Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
+    cases are timed one at a time. --quick takes under two minutes on two cores, --full up to two hours (piles of a
+    thousand boxes). With --against, exits with 1 if fewer than 90 % of the time ratios agree. With --piles, times the
+    reference solver on piles, in its exact and in its textbook profile.
     """
     console = terminal(stderr=True)
     if piles is not None:
         show_piles(console, as_json, piles, options["seed"] or 0)
         return
     if options["ulp"]:
-        raise SceneError("ulp: moves the start of a run; a bench has no use for it")
+        raise SceneError("ulp: moves the start of a run; it has no meaning for a benchmark")
     if options["standard"]:
-        raise SceneError("standard: a suite of cells that are judged; a bench is --quick or --full")
+        raise SceneError("standard: is a suite of judged cases; a benchmark is --quick or --full")
     request = replace(request_from(options), ulps=(0,))
     if not options["scenes"]:
         request = replace(request, scenes=benched(request.suite))
     wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
     cells = accuracy_slots(wanted)
     if not cells:
-        raise SceneError("scenes: no cell fits this selection")
+        raise SceneError("scenes: no case fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(cells)}) if as_json else plural(len(cells), "cell"))
+        click.echo(json.dumps({"cells": len(cells)}) if as_json else plural(len(cells), "case"))
         return
     absent = missing(options["engine"], request.engines)
     for line in absent:
@@ -93,14 +96,14 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     title = f"bench {request.suite}: {asked(request, options)}"
     source, known = ("", []) if options["fresh"] else answered(store, cells)
     if known:
-        console.print(f"{plural(len(known), 'cell')} of {len(cells)} as run {source} answered them: they are the same")
+        console.print(f"reusing {len(known)} of {plural(len(cells), 'result')} of run {source}")
     run = run_plan(
         store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False,
         known=known,
     )  # fmt: skip
     if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
         store.close()
-        click.echo("crosscheck: bench: no cell has a result, so there is nothing to time", err=True)
+        click.echo("crosscheck: bench: no case has a result, so there is nothing to time", err=True)
         sys.exit(statuses.INCOMPLETE)
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
@@ -119,7 +122,7 @@ def _earlier(store: Store, name: str | None) -> Run | None:
         return None
     found = [run for run in reading.bench_runs(store) if name in ("latest", run.id)]
     if not found:
-        raise MissingError(f"against: there is no bench run {name!r} in {store.path}")
+        raise MissingError(f"against: there is no benchmark {name!r} in {store.path}")
     return found[-1]
 
 
@@ -127,7 +130,7 @@ def time_units(
     store: Store, run: Run, scenes: Sequence[str], units: Sequence[Unit], limits: Limits, seed: int, console: Console
 ) -> None:
     """Time all units in the lane and keep the times of ``run``, with how they were taken."""
-    console.print(f"timing {plural(len(units), 'unit')}, one at a time, in random order (seed {seed})", highlight=False)
+    console.print(f"timing {plural(len(units), 'case')}, one at a time, in random order (seed {seed})", highlight=False)
     started, load = time.monotonic(), os.getloadavg()
     store.clear_timings(run)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -163,7 +166,9 @@ def _show(store: Store, run: Run, out: Path, as_json: bool, brief: bool, console
         console.print(Text(speed.busy(tables["timings"]), style="bold"))
     if not brief:
         _print_tables(tables, console)
-    console.print(f"run {run.id}, seed {protocol.get('seed')}; written: {written[0].parent}", highlight=False)
+    where = f"run {run.id}, seed {protocol.get('seed')}; written: {written[0].parent}"
+    console.print(Text(where), soft_wrap=True)
+    console.print(Text(f"figures of error against time: crosscheck report --open{at(out)}"), soft_wrap=True)
 
 
 def _print_tables(tables: speed.Tables, console: Console) -> None:
@@ -181,12 +186,12 @@ def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:
     """Say how far two bench runs agree; True if far enough."""
     both = agreement.agreement(agreement.ratios(store, earlier), agreement.ratios(store, run))
     if len(both) == 0:
-        console.print(f"against {earlier.id}: the two runs have no unit of the same versions in common")
+        console.print(f"against {earlier.id}: the two benchmarks have no case of the same versions in common")
         return False
     share = float(both["agrees"].mean())
     for row in both[~both["agrees"]].to_dict("records"):
         console.print(_disagreement(row), highlight=False)
-    console.print(f"against {earlier.id}: {share:.1%} of {len(both)} ratios agree within their intervals")
+    console.print(f"against {earlier.id}: {share:.1%} of {len(both)} time ratios agree within their intervals")
     return share >= AGREEMENT
 
 
@@ -200,19 +205,18 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
 
 @main.command("profile", epilog="Example: crosscheck profile stack")
 @click.argument("scene")
-@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
-@click.option("--profile", help="Profile of the reference solver; by default the one that promises a solution.")
-@click.option("--dim", default=2, show_default=True, type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
-@click.option("--dt", default="1/240", show_default=True, metavar="S", help="Step.")
-@click.option("--steps", default=2000, show_default=True, type=click.IntRange(1), help="Timed steps.")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene.")
+@click.option("--profile", help="Profile of the reference solver; by default the exact one.")
+@click.option("--dim", default=2, show_default=True, type=click.IntRange(2, 3), help="2-D or 3-D.")
+@click.option("--dt", default="1/240", show_default=True, metavar="S", help="Time step [s].")
+@click.option("--steps", default=2000, show_default=True, type=click.IntRange(1), help="Number of timed steps.")
 @AS_JSON
 def profile_(
     scene: str, param: tuple[str, ...], profile: str | None, dim: int, dt: str, steps: int, as_json: bool
 ) -> None:
-    """Show where the time of the solver's steps goes.
+    """Show how long each stage of a solver step takes.
 
-    Prints the median time of each stage of a step. SCENE is a scene of the catalogue, such as pyramid (--param
-    rows=13).
+    Prints the median time of each stage. SCENE is a scene of the catalogue, such as pyramid (--param rows=13).
     """
     from reference_solver.timeline import timeline
 

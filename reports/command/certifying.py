@@ -61,22 +61,25 @@ WIDTH = 150
 
 @main.command(epilog="Example: crosscheck certify")
 @AS_JSON
-@click.option("--order", is_flag=True, help="Show how errors fall with the step instead: fitted orders.")
+@click.option("--order", is_flag=True, help="Instead, show how errors fall with the time step: fitted orders.")
 @click.option(
-    "--self-test", is_flag=True, help="Plant corruptions one at a time instead: does the certificate see them?"
+    "--self-test", is_flag=True, help="Instead, corrupt results one at a time and see whether the certificate notices."
 )
-@click.option("--random", "count", type=click.IntRange(1), help="Attack: N random scenes against variants of them.")
+@click.option(
+    "--random", "count", type=click.IntRange(1), help="Instead, compare N random scenes with variants of them."
+)
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of the first random scene.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Random scenes: only planar (2) or spatial (3).")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Random scenes: only 2-D or only 3-D.")
 @click.option("--chains", is_flag=True, help="Random scenes: rows of bodies, in which impacts accumulate.")
 def certify(
     as_json: bool, order: bool, self_test: bool, count: int | None, seed: int, dim: tuple[int, ...], chains: bool
 ) -> None:
-    """Test the reference solver against its gates.
+    """Test the reference solver against its stated accuracy.
 
-    The gates of its oracle are measured as well. Exits with 1 if one does not hold. With --random scenes are drawn,
-    certified and run again mirrored, moved, with other steps and so on: what is certified and differs is a defect,
-    and fails; what is refused is told with the condition.
+    Measures every stated error bound, and those of the independent solution that it is compared with. Exits with 1 if
+    one does not hold. With --random, random scenes are solved, certified, and solved again mirrored, moved, with other
+    time steps and so on. A certified result that differs is a defect, and the command exits with 1; refused scenes are
+    listed with the reason.
     """
     console = terminal(stderr=True)
     if not console.is_terminal:
@@ -97,7 +100,7 @@ def certify(
         click.echo(json.dumps([_finite(asdict(gate)) for gate in gates], indent=1))
     console.print(_table(gates))
     broken = sum(not gate.holds for gate in gates)
-    console.print(f"{len(gates) - broken} of {len(gates)} gates hold")
+    console.print(f"{len(gates) - broken} of {len(gates)} bounds hold")
     sys.exit(1 if broken else 0)
 
 
@@ -127,7 +130,7 @@ def show_self_test(console: Console, as_json: bool) -> int:
             for c, size, seen in rows
         ]
         click.echo(json.dumps(plain, indent=1))
-    table = Table(title="Planted corruptions: caught by", title_justify="left")
+    table = Table(title="Planted corruptions: noticed by", title_justify="left")
     for heading in ("family", "what is corrupted", "scene", *(f"{size:g}" for size in SIZES), "where missed"):
         table.add_column(heading)
     for corruption, group in groupby(made, lambda trial: trial.corruption):
@@ -137,7 +140,7 @@ def show_self_test(console: Console, as_json: bool) -> int:
     console.print(table)
     judged = [trial for trial in made if trial.size == JUDGED]
     caught = sum(bool(trial.seen) for trial in judged)
-    console.print(f"{caught} of {len(judged)} caught at size {JUDGED:g}, {PROMISED:.0%} promised")
+    console.print(f"{caught} of {len(judged)} noticed at size {JUDGED:g}, {PROMISED:.0%} required")
     for trial in judged:
         if not trial.seen:
             console.print(f"missed: {trial.corruption.name}, {trial.corruption.scene}: {trial.corruption.missed}")
@@ -177,8 +180,8 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _table(gates: Iterable[Gate]) -> Table:
-    table = Table(title="Gates: measured beside promised", title_justify="left")
-    for heading in ("quantity", "case", "measured", "gate", "made by", ""):
+    table = Table(title="Error bounds: measured and stated", title_justify="left")
+    for heading in ("quantity", "case", "measured", "bound", "made by", ""):
         table.add_column(heading)
     for gate in gates:
         mark = "holds" if gate.holds else "FAILS"

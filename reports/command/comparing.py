@@ -16,8 +16,11 @@ from validation.judging.comparison import FAIL_ON, Kind, by_seriousness, compare
 @click.argument("before", metavar="A")
 @click.argument("after", metavar="B")
 @click.option("--only-regressed", is_flag=True, help="Show only what got worse.")
-@click.option("--only-changed", is_flag=True, help="Leave out rows that only one side has.")
-@click.option("--fail-on", type=click.Choice(list(FAIL_ON)), default="regressions", show_default=True)
+@click.option("--only-changed", is_flag=True, help="Leave out checks that only one side has.")
+@click.option(
+    "--fail-on", type=click.Choice(list(FAIL_ON)), default="regressions", show_default=True,
+    help="Which changes make the command exit with 1.",
+)  # fmt: skip
 @click.option("--markdown", is_flag=True, help="Print Markdown, fit for a pull-request comment.")
 @AS_JSON
 @OUT
@@ -33,8 +36,9 @@ def compare(
 ) -> None:
     """Show what changed between two runs.
 
-    Changes from A to B: verdict flips first, then errors, then speed. A and B are run ids in OUT, releases that
-    were run into it (myengine==3.2.7), results folders (FOLDER or FOLDER:RUN), or .jsonl files of rows.
+    Prints changes from A to B: checks that began or ceased to fail, then errors, then speed. A and B are ids that `list
+    runs` prints, or latest; releases that were run into OUT (myengine==3.2.7); results folders (FOLDER or FOLDER:RUN);
+    or .jsonl files that `run` wrote.
     """
     a, b = rendering.load_side(before, out), rendering.load_side(after, out)
     changes = sorted(compare_rows(a.rows, b.rows) + compare_speeds(a.ratios, b.ratios), key=by_seriousness)

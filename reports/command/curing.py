@@ -29,11 +29,11 @@ from validation.settings.cures import Cure, Unsearched, cures_of, search, write
 @main.command(epilog="Example: crosscheck cure ENGINE pinch")
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
-@click.option("--param", multiple=True, metavar="NAME=VALUE", help="One case: fix a parameter of the scene.")
-@click.option("--dt", metavar="S", help="Step, such as 1/500; that of a model, else 1/240, by default.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Only this case: set a parameter of the scene.")
+@click.option("--dt", metavar="S", help="Time step [s], such as 1/500; by default the model's, else 1/240.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D.")
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
-@click.option("--keep", is_flag=True, help="Write what is found into cures.csv of the engine's folder.")
+@click.option("--keep", is_flag=True, help="Write the fixes into cures.csv of the engine's folder.")
 @AS_JSON
 def cure(
     engine: str,
@@ -47,20 +47,22 @@ def cure(
 ) -> None:
     """Search stock settings that fix a scene, and their cost.
 
-    The search is for what ENGINE gets wrong as shipped on SCENES (all by default). It tries each setting alone, pairs
-    with the best one, and other profiles with what can be left out of them. What mends most checks and breaks none
-    is shown with error and cost before and after, and as lines to paste. Seconds to a minute a scene. A scene's
-    standard cells are asked, in two sizes at two steps. With --param, --dt, or a file (a scene, or a model as its
-    own engine runs it) that case alone is, at its step. With --keep the table of the engine is kept, which `run`,
-    `show`, `explain` and the report read.
+    Tries settings for the checks that ENGINE fails as shipped on SCENES (all by default): each setting alone, pairs
+    with the best one, and other profiles without the settings that make no difference. Prints the smallest change that
+    fixes the most checks and breaks none, with error and cost before and after, and as lines to paste. This takes
+    seconds to a minute per scene.
+
+    By default the standard cases of a scene run, in two sizes at two time steps. With --param, --dt, or a file (a
+    scene, or a model on its own engine) only that case runs. With --keep the fixes are stored for `run`, `show`,
+    `explain` and the report.
     """
     if profile_of(engine, "shipped") is None:
         load(engine)  # says that there is no such engine, if so
-        raise EngineError(f"cure: {engine} has no profile as shipped that could be mended")
+        raise EngineError(f"cure: {engine} has no profile as shipped that could be fixed")
     version = load(engine).version()
     names = scene_names_of(scenes)
     if keep and (param or dt or any(map(is_file, names))):
-        raise SceneError("keep: the table is of scenes of the catalogue as they stand, not of one case")
+        raise SceneError("keep: stores fixes of whole scenes of the catalogue, not of one case")
     params, step = fixed(param), parse_dt(dt) if dt else None
     console, progress = terminal(), terminal(stderr=True)
     listed = {key: old for key, old in cures_of(engine).items() if old.version == version}
@@ -95,7 +97,7 @@ def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
 def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, console: Console) -> None:
     head = Text(f"{engine} {scene} {dimension}-D: ", style="bold")
     if isinstance(found, Unsearched):
-        told = "as shipped nothing is to be mended" if found.asked else "cannot be asked"
+        told = "as shipped nothing is to be fixed" if found.asked else "cannot run"
         console.print(head + Text(f"{told}: {found.reason}", style=""), soft_wrap=True)
         return
     console.print(head + Text(f"{found.failing} of {found.judged} checks fail as shipped"), soft_wrap=True)
@@ -103,7 +105,7 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         console.print(f"  {cure_text(found)}", markup=False, highlight=False, soft_wrap=True)
         return
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
-    for heading in ("", "as shipped", "cured", "truth"):
+    for heading in ("", "as shipped", "fixed", "truth"):
         table.add_column(heading)
     where = params_text(found.params)
     what = f"{found.metric}{f' at {where}' if where else ''}" + ("" if found.unit == "1" else f" [{found.unit}]")
@@ -120,7 +122,7 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         alone = replace(found, changes=found.alone)
         console.print(Text(cure_paste(alone) or nothing_to_paste(alone)), soft_wrap=True)
         console.print(
-            f"what mends {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
+            f"what fixes {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
         )
     for name, value in changes_in_words(found, found.changes):
         console.print(f"  {name} = {value}", markup=False, highlight=False, soft_wrap=True)

@@ -29,10 +29,15 @@ FEW = 6
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
 @click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
-@click.option("--quick/--full", "quick", default=True, help="Ends a factor 1.3 or 1.03 apart; quick is the default.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D.")
+@click.option(
+    "--quick/--full",
+    "quick",
+    default=True,
+    help="Stop when the two ends are a factor 1.3 (quick, the default) or 1.03 (full) apart.",
+)
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
-@click.option("--commands", is_flag=True, help="Print the commands of both ends of every bracket.")
+@click.option("--commands", is_flag=True, help="Print the commands that run both ends again.")
 @AS_JSON
 def frontier(
     scenes: tuple[str, ...],
@@ -44,25 +49,27 @@ def frontier(
     commands: bool,
     as_json: bool,
 ) -> None:
-    """Find how far a scene can be driven until an engine fails.
+    """Find breaking points: how far a scene goes until it fails.
 
-    Bisects for each engine and profile: largest step, stack height, mass ratio, overlap, spin and impact speed,
-    fewest iterations: each as a bracket of one cell that survives and one that does not, with how it ended and the
-    commands that run both again. SCENES that declare no such axis are refused. Exits with 4 if a named engine is
-    not here.
+    Bisects for each engine and profile the largest time step, stack height, mass ratio, overlap, spin and impact speed,
+    and the fewest iterations. Each result is a case that still works and one that fails, with how it fails and the
+    commands that run both again. SCENES without such a quantity are refused. Exits with 4 if a named engine is not
+    installed.
     """
     names = list(dict.fromkeys(scene.name for pattern in scenes for scene in matching(pattern)))
     known = dict.fromkeys(name for name, _ in axes())
     for name in names:
         if name not in known:
-            raise click.BadParameter(f"{name} cannot be driven; {', '.join(known)} can", param_hint="SCENES")
+            raise click.BadParameter(
+                f"{name} has no breaking point to search; {', '.join(known)} have", param_hint="SCENES"
+            )
     engines = list(engine) or registry.usual()
     for name in engines:
         registry.find(name)
     found = brackets(names, engines, profile, dim, quick)
     console, progress = terminal(), terminal(stderr=True)
     for still, _ in search(found, QUICK_RATIO if quick else FULL_RATIO, jobs):
-        progress.print(f"{still} of {len(found)} brackets open", style="dim", highlight=False)
+        progress.print(f"{still} of {len(found)} searches left", style="dim", highlight=False)
     if as_json:
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
     else:
@@ -85,20 +92,20 @@ def _show(found: list[Bracket], commands: bool, console: Console) -> None:
         console.print()
         params = " ".join(f"{k}={v:g}" for k, v in first.params.items())
         console.print(Text(f"{name} ({scene}{' ' + params if params else ''})", style="bold"))
-        console.print(Text(f"survives if it {first.survives}", style="dim"))
+        console.print(Text(f"works if it {first.survives}", style="dim"))
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
-        for heading in ("engine, profile", "survives", "fails", "how"):
+        for heading in ("engine, profile", "works", "fails", "how"):
             table.add_column(heading)
         for each in own:
             table.add_row(_who(each), *_cells(each))
         console.print(table, highlight=False)
         for each in own if commands else ():
-            for end, said in ((each.survives, "survives"), (each.fails, "fails")):
+            for end, said in ((each.survives, "works"), (each.fails, "fails")):
                 if end is not None:
                     console.print(Text(f"  {said}: {reproduce(end.slot.as_dict())}"), soft_wrap=True)
     if not commands and found:
         console.print()
-        console.print(Text("--commands prints the two cells of every bracket, --json all of it", style="dim"))
+        console.print(Text("--commands prints the commands of both ends, --json everything", style="dim"))
 
 
 def _cells(bracket: Bracket) -> tuple[str, str, str]:
@@ -106,7 +113,7 @@ def _cells(bracket: Bracket) -> tuple[str, str, str]:
         return "-", "-", bracket.refused
     good, bad = bracket.survives, bracket.fails
     said = [value_text(bracket.frontier, end.value) if end else "" for end in (good, bad)]
-    return said[0] or "nothing asked", said[1] or "nothing asked", bad.fate if bad else "the hardest asked survives"
+    return said[0] or "none", said[1] or "none", bad.fate if bad else "works to the end of the range"
 
 
 def _as_plain(bracket: Bracket) -> dict[str, Any]:

@@ -30,35 +30,40 @@ _OF_A_CELL = ("output", "engine", "profile", "param", "set", "dim", "dt", "itera
 @click.argument("named", metavar="[RUN]...|SCENE", nargs=-1, shell_complete=scene_names)
 @click.option("--parquet", "target", type=FOLDER, metavar="FOLDER", help="Write the RUNs as Parquet files there.")
 @click.option("--all", "every", is_flag=True, help="With --parquet: all runs, not the latest.")
-@click.option("--to", "form", metavar="FORMAT", help="Write a cell of SCENE: python, or what its engine knows (mjcf).")
+@click.option(
+    "--to", "form", metavar="FORMAT", help="Write a case of SCENE as python, or in a format of its engine (mjcf)."
+)
 @click.option("-o", "--output", type=FILE, help="File to write; stdout by default.")
-@click.option("--engine", metavar="E", shell_complete=engine_names, help="Engine of the cell.")
-@click.option("--profile", metavar="P", help="Profile of the cell; as shipped by default.")
-@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
+@click.option("--engine", metavar="E", shell_complete=engine_names, help="Engine of the case.")
+@click.option("--profile", metavar="P", help="Profile of the case; as shipped by default.")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene.")
 @SET
-@click.option("--dim", type=click.IntRange(2, 3), help="Planar (2) or spatial (3).")
-@click.option("--dt", metavar="S", help="Step, such as 1/240.")
-@click.option("--iterations", type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count.")
+@click.option("--dim", type=click.IntRange(2, 3), help="2-D or 3-D.")
+@click.option("--dt", metavar="S", help="Time step [s], such as 1/240.")
+@click.option(
+    "--iterations", type=click.IntRange(1, MOST_ITERATIONS), help="Solver iterations, instead of the profile's own."
+)
 @AS_JSON
 @OUT
 def export(named: tuple[str, ...], as_json: bool, out: Path, **options: Any) -> None:
     """Write a case as a script of its engine, or results as tables.
 
-    The script runs without this project. With --parquet: RUNs (the latest by default) as judged rows, raw metrics
-    and kept trajectories. With --to: the cell of SCENE on --engine for a bug report; it ends in the same bits.
+    With --to, writes the case of SCENE on --engine as a script for a bug report. It runs without this project and gives
+    the same result to the last bit. With --parquet, writes RUNs (ids that `list runs` prints; the latest by default) as
+    tables of checks, raw quantities and stored trajectories.
     """
     if (options["target"] is None) == (options["form"] is None):
-        raise SceneError("export: say --parquet FOLDER for results, or --to FORMAT for a cell")
+        raise SceneError("export: needs --parquet FOLDER for results, or --to FORMAT for a case")
     if options["form"] is None:
         stray = [name for name in _OF_A_CELL if options[name]]
         if stray:
-            raise SceneError(f"{stray[0]}: chooses a cell to write, which needs --to")
+            raise SceneError(f"{stray[0]}: chooses a case to write, which needs --to")
         _results(named, options["target"], options["every"], as_json, out)
         return
     if options["every"]:
         raise SceneError("all: chooses runs, which needs --parquet")
     if len(named) != 1 or not options["engine"]:
-        raise SceneError("export: --to writes one cell: name its scene and its --engine")
+        raise SceneError("export: --to writes one case: name its scene and its --engine")
     _cell(named[0], options, as_json)
 
 

@@ -21,14 +21,14 @@ from validation.running.plan import QUICK_DT
 
 @main.command("nulls", epilog="Example: crosscheck nulls impact")
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
-@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3).")
+@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D.")
 @AS_JSON
 def nulls(scenes: tuple[str, ...], param: tuple[str, ...], dim: tuple[int, ...], as_json: bool) -> None:
     """Score trivial answers that need no engine.
 
-    The answers are: nothing moves, nothing touches, what touches sticks. An engine's skill in a check is
-    1 - error/error of the best of them; `explain` and the report say it of a row.
+    The trivial answers are: nothing moves; nothing touches; what touches sticks. The skill of an engine in a check is
+    1 minus its error divided by that of the best trivial answer; `explain` and the report print it.
     """
     rows: list[dict[str, Any]] = []
     for scene in dict.fromkeys(scene.name for pattern in scenes or ("*",) for scene in matching(pattern)):

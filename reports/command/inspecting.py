@@ -24,10 +24,12 @@ from validation.records.store import Store
 
 @main.command("list", epilog="Example: crosscheck list scenes")
 @click.argument("what", type=click.Choice(["scenes", "suites", "engines", "checks", "runs"]))
-@click.option("--reasons", is_flag=True, help="Of checks: why each tolerance is what it is.")
-@click.option("--sensitivity", is_flag=True, help="Of checks: what each can see, by planted faults of three sizes.")
-@click.option("--engine", metavar="E", help="Engine that gets the faults; our solver by default.")
-@click.option("--profile", metavar="P", help="Its profile that passes; by default the one that promises a solution.")
+@click.option("--reasons", is_flag=True, help="With checks: the reason of each tolerance.")
+@click.option("--sensitivity", is_flag=True, help="With checks: the smallest planted fault that each notices.")
+@click.option(
+    "--engine", metavar="E", help="With --sensitivity: engine that gets the faults; the reference solver by default."
+)
+@click.option("--profile", metavar="P", help="With --sensitivity: its profile; by default the exact one.")
 @AS_JSON
 @OUT
 def list_(
@@ -35,21 +37,21 @@ def list_(
 ) -> None:
     """List scenes, suites, engines, checks or runs.
 
-    With --sensitivity: the smallest planted fault (10, 1, 0.1 %) of each parameter that makes a check fail or breaks a
-    receipt; takes three minutes. Scenes that our solver cannot pose go to the first tuned engine that can; an
-    engine that is named gets only its own.
+    `list runs` prints the ids that other commands take as RUN. With --sensitivity, prints the smallest planted fault
+    (10, 1 or 0.1 %) of each parameter that makes a check or a property check fail; this takes three minutes. Scenes
+    that the reference solver cannot run go to the first tuned engine that can.
     """
     data: list[Any]
     found = Detected([], [])
     if reasons and what != "checks":
-        raise SceneError("reasons: checks have one, not " + what)
+        raise SceneError("reasons: belongs to checks, not to " + what)
     if sensitivity:
         if what != "checks":
-            raise SceneError("sensitivity: checks have one, not " + what)
+            raise SceneError("sensitivity: belongs to checks, not to " + what)
         named, engine = engine is not None, engine or registry.solver()
         profile = profile or registry.profile_of(engine, "solution")
         if profile is None:
-            raise EngineError(f"profile: {engine} has none that promises a solution; name one with --profile")
+            raise EngineError(f"profile: {engine} has no exact profile; name one with --profile")
         best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if not named and name != engine]
         others = [(registry.load(name), tuned) for name, tuned in best if tuned and registry.find(name).engine]
         found = detection(registry.load(engine), profile, 2, others=others)
@@ -79,7 +81,8 @@ def list_(
 def describe(name: str, as_json: bool) -> None:
     """Describe a scene or an engine.
 
-    Of a scene: law, parameters, checks with reasons. Of an engine: profiles, settings, quirks.
+    For a scene: figure, law, parameters, checks with the reasons of their tolerances. For an engine: profiles, settings
+    with reasons, quirks.
     """
     data = listing.describe(name)
     if as_json:
@@ -93,7 +96,7 @@ def describe(name: str, as_json: bool) -> None:
 def doctor(as_json: bool) -> None:
     """Check the installation.
 
-    Prints engines, versions, CPU, caches, and packages on this path whose names are ours.
+    Prints engines, versions, CPU, caches, and other packages that have the names of ours.
     """
     data = listing.doctor()
     if as_json:
@@ -105,13 +108,18 @@ def doctor(as_json: bool) -> None:
 
 @main.command("check-adapter", epilog="Example: crosscheck check-adapter myengine")
 @click.argument("name", shell_complete=engine_names, required=False)
-@click.option("--self-test", "testing", is_flag=True, help="Plant faults in a toy engine: does its check catch each?")
+@click.option(
+    "--self-test",
+    "testing",
+    is_flag=True,
+    help="Instead, plant faults in a toy engine and see whether each is noticed.",
+)
 @AS_JSON
 def check_adapter_(name: str | None, testing: bool, as_json: bool) -> None:
     """Test an adapter for conformance.
 
-    Exits with 1 if it breaks a check. A check whose scenes the engine refuses is refused, which is no pass; one
-    that the adapter lists as an expected failure is told as such, and as an unexpected pass if it holds.
+    Exits with 1 if a check fails. A check is refused, not passed, if the engine refuses its scenes. Expected failures
+    that the adapter lists are shown as such, and as unexpected passes if they hold.
     """
     if testing == (name is not None):
         raise click.UsageError("name an engine, or give --self-test")
@@ -142,7 +150,7 @@ def _self_test(as_json: bool) -> NoReturn:
     if as_json:
         click.echo(json.dumps(rows, indent=1))
     else:
-        click.echo(f"{len(rows) - missed} of {len(rows)} as they must be; the first row is the healthy toy")
+        click.echo(f"{len(rows) - missed} of {len(rows)} as they must be; the first is the toy without a fault")
     sys.exit(1 if missed else 0)
 
 

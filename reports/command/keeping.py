@@ -38,16 +38,17 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
         click.echo(json.dumps(told))
         return
     for name, found in told.items():
-        line = f"{name}: {plural(found['runs'], 'new run')}, {found['known']} known, {plural(found['rows'], 'row')}"
-        click.echo(line + (f"; {plural(found['differing'], 'row')} differ, ours stay" if found["differing"] else ""))
+        line = f"{name}: {plural(found['runs'], 'new run')}, {found['known']} there already, "
+        line += plural(found["rows"], "result")
+        click.echo(line + (f"; {plural(found['differing'], 'result')} differ, ours stay" if found["differing"] else ""))
 
 
 @main.command("prune", epilog="Example: crosscheck prune --keep 50 --dry-run")
-@click.option("--keep", type=click.IntRange(1), help="Of runs with the same title, keep this many.")
-@click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Runs older than this go.")
-@click.option("--unfinished", is_flag=True, help="Interrupted runs go.")
-@click.option("--recordings", is_flag=True, help="Replays go, but of the newest run of each title.")
-@click.option("--dry-run", is_flag=True, help="Only say what would go.")
+@click.option("--keep", type=click.IntRange(1), help="Keep this many of the runs with the same title, the newest.")
+@click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Delete runs older than this.")
+@click.option("--unfinished", is_flag=True, help="Delete interrupted runs.")
+@click.option("--recordings", is_flag=True, help="Delete replays, except of the newest run of each title.")
+@click.option("--dry-run", is_flag=True, help="Only print what would be deleted.")
 @AS_JSON
 @OUT
 def prune_(
@@ -55,11 +56,11 @@ def prune_(
 ) -> None:
     """Delete old runs.
 
-    Rules choose them; the newest finished run of each title always stays in OUT.
+    The options say which. The newest finished run of each title always stays in OUT.
     """
     rules = Rules(keep, days, unfinished, recordings)
     if rules == Rules():
-        raise SceneError("prune: name a rule: --keep, --older-than, --unfinished or --recordings")
+        raise SceneError("prune: needs --keep, --older-than, --unfinished or --recordings")
     store = Store(out, create=False, write=not dry_run)
     try:
         going = doomed(store.runs(), rules) if dry_run else prune(store, rules)
@@ -70,4 +71,4 @@ def prune_(
         return
     for run in going:
         click.echo(f"{run.id}  {run.title}")
-    click.echo(f"{plural(len(going), 'run')} {'would go' if dry_run else 'went'}")
+    click.echo(f"{plural(len(going), 'run')} {'would be deleted' if dry_run else 'deleted'}")

@@ -107,7 +107,7 @@ def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
         params = own[0][0].params_text()
         console.print(Text(f"{scene[0]} {scene[1]}-D{' ' + params if params else ''}", style="bold"))
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
-        for heading in ("engine, profile", "nothing changed by", "changed by"):
+        for heading in ("engine, profile", "no change by", "changed by"):
             table.add_column(heading, overflow="fold")
         reasons: dict[str, None] = {}
         for slot, judged in own:
@@ -131,8 +131,8 @@ def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
     moves = ", ".join(map(str, MOVES))
     console.print()
     said = (
-        f"A change counts above {FACTOR:g} times the largest one from starts moved, or turned, by {moves} units in the "
-        f"last place and {INVISIBLE:g} of its check's tolerance."
+        f"A change counts if it is larger than {INVISIBLE:g} of the check's tolerance and than {FACTOR:g} times the "
+        f"largest effect of moving or turning the start by {moves} units in the last place."
     )
     console.print(Text(said, style="dim"))
     console.print(Text("; ".join(f"{each.name}: {each.says}" for each in RELATIONS), style="dim"))
@@ -144,7 +144,7 @@ def _text(judged: Judged) -> str:
     if change.holds:
         return f"{change.relation}{said}"
     if change.lost:
-        return f"{change.relation}{said} (no answer: {change.refused})"
+        return f"{change.relation}{said} (no result: {change.refused})"
     return (
-        f"{change.relation}{said} ({change.metric} by {number(change.change, 2)}, may by {number(change.allowed, 1)})"
+        f"{change.relation}{said} ({change.metric} by {number(change.change, 2)}; allowed: {number(change.allowed, 1)})"
     )

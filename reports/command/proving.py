@@ -42,11 +42,11 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
         if wanted and (reason == "all" or (known and reason in known.families)):
             found[engine] = wanted
     if not found and reason in families:
-        raise FindingsError(f"prove: the reason {reason!r} has no proof (in families.toml of its engine)")
+        raise FindingsError(f"prove: the cause {reason!r} has no experiment (in families.toml of its engine)")
     if not found:
         close = ", ".join(map(repr, difflib.get_close_matches(reason, dict.fromkeys(families), n=NEAREST, cutoff=0.5)))
-        hint = f"did you mean {close}?" if close else "`crosscheck findings` has the reasons"
-        raise FindingsError(f"prove: there is no reason called {reason!r} of {len(families)}; {hint}")
+        hint = f"did you mean {close}?" if close else "`crosscheck findings` lists causes"
+        raise FindingsError(f"prove: none of {len(families)} causes is called {reason!r}; {hint}")
     return found
 
 
@@ -64,7 +64,7 @@ def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
             for line in lines(proof):
                 console.print(line, soft_wrap=True)
         held = sum(proof.holds for proof in proofs)
-        console.print(Text(f"{held} of {len(proofs)} experiments show what they say"))
+        console.print(Text(f"{held} of {len(proofs)} experiments confirm their cause"))
     sys.exit(0 if all(proof.holds for proof in proofs) else 1)
 
 

@@ -40,18 +40,23 @@ Command = Callable[..., None]
 def _cells(command: Command) -> Command:
     """Options that choose cells and say how they are run; shared by both commands."""
     options = (
-        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
+        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
         SET,
-        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
-        click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
+        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
+        click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
         click.option(
-            "--iterations", multiple=True, type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count."
+            "--iterations",
+            multiple=True,
+            type=click.IntRange(1, MOST_ITERATIONS),
+            help="Solver iterations, instead of the profile's own.",
         ),
         click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core."),
-        click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s]."),
-        click.option("--fresh", is_flag=True, help="Ask again what the store has already."),
-        click.option("--try", "anyway", is_flag=True, help="Also releases outside of what the adapter knows."),
+        click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s]."),
+        click.option("--fresh", is_flag=True, help="Run again what OUT has already."),
+        click.option(
+            "--try", "anyway", is_flag=True, help="Also releases outside the range that the adapter supports."
+        ),
     )
     for option in reversed(options):
         command = option(command)
@@ -63,8 +68,10 @@ def _cells(command: Command) -> Command:
 @click.argument("which", metavar="A..B|LIST|latest", required=False)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @_cells
-@click.option("--times", is_flag=True, help="Time a cell per scene as well, against a loop on the same machine.")
-@click.option("--environments", "listed", is_flag=True, help="List the environments that are kept, and check each.")
+@click.option(
+    "--times", is_flag=True, help="Also time one case of each scene, relative to a Python loop on the same machine."
+)
+@click.option("--environments", "listed", is_flag=True, help="List and check the environments of releases.")
 @click.option("--remove", metavar="NAME", help="With --environments: remove this one, or 'all'.")
 @click.option("--markdown", is_flag=True, help="Print Markdown on stdout.")
 @AS_JSON
@@ -82,9 +89,9 @@ def releases(
 ) -> None:
     """Run scenes on releases of an engine.
 
-    A..B is a range; a LIST such as 3.0.0,3.1.6, or latest, is taken as well. Prints what moved, and when. Each
-    release gets an environment of its own, made once; what is stored in OUT is not run again. Exits with 4 if a
-    release did not answer: it cannot be installed, imported or driven here, and its rows say why.
+    A..B is a range; a LIST such as 3.0.0,3.1.6, or latest, works as well. Prints what changed, and in which release.
+    Each release gets its own environment, once; results that are in OUT already are not run again. Exits with 4 if a
+    release cannot be installed, imported or run here; the table says why.
     """
     if listed or remove:
         _environments(remove, as_json)
@@ -116,10 +123,10 @@ def _prepared(
     folder(out)
     asked = chosen(engine, which)
     if len(asked) < least:
-        raise SceneError(f"releases: {which} is one release; a change lies between two")
+        raise SceneError(f"releases: {which} is one release; a comparison needs two")
     wanted = planned(asked, request, effort, lambda line: say(console, line))
     if not wanted:
-        raise SceneError("scenes: no cell fits this selection")
+        raise SceneError("scenes: no case fits this selection")
     return asked, wanted, effort, console
 
 
@@ -147,11 +154,11 @@ def _drive(
                 progress.update(task, description=f"{release.name} timing")
                 time(store, release, found, effort, lambda line: say(console, line))
         except KeyboardInterrupt:
-            say(console, "interrupted: what finished is kept, the same command goes on")
+            say(console, "interrupted: finished cases are kept; the same command resumes")
             raise
     taken = history.times(store, release.engine, release.version)
     told = history.told_by(release.engine, release.version, found, taken)
-    say(console, f"{release.name}: {told.reason or plural(len(found), 'cell')}")
+    say(console, f"{release.name}: {told.reason or plural(len(found), 'case')}")
     return told
 
 
@@ -177,8 +184,8 @@ def _with_floors(
 @click.argument("engine", shell_complete=engine_names)
 @click.argument("which", metavar="A..B")
 @click.argument("scene", shell_complete=scene_names)
-@click.option("--check", required=True, metavar="CHECK", help="Metric: apex[1], or apex for all.")
-@click.option("--all", "every", is_flag=True, help="Ask every release: is it the only change?")
+@click.option("--check", required=True, metavar="CHECK", help="Quantity: apex[1], or apex for all of them.")
+@click.option("--all", "every", is_flag=True, help="Run every release, to see whether it is the only change.")
 @_cells
 @AS_JSON
 @OUT
@@ -187,9 +194,9 @@ def bisect_(
 ) -> None:
     """Find the release that changed a check.
 
-    CHECK of SCENE flips, or moves beyond its noise floor, between releases A and B of ENGINE. Of the cells that
-    differ between A and B the most serious one is followed; log2(n) releases are asked, and those that are stored
-    need not run. Exits with 4 if A or B does not answer.
+    Searches the releases A to B of ENGINE for the one in which CHECK of SCENE begins or ceases to fail, or changes by
+    more than its noise. Of several cases the one with the largest change is followed. Of n releases log2(n) run; those
+    whose results are in OUT do not run again. Exits with 4 if A or B cannot run.
     """
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     store = Store(out)
@@ -209,7 +216,7 @@ def bisect_(
 
 def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene: str, as_json: bool) -> NoReturn:
     """Say that nothing was found, and leave."""
-    same = f"{check} of {scene} is the same in {versions[0]} and {versions[-1]}: no verdict flips, no value moves"
+    same = f"{check} of {scene} is the same in {versions[0]} and {versions[-1]}"
     said = found.reason.replace("release 0 ", f"{versions[0]} ").replace(
         f"release {len(versions) - 1} ", f"{versions[-1]} "
     )

@@ -13,6 +13,7 @@ import click
 from adapters.engine import EngineError
 from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.showing import which
 from reports.stages import say, stage
 from reports.terminal import terminal
 from reports.wording import missing_text, plural
@@ -28,8 +29,8 @@ from validation.records.store import MissingError, Store
 def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) -> None:
     """Write the report of a run as one HTML page.
 
-    RUN is the latest by default. The page needs no network. The last bench in the same store, if there is one,
-    becomes its part about speed.
+    RUN is an id that `list runs` prints; the latest by default. The page needs no network. The last benchmark in the
+    same folder, if there is one, becomes its part about speed.
     """
     path = writable(output or out / "report.html", "output")
     with extra("report"):
@@ -38,6 +39,10 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
         source = load_source(out, run)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(render(source), encoding="utf-8")
+    if not as_json:
+        store = Store(out, create=False)
+        click.echo(which(store, source.run, run).line("report", out), err=True)
+        store.close()
     if source.missing:
         said = missing_text(source.missing, len(source.run.plan))
         click.echo(f"crosscheck: run {source.run.id}: {said}", err=True)
@@ -96,7 +101,8 @@ def _made(commits: Sequence[str]) -> str:
 def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
     """Write a run as one archive.
 
-    RUN is the latest by default. The archive has raw rows, environment, report, citation and checksums.
+    RUN is an id that `list runs` prints; the latest by default. The archive has raw results, environment, report,
+    citation and checksums.
     """
     with extra("bundle"):
         from reports.bundle import write_bundle

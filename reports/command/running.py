@@ -40,15 +40,25 @@ from validation.workers import TIMEOUT, run_cells
 @main.command(epilog="Example: crosscheck run bounce --param e=0.7 --dt 1/240")
 @selection
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
-@click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
+@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
-@click.option("--keep", is_flag=True, help="With --invariance: list the breaks that breaks.toml has a reason for.")
-@click.option("--invariance", is_flag=True, help="Ask instead what must not change an answer: order, heading, place.")
+@click.option(
+    "--keep",
+    is_flag=True,
+    help="With --invariance: update the list of known violations, those with a reason in breaks.toml.",
+)
+@click.option(
+    "--invariance",
+    is_flag=True,
+    help="Run metamorphic tests instead: the order, heading and place of bodies must not matter.",
+)
 @CLUSTER
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option("--drop", is_flag=True, help="Leave out of a model what has no place in a scene, and say so.")
-@click.option("--strict", is_flag=True, help="Exit with 1 for every FAIL, listed or not, and every INVALID.")
+@click.option(
+    "--drop", is_flag=True, help="Leave out what a scene cannot have of a model, and print what was left out."
+)
+@click.option("--strict", is_flag=True, help="Exit with 1 for every failure, known or not, and every INVALID.")
 @click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
 @click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
 @AS_JSON
@@ -56,15 +66,17 @@ from validation.workers import TIMEOUT, run_cells
 def run(out: Path, as_json: bool, **options: Any) -> None:
     """Run scenes on engines and judge every check.
 
-    SCENES are names, globs, scene files or models (.xml, .urdf, .sdf); all by default. With --invariance nothing is
-    stored or judged against a truth: the representative cell of each scene, engine and profile is run again with
-    bodies renumbered, the world turned, mirrored, carried along or moved away, with a body out of reach, in the
-    same and in a fresh process; exits with 1 if that changes an answer.
+    SCENES are names, globs, scene files or models (.xml, .urdf, .sdf); all by default. All installed engines run,
+    unless --engine names some.
 
-    Exits with 1 if a row is new, drifted, INVALID, CRASHED, TIMED OUT or missing, with 2 if the call is wrong, with 4
-    if not all of it ran. A number that a scene file states and an engine misses is new. Of models, and of engines
-    that have no list of findings, FAIL and INVALID are shown and are no alarm. With --strict any FAIL or INVALID is
-    one.
+    Exits with 1 if a result is unexpected: a failure that is not on record, a value that differs from its record,
+    INVALID, crashed, timed out or missing. Exits with 2 if the call is wrong, with 4 if not all of it ran. A failed
+    check that a scene file states is unexpected. Failures of models, and of engines without a list of known failures,
+    are shown and do not change the exit status, unless --strict is given.
+
+    With --invariance one case of each scene, engine and profile is run again with bodies renumbered, the world turned,
+    mirrored, moving or far away, with a body out of reach, and in a fresh process. Nothing is stored. Exits with 1 if
+    an answer changes.
     """
     console = terminal(stderr=True)
     for name in ("junit", "markdown"):
@@ -73,17 +85,17 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     request = request_from(options)
     chosen = slots(request)
     if not chosen:
-        raise SceneError("scenes: no cell fits this selection")
+        raise SceneError("scenes: no case fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "cell"))
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "case"))
         return
     if options["invariance"]:
         cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
         sys.exit(statuses.verdict(not compare_and_show(cells, as_json, options["keep"]), True))
     if options["keep"]:
-        raise SceneError("keep: lists breaks of invariance, and needs --invariance")
+        raise SceneError("keep: lists violations of metamorphic tests, and needs --invariance")
     if options["cluster"] and options["keep_trajectories"]:
-        raise SceneError("keep_trajectories: a cluster sends observations only; run those cells here")
+        raise SceneError("keep_trajectories: a cluster sends back no trajectories; run those cases here")
     folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:
@@ -129,8 +141,8 @@ def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: 
 def compile_kernels(as_json: bool, **options: Any) -> None:
     """Compile the solver's kernels.
 
-    Compiles what the engines of these cells compile at their first steps, and nothing else. `run` and `bench` do so by
-    themselves; tests that run side by side would each compile the same.
+    Compiles what these scenes and engines need for their first steps. `run` and `bench` do this by themselves. Call it
+    before processes that run side by side, which would each compile the same.
     """
     done = warm_up(slots(request_from(options)), 0, terminal(stderr=True))
     if as_json:
@@ -138,16 +150,16 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
 
 
 @main.command("run-cell", epilog="Example: crosscheck run-cell < slots.json")
-@click.option("--batch", is_flag=True, help="Read one JSON object per line, write one observation per line.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
+@click.option("--batch", is_flag=True, help="Read one JSON object per line, write one result per line.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
 @click.option("--jobs", default=1, show_default=True, type=JOBS, help="Worker processes.")
 def run_cell(batch: bool, timeout: float, jobs: int) -> None:
-    """Run cells given as JSON, for a scheduler.
+    """Run cases given as JSON, for a scheduler.
 
-    Slots are read from stdin, observations written to stdout. With --batch a first line {"scenes": {...}} hands
-    over the texts of scene files, by their pinned names, so that the files need not be here; every other line gets
-    an answer: an observation, or {"line": N, "error": "..."} for a line that is no slot or whose cell was left.
-    Exits with 2 if a line was wrong, with 4 if a cell was left.
+    Cases are read from stdin, results are written to stdout. With --batch a first line {"scenes": {...}} may hold
+    the texts of scene files, by their pinned names, so that the files need not be here. Every other line gets one line
+    of output: a result, or {"line": N, "error": "..."} if it is not a case or the case did not finish. Exits with 2 if
+    a line was wrong, with 4 if a case did not finish.
     """
     text = sys.stdin.buffer.read().decode(errors="replace")
     cells: dict[Slot, int] = {}

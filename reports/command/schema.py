@@ -17,7 +17,7 @@ from reports.command.group import main
 def schema(output: Path | None) -> None:
     """Print the JSON Schema of scene files.
 
-    An editor that knows it completes and checks what you write; `format` in a file is the schema's version.
+    An editor can use it to complete and check scene files. `format` in a scene file is the version of the schema.
     """
     from validation.files.scene_files import json_schema
 

@@ -37,9 +37,9 @@ class _Seconds(click.ParamType):
 
 #: What the options that name a suite say of it.
 WHAT_SUITES_ARE: dict[Suite, str] = {
-    "quick": "A few cells a scene: the default.",
-    "standard": "The cells whose FAILs are listed row by row.",
-    "full": "All cells of each scene, and other steps.",
+    "quick": "A few cases per scene: the default.",
+    "standard": "More cases: those whose known failures are listed check by check.",
+    "full": "All cases of each scene, and other time steps.",
 }
 #: Longest time that a cell may be given [s]: a week.
 LONGEST = 7 * 86400.0
@@ -53,7 +53,10 @@ WORKERS = click.IntRange(1, MOST_JOBS)
 
 #: Settings of a user's own.
 SET = click.option(
-    "--set", multiple=True, metavar="NAME=VALUE", help="Set a setting of the engine; shown as a profile of that name."
+    "--set",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a setting of the engine; it is shown as part of the profile's name.",
 )
 
 
@@ -68,14 +71,17 @@ def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> s
 
 #: Where cells run, if not here.
 CLUSTER = click.option(
-    "--cluster", callback=_cluster, metavar="ADDRESS", help="Run on Dask: tcp://HOST:PORT, or local:N processes."
+    "--cluster",
+    callback=_cluster,
+    metavar="ADDRESS",
+    help="Run on a Dask cluster: tcp://HOST:PORT, or local:N processes.",
 )
 
 
 def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
     """A line for each engine that was named and is not there, and one if none of the chosen is there at all."""
     absent = [found for found in map(registry.find, chosen) if found.engine is None]
-    lines = [f"engine: {f.name} was named, but did not run: {f.reason}" for f in absent if f.name in named]
+    lines = [f"engine: {f.name} did not run: {f.reason}" for f in absent if f.name in named]
     none = f"engine: none of {', '.join(chosen)} is installed here; crosscheck doctor says why"
     return lines or ([none] if len(absent) == len(chosen) else [])
 
@@ -96,7 +102,7 @@ def fixed(texts: Sequence[str]) -> dict[str, float] | None:
     found: dict[str, float] = {}
     for name, value in map(parameter, texts):
         if name in found:
-            raise SceneError(f"param: {name} is given twice; crosscheck sweep --grid asks several values")
+            raise SceneError(f"param: {name} is given twice; crosscheck sweep --grid runs several values")
         found[name] = value
     return found or None
 
@@ -151,7 +157,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
     """Options that choose cells; shared by every command that runs some."""
     options = (
         click.argument("scenes", nargs=-1, shell_complete=scene_names),
-        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Fix a parameter of the scene."),
+        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
         click.option(
             "--engine",
             multiple=True,
@@ -161,16 +167,19 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
         ),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
         SET,
-        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only planar (2) or spatial (3)."),
-        click.option("--dt", multiple=True, metavar="S", help="Step, such as 1/240 (repeat for more)."),
+        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
+        click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
         click.option(
-            "--iterations", multiple=True, type=click.IntRange(1, MOST_ITERATIONS), help="Replace the profile's count."
+            "--iterations",
+            multiple=True,
+            type=click.IntRange(1, MOST_ITERATIONS),
+            help="Solver iterations, instead of the profile's own.",
         ),
         click.option(
             "--ulp",
             multiple=True,
             type=click.IntRange(-MOST_ULPS, MOST_ULPS),
-            help="Move the start by this many units in the last place.",
+            help="Move the initial positions by this many units in the last place.",
         ),
         *(click.option(f"--{suite}", is_flag=True, help=WHAT_SUITES_ARE[suite]) for suite in SUITES),
     )

@@ -23,10 +23,11 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import prove_and_show
 from reports.command.selection import SET
-from reports.cures import Change, changes, fix, how_measured, told_cure
+from reports.cures import ROLES, Change, changes, fix, how_measured, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
+from reports.tables import title_of
 from reports.terminal import terminal
 from reports.wording import (
     LABELS,
@@ -48,7 +49,7 @@ from validation.judging.studies import results
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
 from validation.questions.nulls import skill_of
-from validation.records.store import Store
+from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
 from validation.running.plan import Request, slots
 
 Plain = Mapping[str, Any]
@@ -59,6 +60,54 @@ TEXT = 100
 
 
 @dataclass(frozen=True)
+class Which:
+    """Which run of a folder is shown.
+
+    Parameters
+    ----------
+    title
+        What it ran.
+    latest
+        Whether it was chosen by being the latest.
+    others
+        How many other runs the folder has.
+    larger
+        Another run with more cases, the latest such; empty if there is none.
+    """
+
+    run: str
+    title: str
+    cases: int
+    latest: bool
+    others: int
+    larger: str
+
+    @property
+    def named(self) -> str:
+        """The run as a command must name it; empty for the latest."""
+        return "" if self.latest else self.run
+
+    def line(self, command: str, out: Path) -> str:
+        """What is shown, and the commands that show another run."""
+        text = f"Run {self.run}{', the latest' if self.latest and self.others else ''}: {self.title}"
+        text += f" ({plural(self.cases, 'case')})."
+        if self.latest and self.larger:
+            text += f" A larger run: crosscheck {command} {self.larger}{at(out)}."
+        if self.others:
+            text += f" All runs: crosscheck list runs{at(out)}."
+        return text
+
+
+def which(store: Store, chosen: Run, asked: str) -> Which:
+    """Which run of a store ``asked`` has chosen."""
+    apart = (SCATTER_TITLE, RELEASE_TITLE, "bench ")
+    others = [run for run in store.runs() if run.id != chosen.id]
+    larger = [run.id for run in others if len(run.plan) > len(chosen.plan) and not run.title.startswith(apart)]
+    title = title_of(chosen.title)
+    return Which(chosen.id, title, len(chosen.plan), asked == "latest", len(others), "".join(larger[-1:]))
+
+
+@dataclass(frozen=True)
 class Kept:
     """What a store has of one run, read at one time."""
 
@@ -66,6 +115,7 @@ class Kept:
     observations: list[Observation]
     planned: int
     missing: int
+    which: Which
 
     def counted(self) -> dict[str, Any]:
         """Id of the run, how many cells it planned, and how many of them left no observation."""
@@ -88,7 +138,8 @@ def _opened(out: Path) -> Iterator[Store]:
 
 def _kept(store: Store, run: str) -> Kept:
     chosen = store.run(run)
-    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen))
+    told = which(store, chosen, run)
+    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), told)
 
 
 def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
@@ -123,20 +174,22 @@ def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
 
 @main.command(epilog="Example: crosscheck show --all")
 @click.argument("run", default="latest")
-@click.option("--all", "every", is_flag=True, help="Every scene, where there are so many that families are shown.")
+@click.option("--all", "every", is_flag=True, help="Every scene, also where there are so many that groups are shown.")
 @AS_JSON
 @OUT
 def show(run: str, every: bool, as_json: bool, out: Path) -> None:
     """Show the verdicts of a run again.
 
-    RUN is the latest by default; it is shown as `run` showed it: matrix, short answers, where the details are.
+    Shows what `run` showed: the matrix, the best engines, what is wrong and what fixes it. RUN is an id that `list
+    runs` prints; the latest by default. The first line says which run is shown.
     """
     rows, kept, costs = load(out, run)
     if as_json:
         click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
-    show_summary(rows, console, costs, every=every, out=out)
+    console.print(Text(kept.which.line("show", out), style="dim"))
+    show_summary(rows, console, costs, every=every, out=out, run=kept.which.named)
     kept.say_missing()
     report = out / "report.html"
     if report.is_file():
@@ -163,9 +216,13 @@ def _as_plain(rows: Sequence[Plain], costs: Costs) -> dict[str, Any]:
 @click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
 @click.option("--scene", multiple=True, metavar="S", shell_complete=scene_names, help="Only this scene.")
 @click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
-@click.option("--new", is_flag=True, help="Only what makes `run` exit with 1: new, drifted, INVALID, crashed.")
-@click.option("--all", "every", is_flag=True, help="Every row, not the worst of each family.")
-@click.option("--prove", metavar="ID", help="Run the experiments beside the reason ID (or 'all'); needs no RUN.")
+@click.option(
+    "--new", is_flag=True, help="Only unexpected results, which make `run` exit with 1: new, changed, INVALID, crashed."
+)
+@click.option("--all", "every", is_flag=True, help="Every failed check, not the worst of each cause.")
+@click.option(
+    "--prove", metavar="ID", help="Run the experiments that test the stated cause ID (or 'all'); needs no RUN."
+)
 @AS_JSON
 @OUT
 def findings(
@@ -173,10 +230,10 @@ def findings(
 ) -> None:
     """List the checks of a run that fail, by cause.
 
-    RUN is the latest by default; the most serious causes come first. A family is one engine, profile, scene, kind
-    of metric and standing; it is shown by its worst row. With --prove, the mechanism that a reason names is
-    switched off on rows that fail because of it: they must pass, and must go on failing with what else might be
-    blamed. Exits with 1 if an experiment does not show what it says.
+    RUN is an id that `list runs` prints; the latest by default. The first line says which run is shown. Failures of
+    one engine, profile, scene and kind of quantity are one line, which shows the worst; the most serious come first.
+    With --prove, the mechanism that a cause names is switched off: checks that fail because of it must then pass, and
+    must still fail when another suspect is switched off instead. Exits with 1 if an experiment contradicts its cause.
     """
     if prove:
         prove_and_show(prove, wanted["engine"], as_json)
@@ -190,11 +247,13 @@ def findings(
     for name, asked in wanted.items():
         there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:
-            raise SceneError(f"--{name}: this run has no rows of {absent[0]!r}, but of {', '.join(there)}")
+            raise SceneError(f"--{name}: this run has no check of {absent[0]!r}, but of {', '.join(there)}")
     # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
         rows = [row for row in rows if is_alarming(row)]
+    if not as_json:
+        terminal().print(Text(kept.which.line("findings", out), style="dim"))
     if every:
         chosen = [row for _, group in grouped(rows) for row in group]
         if as_json:
@@ -206,7 +265,9 @@ def findings(
     if as_json:
         click.echo(json.dumps([family.as_dict() for family in found], indent=1))
         return
-    _print_families(found, terminal(), "no row is new or drifted" if new else "no such row fails", out)
+    _print_families(
+        found, terminal(), "no unexpected result" if new else "no such check fails", at(out, kept.which.named)
+    )
 
 
 def _grid(*headings: str) -> Table:
@@ -216,7 +277,7 @@ def _grid(*headings: str) -> Table:
     return table
 
 
-def _print_families(found: Sequence[Family], console: Console, nothing: str, out: Path | None = None) -> None:
+def _print_families(found: Sequence[Family], console: Console, nothing: str, place: str) -> None:
     if not found:
         console.print(nothing)
         return
@@ -224,15 +285,15 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str, out
         own = [family for family in found if family.mark == mark]
         console.print()
         count = sum(len(family.rows) for family in own)
-        console.print(Text(f"{LABELS[mark]}: {plural(count, 'row')} in {plural(len(own), 'family')}", style="bold"))
-        table = _grid("id", "engine, scene", "worst row", "rows")
+        console.print(Text(f"{LABELS[mark]}: {plural(count, 'check')}, {plural(len(own), 'line')}", style="bold"))
+        table = _grid("id", "engine, scene", "worst check", "checks")
         table.columns[0].no_wrap = True
         for family in own:
             who = f"{family.engine}/{family.profile} {family.scene}"
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
-    said = f"crosscheck explain ID{at(out)} says everything about a row; --all lists every row."
+    said = f"crosscheck explain ID{place} says everything about a check; --all lists every check."
     console.print(Text(said), style="dim")
 
 
@@ -241,8 +302,10 @@ def _worst(row: Plain) -> str:
         return f"{row['dimension']}-D {row['metric']}: {row['reason']}"
     asked = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
     where = " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), asked) if text)
-    truth = quantity(row["truth"], row["unit"])
-    return f"{row['metric']} {measured(row)} instead of {truth}, {_ratio(row)} tolerances off ({where})"
+    right = "" if row["truth"] is None else f" instead of {number(row['truth'])}"
+    allowed = "" if row["tolerance"] is None else f" +- {number(row['tolerance'], 2)}"
+    unit = "" if row["unit"] == "1" or not right else f" {row['unit']}"
+    return f"{row['metric']} {measured(row)}{right}{allowed}{unit} ({where})"
 
 
 def _ratio(row: Plain) -> str:
@@ -250,7 +313,7 @@ def _ratio(row: Plain) -> str:
 
 
 def _print_rows(rows: Sequence[Plain], console: Console) -> None:
-    table = _grid("id", "standing", "engine, scene", "row")
+    table = _grid("id", "status", "engine, scene", "check")
     for row in rows:
         who = f"{row['engine']}/{row['profile']} {row['scene']}"
         table.add_row(row_id(row), LABELS[mark_of(row)], who, _worst(row))
@@ -259,19 +322,20 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
 
 @main.command(epilog="Example: crosscheck explain ENGINE/default/bounce")
 @click.argument("row", shell_complete=row_ids)
-@click.option("--run", default="latest", show_default=True, help="Which run.")
+@click.argument("run", default="latest")
+@click.option("--run", "named", hidden=True)
 @SET
 @AS_JSON
 @OUT
-def explain(row: str, run: str, set: tuple[str, ...], as_json: bool, out: Path) -> None:
+def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json: bool, out: Path) -> None:
     """Explain one check: values, truth, tolerance, cause and fix.
 
-    ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the worst
-    row there; SCENE may be a scene file, by its path or its name. With --set the row is that of PROFILE with these
-    settings.
+    ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the check
+    with the largest error there; SCENE may be a scene file, by its path or its name. With --set, PROFILE has these
+    settings of your own. RUN is an id that `list runs` prints; the latest by default.
     """
     asked, row = row, _with_own(row, set)
-    kept = observed(out, run)
+    kept = observed(out, named or run)
     observations = _where(kept.observations, row)
     rows = judged(kept.run, observations)
     try:
@@ -356,8 +420,8 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
     else:
         slots = [slot for found, slot in ids_of(observations) if found.startswith(name.lower())]
         if len(slots) != 1:
-            many = f"{len(slots)} rows begin" if slots else "no row of this run begins"
-            raise SceneError(f"row: {many} with {name!r}; ids stand in crosscheck findings")
+            many = f"the ids of {len(slots)} checks begin" if slots else "no id of this run begins"
+            raise SceneError(f"row: {many} with {name!r}; crosscheck findings lists ids")
         keys = [("engine", slots[0].engine), ("scene", slots[0].scene)]
     return [one for one in observations if all(getattr(one.slot, key) == value for key, value in keys)]
 
@@ -424,7 +488,7 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         if metric:
             fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
         if not fits:
-            raise SceneError(f"row: this run has no row {name!r}; crosscheck findings lists what fails")
+            raise SceneError(f"row: this run has no check {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)
     return next(row for row in rows if row_id(row).startswith(name.lower()))
 
@@ -451,11 +515,11 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
 
 
 def skill_text(row: Plain) -> str:
-    """``0.98: 1 - error/error of the best null, which is: did nothing``; or why there is none."""
+    """``0.98 (1: exact; 0: as wrong as the trivial answer "did nothing")``; empty where there is none."""
     value, said = skill_of(row)
     if value is None:
-        return f"none: {said}"
-    return f"{number(value, 4)} = 1 - error/error of the best answer without an engine, {said}"
+        return ""
+    return f'{number(value, 4)} (1: exact; 0: as wrong as the trivial answer "{said}")'
 
 
 def _why(change: Change) -> str:
@@ -468,7 +532,7 @@ def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
         return ""
     for other in rows:
         if other["cells"] == row["cells"] and other["metric"] == OUT_OF_PLANE and other["physics"] == "fail":
-            return f"the scene leaves its plane by {measured(other, 3)}: this row is what is seen of it in the plane"
+            return f"the scene leaves its plane by {measured(other, 3)}; this check sees only the motion in the plane"
     return ""
 
 
@@ -476,7 +540,7 @@ def _measured_text(row: Plain) -> str:
     if row["value"] is None:
         return f"no value: {row['reason']}"
     text = f"{row['metric']} = {measured(row, 8)}"
-    return text if has_answer(row) else f"{text}, which does not count: the measurement is broken"
+    return text if has_answer(row) else f"{text}; not judged: the measurement is broken"
 
 
 def _print_explanation(
@@ -494,25 +558,29 @@ def _print_explanation(
     table.show_header = False
     table.columns[0].no_wrap = True
     off = f" = {_ratio(row)} tolerances" if severity(row) else ""
+    skill, invalid = skill_text(row), row["outcome"] == "invalid"
     lines = [
-        ("row", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
+        ("check", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
         ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
-        ("asked", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
+        ("case", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
         ("measured", _measured_text(row)),
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
-        ("skill", skill_text(row)),
-        ("reason" if row["outcome"] == "invalid" else "standing", row["reason"] or "-"),
+        *([("skill", skill)] if skill else []),
+        *([("reason" if invalid else "cause", row["reason"])] if row["reason"] else []),
         *([("off plane", beside)] if beside else []),
     ]
     if better:
-        lines.append(("cure", f"profile {better} passes this row. It differs in:"))
-        lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing]
+        lines.append(("fix", f"profile {better} passes this check. It changes:"))
+        idle = [c for c in differing if c.role == ROLES[""]]
+        lines += [("", f"{c.name} {c.before} -> {c.after}: {_why(c)}") for c in differing if c not in idle]
+        if idle:
+            lines.append(("", "not needed: " + ", ".join(f"{c.name} {c.before} -> {c.after}" for c in idle)))
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     told = told_cure(row) if mark_of(row) != "pass" else ""
-    lines += [("smallest" if better else "cure", told)] if told else []
-    lines.append(("again", again))
+    lines += [("smallest fix" if better else "fix", told)] if told else []
+    lines.append(("run again", again))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
     console.print(table)

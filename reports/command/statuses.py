@@ -20,13 +20,13 @@ INTERRUPTED = 130
 
 #: Status -> what it says, as docs/reference/status.md has it.
 MEANING = {
-    FINE: "everything asked for ran, nothing is alarming",
-    ALARM: "a verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a broken check; "
-    "a reason refuted; a better setting found",
+    FINE: "everything ran, no result is unexpected",
+    ALARM: "an unexpected result: a new failure, a changed value, INVALID, crashed, timed out or missing; a "
+    "regression; a failed test; a cause refuted; a better setting found",
     WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
     RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
-    INCOMPLETE: "not everything asked for ran: named engine missing, cells left after time-outs, too little memory",
-    INTERRUPTED: "interrupted; what finished is kept, the same command resumes",
+    INCOMPLETE: "not everything ran: a named engine is missing, cases did not finish in time, too little memory",
+    INTERRUPTED: "interrupted; finished cases are kept, the same command resumes",
 }
 
 

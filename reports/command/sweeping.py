@@ -18,7 +18,7 @@ from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_f
 from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import terminal
-from reports.wording import plural
+from reports.wording import at, plural
 from validation.judging.rows import rows_of
 from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
 from validation.records.store import Store
@@ -27,38 +27,40 @@ from validation.workers import TIMEOUT
 
 @main.command(epilog="Example: crosscheck sweep bounce --grid e=0:1:50")
 @selection
-@click.option("--grid", multiple=True, metavar="N=LOW:HIGH:COUNT[:log]", help="Every one of COUNT values.")
-@click.option("--list", "lists", multiple=True, metavar="N=A,B,C", help="Every value named.")
-@click.option("--random", multiple=True, metavar="N=LOW:HIGH[:log]", help="Drawn at random, --samples times.")
-@click.option("--sobol", multiple=True, metavar="N=LOW:HIGH[:log]", help="Drawn from a Sobol sequence.")
-@click.option("--samples", default=256, show_default=True, type=int, help="Points of --random and --sobol.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of both.")
+@click.option("--grid", multiple=True, metavar="N=LOW:HIGH:COUNT[:log]", help="COUNT evenly spaced values.")
+@click.option("--list", "lists", multiple=True, metavar="N=A,B,C", help="These values.")
+@click.option("--random", multiple=True, metavar="N=LOW:HIGH[:log]", help="Values at random, --samples of them.")
+@click.option(
+    "--sobol", multiple=True, metavar="N=LOW:HIGH[:log]", help="Values of a Sobol sequence, --samples of them."
+)
+@click.option("--samples", default=256, show_default=True, type=int, help="Number of points of --random and --sobol.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of --random and --sobol.")
 @click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Per cell [s].")
-@click.option("--dry-run", is_flag=True, help="Say how many cells there are, and stop.")
+@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
+@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
 @CLUSTER
 @click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
-@click.option("--csv", "csv_file", type=FILE, help="Table of the cells; OUT/sweep.csv by default.")
+@click.option("--csv", "csv_file", type=FILE, help="Table of the cases; OUT/sweep.csv by default.")
 @click.option("--parquet", type=FILE, help="Also write the table as Parquet to this file.")
 @AS_JSON
 @OUT
 def sweep(out: Path, as_json: bool, **options: Any) -> None:
     """Run scenes over grids of parameters, into one table.
 
-    One line of the table per cell. Grids and lists are crossed with each other and with --samples points. FAILs are
-    what a study looks for, so they are no alarm: it exits with 1 if cells are INVALID, CRASHED, TIMED OUT or
-    missing, with 4 if not all of it ran.
+    The table has one line per case. Grids and lists are crossed with each other and with --samples points. Failed
+    checks do not change the exit status, since a study looks for them. Exits with 1 if cases are INVALID, crashed,
+    timed out or missing, with 4 if not all of it ran.
     """
     console = terminal(stderr=True)
     files = {"csv": options["csv_file"] or out / "sweep.csv", "parquet": options["parquet"]}
     if not options["scenes"]:
-        raise SceneError("scenes: name the scenes of a sweep, it has parameters of its own")
+        raise SceneError("scenes: a sweep needs the name of a scene")
     request, study = request_from(options), _study(options)
     chosen = study_slots(request, study)
     if not chosen:
-        raise SceneError("scenes: no cell fits this selection")
+        raise SceneError("scenes: no case fits this selection")
     if options["dry_run"]:
-        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "cell"))
+        click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "case"))
         return
     folder(out)
     for name in ("csv", "parquet"):
@@ -81,6 +83,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
         click.echo(json.dumps(json.loads(found.to_json(orient="records", double_precision=15)), indent=1))
     console.print(counted(found))
     console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"what fails and why: crosscheck findings{at(out)}", markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -32,10 +32,12 @@ def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, .
 @main.command(epilog="Example: crosscheck tune ENGINE")
 @click.argument("engine")
 @click.option("--profile", help="Profile to start from; the tuned one by default.")
-@click.option("--group", multiple=True, callback=known_groups, help="Scenes of one kind; all by default.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Dimensions; all that the engine has by default.")
+@click.option("--group", multiple=True, callback=known_groups, help="Group of scenes; all by default.")
+@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D.")
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
-@click.option("--decisive", "which", is_flag=True, help="Measure which settings of its cures matter, and keep it.")
+@click.option(
+    "--decisive", "which", is_flag=True, help="Measure which settings of its fixes matter, and keep the result."
+)
 @AS_JSON
 def tune(
     engine: str,
@@ -48,13 +50,12 @@ def tune(
 ) -> None:
     """Search better stock settings for a profile.
 
-    Looks for settings of ENGINE that do better than the profile on all scenes of a kind. Changes nothing: what is found
-    is adopted in the adapter, with its reason. Exits with 1 if something better was found, so that a release of an
-    engine that has better settings shows.
+    Looks for settings of ENGINE that do better than the profile on all scenes of a group. Changes no file: enter better
+    settings into the adapter, with the reason. Exits with 1 if something better was found.
 
-    With --decisive: each setting that a cure changes is switched alone and left out, and what came out is written to
-    decisive.csv in the engine's folder, which the report and `explain` read. Exits with 1 if other settings decide
-    than were listed.
+    With --decisive, each setting that a fix changes is tried alone and left out, to measure which ones matter. The
+    result is written to decisive.csv in the engine's folder, which the report and `explain` read. Exits with 1 if it
+    differs from what was listed.
     """
     console = terminal(stderr=True)
     if which:
@@ -87,13 +88,13 @@ def _missing(engine: str, what: str, purpose: str) -> str:
     """Why there is nothing to try or to measure."""
     if fault := fault_of_tuning(engine):
         return f"{engine}: {fault}"
-    return f"nobody has named {what} of {engine} to {purpose} ({TUNING} in its folder)"
+    return f"no {what} of {engine} to {purpose} are listed ({TUNING} in its folder)"
 
 
 def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
     """Measure and keep which settings decide the cures of an engine; whether the same do as were listed."""
     if not cured_of(engine):
-        raise EngineError(f"tune: {_missing(engine, 'cures', 'measure')}")
+        raise EngineError(f"tune: {_missing(engine, 'fixes', 'measure')}")
     listed = {(e.scene, e.shipped, e.better): e.text for e in measured_of(engine)}
     try:
         found = measure_all(engine, jobs)
@@ -107,7 +108,7 @@ def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
         click.echo(json.dumps([asdict(entry) for entry in found], indent=1))
     else:
         for entry in found:
-            console.print(f"{engine}/{entry.shipped} {entry.scene}: cured by {entry.text}", soft_wrap=True)
+            console.print(f"{engine}/{entry.shipped} {entry.scene}: fixed by {entry.text}", soft_wrap=True)
     return listed == {(e.scene, e.shipped, e.better): e.text for e in found}
 
 

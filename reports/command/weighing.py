@@ -25,8 +25,8 @@ from validation.running.plan import slots
 def residuals(as_json: bool, **options: Any) -> None:
     """Check reported contact forces against the laws of contact.
 
-    The representative cell of each scene is run. Numbers are shares of the largest impulse of the run (works: times the
-    fastest contact); a word where an engine reports none.
+    Runs one case of each scene. Numbers are relative to the largest impulse of the run (work: also to the fastest
+    contact). For an engine that reports no forces, the reason is printed instead.
     """
     cells = cells_of(slots(request_from(options)), bool(options["param"] or options["iterations"] or options["dt"]))
     progress = terminal(stderr=True)

@@ -101,7 +101,7 @@ def test_a_terminal_is_asked_for_the_reason_of_every_family(out, findings, monke
     listed = files.findings_of("chipmunk").members
     assert {key[6].partition("[")[0] for key in listed} == set(family.metrics)
     # Asked again about a family that has not changed since, it does not ask.
-    assert "is this still why" not in accept(out, input="\n" * 10).stderr
+    assert "is this still the cause" not in accept(out, input="\n" * 10).stderr
 
 
 def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
@@ -121,12 +121,12 @@ def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_anothe
     told = io.StringIO()
     Console(file=told, width=120).print(accepting._table("toy", changes))
     title, header, first, second = (line for line in told.getvalue().splitlines() if re.search(r"\w", line))
-    assert title.strip() == "Findings of toy: rows per family"
+    assert title.strip() == "Known failures of toy: checks per cause"
     cells = [re.split(r"[│┃]", line)[1:-1] for line in (header, first, second)]
     assert [[cell.strip() for cell in line] for line in cells] == [
-        ["family", "listed", "new", "drifted", "gone", "bands", "why"],
+        ["cause", "listed", "new", "changed", "gone", "bands", "why"],
         ["one", "150", "2", "30", "4", "5", "four sweeps"],
-        ["another", "0", "12345", "0", "0", "0", "nobody has said why yet"],
+        ["another", "0", "12345", "0", "0", "0", "no reason is written yet"],
     ]
     for line in cells:
         assert all(cell[-2] != " " for cell in line[1:6]) and all(cell[1] != " " for cell in (line[0], line[6]))
@@ -158,13 +158,13 @@ def test_the_table_has_the_families_that_would_change_and_no_others(out, finding
     accept(out, "--family", "starved")
     files.findings_of.cache_clear()
     again = accept(out)
-    assert again.exit_code == 0 and "rows per family" not in again.stderr
+    assert again.exit_code == 0 and "checks per cause" not in again.stderr
 
 
 def test_an_unknown_family_is_a_wrong_call(out, findings):
     result = accept(out, "--family", "unheard-of")
     assert result.exit_code == 2
-    assert "no such family" in result.stderr
+    assert "no such cause" in result.stderr
 
 
 def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):

@@ -107,7 +107,7 @@ def test_an_engine_without_a_profile_as_shipped_has_nothing_to_be_cured(searched
     monkeypatch.setattr(curing, "profile_of", lambda engine, role: None if role == "shipped" else "tuned")
     status, out, err = said("cure", "chipmunk")
     assert (status, out, searched) == (2, "", [])
-    assert err == ["crosscheck: cure: chipmunk has no profile as shipped that could be mended"]
+    assert err == ["crosscheck: cure: chipmunk has no profile as shipped that could be fixed"]
     assert "nobody" in "".join(said("cure", "nobody")[2])
 
 
@@ -166,7 +166,7 @@ def test_frontiers_are_searched_to_the_ratio_that_is_asked_and_told_as_data(monk
     status, out, err = said(*call, "--json", "--jobs", "2")
     found = json.loads(out)
     count = len(found)
-    assert status == 0 and count and err == [f"{count} of {count} brackets open", f"0 of {count} brackets open"]
+    assert status == 0 and count and err == [f"{count} of {count} searches left", f"0 of {count} searches left"]
     assert {(each["scene"], each["engine"], each["profile"], each["dimension"]) for each in found} == {
         (names[0], "chipmunk", "tuned", 2)
     }
@@ -176,9 +176,13 @@ def test_frontiers_are_searched_to_the_ratio_that_is_asked_and_told_as_data(monk
     plain, told = said(*call)[1], said(*call, "--commands")[1]
     assert plain == told and plain.count("crosscheck run") == count <= driving.FEW
     monkeypatch.setattr(driving, "FEW", count - 1)
-    assert "--commands prints the two cells" in said(*call)[1] and said(*call, "--commands")[1] == told
+    assert "--commands prints the commands of both ends" in said(*call)[1] and said(*call, "--commands")[1] == told
     status, out, err = said("frontier", "seam" if "seam" not in names else "slide", "--engine", "chipmunk")
-    assert status == 2 and out == "" and f"cannot be driven; {', '.join(names)} can" in " ".join(" ".join(err).split())
+    assert (
+        status == 2
+        and out == ""
+        and f"has no breaking point to search; {', '.join(names)} have" in " ".join(" ".join(err).split())
+    )
 
 
 def test_a_named_engine_that_is_not_here_has_a_status_of_its_own(monkeypatch):
@@ -211,7 +215,7 @@ def test_public_questions_are_asked_and_one_that_is_no_longer_so_is_an_alarm(mon
     monkeypatch.setattr(asking, "ask", lambda chosen, jobs: ask(chosen, jobs, true=len(chosen) == 0))
     assert said("field", "chipmunk")[0] == 1
     status, out, err = said("field", "nothing", "at-all")
-    assert status == 2 and "no note has nothing or at-all" in " ".join(err)
+    assert status == 2 and "no known report has nothing or at-all" in " ".join(err)
 
 
 # ---- findings that are accepted --------------------------------------------------------------------------------------
@@ -251,13 +255,13 @@ def test_what_is_accepted_refused_and_left_out_is_said_and_counted(monkeypatch, 
         "refused": 14, "left_out": 2, "not_accepted": ["f-2"],
     }  # fmt: skip
     told = [
-        "refused: 14 rows: a law covers it",
+        "refused: 14 checks: a law covers it",
         *["  chipmunk/default stack 3-D {'n': 2.0} creep 0.123457"] * accepting.SHOWN,
-        "  and 2 more", "not accepted: f-2", "of no family that is named: 2 rows new or drifted",
+        "  and 2 more", "not accepted: f-2", "not named by --family: 2 checks new or changed",
     ]  # fmt: skip
     assert err[-len(told) :] == told
     status, out, err = said(*call)
-    assert out == f"chipmunk: 3 rows of 1 family listed in {tmp_path / accepting.MEMBERS}\n" and status == 1
+    assert out == f"chipmunk: 3 checks with 1 cause listed in {tmp_path / accepting.MEMBERS}\n" and status == 1
     quiet = Proposal("chipmunk", changes[:1], {}, ())
     monkeypatch.setattr(accepting, "propose", lambda *given: quiet)
     assert said(*call)[0] == 0
@@ -297,12 +301,12 @@ def test_a_cell_is_written_where_it_is_asked_for_and_told_as_data(monkeypatch, t
         "crosscheck: output: pymunk.py would be imported in the place of pymunk itself, name it otherwise"
     ])  # fmt: skip
     for arguments, why in (
-        (("export",), "export: say --parquet FOLDER for results, or --to FORMAT for a cell"),
-        (("export", "stack", "--to", "python"), "export: --to writes one cell: name its scene and its --engine"),
+        (("export",), "export: needs --parquet FOLDER for results, or --to FORMAT for a case"),
+        (("export", "stack", "--to", "python"), "export: --to writes one case: name its scene and its --engine"),
         ((*cell, "--all"), "all: chooses runs, which needs --parquet"),
         *(
             (("export", "--parquet", str(tmp_path / "p"), f"--{name}", value),
-             f"{name}: chooses a cell to write, which needs --to")
+             f"{name}: chooses a case to write, which needs --to")
             for name, value in (("output", str(path)), ("engine", "chipmunk"), ("profile", "x"), ("param", "n=1"),
                                 ("dim", "2"), ("dt", "1/60"), ("iterations", "3"))
         ),
@@ -313,13 +317,13 @@ def test_a_cell_is_written_where_it_is_asked_for_and_told_as_data(monkeypatch, t
 def test_a_bench_that_fits_no_cell_or_has_no_use_for_an_option_says_so_before_anything_runs(tmp_path):
     call = ("bench", "impact", "--engine", "chipmunk", "--out", str(tmp_path / "out"))
     for more, why in (
-        (("--ulp", "1"), "ulp: moves the start of a run; a bench has no use for it"),
-        (("--standard",), "standard: a suite of cells that are judged; a bench is --quick or --full"),
+        (("--ulp", "1"), "ulp: moves the start of a run; it has no meaning for a benchmark"),
+        (("--standard",), "standard: is a suite of judged cases; a benchmark is --quick or --full"),
     ):
         assert said(*call, *more) == (2, "", [f"crosscheck: {why}"])
     cells = json.loads(said(*call, "--dry-run", "--json")[1])["cells"]
-    assert cells > 1 and said(*call, "--dry-run") == (0, f"{cells} cells\n", [])
-    assert benching.plural(1, "cell") == "1 cell" and not (tmp_path / "out").exists()
+    assert cells > 1 and said(*call, "--dry-run") == (0, f"{cells} cases\n", [])
+    assert benching.plural(1, "case") == "1 case" and not (tmp_path / "out").exists()
 
 
 # ---- cells that are chosen -------------------------------------------------------------------------------------------
@@ -347,7 +351,7 @@ def test_options_become_a_request_field_by_field_and_its_words():
     assert not selection.request_from(options | {"full": False, "quick": True}).floors
     for wrong, why in (
         ({"quick": True}, "--quick and --full: a run is of one suite"),
-        ({"param": ("n=2", "n=3")}, "param: n is given twice; crosscheck sweep --grid asks several values"),
+        ({"param": ("n=2", "n=3")}, "param: n is given twice; crosscheck sweep --grid runs several values"),
         ({"param": ("n",)}, "param: 'n' is not of the form NAME=VALUE"),
         ({"param": ("=2",)}, "param: '=2' is not of the form NAME=VALUE"),
         ({"param": ("n=two",)}, "param: n='two' is not a number"),
@@ -364,7 +368,7 @@ def test_a_line_for_each_engine_that_was_named_and_is_not_here_or_one_if_none_is
         return SimpleNamespace(name=name, engine=None if name.startswith("no") else object(), reason=f"no {name}")
 
     monkeypatch.setattr(selection.registry, "find", find)
-    named = "engine: {0} was named, but did not run: no {0}".format
+    named = "engine: {0} did not run: no {0}".format
     none = "engine: none of nobody, noone is installed here; crosscheck doctor says why"
     for asked, chosen, told in (
         ((), ["a", "b"], []), ((), ["a", "nobody"], []), (("a",), ["a"], []), ((), ["nobody", "noone"], [none]),

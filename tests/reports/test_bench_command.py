@@ -74,7 +74,7 @@ def test_tables_are_written_as_csv_and_json(bench):
 
 def test_a_dry_run_says_how_many_cells_and_times_nothing(tmp_path):
     result = call(*ONE, "--dry-run", "--out", tmp_path / "none")
-    assert result.exit_code == 0 and result.stdout == "32 cells\n"
+    assert result.exit_code == 0 and result.stdout == "32 cases\n"
     assert not (tmp_path / "none").exists()
 
 
@@ -83,8 +83,8 @@ def test_a_dry_run_says_how_many_cells_and_times_nothing(tmp_path):
     [
         (["bench", "bounse"], "did you mean 'bounce'"),
         (["bench", "impact", "--engine", "chipmonk"], "did you mean 'chipmunk'"),
-        (["bench", "impact", "--against", "latest"], "there is no bench run 'latest'"),
-        (["bench", "impact", "--ulp", "1"], "a bench has no use for it"),
+        (["bench", "impact", "--against", "latest"], "there is no benchmark 'latest'"),
+        (["bench", "impact", "--ulp", "1"], "no meaning for a benchmark"),
         (["bench", "impact", "--dt", "0"], "dt: 0 must be a positive"),
     ],
 )

@@ -89,22 +89,26 @@ def test_the_cheapest_is_marked_and_whoever_is_not_told_apart_from_it_is_a_tie(p
     cells = marks(text)
     assert [cells[name][0] for name in COSTS] == ["* 1 ms 1/240", "= 1.01 ms 1/240", "1.5 ms 1/240"]
     assert [cells[name][2] for name in COSTS] == ["* 1 ms 1/240", "= 1.01 ms 1/240", "-"]
-    assert "=: a tie, its interval overlaps the cheapest" in text
-    assert "This machine was busy" not in text
+    assert "=: no measurable difference from the cheapest" in text
+    assert "The machine was busy" not in text
 
 
 def test_who_cannot_be_asked_is_in_no_table_and_a_table_of_nothing_is_none(printed):
     """``unsupport...`` stood where an error belongs, and headings over nothing."""
     text = printed(planar=2)
     assert text.count("chipmunk/default") == 1 and "impact 3-D" not in text and "unsupported" not in text
-    assert "Binding" not in text and "Cost of a step" not in text
+    assert "Overhead" not in text and "Cost of a step" not in text
 
 
 def test_a_busy_machine_is_said_and_ranks_nobody(printed):
     text = printed(busy=("bullet",))
-    assert "This machine was busy: for 33% of the units wall time is more than 1.2 times CPU time." in text
+    assert "The machine was busy: for 33% of the cases wall time is more than 1.2 times CPU time." in text
     assert [cells[0] for cells in marks(text).values()] == ["1 ms 1/240", "1.01 ms 1/240", "1.5 ms 1/240"]
-    assert "*" not in text and "a tie" not in text and "-: not reached; 1/240 x30: step, iterations" in text
+    assert (
+        "*" not in text
+        and "no measurable" not in text
+        and "-: error not reached; 1/240 x30: time step, iterations" in text
+    )
 
 
 @pytest.mark.parametrize(
@@ -134,8 +138,8 @@ def test_the_quality_of_the_timings_is_one_line():
         "drifts": [True, False, False], "load": np.array([1.0, 1.5, math.nan]),
     })  # fmt: skip
     assert speed.quality_line(table) == (
-        "2 units timed, 12 timings; interval of the median under 5 % for 50 %, median 6.0 %; 1 drift; "
-        "wall / CPU time 1.25 (median); 1 void"
+        "2 cases timed in 12 timings, good to about 6.0 % (median); 1 drifted, 1 not timed; "
+        "wall time / CPU time 1.25 (median)"
     )
     assert speed.quality_line(table[table["void"] != ""]) == "nothing was timed"
 

@@ -38,8 +38,8 @@ def test_units_are_timed_one_by_one_and_how_it_was_done_is_kept(monkeypatch):
     monkeypatch.setattr(benching.time, "monotonic", lambda: next(clock))
     monkeypatch.setattr(benching.os, "getloadavg", lambda: next(loads))
     out, console = printed()
-    benching._time(store, "run", ["impact", "slide"], ["u", "v", "w"], benching.QUICK, 7, console)
-    assert out.getvalue() == "timing 3 units, one at a time, in random order (seed 7)\n"
+    benching.time_units(store, "run", ["impact", "slide"], ["u", "v", "w"], benching.QUICK, 7, console)
+    assert out.getvalue() == "timing 3 cases, one at a time, in random order (seed 7)\n"
     protocol = did.pop()[-1]
     assert did == [
         ("clear", "run"), ("lane", ["u", "v", "w"], benching.QUICK, 7),
@@ -109,6 +109,7 @@ def test_what_a_bench_shows_ends_with_its_run_its_seed_and_where_it_is_written(
     assert out.getvalue().splitlines() == [
         "quality of timings", *([busy] if busy else []), *told, *beside,
         f"run 20260101-000000, seed {seed}; written: {tmp_path / 'bench'}",
+        f"figures of error against time: crosscheck report --open --out {tmp_path}",
     ]  # fmt: skip
 
 

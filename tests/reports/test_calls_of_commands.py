@@ -69,7 +69,7 @@ def test_a_run_hands_on_its_cells_limits_and_title_and_its_status_is_that_of_its
     cells = ("run", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--out", str(tmp_path / "o"))
     assert said(*cells) == (statuses.FINE, "2 rows, 1\n", [])
     count = json.loads(said(*cells, "--dry-run", "--json")[1])["cells"]
-    assert said(*cells, "--dry-run") == (0, f"{count} cells\n", [])
+    assert said(*cells, "--dry-run") == (0, f"{count} cases\n", [])
     told = "impact --engine chipmunk --profile tuned --dim 2"
     assert ran.calls == [(f"quick: {told}", count, 0, running.TIMEOUT, None, False, "")] and ran.apart == []
     assert ran.kept == [("a-run", ["seen"], ran.rows)]
@@ -116,10 +116,10 @@ def test_invariance_is_asked_of_the_cells_and_only_there_breaks_are_kept(monkeyp
     (own,) = asked[0][1]
     assert asked == [(1, {own}, False, False), (1, {own}, True, True), (1, {(("n", 3.0),)}, False, False)]
     assert said(*cells, "--keep") == (
-        2, "", ["crosscheck: keep: lists breaks of invariance, and needs --invariance"]
+        2, "", ["crosscheck: keep: lists violations of metamorphic tests, and needs --invariance"]
     )  # fmt: skip
     assert said(*cells, "--keep-trajectories", "--cluster", "local:2") == (
-        2, "", ["crosscheck: keep_trajectories: a cluster sends observations only; run those cells here"]
+        2, "", ["crosscheck: keep_trajectories: a cluster sends back no trajectories; run those cases here"]
     )  # fmt: skip
     assert not (tmp_path / "out").exists()
 
@@ -179,7 +179,9 @@ def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_p
     call = ("sweep", "impact", "--grid", "e=0:1:3", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2",
             "--out", str(out))  # fmt: skip
     status, told, err = said(*call, "--jobs", "2", "--timeout", "9")
-    assert (status, told) == (0, "") and err == ["2 lines", f"table: {out / 'sweep.csv'}"]
+    assert (status, told) == (0, "") and err == [
+        "2 lines", f"table: {out / 'sweep.csv'}", f"what fails and why: crosscheck findings --out {out}"
+    ]  # fmt: skip
     assert ran.calls == [("sweep: impact", 3, 2, 9.0, None, False, "")]
     assert pd.read_csv(out / "sweep.csv").equals(table)
     status, told, _ = said(*call, "--json", "--fresh", "--csv", str(tmp_path / "t.csv"))
@@ -187,7 +189,7 @@ def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_p
     assert (status, json.loads(told)) == (0, plain) and ran.calls[-1][5] and told.count("\n") > 4
     assert pd.read_csv(tmp_path / "t.csv").equals(table)
     assert (
-        said(*call, "--dry-run") == (0, "3 cells\n", []) and said(*call, "--dry-run", "--json")[1] == '{"cells": 3}\n'
+        said(*call, "--dry-run") == (0, "3 cases\n", []) and said(*call, "--dry-run", "--json")[1] == '{"cells": 3}\n'
     )
     for outcome in ("invalid", "crashed", "timed_out", "missing"):
         ran.rows = [row(), SimpleNamespace(alarming=False, outcome=outcome)]
@@ -203,7 +205,7 @@ def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_p
     ):  # fmt: skip
         assert said(*call, *more) == (2, "", [f"crosscheck: {why}"])
     assert said("sweep", "--grid", "e=0:1:3") == (
-        2, "", ["crosscheck: scenes: name the scenes of a sweep, it has parameters of its own"]
+        2, "", ["crosscheck: scenes: a sweep needs the name of a scene"]
     )  # fmt: skip
 
 
@@ -299,7 +301,7 @@ def test_a_search_for_settings_is_told_as_it_goes_and_what_is_better_has_a_statu
     assert said("tune", "chipmunk")[2] == ["crosscheck: profile: chipmunk has no tuned one; name one with --profile"]
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: ())
     assert said("tune", "chipmunk")[2] == [
-        "crosscheck: tune: nobody has named stock settings of chipmunk to try (tuning.toml in its folder)"
+        "crosscheck: tune: no stock settings of chipmunk to try are listed (tuning.toml in its folder)"
     ]
 
 

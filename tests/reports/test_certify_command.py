@@ -146,11 +146,11 @@ def test_the_self_test_says_by_what_each_corruption_is_caught_at_each_size(monke
     (first,), (second,) = ([row for row in cells if row and row[0] == name] for name in ("law", "motion"))
     assert first == ["law", "friction", "block", "MISSED", *["coulomb"] * (len(SIZES) - 1), "no check asks for it"]
     assert second == ["motion", "a place", "ball", *["gap"] * len(SIZES), ""]
-    assert f"2 of 2 caught at size {JUDGED:g}, 95% promised" in result.stderr and "missed:" not in result.stderr
+    assert f"2 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr and "missed:" not in result.stderr
 
 
 def test_the_self_test_fails_where_too_little_is_caught_at_the_size_that_is_judged(monkeypatch):
     result = planted(monkeypatch, {("friction", JUDGED)}, [])
     assert result.exit_code == 1 and result.stdout == ""
-    assert f"1 of 2 caught at size {JUDGED:g}, 95% promised" in result.stderr
+    assert f"1 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr
     assert "missed: friction, block: no check asks for it" in result.stderr

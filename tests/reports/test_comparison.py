@@ -60,10 +60,10 @@ def test_filters_and_exit_codes():
 
 def test_text_and_markdown_name_the_row_and_the_command():
     text = compare("base", "flip").stdout
-    assert "1 verdict flipped (1 regressed)" in text
+    assert "1 newly failing" in text
     assert "crosscheck run bounce" in text
     markdown = compare("base", "flip", "--markdown").stdout
-    assert "| verdict flipped | worse | 1 | chipmunk/tuned bounce 2-D" in markdown
+    assert "| newly failing | worse | 1 | chipmunk/tuned bounce 2-D" in markdown
 
 
 def test_rows_of_one_side_only_are_said(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from reports import exports
 from reports.findings import finding_line
-from reports.matrix import legend
+from reports.matrix import legend, matrix_of, status_of
 from validation.cells import Observation, Outcome, Slot
 from validation.judging.rows import Row
 from validation.records.store import Store, StoreError
@@ -74,18 +74,18 @@ def test_csv_holds_all_fields_but_slot_and_log():
 
 def test_markdown_is_the_matrix_its_legend_and_what_needs_attention():
     rows = plain(KNOWN, ROW, PASS, SPATIAL, CRASHED)
-    empty = legend().replace("|", "\\|")
+    matrix = matrix_of(rows)
     assert exports.as_markdown(rows) == "\n".join([
         "| scene | chipmunk/default<br>7.3.1 | chipmunk/tuned<br>7.3.1 |",
         "|---|---|---|",
-        "| impact 2-D | FAIL known 1/1 | CRASHED 2/3 |",
-        "| impact 3-D |  | pass 1 |",
-        "", empty, "",
-        "**CRASHED**: 1 row",
+        "| impact 2-D | 1 of 1 fail | 2 of 3 fail, 1 crashed, 1 new |",
+        "| impact 3-D |  | 1 pass |",
+        "", legend(matrix), "", status_of(matrix), "",
+        "**CRASHED**: 1 check",
         "* " + finding_line(rows[4]).replace("|", "\\|"),
-        "**FAIL new**: 1 row",
+        "**FAIL, new**: 1 check",
         "* " + finding_line(rows[1]).replace("|", "\\|"),
-        "**FAIL known**: 1 row",
+        "**FAIL, known**: 1 check",
         "",
     ])  # fmt: skip
 
@@ -101,13 +101,13 @@ def test_markdown_says_who_is_in_no_ranking_and_who_leaves_the_plane_between_leg
     out = replace(ROW, engine="mujoco", engine_version="3.3", metric="out_of_plane", value=0.25, truth=0.0,
                   standing="known", scene="im|pact")  # fmt: skip
     lines = exports.as_markdown(plain(PASS, matched, out)).split("\n")
-    start = lines.index(legend().replace("|", "\\|"))
+    start = lines.index(status_of(matrix_of(plain(PASS, matched, out))))
     assert lines[start + 1] == lines[start + 3] == lines[start + 5] == ""
-    assert lines[start + 2].startswith("mujoco/matched: the textbook's law")
+    assert lines[start + 2].startswith("mujoco/matched: the textbook law")
     assert lines[start + 4] == (
-        "Planar cells that leave their plane in space: mujoco/tuned 1 of 1 (most of all im\\|pact, by 0.25 m)"
+        "2-D scenes that leave their plane in a 3-D engine: mujoco/tuned 1 of 1 (farthest in im\\|pact: 0.25 m)"
     )
-    assert lines[start + 6].startswith("**FAIL known**")
+    assert lines[start + 6].startswith("**FAIL, known**")
 
 
 # ---- JUnit ---------------------------------------------------------------------------------------------------------

@@ -29,17 +29,17 @@ COMMAND = "crosscheck run incline --param ratio=0.99 --dim 3 --engine mujoco --p
 
 def test_a_line_says_who_what_how_far_off_why_and_how_to_see_it_again():
     assert finding_line(row()) == (
-        "FAIL known: mujoco/default incline 3-D ratio=0.99: creep 0.5 m/s, truth 0 m/s, tolerance 0.1 (Coulomb); "
+        "FAIL, known: mujoco/default incline 3-D ratio=0.99: creep 0.5 m/s, truth 0 m/s, tolerance 0.1 (Coulomb); "
         f"it is soft | {COMMAND}"
     )
     assert f"tolerance 0.1 (Coulomb) | {COMMAND}" in finding_line(row(reason=""))
 
 
 def test_a_line_of_a_sweep_says_its_iterations_and_one_without_a_value_its_reason_alone():
-    assert finding_line(row(iterations=30)).startswith("FAIL known: mujoco/default incline 3-D ratio=0.99 at 30 iter")
+    assert finding_line(row(iterations=30)).startswith("FAIL, known: mujoco/default incline 3-D ratio=0.99 at 30 iter")
     bare = row(iterations=30)
     bare["slot"] = {**bare["slot"], "params": {}}
-    assert finding_line(bare).startswith("FAIL known: mujoco/default incline 3-D at 30 iterations: creep")
+    assert finding_line(bare).startswith("FAIL, known: mujoco/default incline 3-D at 30 iterations: creep")
     crashed = row(value=None, outcome="crashed", reason="signal 11")
     assert finding_line(crashed) == f"CRASHED: mujoco/default incline 3-D ratio=0.99: signal 11 | {COMMAND}"
 
@@ -90,7 +90,7 @@ def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_chec
     first = [row(metric, **lost | {"reason": "SIGSEGV"}) for metric in names]
     found = families([*first, row("drift", **lost | {"reason": "SIGABRT"})])
     assert [(f.mark, f.metric, len(f.rows)) for f in found] == [(outcome, "*", 3), (outcome, "*", 1)]
-    assert found[0].line.endswith("mujoco/default incline 3-D ratio=0.99: SIGSEGV (3 rows)")
+    assert found[0].line.endswith("mujoco/default incline 3-D ratio=0.99: SIGSEGV (3 checks)")
     assert found[1].line.endswith(": SIGABRT")
 
 
@@ -100,16 +100,16 @@ def test_a_run_that_is_not_certified_is_told_once_with_the_first_reason_of_its_c
     ended = {"outcome": "invalid", "physics": None, "standing": None}
     (family,) = families([row("impulse[1]", **ended, reason=why), row("drift", **ended, reason=why)])
     told = "certificate: bodies overlap at the start: 0.1, at most 1e-06 (and 2 more)"
-    assert family.line == f"INVALID: mujoco/default incline 3-D ratio=0.99: {told} (2 rows)"
+    assert family.line == f"INVALID: mujoco/default incline 3-D ratio=0.99: {told} (2 checks)"
     assert families([row(**ended, reason="receipt mass: 2")])[0].line.endswith("ratio=0.99: receipt mass: 2")
 
 
 def test_a_family_is_told_in_one_line_and_as_plain_data():
     worst, mild = row("impulse[2]", 0.9, iterations=4), row("impulse[1]", 0.2, iterations=4)
     (family,) = families([mild, worst])
-    line = "FAIL known: mujoco/default incline 3-D ratio=0.99 at 4 iterations: impulse[2] 0.9 m/s, truth 0 m/s, " \
+    line = "FAIL, known: mujoco/default incline 3-D ratio=0.99 at 4 iterations: impulse[2] 0.9 m/s, truth 0 m/s, " \
         "tolerance 0.1"  # fmt: skip
-    assert family.line == f"{line}, the worst of 2 rows"
+    assert family.line == f"{line}, the worst of 2 checks"
     assert families([worst])[0].line == line
     assert families([row()])[0].where == "3-D ratio=0.99"
     assert json.loads(json.dumps(family.as_dict())) == {

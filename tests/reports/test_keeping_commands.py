@@ -77,21 +77,21 @@ def test_polars_and_duckdb_read_the_same_numbers_as_pandas(out, tmp_path):
 
 def test_merge_says_what_came(out, tmp_path):
     first = call("merge", out, "--out", tmp_path)
-    assert "2 new runs, 0 known" in first.stdout
-    assert "0 new runs, 2 known, 0 rows" in call("merge", out, "--out", tmp_path).stdout
+    assert "2 new runs, 0 there already" in first.stdout
+    assert "0 new runs, 2 there already, 0 results" in call("merge", out, "--out", tmp_path).stdout
     assert call("merge", tmp_path / "nothing", "--out", tmp_path / "new", status=2)
     assert not (tmp_path / "new").exists()
 
 
 def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
     call("merge", out, "--out", tmp_path)
-    assert "name a rule" in call("prune", "--out", tmp_path, status=2).output
+    assert "needs --keep" in call("prune", "--out", tmp_path, status=2).output
     # Two runs that ask differently have different titles: none is a repetition of the other.
-    assert "0 runs would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
+    assert "0 runs would be deleted" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
     again = ("impact", "--engine", "chipmunk", "--dim", 2, "--param", "v=3", "--fresh", "--jobs", 1)
     call("run", *again, "--out", tmp_path)
-    assert "1 run would go" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
-    assert "1 run went" in call("prune", "--keep", 1, "--out", tmp_path).stdout
+    assert "1 run would be deleted" in call("prune", "--keep", 1, "--dry-run", "--out", tmp_path).stdout
+    assert "1 run deleted" in call("prune", "--keep", 1, "--out", tmp_path).stdout
     assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 2
 
 

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 STAND_IN = """#!/bin/sh
 echo "called: $*" >> "$CALLED"
 case "$1" in report) echo "path on stdout";; *) echo "output of $1";; esac
-case "$1" in run) exit ${RUN:-0};; bench) exit ${BENCH:-0};; report) exit ${REPORT:-0};; show) exit ${SHOW:-0};; esac
+case "$1" in run) exit ${RUN:-0};; bench) exit ${BENCH:-0};; report) exit ${REPORT:-0};; esac
 """
 
 
@@ -44,25 +44,25 @@ def make_run(tmp_path):
     return run
 
 
-def test_bench_and_report_come_after_the_cells_and_the_matrix_with_the_report_s_path_comes_last(make_run):
+def test_the_answer_is_printed_once_then_come_bench_and_report_with_its_path(make_run):
     status, lines, calls = make_run()
-    assert status == 0 and [call[0] for call in calls] == ["run", "bench", "report", "show"]
+    assert status == 0 and [call[0] for call in calls] == ["run", "bench", "report"]
     assert all(call[-2] == "--out" and call[-1] == calls[0][-1] for call in calls)
     assert "--quick" in calls[0] and "--standard" in make_run("SUITE=standard")[2][0]
     shown = [line for line in lines if line.startswith(("output of", "path"))]
-    assert shown == ["output of run", "output of bench", "output of show"]  # of the report `show` tells the path
-    assert lines[-2] == "output of show"
+    assert shown == ["output of run", "output of bench", "path on stdout"]
+    assert lines[-3:-1] == ["report:", "path on stdout"]
 
 
-def test_it_says_after_how_many_seconds_the_matrix_stood_and_what_all_of_it_took(make_run):
+def test_it_says_after_how_many_seconds_the_verdicts_stood_and_all_was_done(make_run):
     _, lines, _ = make_run()
-    assert re.fullmatch(r"matrix after \d+ s; now time and report", lines[1])
-    assert re.fullmatch(r"all of it took \d+ s", lines[-1])
+    assert re.fullmatch(r"verdicts after \d+ s; now the benchmark and the report", lines[1])
+    assert re.fullmatch(r"done after \d+ s", lines[-1])
 
 
 def test_bad_rows_decide_the_status_and_leave_time_and_report_to_be_made(make_run):
     status, _, calls = make_run(run=1)
-    assert status != 0 and [call[0] for call in calls] == ["run", "bench", "report", "show"]
+    assert status != 0 and [call[0] for call in calls] == ["run", "bench", "report"]
 
 
 @pytest.mark.parametrize("broken", [2, 3, 4, 130])
@@ -71,7 +71,7 @@ def test_a_run_that_is_no_verdict_has_nothing_to_be_timed_or_reported(make_run, 
     assert status != 0 and [call[0] for call in calls] == ["run"]
 
 
-@pytest.mark.parametrize("stage", ["bench", "report", "show"])
+@pytest.mark.parametrize("stage", ["bench", "report"])
 def test_a_stage_that_fails_fails_it(make_run, stage):
     status, _, calls = make_run(**{stage: 1})
     assert status != 0 and calls[-1][0] == stage

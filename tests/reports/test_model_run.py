@@ -66,9 +66,11 @@ def test_what_fails_says_that_the_model_is_your_own_and_is_no_alarm(tmp_path):
     words = ("run", path, "--engine", "mujoco", "--profile", "default", "--dim", 3, "--param", "duration=0.5",
              "--jobs", 1)  # fmt: skip
     done = call(*words, "--out", tmp_path, status=(0,))
-    assert "default 3-D  FAIL 1/2" in done.stdout and "overlaps by" in done.stdout
+    assert "default 3-D  1/2 fail" in done.stdout and "overlaps by" in done.stdout
     assert "Needs attention" not in done.stdout
-    assert "nothing is listed of a model: what is wrong reads FAIL and does not fail the command" in done.stderr
+    assert (
+        "failures of a model are shown and do not fail the command: no known failures are listed for it" in done.stderr
+    )
     rows = json.loads(call(*words, "--out", tmp_path / "again", "--json", status=(0,)).stdout)
     (row,) = [row for row in rows if row["physics"] == "fail"]
     assert (row["metric"], row["standing"], row["reason"]) == ("penetration", None, "not listed: your own model")
@@ -102,9 +104,9 @@ def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypat
 
 def test_the_same_command_says_how_many_cells_and_a_profile_can_be_chosen(tmp_path):
     words = ("run", MODELS / "ball_on_floor.xml", "--engine", "mujoco", "--dry-run", "--out", tmp_path)
-    assert call(*words).stdout == "8 cells\n"  # three profiles and the model's own, in the plane and in space
-    assert call(*words, "--profile", "model").stdout == "2 cells\n"
-    assert call(*words, "--profile", "model", "--dt", "1/240", "--dt", "1/480").stdout == "4 cells\n"
+    assert call(*words).stdout == "8 cases\n"  # three profiles and the model's own, in the plane and in space
+    assert call(*words, "--profile", "model").stdout == "2 cases\n"
+    assert call(*words, "--profile", "model", "--dt", "1/240", "--dt", "1/480").stdout == "4 cases\n"
     assert "no chosen engine has a profile 'mine'" in call(*words, "--profile", "mine", status=(2,)).output
 
 

@@ -62,7 +62,7 @@ def asked(monkeypatch):
         (row(None, Standing.NEW), listed(False), "Failed", "its report"),  # no answer is a failure
         (row(None, outcome="crashed"), None, "Failed", "its report"),
         (row(None, reason="no boxes", outcome="unsupported"), None, "Skipped", "no boxes"),
-        (None, None, "Failed", "there is no row of speed: the cell left no observation"),
+        (None, None, "Failed", "there is no result of speed: the case did not finish"),
     ],
 )  # fmt: skip
 def test_how_a_check_ends(asked, found, finding, how, said):
@@ -82,7 +82,7 @@ def test_what_passes_although_others_list_it_is_kept_for_the_end(asked):
     Plugin.pytest_terminal_summary(SimpleNamespace(mended=[]), terminal)
     assert said == []
     Plugin.pytest_terminal_summary(SimpleNamespace(mended=["one", "two"]), terminal)
-    assert said == ["= crosscheck: mended", "one", "two"]
+    assert said == ["= crosscheck: fixed", "one", "two"]
 
 
 def test_cells_of_a_scene_run_once_when_the_first_of_its_checks_is_asked(monkeypatch):

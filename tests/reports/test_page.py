@@ -507,7 +507,7 @@ def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
     run, _ = store.start("quick: impact", slots)
     store.add(run, execute(slots[0]))
     store.close()
-    said = "2 of 3 planned cells left no observation"
+    said = "2 of 3 planned cases have no result"
     shown = CliRunner().invoke(main, ["show", "--out", str(tmp_path)])
     made = CliRunner().invoke(main, ["report", "--json", "--out", str(tmp_path)])
     assert said in shown.stderr and said in made.stderr
@@ -521,8 +521,8 @@ def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
     for slot in slots[1:]:
         store.add(run, execute(slot))
     store.close()
-    assert "left no observation" not in CliRunner().invoke(main, ["show", "--out", str(tmp_path)]).stderr
-    assert "left no observation" not in render(load_source(tmp_path))
+    assert "have no result" not in CliRunner().invoke(main, ["show", "--out", str(tmp_path)]).stderr
+    assert "have no result" not in render(load_source(tmp_path))
 
 
 def test_the_page_of_a_run_in_which_nothing_could_be_asked_claims_nothing(tmp_path):

@@ -143,7 +143,7 @@ def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monke
     monkeypatch.setattr(told_cures, "belongs_of", lambda engine: {"useMaximalCoordinates": f"the solver of {engine}"})
     monkeypatch.setattr(told_cures, "decisive", lambda *asked: SimpleNamespace(parts=()))
     found = {change.name: change for change in told_cures.changes(kept, "impact", 2, "bullet", "default", "tuned")}
-    assert "belongs to the solver of bullet" in vars(found["useMaximalCoordinates"]).values()
+    assert "part of the solver of bullet" in vars(found["useMaximalCoordinates"]).values()
 
 
 @pytest.mark.parametrize(("standing", "covered"), [("known", True), ("known", False), ("new", True), (None, False)])

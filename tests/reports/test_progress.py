@@ -72,12 +72,12 @@ def test_what_was_left_is_said_by_reason_and_the_same_plan_goes_on_with_it_alone
 
     run, said = planned(cells)
     lines = [line.strip() for line in said.splitlines()]
-    assert "left: 2 cells, three time-outs [of toy]" in lines and "left: 1 cell, another" in lines
+    assert "not run: 2 cases, three time-outs [of toy]" in lines and "not run: 1 case, another" in lines
     assert "this run is not complete; the same command resumes it" in lines and not run.finished
     asked = []
     again, said = planned(lambda todo, leave: map(answer, asked.extend(todo) or todo))
     assert asked == SLOTS[1:] and again.id == run.id and again.finished
-    assert f"resuming run {run.id}: 1 of 4 cells done" in said
+    assert f"resuming run {run.id}: 1 of 4 cases done" in said
     assert min(counted(said)) == (1, 4) and max(counted(said)) == (4, 4)
 
 
@@ -91,7 +91,7 @@ def test_ctrl_c_says_that_nothing_is_lost_and_loses_nothing(planned):
     (run,) = planned.store.runs()
     assert [o.slot for o in planned.store.observations(run)] == SLOTS[:1] and not run.finished
     _, said = planned(lambda todo, leave: map(answer, todo))
-    assert "1 of 4 cells done" in said
+    assert "1 of 4 cases done" in said
 
 
 def test_answers_that_are_known_are_kept_and_not_asked_again_and_others_are_not_taken(planned):

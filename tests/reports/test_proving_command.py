@@ -19,14 +19,14 @@ def run(*arguments):
 
 @pytest.mark.parametrize(
     ("asked", "hint"),
-    [("stack-touching", "you mean 'stack-touching-start'"), ("phlogiston", "`crosscheck findings` has the reasons")],
+    [("stack-touching", "you mean 'stack-touching-start'"), ("phlogiston", "`crosscheck findings` lists causes")],
 )
 def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, hint):
     """Hundreds of names are no hint."""
     result = run("--prove", asked)
     assert result.exit_code == 2
     (said,) = (line for line in result.output.splitlines() if asked in line)
-    assert f"there is no reason called {asked!r}" in said and hint in said
+    assert f"causes is called {asked!r}" in said and hint in said
     assert len(said) < 240
 
 
@@ -74,7 +74,7 @@ def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
     result = run("--prove", experiment.family, "--engine", "chipmunk")
     assert result.exit_code == statuses.ALARM
     said = [line.split()[0] for line in result.stdout.splitlines() if "PROVEN" in line]
-    assert said == ["PROVEN", "NOT"] and "1 of 2 experiments show what they say" in result.stdout
+    assert said == ["PROVEN", "NOT"] and "1 of 2 experiments confirm their cause" in result.stdout
 
 
 def test_a_ratio_is_told_without_its_unit_of_one():
@@ -88,4 +88,4 @@ def test_who_is_not_in_the_run_is_said_and_not_that_nothing_fails(page_folder, o
     result = run("--out", str(page_folder), option, name)
     assert result.exit_code == 2 and result.stdout == ""
     (line,) = result.stderr.strip().splitlines()
-    assert line.startswith(f"crosscheck: {option}: this run has no rows of '{name}', but of ")
+    assert line.startswith(f"crosscheck: {option}: this run has no check of '{name}', but of ")

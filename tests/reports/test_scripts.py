@@ -460,12 +460,12 @@ def test_hostile_names_end_neither_comment_nor_string(tmp_path):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["bounce", "--engine", "chipmunk"], "say --parquet FOLDER for results, or --to FORMAT for a cell"),
+    (["bounce", "--engine", "chipmunk"], "needs --parquet FOLDER for results, or --to FORMAT for a case"),
     (["bounce", "--engine", "chipmunk", "--to", "mjcf"], "to: chipmunk writes python, not mjcf"),
     (["bounce", "--to", "python"], "name its scene and its --engine"),
     (["bounce", "stack", "--engine", "chipmunk", "--to", "python"], "name its scene and its --engine"),
     (["bounce", "--engine", "chipmunk", "--to", "python", "--all"], "all: chooses runs"),
-    (["--parquet", "p", "--engine", "chipmunk"], "engine: chooses a cell"),
+    (["--parquet", "p", "--engine", "chipmunk"], "engine: chooses a case"),
     (["bounce", "--dim", "3", "--engine", "chipmunk", "--to", "python"], "chipmunk is planar"),
     (["bounce", "--engine", "chipmunk", "--to", "python", "-o", "pymunk.py"], "name it otherwise"),
     (["bounce", "--engine", "chipmunk", "--profile", "best", "--to", "python"], "has no profile 'best'"),

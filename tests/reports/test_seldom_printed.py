@@ -63,7 +63,7 @@ def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
     said = printed(lambda console: tables.sensitivity(entries, {"spin": ["inertia", "spin"]}, BLIND, console))
     assert [line.split("   ")[0] for line in said[2:4]] == ["stack/creep", "receipt damping"]
     assert said[2].endswith("   mu 1 %, g 0.1 %") and said[3].endswith("   none of these faults")
-    assert said[0].split("   ") == ["check or receipt", "sees a fault from this size on"]
+    assert said[0].split("   ") == ["check or property check", "smallest fault that it notices"]
     assert said[4] == "spin: no check of these scenes sees it; the cell is INVALID by inertia, spin"
     angle, creep = ([cell for cell in line.split("  ") if cell] for line in said[-2:])
     assert [cell.strip() for cell in angle] == [
@@ -84,7 +84,7 @@ def test_sensitivity_is_asked_of_checks_alone(monkeypatch):
     monkeypatch.setattr(inspecting, "detection", lambda *asked, **named: Detected([], BLIND))
     assert "incline/angle" in call("list", "checks", "--sensitivity").stdout
     assert json.loads(call("list", "checks", "--sensitivity", "--json").stdout) == []
-    assert "checks have one, not scenes" in call("list", "scenes", "--sensitivity", status=2).stderr
+    assert "belongs to checks, not to scenes" in call("list", "scenes", "--sensitivity", status=2).stderr
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------
@@ -142,7 +142,11 @@ def test_the_cost_of_the_binding_has_a_line_an_engine_in_the_order_of_all_tables
 
 @pytest.mark.parametrize(
     ("count", "enough", "said"),
-    [(20, True, "95.0% of 20 ratios agree"), (3, False, "66.7% of 3 ratios agree"), (0, False, "no unit of the same")],
+    [
+        (20, True, "95.0% of 20 time ratios agree"),
+        (3, False, "66.7% of 3 time ratios agree"),
+        (0, False, "no case of the same"),
+    ],
 )
 def test_two_benches_agree_where_nearly_all_of_their_ratios_do(monkeypatch, count, enough, said):
     both = pd.DataFrame(
@@ -170,22 +174,22 @@ def changed(kind=Kind.FLIP, worse=True):
 
 @pytest.mark.parametrize(
     ("others", "said"),
-    [(None, "the only change? --all asks every release"),
-     (((0, 1), (2, 3)), "not the only change of this row: also 1.0 -> 1.1, 1.2 -> 2.0"),
-     ((), "the only change of this row: every release was asked")],
+    [(None, "whether it is the only change: --all runs every release"),
+     (((0, 1), (2, 3)), "not the only change of this check: also 1.0 -> 1.1, 1.2 -> 2.0"),
+     ((), "the only change of this check: every release ran")],
 )  # fmt: skip
 def test_a_bisection_says_what_changed_who_was_silent_and_how_to_see_it_again(others, said):
     found = Found(1, 3, (0, 3, 1), {2: "it cannot be imported"}, changed(), others)
     again = releasing._commands("toy", "1.1", "2.0", SLOT, Path("else where"))
     lines = told_releases.found_as_text(told_releases.found_as_plain(found, "toy", VERSIONS, again)).splitlines()
     assert lines == [
-        "verdict flipped in toy 2.0: default stack 3-D n=2 at 7 iterations creep",
+        "newly failing since toy 2.0: default stack 3-D n=2 at 7 iterations creep",
         "  toy 1.1: pass",
         "  toy 2.0: fail",
-        "  1.2 lies between and did not answer: it cannot be imported",
-        "asked 3 releases: 1.0, 2.0, 1.1",
+        "  1.2 lies between and cannot run: it cannot be imported",
+        "ran 3 releases: 1.0, 2.0, 1.1",
         said,
-        "to see it again:",
+        "to run it again:",
         "  crosscheck releases toy 1.1,2.0 stack --profile tuned --dim 3 --dt 1/240 --iterations 7 --param n=2.0 "
         "--param mu=0.1 --fresh --out 'else where'",
         "  crosscheck compare toy==1.1 toy==2.0 --out 'else where'",
@@ -199,7 +203,7 @@ def test_a_bisection_says_what_changed_who_was_silent_and_how_to_see_it_again(ot
 
 @pytest.mark.parametrize(
     ("reason", "said", "status"),
-    [("", "creep of stack is the same in 1.0 and 2.0: no verdict flips, no value moves", 0),
+    [("", "creep of stack is the same in 1.0 and 2.0", 0),
      ("release 0 has no answer", "1.0 has no answer", 4), ("release 3 has no answer", "2.0 has no answer", 4)],
 )  # fmt: skip
 def test_where_nothing_was_found_it_says_so_and_whether_that_is_an_answer(capsys, reason, said, status):
@@ -243,12 +247,12 @@ def test_rows_that_moved_between_releases_are_counted_by_what_became_of_them():
     ends = "; first `creep` (3-D n=2 at 7 iterations) pass -> fail"
     every = [(kind, worse) for kind in (Kind.FLIP, Kind.OUTCOME, Kind.ERROR) for worse in (True, False)]
     assert [written._moved([step(kind)]) for kind in every] == [
-        f"1 row {what}{ends}" for what in ("begins to fail", "ceases to fail", "ends without an answer",
-                                           "has an answer again", "changes its value", "changes its value")
+        f"1 check {what}{ends}" for what in ("begins to fail", "ceases to fail", "ends without a result",
+                                             "has a result again", "changes its value", "changes its value")
     ]  # fmt: skip
     assert written._moved([step(*every), step(*every[::-1])]) == (
-        "2 rows begin to fail, 2 rows cease to fail, 2 rows end without an answer, 2 rows have an answer again, "
-        f"4 rows change their value{ends}"
+        "2 checks begin to fail, 2 checks cease to fail, 2 checks end without a result, 2 checks have a result again, "
+        f"4 checks change their value{ends}"
     )
 
 
@@ -278,7 +282,7 @@ def test_what_changed_an_answer_is_said_and_as_data_has_its_cell(monkeypatch, ca
     ]  # fmt: skip
     assert not posing.compare_and_show([slot], False)
     said = " ".join(capsys.readouterr().out.split())
-    assert "stack 2-D n=2" in said and "mirrored (drift by 0.001, may by 1.0e-6)" in said
+    assert "stack 2-D n=2" in said and "mirrored (drift by 0.001; allowed: 1.0e-6)" in said
     assert "crosscheck run stack --param n=2 --dim 2 --engine chipmunk --profile tuned" in said
     changes.pop()
     assert posing.compare_and_show([slot], False)
@@ -300,7 +304,7 @@ def test_doctor_says_of_each_engine_and_package_what_it_is_and_where_and_what_is
     said = [" ".join(line.split()) for line in printed(lambda console: tables.health(data, console))]
     for line in (
         "cpu a [fast] one", "commit -", "toy 1.2 installed", "brittle - ImportError: [no] such symbol",
-        "reports /y/[old]/reports", "compiled kernels no folder is writable: compiled in every process",
+        "reports /y/[old]/reports", "compiled kernels no folder is writable, so every process compiles them",
         "1 problem(s)", "reports is not ours: /y/[old]", "where brittle raised it", "File one, line 3",
     ):  # fmt: skip
         assert line in said
@@ -316,7 +320,7 @@ def test_before_a_family_is_accepted_its_rows_are_counted_and_the_first_three_to
     values = {key: Finding(family, 0.25 * (k + 1), 1e-3) for k, key in enumerate(keys)}
     moved = {key: (own, replace(own, value=2.0 * own.value)) for key, own in values.items()}
     assert accepting._details(Proposed(family, new=values, gone=values)).splitlines() == [
-        "family f-1: default, tuned on stack", "  new: 5 x default creep", "  new: 1 x tuned drift",
+        "cause f-1: default, tuned on stack", "  new: 5 x default creep", "  new: 1 x tuned drift",
         "  gone: 5 x default creep", "  gone: 1 x tuned drift", "  default stack 2 n=0 creep[0]: 0.25",
         "  default stack 2 n=1 creep[1]: 0.5", "  default stack 2 n=2 creep[2]: 0.75",
     ]  # fmt: skip
@@ -325,7 +329,7 @@ def test_before_a_family_is_accepted_its_rows_are_counted_and_the_first_three_to
         "  with another band: 1 x tuned drift", "  default stack 2 n=0 creep[0]: 0.25 -> 0.5",
         "  default stack 2 n=1 creep[1]: 0.5 -> 1", "  default stack 2 n=2 creep[2]: 0.75 -> 1.5",
     ]  # fmt: skip
-    assert accepting._details(Proposed(family, same=values)) == "family f-1: default, tuned on stack"
+    assert accepting._details(Proposed(family, same=values)) == "cause f-1: default, tuned on stack"
 
 
 def test_a_stack_that_sinks_is_a_tile_with_its_depth_in_words_and_dark_where_it_is_deep():

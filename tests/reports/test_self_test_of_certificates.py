@@ -17,4 +17,4 @@ def test_a_share_of_exactly_what_is_promised_is_enough(monkeypatch, missed, stat
     monkeypatch.setattr(certifying, "trials", lambda: iter(made))
     out = io.StringIO()
     assert certifying.show_self_test(Console(file=out, width=160), False) == status
-    assert f"{20 - missed} of 20 caught at size {JUDGED:g}, 95% promised" in out.getvalue()
+    assert f"{20 - missed} of 20 noticed at size {JUDGED:g}, 95% required" in out.getvalue()

@@ -78,7 +78,9 @@ def test_a_name_that_leaves_no_room_for_a_scene_has_a_line_for_each_setting():
         for table in tables_of(matrix_of(rows), {}, width):
             console.print(table)
         text = console.export_text()
-        assert "FAIL 5/12" in text and all(len(line.rstrip()) <= width for line in text.splitlines())
+        assert ("5/12 fail" in text or "5 of 12 fail" in text) and all(
+            len(line.rstrip()) <= width for line in text.splitlines()
+        )
         assert sum("=" in line for line in text.splitlines()) == lines
         assert "".join(text.split("mujoco")[1].split()).startswith(name.partition("+")[0])
 
@@ -103,7 +105,7 @@ def test_findings_and_explain_find_it_by_name_and_by_set(ran):
 
 def test_what_explain_cannot_find_is_one_line(ran):
     done = call("explain", "chipmunk/default/bounce", "--set", "damping=0.25", "--out", ran[0], status=2)
-    assert "no row 'chipmunk/default+damping=0.25/bounce'" in done.output
+    assert "no check 'chipmunk/default+damping=0.25/bounce'" in done.output
     done = call("explain", "0123abcd", "--set", "damping=0.25", "--out", ran[0], status=2)
     assert "set: names a profile; say ENGINE/PROFILE/SCENE in the place of '0123abcd'" in done.output
 
@@ -169,7 +171,7 @@ def test_a_scene_file_runs_with_settings(tmp_path):
         (["run", "bounce", "--engine", "reference", "--set", "damping=0.5"], "set: reference has no setting 'damping'"),
         (["bisect", "chipmunk", "7.0.0..7.3.1", "bounce", "--check", "apex", "--set", "damp=1"],
          "set: chipmunk has no setting 'damp'; near it: damping"),
-        (["export", "--parquet", "folder", "--set", "damping=0.5"], "set: chooses a cell to write, which needs --to"),
+        (["export", "--parquet", "folder", "--set", "damping=0.5"], "set: chooses a case to write, which needs --to"),
     ],
 )  # fmt: skip
 def test_a_wrong_setting_is_one_line_and_nothing_runs(words, said, tmp_path, monkeypatch):

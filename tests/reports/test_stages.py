@@ -67,8 +67,8 @@ class Warming:
 
 
 @pytest.mark.parametrize(
-    ("load", "busy"), [(0.0, ""), (2.0, ""), (2.4, "; these are busy (load 2 on 4), so longer"),
-                       (9.6, "; these are busy (load 10 on 4), so longer")],
+    ("load", "busy"), [(0.0, ""), (2.0, ""), (2.4, "; longer now, the machine is busy (load 2 on 4 cores)"),
+                       (9.6, "; longer now, the machine is busy (load 10 on 4 cores)")],
 )  # fmt: skip
 def test_who_waits_for_a_compilation_is_told_for_how_long_and_that_a_busy_machine_takes_longer(
     console, monkeypatch, load, busy
@@ -78,7 +78,7 @@ def test_who_waits_for_a_compilation_is_told_for_how_long_and_that_a_busy_machin
     monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
     assert stages.warm_up(["slots"], 2, console) == ["reference 2-D", "reference 3-D"]
     first, last = said(console).splitlines()
-    assert first == f"compiling kernels, once per version of the solver: about 1 min 00 s on idle cores{busy}"
+    assert first == f"compiling the solver's kernels (once): about 1 min 00 s on idle cores{busy}"
     assert last == "compiled: 0 s"
 
 
@@ -95,7 +95,7 @@ def test_who_waits_for_little_is_not_told_of_a_minute(console, monkeypatch):
     monkeypatch.setattr(stages, "Warming", Warming)
     monkeypatch.setattr(Warming, "begun", True)
     stages.warm_up(["slots"], 2, console)
-    first = "kernels are compiled; what these cells call besides is looked for"
+    first = "kernels are compiled; checking what else these cases need"
     assert said(console).splitlines() == [first, "compiled: 0 s"]
 
 

@@ -1,4 +1,4 @@
-"""The terminal answers first: matrix, which engine for what, what is wrong and what cures it, then where to look."""
+"""The terminal answers first: matrix, best engines, what is wrong and what fixes it, then which commands lead on."""
 
 import io
 import json
@@ -71,8 +71,8 @@ def test_the_matrix_of_the_whole_quick_suite_stands_in_the_first_thirty_lines(wi
         for profile in profiles:
             assert any(line.startswith(f"  {profile}") for line in head)
     assert any(line.startswith("  every profile 3-D") for line in head)  # chipmunk is planar, and it is said
-    assert ("FAIL known 142/142" in "\n".join(head)) == (width >= 100)
-    assert "known 142/142" in "\n".join(head)
+    assert ("142 of 142 fail" in "\n".join(head)) == (width >= 100)
+    assert "142/142 fail" in "\n".join(head) or width >= 100
 
 
 def test_scenes_that_do_not_fit_make_a_further_table():
@@ -89,15 +89,15 @@ def test_a_sweep_over_iterations_is_counted_apart_from_the_profile():
     own, swept = found.fields[("stack", 2), ("bullet", "tuned")], found.swept[("stack", 2), ("bullet", "tuned")]
     assert (own.missed, own.judged, swept.missed, swept.judged) == (3, 9, 2, 2)
     (line,) = sweeps_of(found)
-    assert line == "stack at 1, 4 iterations instead of the profile's own, FAIL: bullet/tuned 2/2."
-    assert "known 3/9" in "\n".join(shown(rows, 80))
+    assert line == "stack at 1, 4 iterations instead of the profile's own, failed checks: bullet/tuned 2 of 2"
+    assert "3 of 9 fail" in "\n".join(shown(rows, 80))
 
 
 def test_an_answer_that_never_changes_is_told_in_one_clause_with_its_cure():
     rows = [row("impact", 3, "mujoco", "default", "explained", 0.1 + 0.001 * e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
     rows += [row("impact", 3, "mujoco", "tuned", "pass", e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
     (answer,) = answers(rows)
-    assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101 whatever e is asked; tuned cures it"
+    assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101, whatever e is; profile tuned fixes it"
 
 
 def test_a_parameter_is_named_only_if_the_truth_of_one_number_follows_it():
@@ -105,9 +105,9 @@ def test_a_parameter_is_named_only_if_the_truth_of_one_number_follows_it():
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1, truth, e=e, v=1.0) | {"metric": f"restitution[{i}]"}
             for e in (0.5, 1.0) for i, truth in ((1, 0.3), (2, 0.9))]  # fmt: skip
     (answer,) = answers(rows)
-    assert answer.wrong.endswith("whatever is asked")
+    assert answer.wrong.endswith(", in every case")
     rows += [rows[0] | {"params": {"e": 0.5, "v": 2.0}, "truth": 0.4}]
-    assert answers(rows)[0].wrong.endswith("whatever v is asked")
+    assert answers(rows)[0].wrong.endswith(", whatever v is")
 
 
 def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
@@ -183,7 +183,7 @@ def test_a_profile_that_ran_at_another_step_cures_nothing(dt):
     search = "crosscheck cure mujoco stack --param n=2 --dt 1/500 --dim 2"
     assert answer.cure == f"no other profile was run in this case; {search} searches for settings"
     rows[1]["dt"] = 1 / 500
-    assert answers(rows)[0].cure == "tuned cures it"
+    assert answers(rows)[0].cure == "profile tuned fixes it"
 
 
 def test_a_profile_that_ran_another_case_is_not_nearer():
@@ -199,7 +199,7 @@ def test_what_is_nearer_is_no_cure():
         row("incline", 2, "bullet", "tuned", "known" if r > 0.8 else "pass", 0.01, 0.0, ratio=r) for r in (0.5, 0.9)
     ]
     (answer,) = answers(rows)
-    assert answer.cure.startswith("tuned is nearer, 1 of 2 rows FAIL: creeps at 0.01")
+    assert answer.cure.startswith("profile tuned is nearer (1 of 2 fail): creeps at 0.01")
 
 
 def test_a_time_that_the_end_cut_off_is_never_shown_as_a_time():
@@ -223,7 +223,7 @@ def test_who_passes_is_named_by_cost_and_by_the_dimensions_it_knows():
     (choice,) = choices(rows, costs)
     assert choice.line == "chipmunk/tuned (2-D only, 1 ms/s), mujoco/tuned (2 ms/s)"
     (choice,) = choices([row("stack", 2, "bullet", "tuned", "known", 0.1)])
-    assert choice.line == "nobody passes every row; nearest is bullet/tuned (1 of 1 rows FAIL)"
+    assert choice.line == "none passes every check; nearest: bullet/tuned (1 of 1 fail)"
 
 
 def test_later_apexes_that_fail_alone_are_told_as_they_are():
@@ -234,9 +234,9 @@ def test_later_apexes_that_fail_alone_are_told_as_they_are():
 
 def test_alarms_stand_before_the_answers():
     lines = shown([*quick_suite(), row("stack", 2, "mujoco", "tuned", "new", 0.1)], 80)
-    alarm = next(k for k, line in enumerate(lines) if line.startswith("Needs attention: 1 row"))
-    assert alarm < next(k for k, line in enumerate(lines) if line.startswith("Which engine"))
-    assert "NEW 1/143" in "\n".join(lines[:30])
+    alarm = next(k for k, line in enumerate(lines) if line.startswith("Needs attention: 1 unexpected result"))
+    assert alarm < next(k for k, line in enumerate(lines) if line.startswith("Best engine"))
+    assert "1/143 fail, 1 new" in "\n".join(lines[:30])
 
 
 REFUSED = {"outcome": "unsupported", "reason": "chipmunk is planar", "value": None, "physics": None}
@@ -246,9 +246,9 @@ def test_a_run_in_which_nothing_could_be_asked_says_so_and_why():
     rows = [row("impact", 3, "chipmunk", profile, "unsupported") | REFUSED for profile in ("default", "tuned")]
     text = " ".join(" ".join(shown(rows, 100)).split())
     assert "UNSUPPORTED: chipmunk impact: chipmunk is planar" in text
-    assert "impact no verdict: it cannot be asked of the engines of this run" in text
+    assert "impact no verdict: no engine of this run can run it" in text
     assert "Nothing was judged" in text
-    for wrong in ("nearest is", "iteration counts", "Every row passes", "NAME", "within tolerance", "explain ID"):
+    for wrong in ("nearest", "iteration counts", "Every check passes", "NAME", "outside its tolerance", "explain ID"):
         assert wrong not in text
 
 
@@ -260,12 +260,12 @@ def shown_only(rows):
 
 def test_numbers_that_are_shown_without_a_truth_are_no_failures():
     judged, shown_beside = [row("impact", 2, "bullet", "tuned")], shown_only([row("impact", 2, "bullet", "tuned")])
-    assert "Every row that is judged passes" in shown(judged + shown_beside, 100)
+    assert "Every check passes" in shown(judged + shown_beside, 100)
     text = "\n".join(shown(shown_beside, 100))
-    assert "Nothing was judged: no number of this run has a finite tolerance" in text
-    assert "impact  no verdict: nothing of it is judged" in text
+    assert "Nothing was judged: no check of this run has a finite tolerance" in text
+    assert "impact  no verdict: no check of it has a tolerance" in text
     starved = [row("impact", 2, "bullet", "tuned", "known", 0.1, iterations=1)]
-    assert any(line.startswith("Only rows at other iteration counts fail") for line in shown(judged + starved, 100))
+    assert any(line.startswith("Only checks at other iteration counts fail") for line in shown(judged + starved, 100))
 
 
 def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
@@ -281,9 +281,9 @@ def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
     broken = [whole | {"metric": metric} for metric in ("a", "b[1]", "b[2]")]
     rows = [*broken, row("impact", 2, "bullet", "one")]
     text = " ".join(" ".join(shown(rows, 100)).split())
-    assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 rows)" in text
-    assert f"bullet/tuned impact: 3 of 3 rows have no answer (INVALID: {why}); nothing is said of the engine" in text
-    assert "truth 1" not in text and "one cures it" not in text
+    assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 checks)" in text
+    assert f"bullet/tuned impact: no result for 3 of 3 checks (INVALID: {why}); the measurement is broken" in text
+    assert "truth 1" not in text and "tuned fixes it" not in text and "one fixes it" not in text
     assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
 
 
@@ -316,7 +316,7 @@ def test_a_run_says_which_engine_to_use_for_stacks_how_wrong_the_bounce_is_and_t
     head, rest = lines[:30], " ".join(" ".join(lines).split())
     assert any(line.startswith("mujoco 4") for line in head) and any("bounce" in line for line in head)
     assert re.search(r"stack +.*mujoco/tuned", "\n".join(lines))
-    assert re.search(r"mujoco/default bounce: [^;]*rebound[^;]* whatever e is asked; tuned cures it", rest)
+    assert re.search(r"mujoco/default bounce: [^;]*rebound[^;]*, whatever e is; profile tuned fixes it", rest)
     assert "crosscheck explain ID" in text
 
 
@@ -376,7 +376,15 @@ def test_findings_lists_every_failing_row_once_and_filters(two_engines):
 def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_engines):
     out, _ = two_engines
     text = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout
-    for word in ("measured", "truth", "tolerance", "standing", "cure", "profile tuned passes", "crosscheck run bounce"):
+    for word in (
+        "measured",
+        "truth",
+        "tolerance",
+        "cause",
+        "fix",
+        "profile tuned passes this check",
+        "crosscheck run bounce",
+    ):
         assert word in text
     assert "<option " in text and "solref=" in text
     plain = json.loads(call("explain", "mujoco/default/bounce/apex", "--json", "--out", out).stdout)
@@ -423,7 +431,7 @@ def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeyp
         return [each for each in rows if each["metric"] != "out_of_plane"] + beside
 
     monkeypatch.setattr(showing, "judged", tipped)
-    said = "off plane the scene leaves its plane by 0.25 m: this row is what is seen of it in the plane"
+    said = "off plane the scene leaves its plane by 0.25 m; this check sees only the motion in the plane"
     assert said in " ".join(call(*row).stdout.split())
     assert "off plane" not in call("explain", "mujoco/default/bounce/out_of_plane", "--out", out).stdout
 
@@ -500,7 +508,8 @@ def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
     assert told["id"] in shown and "".join(f"--out {out}".split()) in "".join(shown.split())
     assert json.loads(call("explain", "chipmunk/tuned/a b", "--json", "--out", out).stdout)["scene"] == told["scene"]
     found = call("findings", "--scene", str(path), "--out", out)
-    assert (found.exit_code, found.stdout) == (0, "no such row fails\n")
+    assert (found.exit_code, found.stdout) == (0, found.stdout)
+    assert found.stdout.endswith("(1 case).\nno such check fails\n")
 
 
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])
@@ -534,11 +543,36 @@ def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp
         assert said or not any("--out" in line for line in lines)
 
 
+def test_what_is_shown_says_which_run_it_is_and_names_a_larger_one(tmp_path):
+    """A small run after a whole one is the latest, and is not taken for the whole one."""
+    pytest.importorskip("pymunk")
+    cells = [Slot("impact", (("e", e),), 2, "chipmunk", "tuned", 1 / 240) for e in (0.0, 0.5)]
+    store, ids = Store(tmp_path), []
+    for title, slots in (("quick: impact", cells), ("quick: impact --param e=0", cells[:1])):
+        run, _ = store.start(title, slots)
+        for slot in slots:
+            store.add(run, execute(slot))
+        store.finish(run)
+        ids.append(run.id)
+    store.close()
+    whole, latest = ids
+    for command in ("show", "findings"):
+        said = " ".join(call(command, "--out", tmp_path).stdout.split())
+        assert said.startswith(f"Run {latest}, the latest: quick: impact --param e=0 (1 case).")
+        assert f"A larger run: crosscheck {command} {whole} --out {tmp_path}." in said
+        assert f"All runs: crosscheck list runs --out {tmp_path}." in said
+    named = " ".join(call("show", whole, "--out", tmp_path).stdout.split())
+    assert named.startswith(f"Run {whole}: quick: impact (2 cases).") and "larger" not in named
+    assert f"crosscheck report --open {whole} --out {tmp_path}" in named  # the next commands are about the same run
+    alone = call("explain", "chipmunk/tuned/impact", whole, "--json", "--out", tmp_path)
+    assert alone.exit_code == 0 and json.loads(alone.stdout)["run"] == whole
+
+
 def test_a_profile_whose_measurement_is_broken_is_no_profile_that_does_no_better():
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1), row("impact", 2, "mujoco", "tuned", "known", 0.1)]
     assert answers(rows)[0].cure.startswith("no other profile does better")
     rows[1] |= {"outcome": "invalid", "physics": None, "standing": None, "reason": "receipt mass"}
-    assert answers(rows)[0].cure.startswith("tuned gave no answer")
+    assert answers(rows)[0].cure.startswith("profile tuned gave no result")
 
 
 @pytest.mark.parametrize(

@@ -89,12 +89,12 @@ def test_a_wrong_call_is_one_line_and_runs_nothing(words, said, tmp_path):
 
 
 def test_without_a_scene_there_is_nothing_to_vary(tmp_path):
-    assert "name the scenes" in call("sweep", "--list", "e=1", "--out", tmp_path, status=2).output
+    assert "needs the name of a scene" in call("sweep", "--list", "e=1", "--out", tmp_path, status=2).output
 
 
 def test_a_sweep_has_a_line_per_cell_and_the_same_command_makes_it_again(tmp_path):
     words = (*CELL, "--grid", "e=0:1:3", "--list", "v=1,2", "--jobs", 1, "--out", tmp_path)
-    assert call(*words, "--dry-run").stdout == "6 cells\n"
+    assert call(*words, "--dry-run").stdout == "6 cases\n"
     told = json.loads(call(*words, "--json").stdout)
     found = pd.read_csv(tmp_path / "sweep.csv")
     assert len(found) == len(told) == 6 and found.passes.all() and set(found.outcome) == {"ok"}
@@ -120,7 +120,7 @@ def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
     monkeypatch.setattr(store.Store, "add", interrupted)
     call(*words, status=130)
     done = call(*words)
-    assert "2 of 4 cells done" in done.stderr and len(kept) == 4
+    assert "2 of 4 cases done" in done.stderr and len(kept) == 4
     results = Store(tmp_path, create=False)
     assert len(results.runs()) == 1 and results.run().finished
     results.close()
@@ -132,7 +132,7 @@ def test_a_fail_is_what_a_study_looks_for_and_a_crash_is_an_alarm(tmp_path, plug
     call(*words, "--engine", "bullet", "--profile", "default", "--out", tmp_path / "a")
     assert not pd.read_csv(tmp_path / "a" / "sweep.csv").passes.all()
     done = call(*words, "--engine", "evil", "--profile", "raise", "--out", tmp_path / "b", status=1)
-    assert "no answer" in done.stderr
+    assert "no result" in done.stderr
     assert list(pd.read_csv(tmp_path / "b" / "sweep.csv").passes) == [False]
 
 

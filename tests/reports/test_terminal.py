@@ -162,7 +162,9 @@ def test_every_command_has_the_console_that_reads_no_markup():
     assert made == ["terminal.py"]
 
 
-@pytest.mark.parametrize(("load", "said"), [(0.4, ""), (1.0, ""), (8.2, "; these are busy (load 8 on 2), so longer")])
+@pytest.mark.parametrize(
+    ("load", "said"), [(0.4, ""), (1.0, ""), (8.2, "; longer now, the machine is busy (load 8 on 2 cores)")]
+)
 def test_an_estimate_for_idle_cores_says_where_they_are_not_idle(monkeypatch, load, said):
     from reports import stages
 
@@ -189,7 +191,7 @@ def test_checks_are_listed_a_line_each_and_say_where_their_reasons_stand():
     assert [line.partition(" ")[0] for line in body] == [check["name"] for check in plain] and len(plain) > 200
     assert max(map(len, told)) <= 80 and "--reasons" in last and "describe SCENE" in last
     refused = call("list", "scenes", "--reasons")
-    assert refused.exit_code == 2 and "reasons: checks have one, not scenes" in refused.stderr
+    assert refused.exit_code == 2 and "reasons: belongs to checks, not to scenes" in refused.stderr
 
 
 WIDE = [

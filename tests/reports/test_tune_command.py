@@ -79,7 +79,7 @@ def test_a_group_that_there_is_not_and_an_engine_without_candidates_are_refused_
     assert "'nosuch' is not one of" in done.stderr and all(name in done.stderr for name in groups())
     done, asked = tune("reference")
     assert (done.exit_code, asked) == (2, [])
-    assert "nobody has named stock settings of reference to try" in done.stderr
+    assert "no stock settings of reference to try are listed" in done.stderr
 
 
 def cured(scene, *decide):
@@ -104,7 +104,7 @@ def test_what_decides_a_cure_is_said_and_kept_and_the_status_tells_whether_it_is
     found = [cured("stack", "slop"), cured("impact", "sweeps")]
     done = measured(found[::-1], found)
     assert done.exit_code == 0
-    assert lines(done.stdout) == ["chipmunk/default stack: cured by slop", "chipmunk/default impact: cured by sweeps"]
+    assert lines(done.stdout) == ["chipmunk/default stack: fixed by slop", "chipmunk/default impact: fixed by sweeps"]
     kept = (tmp_path / "decisive.csv").read_text(encoding="utf-8")
     assert "slop" in kept and "sweeps" in kept
     for listed in ([cured("stack", "slop")], [cured("stack", "bias"), found[1]], [*found, cured("bounce", "slop")]):
@@ -121,4 +121,4 @@ def test_an_engine_without_cures_and_a_list_that_is_no_longer_true_are_refused_i
     done = CliRunner().invoke(main, ["tune", "chipmunk", "--decisive"])
     assert done.exit_code == 2 and "tune: the profile changes no setting of stack" in done.stderr
     done = CliRunner().invoke(main, ["tune", "reference", "--decisive"])
-    assert done.exit_code == 2 and "nobody has named cures of reference to measure" in done.stderr
+    assert done.exit_code == 2 and "no fixes of reference to measure are listed" in done.stderr

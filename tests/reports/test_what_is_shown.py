@@ -97,7 +97,7 @@ def test_a_number_is_shown_as_it_is(value, digits, text):
 
 def test_a_finding_says_value_truth_tolerance_reason_and_how_to_reproduce_it():
     line = finding_line(ROW.as_dict())
-    assert line.startswith("FAIL new: chipmunk/tuned impact 2-D e=0.8: ")
+    assert line.startswith("FAIL, new: chipmunk/tuned impact 2-D e=0.8: ")
     for text in ("rebound_ratio 0.123457", "truth 0.8", "tolerance 1.0e-12", "exact law", "nobody knew"):
         assert text in line
     assert line.endswith("crosscheck run impact --param e=0.8 --dim 2 --engine chipmunk --profile tuned --dt 1/240")
@@ -113,10 +113,10 @@ def field_of(*rows):
 
 def test_a_field_counts_what_does_not_pass_of_what_is_judged():
     known = QUIET["known"]
-    assert field_of(PASS, PASS, PASS).text == "pass 3"
-    assert field_of(PASS, known, known).text == "FAIL known 2/3"
-    assert field_of(known, QUIET["no value, listed"], QUIET["unsupported"]).text == "FAIL known 1/1"
-    assert field_of(PASS, QUIET["explained"], known, ROW).text == "FAIL new 3/4"
+    assert field_of(PASS, PASS, PASS).text == "3 pass"
+    assert field_of(PASS, known, known).text == "2 of 3 fail"
+    assert field_of(known, QUIET["no value, listed"], QUIET["unsupported"]).text == "1 of 1 fail"
+    assert field_of(PASS, QUIET["explained"], known, ROW).text == "3 of 4 fail, 1 new"
     assert field_of(QUIET["unsupported"]).text == "-"
 
 
@@ -145,4 +145,4 @@ def test_fields_do_not_mix_scenes_dimensions_engines_or_profiles():
             replace(ROW, profile="default")]  # fmt: skip
     matrix = matrix_of([row.as_dict() for row in rows])
     assert len(matrix.fields) == 5
-    assert {field.text for field in matrix.fields.values()} == {"FAIL new 1/1"}
+    assert {field.text for field in matrix.fields.values()} == {"1 of 1 fail, 1 new"}

@@ -56,7 +56,7 @@ def ran() -> str:
     """A small run of one engine, without lines of progress, which tell times, and its version."""
     with TemporaryDirectory(prefix="crosscheck-run-") as where:
         text = printed(Path(where), "run", "bounce", "slide", "--engine", "chipmunk")
-    return re.sub(r"(?m)^\d+ cells: .*\n", "", text).replace(load("chipmunk").version(), "VERSION")
+    return re.sub(r"(?m)^\d+ cases: .*\n", "", text).replace(load("chipmunk").version(), "VERSION")
 
 
 SCREENS: dict[str, Callable[[], str]] = {

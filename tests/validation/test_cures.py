@@ -68,17 +68,24 @@ def test_numbers_of_numpy_are_written_and_a_table_that_cannot_be_keeps_the_old_o
 
 def test_a_cure_is_told_in_one_line_with_error_and_cost():
     text = cure_text(CURE)
-    assert text.startswith("2-D by cone=elliptic, solimp=0.9999 0.9999 0.001 0.5 1: creep at margin=1.05")
+    assert text.startswith("2-D: cone=elliptic, solimp=0.9999 0.9999 0.001 0.5 1; creep at margin=1.05: ")
     assert "0.0157 -> 1.4e-6 m/s" in text and text.endswith("at 1.7 times the cost") and "\n" not in text
     assert "2 of 5 checks still fail" in cure_text(replace(CURE, left=2))
     told = cure_text(replace(CURE, metric="rebound_ratio", unit="1", before=1.00036, after=1.0, truth=1.0))
     assert "1.0004 -> 1, at" in told  # as many digits as tell them apart
     short = cure_text(replace(CURE, metric="acceleration", unit="m/s^2", before=0.0016, after=0.00416, truth=0.00439))
     assert "0.0016 -> 0.00416 m/s^2 (true: 0.00439), at" in short
+    assert cure_text(replace(CURE, cost_after=CURE.cost_before)).endswith(", at the same cost")
     assert "no value -> 0.00416" in cure_text(replace(CURE, before=None, after=0.00416))
-    assert cure_text(replace(CURE, left=5, changes={})).endswith(
-        "none of 45 changes of its settings that were tried helps"
-    )
+    assert cure_text(replace(CURE, left=5, changes={})).endswith("2-D: no setting helps (45 tried)")
+
+
+def test_a_search_that_found_nothing_says_how_many_settings_it_tried_in_each_dimension(monkeypatch):
+    nothing = replace(CURE, left=CURE.failing, changes={})
+    listed = {("pinch", 2): nothing, ("pinch", 3): replace(nothing, dimension=3, tried=30)}
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    (said,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
+    assert said == "no setting helps (45 tried in 2-D, 30 tried in 3-D)"
 
 
 def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
@@ -99,19 +106,19 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     row |= {"metric": "turned"}
     assert told_cure(row) == cure_text(CURE)
     other = told_cure({**row, "metric": "out_of_plane"})
-    assert other == f"none is known of this check; of creep, turned in this scene: {cure_text(CURE)}"
+    assert other == f"none is known for this check; for creep, turned in this scene, {cure_text(CURE)}"
     # What is told is mended in the cell that is told, though the same check fails elsewhere with the cure.
     listed["pinch", 2] = replace(CURE, cells=(*CURE.cells, {"margin": 100.0}), mends=("turned",))
     assert told_cure({**row, "metric": "creep", "params": {"margin": 1.05, "g": 9.81}}) == cure_text(CURE)
     assert "none is known" in told_cure({**row, "metric": "creep", "params": {"margin": 100.0}})
-    unsearched = "not searched for in this case: crosscheck cure mujoco pinch"
+    unsearched = "none was searched for in this case; to search: crosscheck cure mujoco pinch"
     assert told_cure({**row, "dimension": 3}) == told_cure({**row, "engine_version": "4.0.2"}) == unsearched
     assert told_cure({**row, "profile": "tuned"}) == ""
     listed["pinch", 2] = CURE  # a table of before kinds were written down: what it tells is of its own metric
     assert told_cure({**row, "metric": "creep[1]"}) == cure_text(CURE)
     assert "none is known" in told_cure(row)
     listed["pinch", 2] = replace(CURE, left=5, changes={})
-    assert told_cure({**row, "metric": "out_of_plane"}).startswith("2-D: none of 45 changes")
+    assert told_cure({**row, "metric": "out_of_plane"}).startswith("2-D: no setting helps (45 tried)")
 
 
 @pytest.mark.parametrize(
@@ -131,7 +138,10 @@ def test_of_another_case_than_was_searched_no_cure_is_told_but_where_to_search_i
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "creep", "params": {}, "dt": 1 / 240, "iterations": None, "outcome": "ok"}
     assert told_cure(row) == cure_text(CURE) and cure_of(row).changes == CURE.changes
-    assert told_cure(row | case) == f"not searched for in this case: {command}" and cure_of(row | case) is None
+    assert (
+        told_cure(row | case) == f"none was searched for in this case; to search: {command}"
+        and cure_of(row | case) is None
+    )
     assert told_cure(row | case | {"outcome": "not_installed"}) == told_cure(row | case | {"profile": "tuned"}) == ""
 
 
@@ -163,7 +173,7 @@ def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_line
     export = (
         "crosscheck export pinch --param margin=1.05 --dt 1/500 --dim 2 --engine mujoco --profile tuned --to python"
     )
-    said = f"nothing to paste: mujoco has no lines of settings; {export} writes its calls"
+    said = f"nothing to paste: mujoco is set by calls; {export} writes them"
     assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("", said)
 
 
@@ -177,8 +187,8 @@ def test_a_cure_of_an_engine_without_lines_of_settings_says_how_its_calls_are_wr
     paste, said = fix(row, [], "")
     assert paste == "" and said == nothing_to_paste(cure)
     start, command = said.split("; ")
-    words = shlex.split(command.removesuffix(" writes its calls"))
-    assert start == "nothing to paste: mujoco has no lines of settings"
+    words = shlex.split(command.removesuffix(" writes them"))
+    assert start == "nothing to paste: mujoco is set by calls"
     assert words[:3] == ["crosscheck", "export", "pinch"]
     done = CliRunner().invoke(main, words[1:])
     assert done.exit_code == 0 and "default+cone=elliptic+impratio=10" in done.output
@@ -200,7 +210,7 @@ def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypat
     both = {("pinch", 2): CURE, ("pinch", 3): replace(CURE, dimension=3, cost_after=4.5e-5)}
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: both)
     (text,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
-    assert text.startswith("2-D and 3-D by cone=elliptic") and text.endswith("at 3 times the cost")
+    assert text.startswith("smallest fix, 2-D and 3-D: cone=elliptic") and text.endswith("at 3 times the cost")
     both["pinch", 3] = replace(CURE, dimension=3, changes={"tolerance": 0.0})
     assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 2
 

@@ -30,7 +30,7 @@ from validation.settings.switching import switched
 
 FILE = "measured.toml"
 #: What our cells say of a fact.
-SHOWN, CONTRADICTED, TESTED, UNASKED = "as measured", "contradicted", "tested", "not asked"
+SHOWN, CONTRADICTED, TESTED, UNASKED = "as measured", "contradicted", "tested", "not checked"
 
 
 @dataclass(frozen=True)

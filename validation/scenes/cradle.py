@@ -150,5 +150,5 @@ SCENE = CanonicalScene(
         error,
         "the whole scene: approach, impacts, departure",
     ),
-    words={"speed": "leaves a ball with {value}", "energy_defect": "changes the energy by {value} of it"},
+    words={"speed": "leaves a ball with {value}", "energy_defect": "changes the energy by {value} (relative)"},
 )

@@ -181,6 +181,6 @@ SCENE = CanonicalScene(
     words={
         "small_speed": "leaves the small ball with {value}",
         "large_speed": "leaves the large ball with {value}",
-        "energy_defect": "changes the energy by {value} of it",
+        "energy_defect": "changes the energy by {value} (relative)",
     },
 )

@@ -335,7 +335,7 @@ SCENE = CanonicalScene(
         "spin": "turns the bar with {value}",
         "energy_lost": "takes {value} of the energy that the blow has",
         "energy_lost<0": "adds {value} of the energy that the blow has",
-        "angular_defect": "changes the angular momentum by {value} of it",
+        "angular_defect": "changes the angular momentum by {value} (relative)",
         "sideways": "throws ball or bar aside with {value}",
     },
 )

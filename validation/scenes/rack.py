@@ -145,8 +145,8 @@ SCENE = CanonicalScene(
         "the whole scene: approach, break, departure",
     ),
     words={
-        "momentum_defect": "changes the momentum by {value} of it",
-        "energy_defect": "changes the energy by {value} of it",
+        "momentum_defect": "changes the momentum by {value} (relative)",
+        "energy_defect": "changes the energy by {value} (relative)",
         "asymmetry": "throws left and right apart by {value} of the cue's speed",
     },
 )

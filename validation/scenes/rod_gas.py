@@ -277,7 +277,7 @@ SCENE = CanonicalScene(
     words={
         "misplaced": "has a rod off its place by {value}",
         "wrong_speed": "gives a rod a speed that is off by {value}",
-        "energy_defect": "changes the energy by {value} of it",
+        "energy_defect": "changes the energy by {value} (relative)",
         "astray": "pushes a rod off the line by {value}",
     },
 )

@@ -224,7 +224,7 @@ SCENE = CanonicalScene(
     smooth=("flip_time",),
     words={
         "flip_time": "turns over after {value}",
-        "momentum_drift": "changes its angular momentum by {value} of it",
-        "energy_drift": "changes its energy by {value} of it",
+        "momentum_drift": "changes its angular momentum by {value} (relative)",
+        "energy_drift": "changes its energy by {value} (relative)",
     },
 )

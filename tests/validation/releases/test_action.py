@@ -64,14 +64,14 @@ def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
 def test_a_build_that_lost_a_verdict_fails_and_its_comment_says_which(job):
     home = job("3.0", 1)
     comment = (home / "crosscheck-out" / "comment.md").read_text()
-    assert "verdict flipped" in comment and "`rebound_ratio`" in comment and "worse" in comment
+    assert "newly failing" in comment and "`rebound_ratio`" in comment and "worse" in comment
 
 
 @pytest.mark.long
 def test_never_fails_for_no_change(job):
     """The toy has no findings, so what fails is new to nobody: only the comparison would fail the job."""
     home = job("3.0", 0, FAIL_ON="never")
-    assert "verdict flipped" in (home / "crosscheck-out" / "comment.md").read_text()
+    assert "newly failing" in (home / "crosscheck-out" / "comment.md").read_text()
 
 
 @pytest.mark.long

@@ -350,7 +350,7 @@ def test_a_step_is_told_with_the_note_between_its_releases_or_is_unexplained(not
     (said,) = sentences("toy", [step for step in found if step.family.first.metric == "rebound_ratio"])
     assert said == (
         "**3** (after 2). Speeds are capped (notes of 2.5).\n"
-        "  * default impact: 1 row begins to fail; first `rebound_ratio` (2-D e=0.5 v=4) 0.5 (pass) -> 0.4 (fail)"
+        "  * default impact: 1 check begins to fail; first `rebound_ratio` (2-D e=0.5 v=4) 0.5 (pass) -> 0.4 (fail)"
     )
     assert notes.explanations("toy", "impact", "default", "2.5", "3") == ["unexplained"]
     assert notes.explanations("toy", "impact", "default", "2", "2.5") == ["speeds are capped (notes of 2.5)"]
@@ -412,5 +412,5 @@ def test_the_published_page_has_a_part_per_engine_with_what_moved_or_that_nothin
     store.close()
     assert lines[0] == "# Physics over engine releases"
     assert lines[lines.index("## one") :] == [
-        "## one", "", "a table", "* two rows moved", "", "## other", "", "a table", "No row moved.",
+        "## one", "", "a table", "* two rows moved", "", "## other", "", "a table", "Nothing changed.",
     ]  # fmt: skip
