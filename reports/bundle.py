@@ -4,7 +4,7 @@ README.txt           what is inside
 environment.json     machine, Python, packages, commit, plan
 observations.jsonl   raw measurements, one cell per line; verdicts are derived from them
 rows.jsonl, rows.csv every judged value
-timings.csv          raw timings of the bench, if there is one
+timings.csv          raw timings of the benchmark, if there is one
 scenes/              scene files that ran, as they were when it began
 report.html          the report
 CITATION.cff         how to cite, with run and commit

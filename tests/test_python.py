@@ -111,7 +111,7 @@ def test_a_result_has_its_motion_its_table_and_its_explanation(engine):
     html = result._repr_html_()
     assert html.count("<tr") == 1 + len(rows) and "<table" in html and "FAIL" in html
     text = result.explain()
-    assert "profile tuned passes this row" in text and "solref" in text
+    assert "profile tuned passes this check" in text and "solref" in text
     assert "crosscheck run bounce" in text and "force_in_flight" in result.explain("force_in_flight")
     assert repr(result) == "<bounce 3-D on mujoco/default, dt 1/240 s, e=0.7: 6 of 8 checks fail>"
 

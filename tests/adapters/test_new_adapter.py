@@ -66,6 +66,4 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     asked = ["run", "bounce", "--engine", "my_discs", "--dim", "2", "--quick", "--jobs", "1"]
     command = [sys.executable, "-m", "reports.command", *asked]
     ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert ran.returncode == 0 and "my_discs/plain" in ran.stdout and "Every row that is judged passes" in ran.stdout, (
-        ran.stderr
-    )
+    assert ran.returncode == 0 and "my_discs 0.1" in ran.stdout and "Every check passes" in ran.stdout, ran.stderr

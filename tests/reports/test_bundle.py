@@ -120,13 +120,13 @@ def test_a_bundle_lists_its_files_in_order_with_what_each_is_and_is_the_same_eac
         texts = {name.partition("/")[2]: archive.read(name).decode() for name in archive.namelist()}
     assert texts["README.txt"].splitlines() == [
         "contact-crosscheck, run 20260101-000000", "",
-        "environment.json     machine, Python, packages, commit and plan of the run (and of the bench)",
-        "observations.jsonl   raw measurements, one cell per line",
+        "environment.json     machine, Python, packages, commit and plan of the run (and of the benchmark)",
+        "observations.jsonl   raw measurements, one case per line",
         "rows.jsonl           every judged value, one per line",
         "rows.csv             the same as a table", "report.html          the report, one self-contained page",
         "CITATION.cff         how to cite this result", "scenes/1a2b3c4d-drop-it-.toml a scene file that ran",
         "scenes/00000000-fall.toml a scene file that ran", "",
-        "Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the rows.",
+        "Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the checks.",
         "Check the files with: sha256sum -c SHA256SUMS",
     ]  # fmt: skip
     assert texts["report.html"] == "<p>20260101-000000</p>" and texts["scenes/00000000-fall.toml"] == "other"
@@ -156,5 +156,5 @@ def test_times_of_a_bench_and_how_they_were_taken_are_in_the_bundle(monkeypatch,
     assert texts["timings.csv"].splitlines() == ["engine,seconds", "toy,0.5", "'=toy,0.25"]  # no formula in a cell
     told = json.loads(texts["environment.json"])["bench"]
     assert told["id"] == "20260102-000000" and told["protocol"] == {"seed": 7}
-    assert "timings.csv          raw timings of the bench" in texts["README.txt"].splitlines()
+    assert "timings.csv          raw timings of the benchmark" in texts["README.txt"].splitlines()
     assert "commit" not in bundle.citation(other).partition("identifiers")[0].splitlines()[-1]

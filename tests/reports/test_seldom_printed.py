@@ -64,7 +64,7 @@ def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
     assert [line.split("   ")[0] for line in said[2:4]] == ["stack/creep", "receipt damping"]
     assert said[2].endswith("   mu 1 %, g 0.1 %") and said[3].endswith("   none of these faults")
     assert said[0].split("   ") == ["check or property check", "smallest fault that it notices"]
-    assert said[4] == "spin: no check of these scenes sees it; the cell is INVALID by inertia, spin"
+    assert said[4] == "spin: no check of these scenes notices it; the case is INVALID by inertia, spin"
     angle, creep = ([cell for cell in line.split("  ") if cell] for line in said[-2:])
     assert [cell.strip() for cell in angle] == [
         "incline/angle", "g", "0.001", "0.05", "50.0 %", "1/1920 s", "speed, drift",
@@ -76,7 +76,7 @@ def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
         "0.3",
         "1.5 %",
         "no step",
-        "receipts only",
+        "property checks only",
     ]
 
 
@@ -305,7 +305,7 @@ def test_doctor_says_of_each_engine_and_package_what_it_is_and_where_and_what_is
     for line in (
         "cpu a [fast] one", "commit -", "toy 1.2 installed", "brittle - ImportError: [no] such symbol",
         "reports /y/[old]/reports", "compiled kernels no folder is writable, so every process compiles them",
-        "1 problem(s)", "reports is not ours: /y/[old]", "where brittle raised it", "File one, line 3",
+        "1 problem(s)", "reports is not ours: /y/[old]", "traceback of brittle", "File one, line 3",
     ):  # fmt: skip
         assert line in said
     sound = data | {"commit": "abc", "problems": [], "traces": {}, "kernel_cache": {"folder": "/z"}}
@@ -325,7 +325,7 @@ def test_before_a_family_is_accepted_its_rows_are_counted_and_the_first_three_to
         "  default stack 2 n=1 creep[1]: 0.5", "  default stack 2 n=2 creep[2]: 0.75",
     ]  # fmt: skip
     assert accepting._details(Proposed(family, drifted=moved, bands=moved)).splitlines()[1:] == [
-        "  drifted: 5 x default creep", "  drifted: 1 x tuned drift", "  with another band: 5 x default creep",
+        "  changed: 5 x default creep", "  changed: 1 x tuned drift", "  with another band: 5 x default creep",
         "  with another band: 1 x tuned drift", "  default stack 2 n=0 creep[0]: 0.25 -> 0.5",
         "  default stack 2 n=1 creep[1]: 0.5 -> 1", "  default stack 2 n=2 creep[2]: 0.75 -> 1.5",
     ]  # fmt: skip

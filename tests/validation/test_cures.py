@@ -381,7 +381,7 @@ def test_what_passes_and_what_cannot_be_asked_are_told_apart():
     told = CliRunner().invoke(main, ["cure", "chipmunk", "incline", "slide"])
     assert told.exit_code == 0, told.output
     lines = told.stdout.splitlines()
-    assert re.match(r"chipmunk incline 2-D: as shipped nothing is to be mended: it passes all \d+ checks$", lines[0])
+    assert re.match(r"chipmunk incline 2-D: as shipped nothing is to be fixed: it passes all \d+ checks$", lines[0])
     refused = [line for line in lines if ": cannot be asked: " in line]
     assert [line.partition(":")[0] for line in refused] == ["chipmunk incline 3-D", "chipmunk slide 3-D"]
     assert "chipmunk slide 2-D: 1 of" in told.stdout
@@ -513,7 +513,7 @@ def test_one_case_of_a_scene_is_searched_at_its_own_step(monkeypatch):
     assert CliRunner().invoke(main, ask).exit_code == 0
     assert asked == [("chipmunk", "stack", 2, 1, {"n": 3.0}, 1 / 120)]
     kept = CliRunner().invoke(main, [*ask, "--keep"])
-    assert kept.exit_code == 2 and "keep: the table is of scenes of the catalogue" in kept.output
+    assert kept.exit_code == 2 and "keep: stores fixes of whole scenes of the catalogue" in kept.output
 
 
 def test_a_scene_in_other_sizes_is_judged_in_its_own_units():

@@ -81,7 +81,7 @@ MEMBERS = ",".join(files.COLUMNS) + "\n"
 def forget():
     engine_folder.forget()
     for cached in (files.findings_of, solutions_of, identity.adapter_hash, decisive.measured_of,
-                   palette._own_colour, palette._mark_of):  # fmt: skip
+                   palette._own_colour, palette.role_of):  # fmt: skip
         cached.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "toy_package"]:
         del sys.modules[name]

@@ -155,7 +155,11 @@ def test_a_scene_that_cannot_be_driven_is_refused_with_those_that_can():
     from reports.command import main
 
     result = CliRunner().invoke(main, ["frontier", "impact"])
-    assert result.exit_code == 2 and "impact cannot be driven" in result.stderr and "thin_wall" in result.stderr
+    assert (
+        result.exit_code == 2
+        and "impact has no breaking point to search" in result.stderr
+        and "thin_wall" in result.stderr
+    )
 
 
 def test_a_quick_search_asks_one_dimension_and_a_named_one_is_asked_whatever_the_search():
