@@ -184,7 +184,7 @@ def test_where_a_plugin_raised_what_is_wrong_is_kept_and_told_by_the_doctor(site
     assert told[0] == "Traceback (most recent call last):" and any("in colour" in line for line in told)
     assert told[-1] == found.reason and "\x1b" not in str(told) and set(doctor()["traces"]) == {"toy"}
     said = CliRunner().invoke(main, ["doctor"]).output
-    assert "where toy raised it" in said and "in colour" in said
+    assert "traceback of toy" in said and "in colour" in said
     (site / "numbers.py").write_text('COLOUR = "#102030"\n')
     registry.find.cache_clear()
     assert registry.find("toy").trace == "" and doctor()["traces"] == {}
