@@ -27,7 +27,7 @@ from contact_crosscheck.apart import apart
 from contact_crosscheck.models import Scene, scene_named
 from reports.exports import described
 from reports.findings import severity
-from reports.wording import LABELS, mark_of, measured, params_text, quantity, reproduce
+from reports.wording import LABELS, ROLE_WORDS, mark_of, measured, params_text, quantity, reproduce
 from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, format_dt, prepare, settings_of, slot_from_dict
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 
 #: An engine by its name, or one that the caller has written.
 AnyEngine = str | Engine | type[Engine]
-#: Words for the roles of profiles, beside the roles' own names.
-ROLES = {"as shipped": "shipped", "compromise": "one", "exact": "solution"}
 #: What is said once per call where nothing protects the caller from an engine.
 UNPROTECTED = (
     "engine: {} runs in this process, without a time limit, and its crash would end Python; crosscheck new-adapter "
@@ -380,7 +378,7 @@ def profile_named(engine: str, profile: str | None, scene: CanonicalScene) -> st
     if profile in known or (brought is not None and profile == brought.profile):
         return profile
     roles = facts.roles if facts else {}
-    fits = [name for name, role in roles.items() if role == ROLES.get(profile, profile)]
+    fits = [name for name, role in roles.items() if profile in (role, ROLE_WORDS.get(role))]
     if not fits:
         raise EngineError(f"profile: {engine} has no profile {one_line(profile, NAME)!r}, only {', '.join(known)}")
     return fits[0]

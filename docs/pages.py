@@ -8,6 +8,7 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,12 @@ import jinja2
 import pandas as pd
 
 from adapters import registry
-from reports.cures import cure_paste, cure_text, listed
+from reports.cures import cure_paste, cure_text, recorded_fixes
 from reports.listing import describe
 from reports.wording import markdown, number
 from validation.catalogue import CATALOGUE
 
 PUBLISHED = Path(__file__).parents[1] / "reports" / "published" / "report.html"
-ROWS = re.compile(r'download="?rows\.json\.gz"? href="data:application/gzip;base64,([^"]*)"')
 
 
 def write(folder: Path) -> None:
@@ -121,9 +121,25 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
 
 
+class Links(HTMLParser):
+    """What a page offers to save: the address of each file by its name."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.files: dict[str, str] = {}
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """See `HTMLParser`."""
+        told = dict(attrs)
+        if tag == "a" and told.get("download"):
+            self.files[str(told["download"])] = str(told.get("href"))
+
+
 def passed() -> pd.DataFrame:
     """Checks judged and failed of each scene, engine and profile in the published report."""
-    (packed,) = ROWS.findall(PUBLISHED.read_text(encoding="utf-8"))
+    links = Links()
+    links.feed(PUBLISHED.read_text(encoding="utf-8"))
+    packed = links.files["rows.json.gz"].partition(",")[2]
     rows = pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(packed))))
     rows = rows[rows.iterations.isna() & rows.physics.isin(["pass", "fail"])]
     rows["failed"] = rows.physics == "fail"
@@ -139,7 +155,7 @@ def fixes(scene: str) -> list[dict[str, Any]]:
             "text": cure_text(cure, f"in {cure.dimension}-D"),
             "paste": cure_paste(cure) if cure.helps else "",
         }
-        for cure in listed(scene, registry.names())
+        for cure in recorded_fixes(scene, registry.names())
     ]
 
 

@@ -295,7 +295,7 @@ def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
     return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
 
 
-def listed(scene: str, engines: Iterable[str]) -> list[Cure]:
+def recorded_fixes(scene: str, engines: Iterable[str]) -> list[Cure]:
     """What is on record of engines as shipped on a scene: one each, in space where the engine has it there too."""
     found = []
     for engine in engines:

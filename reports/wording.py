@@ -41,6 +41,13 @@ STATUS = {
 }  # fmt: skip
 
 
+#: What a profile is called for people, by its role.
+ROLE_WORDS: dict[str, str] = {
+    "shipped": "as shipped", "tuned": "tuned", "one": "compromise", "textbook": "textbook", "solution": "exact",
+    "matched": "custom loop",
+}  # fmt: skip
+
+
 def mark_of(row: Mapping[str, Any]) -> str:
     """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
     if row["outcome"] in ("crashed", "timed_out", "missing", "invalid", "not_installed"):

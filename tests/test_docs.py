@@ -1,5 +1,6 @@
 """The documentation builds offline without a warning, with a page for each scene."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,15 @@ import pytest
 from validation.catalogue import CATALOGUE
 
 ROOT = Path(__file__).parents[1]
+
+
+def test_each_scene_s_page_has_who_passes_it_in_the_published_report(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    found = importlib.import_module("pages").passed()
+    assert set(found.scene) == set(CATALOGUE)
+    exact = found[(found.engine == "reference") & (found.profile == "reference")]
+    assert (exact.judged > 0).all() and (exact.failed == 0).all()
+    assert (found.failed > 0).any() and (found.failed <= found.judged).all()
 
 
 @pytest.mark.long

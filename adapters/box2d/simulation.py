@@ -23,7 +23,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 class Box2DSimulation(Simulation):
     """One ``b2World``; bodies in the scene's order.
 
-    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:

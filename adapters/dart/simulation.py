@@ -28,7 +28,7 @@ DETECTORS = {
 class DartSimulation(Simulation):
     """One world; bodies in the scene's order, each a skeleton of its own.
 
-    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:

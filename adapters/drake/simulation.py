@@ -18,7 +18,7 @@ from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Spher
 class DrakeSimulation(Simulation):
     """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world.
 
-    ``module`` stands for the engine where its calls are recorded (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:

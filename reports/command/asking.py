@@ -17,7 +17,7 @@ from adapters import registry
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.cures import cure_paste, cure_text, listed, nothing_to_paste
+from reports.cures import cure_paste, cure_text, nothing_to_paste, recorded_fixes
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import Finding, ask, matching
@@ -50,7 +50,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
         raise click.BadParameter(told, param_hint="WORDS")
     best, others = found[0], [other.scene for other in found[1:] if other.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
-    fixes = listed(best.scene, about or registry.names())
+    fixes = recorded_fixes(best.scene, about or registry.names())
     missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
     if as_json:
         plain = {

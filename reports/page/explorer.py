@@ -215,7 +215,7 @@ def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[floa
     elif not stayed:
         said = ["as it should be"]
     else:
-        tuned = [column for column in (*stayed, *off) if word_of(column[1]) in SECOND.values()]
+        tuned = [column for column in (*stayed, *off) if role_of(column[1]) in SECOND]
         shipped = [called(engine) for engine, profile in stayed if word_of(profile) == "as shipped"]
         others = f"{shipped[0] if len(shipped) == 1 else f'{len(shipped)} engines'} as shipped" if shipped else ""
         mended = bool(tuned) and not set(tuned) & set(off)

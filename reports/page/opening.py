@@ -16,15 +16,12 @@ from reports.page.conclusions import answering, joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import family_of
 from reports.palette import role_of
-from reports.wording import mark_of
+from reports.wording import ROLE_WORDS, mark_of
 from validation.canonical import Restitution
 from validation.posed import resolve
 
-#: Roles of the two profiles by which an engine is judged first, and what they are called there.
-FIRST = {"shipped": "as shipped", "textbook": "textbook"}
-SECOND = {"tuned": "tuned", "solution": "exact"}
-#: What any profile is called beside the name of its engine; one without a role has its own name.
-CALLED = {**FIRST, **SECOND, "one": "compromise", "matched": "custom loop"}
+#: Roles of the two profiles by which an engine is judged first.
+FIRST, SECOND = ("shipped", "textbook"), ("tuned", "solution")
 #: An engine does not do what it is set to where more than half of the checks fail.
 MOST = 0.5
 
@@ -50,8 +47,8 @@ def called(engine: str) -> str:
 
 
 def word_of(profile: str) -> str:
-    """What a profile is called for people."""
-    return CALLED.get(role_of(profile) or "", profile)
+    """What a profile is called for people; one without a role has its own name."""
+    return ROLE_WORDS.get(role_of(profile) or "", profile)
 
 
 def halves(source: Source) -> list[tuple[str, list[Half]]]:
@@ -59,7 +56,7 @@ def halves(source: Source) -> list[tuple[str, list[Half]]]:
     found = []
     for engine in source.engines:
         own = [Half(p, word_of(p), k) for k, (name, p) in enumerate(source.columns) if name == engine]
-        chosen = [half for words in (FIRST, SECOND) for half in own if half.word in words.values()]
+        chosen = [half for roles in (FIRST, SECOND) for half in own if role_of(half.profile) in roles]
         found.append((engine, (chosen or own)[:2]))
     return found
 
