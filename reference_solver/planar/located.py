@@ -58,7 +58,7 @@ from reference_solver.planar.state import (
     SubStep,
     World,
 )
-from reference_solver.planar.step import copy_contacts, move, step
+from reference_solver.planar.step import copy_contacts, step
 from reference_solver.stepping import operations
 from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
@@ -212,7 +212,7 @@ def follow_path(island: Island, length: float, end: float, curved: bool) -> floa
         pushed = rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally)
         flight.move_along(bodies, sub, end, end == length)
         if pushed:
-            move(bodies, bodies.pseudo, options.dt)
+            flight.push_bodies(bodies, options.dt)
     remember_forces(bodies, rows, length, options.dt)
     if end < length:
         press.cut_work(bodies, rows, sub, tally, end, end / length)
@@ -395,11 +395,10 @@ def gather(whole: Island, world: World, count: int) -> Island:
             local.kind[k, d] = bodies.kind[i, d]
         for d in range(4):
             world.limit[k, d] = islands.limit[i, d]
-        world.order[k] = k
     whole.sub.lasting.size[BODIES] = count
     whole.rows.counts[REMEMBERED] = 0
     laws = whole.pairs
-    pairs = Pairs(laws.restitution, laws.friction, boxes_part(laws.boxes, world.order, count))
+    pairs = Pairs(laws.restitution, laws.friction, boxes_part(laws.boxes, count))
     return Island(
         bodies_part(local, count),
         pairs,

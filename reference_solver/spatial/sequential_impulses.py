@@ -1,4 +1,11 @@
-"""Sequential impulses point by point: a normal row, then the friction disc, totals clamped (E10, E11)."""
+"""Sequential impulses point by point: a normal row, then the friction disc, totals clamped (E10, E11).
+
+The rows of a manifold are solved in terms of the relative twist of its two bodies at its centre: it is read once, each
+impulse changes it, and the bodies get the sum of the impulses at the end.
+
+The points of a manifold are taken forwards and backwards in turns. In one order throughout, what the last sweep leaves
+unsolved is always at the same corner, and a column creeps to one side.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +19,32 @@ from reference_solver.stepping.options import Options
 
 
 @inner_kernel
-def sweep_points(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
-    """One sweep over all points in canonical order, at each the normal row and then the friction rows."""
+def sweep_points(
+    bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float, turn: int, push: int
+) -> None:
+    """One sweep over all manifolds in canonical order, at each point the normal row and then the friction rows.
+
+    ``turn``: number of the sweep. ``push``: whether the pseudo-velocity rows (E16) are solved along with them.
+    """
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for p in range(manifolds.points[m]):
-            for part in range(2 if manifolds.friction[m] > 0.0 else 1):
-                if part == 0:
-                    change = press(manifolds, m, p, velocity_at(v, w, manifolds, m, p), relaxation)
-                else:
-                    change = drag(manifolds, m, p, velocity_at(v, w, manifolds, m, p), relaxation)
+        last = manifolds.points[m] - 1
+        for k in range(last + 1):
+            p = last - k if turn % 2 else k
+            change = press(manifolds, m, p, velocity_at(v, w, manifolds, m, p), relaxation)
+            if manifolds.friction[m] > 0.0:
                 v, w = respond(v, w, manifolds, m, p, change)
-                force = add(force, change)
-                moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
+                drags = drag(manifolds, m, p, velocity_at(v, w, manifolds, m, p), relaxation)
+                v, w = respond(v, w, manifolds, m, p, drags)
+                change = add(change, drags)
+            else:
+                v, w = respond(v, w, manifolds, m, p, change)
+            force = add(force, change)
+            moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
         apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
+        if push:
+            push_manifold(bodies, manifolds, m, options, relaxation, turn)
 
 
 @inner_kernel
@@ -56,18 +74,26 @@ def drag(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> 
 
 
 @inner_kernel
-def sweep_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
-    """One sweep over the pseudo-velocity rows of position correction (E16)."""
+def push_manifold(bodies: Bodies, manifolds: Manifolds, m: int, options: Options, relaxation: float, turn: int) -> None:
+    """Pseudo-velocity rows of manifold m (E16)."""
+    v, w = relative_twist(bodies.pseudo, manifolds, m, options.rotation)
+    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    last = manifolds.points[m] - 1
+    for k in range(last + 1):
+        p = last - k if turn % 2 else k
+        u = velocity_at(v, w, manifolds, m, p)
+        old = manifolds.push[m, p]
+        new = max(old - relaxation * (u[2] - manifolds.push_target[m, p]) / manifolds.matrix[m, p, 5], 0.0)
+        manifolds.push[m, p] = new
+        change = (0.0, 0.0, new - old)
+        v, w = respond(v, w, manifolds, m, p, change)
+        force = add(force, change)
+        moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
+    apply_wrench(bodies, bodies.pseudo, manifolds, m, options.rotation, force, moment)
+
+
+@inner_kernel
+def sweep_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float, turn: int) -> None:
+    """One sweep over the pseudo-velocity rows alone."""
     for m in range(len(manifolds)):
-        v, w = relative_twist(bodies.pseudo, manifolds, m, options.rotation)
-        force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for p in range(manifolds.points[m]):
-            u = velocity_at(v, w, manifolds, m, p)
-            old = manifolds.push[m, p]
-            new = max(old - relaxation * (u[2] - manifolds.push_target[m, p]) / manifolds.matrix[m, p, 5], 0.0)
-            manifolds.push[m, p] = new
-            change = (0.0, 0.0, new - old)
-            v, w = respond(v, w, manifolds, m, p, change)
-            force = add(force, change)
-            moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
-        apply_wrench(bodies, bodies.pseudo, manifolds, m, options.rotation, force, moment)
+        push_manifold(bodies, manifolds, m, options, relaxation, turn)
