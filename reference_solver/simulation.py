@@ -206,7 +206,7 @@ class Simulation:
 
     @property
     def certificate(self) -> dict[str, Any]:
-        """How well the answers solve their own equations, over the whole run; without ``certified`` `UNCERTIFIED` alone.
+        """How well the answers solve their own equations, over the run; without ``certified`` `UNCERTIFIED` alone.
 
         ``holds``
             Whether the run may serve as truth: every share below is within its gate (`certificate.GATES`).

@@ -67,7 +67,6 @@ from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
-from reference_solver.stepping.options import BLOCK
 from reference_solver.stepping.paths import Paths
 from reference_solver.stepping.phase import NO_PHASE
 from reference_solver.stepping.vectors import copy_vectors
@@ -107,8 +106,7 @@ def weigh_clusters(island: Island) -> None:
 def begin_solve(island: Island) -> None:
     """Rows that touch, their blocks, and the velocities of the start."""
     impact.keep_touching(island.bodies, island.pairs, island.rows, island.sub, island.options.dt)
-    if island.options.solver == BLOCK:
-        prepare_blocks(island.bodies, island.rows)
+    prepare_blocks(island.bodies, island.rows)
     copy_vectors(island.bodies.twist, island.sub.before)
 
 
@@ -300,8 +298,7 @@ def find_loaded(island: Island) -> int:
         return -1
     if not impact.keep_loaded(island.bodies, island.pairs, island.rows):
         return 0
-    if island.options.solver == BLOCK:
-        prepare_blocks(island.bodies, island.rows)
+    prepare_blocks(island.bodies, island.rows)
     return int(island.rows.counts[CONTACTS]) if has_room(island) else -1
 
 

@@ -50,10 +50,9 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, 
             if push:
                 push_point(bodies, rows, first, relaxation)
         else:
-            c, d = first + turn % 2, first + 1 - turn % 2
-            sweep_pair(bodies, rows, c, d, options, relaxation)
+            sweep_pair(bodies, rows, m, turn % 2, options, relaxation)
             if push:
-                push_pair(bodies, rows, c, d, relaxation)
+                push_pair(bodies, rows, first + turn % 2, first + 1 - turn % 2, relaxation)
 
 
 @inner_kernel
@@ -61,66 +60,72 @@ def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation
     """Rows of a manifold of one point."""
     a, b, row = rows.integer[c, A], rows.integer[c, B], rows.real[c]
     va, vb = bodies.twist[a], bodies.twist[b]
-    nx, ny = row[NX], row[NY]
-    x, y = vb[0] - va[0], vb[1] - va[1]
-    un = nx * x + ny * y + (row[BN] * vb[2] - row[AN] * va[2])
-    old = row[PN]
-    new = max(old - relaxation * (un - row[TARGET]) * row[NORMAL_MASS], 0.0)
-    row[PN], pn, pt = new, new - old, 0.0
-    if options.friction:
-        ut = nx * y - ny * x + (row[BT] * vb[2] - row[AT] * va[2]) + row[COUPLING] * pn
-        old = row[PT]
-        row[PT] = into_interval(old - relaxation * ut * row[TANGENT_MASS], row[FRICTION] * new)
-        pt = row[PT] - old
-    px, py = pn * nx - pt * ny, pn * ny + pt * nx
     mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
-    va[0] -= mass_a * px
-    va[1] -= mass_a * py
-    va[2] -= bodies.real[a, INVERSE_INERTIA] * (row[AN] * pn + row[AT] * pt)
-    vb[0] += mass_b * px
-    vb[1] += mass_b * py
-    vb[2] += bodies.real[b, INVERSE_INERTIA] * (row[BN] * pn + row[BT] * pt)
+    ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
+    nx, ny, an, bn, at, bt = row[NX], row[NY], row[AN], row[BN], row[AT], row[BT]
+    x, y = vb[0] - va[0], vb[1] - va[1]
+    old_n, old_t, relaxed = row[PN], row[PT], relaxation * row[NORMAL_MASS]
+    n = max(old_n - relaxed * (nx * x + ny * y + (bn * vb[2] - an * va[2]) - row[TARGET]), 0.0)
+    row[PN], t = n, old_t
+    if options.friction:
+        relaxed, k = relaxation * row[TANGENT_MASS], row[COUPLING]
+        rest = old_t - relaxed * (nx * y - ny * x + (bt * vb[2] - at * va[2]) - k * old_n)
+        t = into_interval(rest - relaxed * k * n, row[FRICTION] * n)
+        row[PT] = t
+    pn, pt = n - old_n, t - old_t
+    va[0] = va[0] - mass_a * nx * pn + mass_a * ny * pt
+    va[1] = va[1] - mass_a * ny * pn - mass_a * nx * pt
+    va[2] = va[2] - ia * an * pn - ia * at * pt
+    vb[0] = vb[0] + mass_b * nx * pn - mass_b * ny * pt
+    vb[1] = vb[1] + mass_b * ny * pn + mass_b * nx * pt
+    vb[2] = vb[2] + ib * bn * pn + ib * bt * pt
 
 
 @inner_kernel
-def sweep_pair(bodies: Bodies, rows: Rows, c: int, d: int, options: Options, relaxation: float) -> None:
-    """Rows of a manifold of two points, which share their normal: those of row c, then those of row d."""
-    a, b, one, two = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d]
+def sweep_pair(bodies: Bodies, rows: Rows, m: int, second: int, options: Options, relaxation: float) -> None:
+    """Rows of a manifold of two points, which share their normal; ``second``: 1 where the second point comes first.
+
+    In p := max(p - (u - b) / k, 0) the velocity u is that at the start plus W times what impulses have changed since.
+    All that is known at the start is taken together first (``rest``), so that a row waits for little.
+    """
+    c, d, i, j = rows.manifold[m] + second, rows.manifold[m] + 1 - second, 2 * second, 2 - 2 * second
+    a, b, one, two, w = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d], rows.block[m]
     va, vb = bodies.twist[a], bodies.twist[b]
     mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
     ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
-    nx, ny = one[NX], one[NY]
-    x, y, wa, wb = vb[0] - va[0], vb[1] - va[1], va[2], vb[2]
+    nx, ny, x, y, wa, wb = one[NX], one[NY], vb[0] - va[0], vb[1] - va[1], va[2], vb[2]
     along, across = nx * x + ny * y, nx * y - ny * x
     an1, bn1, an2, bn2 = one[AN], one[BN], two[AN], two[BN]
     at1, bt1, at2, bt2 = one[AT], one[BT], two[AT], two[BT]
-    old = one[PN]
-    new = max(old - relaxation * (along + (bn1 * wb - an1 * wa) - one[TARGET]) * one[NORMAL_MASS], 0.0)
-    one[PN], pn1, pt1 = new, new - old, 0.0
-    if options.friction:
-        ut = across + (bt1 * wb - at1 * wa) + one[COUPLING] * pn1
-        old = one[PT]
-        one[PT] = into_interval(old - relaxation * ut * one[TANGENT_MASS], one[FRICTION] * new)
-        pt1 = one[PT] - old
-    un = along + (bn2 * wb - an2 * wa) + (mass_a + mass_b + ia * (an1 * an2) + ib * (bn1 * bn2)) * pn1
-    un += (ia * (at1 * an2) + ib * (bt1 * bn2)) * pt1
-    old = two[PN]
-    new = max(old - relaxation * (un - two[TARGET]) * two[NORMAL_MASS], 0.0)
-    two[PN], pn2, pt2 = new, new - old, 0.0
-    if options.friction:
-        ut = across + (bt2 * wb - at2 * wa) + (ia * (an1 * at2) + ib * (bn1 * bt2)) * pn1
-        ut += (mass_a + mass_b + ia * (at1 * at2) + ib * (bt1 * bt2)) * pt1 + two[COUPLING] * pn2
-        old = two[PT]
-        two[PT] = into_interval(old - relaxation * ut * two[TANGENT_MASS], two[FRICTION] * new)
-        pt2 = two[PT] - old
-    pn, pt = pn1 + pn2, pt1 + pt2
-    px, py = pn * nx - pt * ny, pn * ny + pt * nx
-    va[0] -= mass_a * px
-    va[1] -= mass_a * py
-    va[2] -= ia * ((an1 * pn1 + an2 * pn2) + (at1 * pt1 + at2 * pt2))
-    vb[0] += mass_b * px
-    vb[1] += mass_b * py
-    vb[2] += ib * ((bn1 * pn1 + bn2 * pn2) + (bt1 * pt1 + bt2 * pt2))
+    old_n1, old_t1, old_n2, old_t2 = one[PN], one[PT], two[PN], two[PT]
+    t1, t2, friction = old_t1, old_t2, options.friction
+    relaxed = relaxation * one[NORMAL_MASS]
+    n1 = max(old_n1 - relaxed * (along + (bn1 * wb - an1 * wa) - one[TARGET]), 0.0)
+    if friction:
+        relaxed = relaxation * one[TANGENT_MASS]
+        rest = old_t1 - relaxed * (across + (bt1 * wb - at1 * wa) - w[i, i + 1] * old_n1)
+        t1 = into_interval(rest - relaxed * w[i, i + 1] * n1, one[FRICTION] * n1)
+    relaxed = relaxation * two[NORMAL_MASS]
+    rest = along + (bn2 * wb - an2 * wa) - two[TARGET] - w[i, j] * old_n1
+    if friction:
+        rest = old_n2 - relaxed * (rest - w[i + 1, j] * old_t1)
+        n2 = max(rest - relaxed * w[i, j] * n1 - relaxed * w[i + 1, j] * t1, 0.0)
+        relaxed = relaxation * two[TANGENT_MASS]
+        rest = across + (bt2 * wb - at2 * wa) - w[i, j + 1] * old_n1 - w[i + 1, j + 1] * old_t1
+        rest = old_t2 - relaxed * (rest - w[j, j + 1] * old_n2)
+        rest = rest - relaxed * w[i, j + 1] * n1 - relaxed * w[i + 1, j + 1] * t1
+        t2 = into_interval(rest - relaxed * w[j, j + 1] * n2, two[FRICTION] * n2)
+    else:
+        n2 = max(old_n2 - relaxed * rest - relaxed * w[i, j] * n1, 0.0)
+    one[PN], one[PT], two[PN], two[PT] = n1, t1, n2, t2
+    pn1, pn2, pt1, pt2 = n1 - old_n1, n2 - old_n2, t1 - old_t1, t2 - old_t2
+    px, py = (pn1 + pn2) * nx - pt1 * ny, (pn1 + pn2) * ny + pt1 * nx
+    va[0] = va[0] - mass_a * px + mass_a * ny * pt2
+    va[1] = va[1] - mass_a * py - mass_a * nx * pt2
+    va[2] = wa - ia * (an1 * pn1 + an2 * pn2 + at1 * pt1) - ia * at2 * pt2
+    vb[0] = vb[0] + mass_b * px - mass_b * ny * pt2
+    vb[1] = vb[1] + mass_b * py + mass_b * nx * pt2
+    vb[2] = wb + ib * (bn1 * pn1 + bn2 * pn2 + bt1 * pt1) + ib * bt2 * pt2
 
 
 @inner_kernel

@@ -19,7 +19,7 @@ from reference_solver.planar.rows import prepare, warm_start
 from reference_solver.planar.state import CONTACTS, DISC, FIXED, FREE, Bodies, Pairs, Rows
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.ledger import Buffer
-from reference_solver.stepping.options import BLOCK, Options, pushes_along
+from reference_solver.stepping.options import Options, pushes_along
 
 
 @inner_kernel
@@ -56,8 +56,7 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, options: Op
         return False
     if rows.counts[CONTACTS] > 0:
         prepare(bodies, pairs, rows, options)
-        if options.solver == BLOCK:
-            prepare_blocks(bodies, rows)
+        prepare_blocks(bodies, rows)
     accelerate(bodies, options)
     if options.certified:
         open_solve(bodies, options.dt, tally)

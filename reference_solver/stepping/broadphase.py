@@ -16,8 +16,10 @@ from reference_solver.structures import structure
 
 #: Levels of the grid, of cells half as wide each: one bit each of an integer. All smaller bodies are on the last.
 LEVELS = 62
+#: Cells are wider than their bodies by this share: rounding of a coordinate over a width is less, up to `FARTHEST`.
+ROOM = 2.0**-20
 #: Cells are counted up to here on both sides of the origin; what is farther away shares the outermost one.
-FARTHEST = 2.0**53
+FARTHEST = 2.0**30
 #: Large primes for the hash of a cell (Teschner et al., Optimized spatial hashing for collision detection, 2003).
 PRIMES = (73856093, 19349663, 83492791)
 
@@ -88,6 +90,16 @@ def bodies_of(pair: int) -> tuple[int, int]:
 
 
 @inner_kernel
+def bound_along(boxes: Boxes, i: int, axis: int, component: float, place: float) -> None:
+    """Bound half-space i along an axis that is its normal, to the last bit, by the place of its face there."""
+    noise = 1e-15 * abs(place)
+    if component == 1.0:
+        boxes.high[i, axis] = place + noise
+    elif component == -1.0:
+        boxes.low[i, axis] = place - noise
+
+
+@inner_kernel
 def may_touch(bodies: Bodies, boxes: Boxes, i: int, j: int) -> bool:
     """Bounds overlap and at least one body can respond."""
     for d in range(boxes.low.shape[1]):
@@ -140,16 +152,17 @@ def bucket_of(boxes: Boxes, level: int, x: int, y: int, z: int) -> int:
 
 
 @inner_kernel
-def fill_grid(boxes: Boxes) -> tuple[int, int]:
-    """Put each bounded body into the cell of its lower corner, at the level whose cells are as wide as it, or wider.
+def fill_grid(boxes: Boxes) -> tuple[float, int]:
+    """Put each bounded body into the cell of its lower corner, at the last level whose cells are wider than it.
 
-    Returns the exponent of 2 that is the width of the cells of level 0, and one bit for each level that has bodies.
+    Returns the width of the cells of level 0, wider than all bodies, and one bit for each level that has bodies. Cells
+    of each level are half as wide as those of the one before.
     """
     widest = 0.0
     for i in range(len(boxes.low)):
         width = width_of(boxes, i)
         widest = max(widest, width if width < math.inf else 0.0)
-    top = math.frexp(widest)[1]
+    widest *= 1.0 + ROOM
     boxes.bucket[:] = -1
     occupied, axes = 0, boxes.low.shape[1]
     for i in range(len(boxes.low) - 1, -1, -1):
@@ -157,26 +170,28 @@ def fill_grid(boxes: Boxes) -> tuple[int, int]:
         if width == math.inf:
             boxes.cell[i, 0] = -1
             continue
-        level = min(top - math.frexp(width)[1], LEVELS - 1) if width > 0.0 else LEVELS - 1
+        level = LEVELS - 1
+        if width > 0.0:
+            level = min(max(math.frexp(widest / (width * (1.0 + 0.5 * ROOM)))[1] - 1, 0), level)
         boxes.cell[i, 0] = level
         occupied |= 1 << level
-        size = math.ldexp(1.0, top - level)
+        size = math.ldexp(widest, -level)
         for d in range(axes):
             boxes.cell[i, 1 + d] = cell_at(boxes.low[i, d], size)
-        z = boxes.cell[i, 3] if axes == 3 else 0
-        bucket = bucket_of(boxes, level, boxes.cell[i, 1], boxes.cell[i, 2], z)
+        bucket = bucket_of(boxes, level, boxes.cell[i, 1], boxes.cell[i, 2], boxes.cell[i, 3] if axes == 3 else 0)
         boxes.after[i] = boxes.bucket[bucket]
         boxes.bucket[bucket] = i
-    return top, occupied
+    return widest, occupied
 
 
 @inner_kernel
-def find_in_grid(bodies: Bodies, boxes: Boxes, grid: tuple[int, int]) -> int:
+def find_in_grid(bodies: Bodies, boxes: Boxes, grid: tuple[float, int]) -> int:
     """Fill `found`: each body with those of its own level and of wider cells, and unbounded ones with all others.
 
-    A body whose lower corner is in a cell reaches at most one cell farther.
+    The lower corner of a body that another one meets is in the same cell as its own, or in one beside it. At its own
+    level it looks in one of each two cells that lie opposite each other: from there the other one finds it.
     """
-    top, occupied = grid
+    widest, occupied = grid
     count, n, axes = 0, len(boxes.low), boxes.low.shape[1]
     for i in range(n):
         own = boxes.cell[i, 0]
@@ -189,18 +204,19 @@ def find_in_grid(bodies: Bodies, boxes: Boxes, grid: tuple[int, int]) -> int:
         for level in range(own + 1):
             if not (occupied >> level) & 1:
                 continue
-            size = math.ldexp(1.0, top - level)
-            x0, x1 = cell_at(boxes.low[i, 0], size) - 1, cell_at(boxes.high[i, 0], size)
-            y0, y1 = cell_at(boxes.low[i, 1], size) - 1, cell_at(boxes.high[i, 1], size)
-            z0, z1 = 0, 0
+            size = math.ldexp(widest, -level)
+            x, y, z = cell_at(boxes.low[i, 0], size), cell_at(boxes.low[i, 1], size), 0
+            x1, y1, z0, z1 = cell_at(boxes.high[i, 0], size), cell_at(boxes.high[i, 1], size), 0, 0
             if axes == 3:
-                z0, z1 = cell_at(boxes.low[i, 2], size) - 1, cell_at(boxes.high[i, 2], size)
-            for z in range(z0, z1 + 1):
-                for y in range(y0, y1 + 1):
-                    for x in range(x0, x1 + 1):
-                        j = boxes.bucket[bucket_of(boxes, level, x, y, z)]
+                z, z1 = cell_at(boxes.low[i, 2], size), cell_at(boxes.high[i, 2], size)
+                z0 = z if level == own else z - 1
+            for zz in range(z0, z1 + 1):
+                for yy in range(y if level == own and zz == z else y - 1, y1 + 1):
+                    for xx in range(x if level == own and zz == z and yy == y else x - 1, x1 + 1):
+                        j = boxes.bucket[bucket_of(boxes, level, xx, yy, zz)]
+                        beside = level < own or xx != x or yy != y or zz != z
                         while j >= 0:
-                            if (j > i or level < own) and in_cell(boxes, j, level, x, y, z):
+                            if (beside or j > i) and in_cell(boxes, j, level, xx, yy, zz):
                                 if may_touch(bodies, boxes, i, j):
                                     count = enter_pair(boxes, count, i, j)
                             j = boxes.after[j]
