@@ -1,8 +1,10 @@
 """The documentation builds offline without a warning, with a page for each scene."""
 
 import importlib
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,28 @@ def test_each_scene_s_page_has_who_passes_it_in_the_published_report(monkeypatch
     exact = found[(found.engine == "reference") & (found.profile == "reference")]
     assert (exact.judged > 0).all() and (exact.failed == 0).all()
     assert (found.failed > 0).any() and (found.failed <= found.judged).all()
+
+
+def written_by_hand():
+    """Every page for people but the theory of the solver and the list of models in `tests/models`."""
+    tracked = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, check=True, capture_output=True, text=True)
+    apart = ("docs/solver/", "reference_solver/", "reports/published/", "tests/")
+    return [ROOT / name for name in tracked.stdout.split() if not name.startswith(apart)]
+
+
+def test_pages_that_are_written_by_hand_have_at_most_twelve_thousand_words():
+    words = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").split()) for path in written_by_hand()
+    }
+    assert {"README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "docs/method.md"} <= set(words)
+    assert sum(words.values()) <= 12_000, words
+
+
+def test_fragments_of_the_changelog_have_a_type_that_towncrier_knows():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["towncrier"]
+    types = "|".join(kind["directory"] for kind in settings["type"])
+    names = [path.name for path in (ROOT / settings["directory"]).iterdir()]
+    assert [name for name in names if not re.fullmatch(rf"(\d+|\+[\w-]+)\.({types})\.md|README\.md", name)] == []
 
 
 @pytest.mark.long
