@@ -76,11 +76,13 @@ def test_snippets_of_the_solver_s_documents_run():
 @pytest.mark.long
 def test_the_documentation_builds_without_a_warning(tmp_path):
     source = tmp_path / "docs"
-    tracked = subprocess.run(["git", "ls-files", "docs"], cwd=ROOT, check=True, capture_output=True, text=True)
+    tracked = subprocess.run(
+        ["git", "ls-files", "docs", ":(glob)*.md"], cwd=ROOT, check=True, capture_output=True, text=True
+    )
     for name in tracked.stdout.split():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
-    for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "reference_solver", "reports"):
+    for name in ("reference_solver", "reports"):
         (tmp_path / name).symlink_to(ROOT / name)
     built = tmp_path / "html"
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(source), str(built)]
