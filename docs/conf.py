@@ -13,8 +13,6 @@ version = release = version_of("contact-crosscheck")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_click"]
 exclude_patterns = ["_build", "templates"]
 myst_heading_anchors = 3
-# The theory of the solver is kept beside its code, where links between headings are those of GitHub.
-suppress_warnings = ["myst.header", "myst.xref_missing"]
 numpydoc_show_class_members = False
 autodoc_typehints = "none"
 html_theme = "pydata_sphinx_theme"

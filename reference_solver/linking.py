@@ -71,7 +71,7 @@ class Program(JITCodeLibrary):
         """Optimise once, with loops as they are.
 
         Two passes of numba's own, one of them for what counts references, unrolled and vectorised loops that run a few
-        times each: a third more machine code, and no faster (reference_solver/README.md).
+        times each: a third more machine code, and no faster (docs/solver/performance.md).
         """
         options = llvm.create_pipeline_tuning_options(config.OPT)
         options.loop_vectorization = options.slp_vectorization = False

@@ -16,7 +16,7 @@ ACCURACY = 1e-8
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of the time-stepping scheme; equation numbers refer to ``reference_solver/README.md``.
+    """Numbers of the time-stepping scheme; equation numbers refer to ``docs/solver``.
 
     Parameters
     ----------

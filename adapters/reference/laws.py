@@ -13,7 +13,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         metric,
         passing_law(metric),
         "nothing is swept: no step ends with the ball in the plate, so that it is never found",
-        "reference_solver/README.md, scheme fixed: contacts are looked for at the start of a step",
+        "docs/solver/step.md: contacts are looked for at the start of a step",
         ("0.1.",),
     )
     for metric in ("rebound_ratio", "beyond")
@@ -26,7 +26,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         shoved_law(metric),
         "nothing is swept: where the first step that ends in the plate ends beyond its middle, it leaves on the "
         "far side as fast as it came",
-        "reference_solver/README.md, scheme fixed: contacts are looked for at the start of a step",
+        "docs/solver/step.md: contacts are looked for at the start of a step",
         ("0.1.",),
     )
     for metric in ("rebound_ratio", "beyond")

@@ -17,7 +17,7 @@ from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, Check, either, flag, number, whole, word
 
-SOURCE = "reference_solver/README.md"
+SOURCE = "docs/solver"
 #: Why each of the solver's settings has its value; the values themselves are the solver's own.
 REASONS = {
     "iterations": "what textbooks and engines use: an answer at a fixed cost, whatever is left unsolved",

@@ -39,7 +39,7 @@ class Bare:
         return Told(float(self._solver.pose[1, 1]) - self._lowest, along, up, spin)
 
 
-_MODEL, _SETTINGS, _NONE = "reference_solver/model.py", "reference_solver/settings.py", "reference_solver/README.md"
+_MODEL, _SETTINGS, _NONE = "reference_solver/model.py", "reference_solver/settings.py", "docs/solver/step.md"
 UNSET = (
     Unset("friction of a pair", "none: must be stated", _MODEL),
     Unset("friction of two bodies", "does not combine: pairs have it", _MODEL),

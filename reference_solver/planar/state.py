@@ -1,6 +1,6 @@
 """Arrays that the planar kernels work on, as named tuples of arrays and numbers.
 
-Symbols as in ``reference_solver/README.md``. Rows ``c`` are contact points, sorted by (body_a, body_b, feature);
+Symbols as in ``docs/solver/model.md``. Rows ``c`` are contact points, sorted by (body_a, body_b, feature);
 points of one pair of bodies are neighbours and form a manifold ``m``.
 """
 

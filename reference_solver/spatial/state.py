@@ -3,7 +3,7 @@
 Records rather than one array per field: a kernel call hands over one pointer instead of two hundred numbers,
 which is what compilation time goes with, and the constants of a manifold lie side by side in memory.
 
-Symbols as in ``reference_solver/README.md``. A manifold ``m`` holds the one to eight contact points ``s`` of one
+Symbols as in ``docs/solver/model.md``. A manifold ``m`` holds the one to eight contact points ``s`` of one
 pair of bodies, which share a normal; manifolds are sorted by (body_a, body_b), their points by feature.
 Every manifold has room for eight points.
 """

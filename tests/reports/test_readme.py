@@ -153,12 +153,12 @@ NOT_RUN = {
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A folder with the scene of CONTRIBUTING.md, from which the commands are run in the order of the README."""
+    """A folder with the documentation's scene file, from which the commands are run in the order of the README."""
     for package in ("pymunk", "pybullet", "mujoco"):
         pytest.importorskip(package)
     folder = tmp_path_factory.mktemp("readme")
-    contributing = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    scene = next(block for block in re.findall(r"```toml\n(.*?)```", contributing, re.S) if "[[bodies]]" in block)
+    own = (ROOT / "docs/howto/own-scene.md").read_text(encoding="utf-8")
+    scene = next(block for block in re.findall(r"```toml\n(.*?)```", own, re.S) if "[[bodies]]" in block)
     (folder / "my-scene.toml").write_text(scene, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)

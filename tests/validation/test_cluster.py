@@ -178,7 +178,9 @@ def test_scene_files_need_not_be_on_the_workers(tmp_path):
     from validation import posed
 
     path = tmp_path / "drop.toml"
-    text = (ROOT / "CONTRIBUTING.md").read_text().partition('```toml\nname = "sliding box"')[2].partition("```")[0]
+    text = (
+        (ROOT / "docs/howto/own-scene.md").read_text().partition('```toml\nname = "sliding box"')[2].partition("```")[0]
+    )
     path.write_text('name = "sliding box"' + text)
     name = posed.pinned(str(path))
     path.unlink()

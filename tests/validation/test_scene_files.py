@@ -257,7 +257,7 @@ def test_what_an_engine_refuses_is_unsupported_in_one_line_and_no_alarm(tmp_path
 
 
 def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
+    text = (ROOT / "docs/howto/own-scene.md").read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
     canonical = stated(tmp_path, text)
     scene = canonical.scene(2)
     ramp, box = scene.bodies
