@@ -78,7 +78,7 @@ def correct_positions(bodies: Bodies, rows: Rows, options: Options, tally: Array
         if options.solver == BLOCK:
             sweep_block_pushes(bodies, rows, relaxation)
         else:
-            sweep_pushes(bodies, rows, relaxation, s)
+            sweep_pushes(bodies, rows, relaxation)
         if options.residual >= 0.0 and s % 4 == 3 and missing_push(bodies, rows) <= PUSH_TOLERANCE * largest:
             break
     return True

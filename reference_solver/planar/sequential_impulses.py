@@ -4,8 +4,9 @@ The rows of one manifold are solved in their own space: their velocities are rea
 changes the velocities of the other rows by the matrix W of the manifold (E12), and the bodies get the sum at the end.
 That is the same row after row, with fewer operations that wait for each other.
 
-The two points of a manifold take turns in being first. In one order throughout, what the last sweep leaves unsolved is
-always at the same corner, and a column creeps to one side.
+In the second half of the sweeps the second point of two comes first. In one order throughout, what the last sweep
+leaves unsolved is always at the same corner, and a column creeps to one side until it falls. Turning round after each
+sweep would do as well, but solves the same row twice in a row, which changes nothing.
 """
 
 from __future__ import annotations
@@ -38,10 +39,11 @@ from reference_solver.stepping.options import Options
 
 
 @inner_kernel
-def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, turn: int, push: int) -> None:
+def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, backwards: int, push: int) -> None:
     """One sweep over all manifolds in canonical order, at each point the normal row and then the friction row.
 
-    ``turn``: number of the sweep. ``push``: whether the pseudo-velocity rows (E16) are solved along with them.
+    ``backwards``: whether the second point of two comes first. ``push``: whether the pseudo-velocity rows (E16) are
+    solved along with them.
     """
     for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
@@ -50,9 +52,9 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, 
             if push:
                 push_point(bodies, rows, first, relaxation)
         else:
-            sweep_pair(bodies, rows, m, turn % 2, options, relaxation)
+            sweep_pair(bodies, rows, m, backwards, options, relaxation)
             if push:
-                push_pair(bodies, rows, first + turn % 2, first + 1 - turn % 2, relaxation)
+                push_pair(bodies, rows, first + backwards, first + 1 - backwards, relaxation)
 
 
 @inner_kernel
@@ -82,13 +84,13 @@ def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation
 
 
 @inner_kernel
-def sweep_pair(bodies: Bodies, rows: Rows, m: int, second: int, options: Options, relaxation: float) -> None:
-    """Rows of a manifold of two points, which share their normal; ``second``: 1 where the second point comes first.
+def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Options, relaxation: float) -> None:
+    """Rows of a manifold of two points, which share their normal; ``backwards``: 1 where the second point comes first.
 
     In p := max(p - (u - b) / k, 0) the velocity u is that at the start plus W times what impulses have changed since.
     All that is known at the start is taken together first (``rest``), so that a row waits for little.
     """
-    c, d, i, j = rows.manifold[m] + second, rows.manifold[m] + 1 - second, 2 * second, 2 - 2 * second
+    c, d, i, j = rows.manifold[m] + backwards, rows.manifold[m] + 1 - backwards, 2 * backwards, 2 - 2 * backwards
     a, b, one, two, w = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d], rows.block[m]
     va, vb = bodies.twist[a], bodies.twist[b]
     mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
@@ -174,11 +176,11 @@ def push_pair(bodies: Bodies, rows: Rows, c: int, d: int, relaxation: float) -> 
 
 
 @inner_kernel
-def sweep_pushes(bodies: Bodies, rows: Rows, relaxation: float, turn: int) -> None:
+def sweep_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows alone."""
     for m in range(rows.counts[MANIFOLDS]):
         first = rows.manifold[m]
         if rows.manifold[m + 1] - first == 1:
             push_point(bodies, rows, first, relaxation)
         else:
-            push_pair(bodies, rows, first + turn % 2, first + 1 - turn % 2, relaxation)
+            push_pair(bodies, rows, first, first + 1, relaxation)

@@ -78,7 +78,7 @@ def correct_positions(bodies: Bodies, manifolds: Manifolds, options: Options, ta
         return False
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     for s in range(options.iterations if options.residual < 0.0 else PUSH_SWEEPS):
-        sweep_pushes(bodies, manifolds, options, relaxation, s if options.residual < 0.0 else 0)
+        sweep_pushes(bodies, manifolds, options, relaxation)
         if options.residual >= 0.0 and s % 4 == 3:
             if push_residual(bodies, manifolds, options) <= PUSH_TOLERANCE * largest:
                 break

@@ -3,8 +3,8 @@
 The rows of a manifold are solved in terms of the relative twist of its two bodies at its centre: it is read once, each
 impulse changes it, and the bodies get the sum of the impulses at the end.
 
-The points of a manifold are taken forwards and backwards in turns. In one order throughout, what the last sweep leaves
-unsolved is always at the same corner, and a column creeps to one side.
+In the second half of the sweeps the points of a manifold are taken backwards. In one order throughout, what the last
+sweep leaves unsolved is always at the same corner, and a column creeps to one side.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from reference_solver.stepping.options import Options
 
 @inner_kernel
 def sweep_points(
-    bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float, turn: int, push: int
+    bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float, backwards: int, push: int
 ) -> None:
     """One sweep over all manifolds in canonical order, at each point the normal row and then the friction rows.
 
-    ``turn``: number of the sweep. ``push``: whether the pseudo-velocity rows (E16) are solved along with them.
+    ``backwards``: whether points are taken from the last to the first. ``push``: whether the pseudo-velocity rows (E16) are solved along with them.
     """
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
@@ -40,7 +40,7 @@ def sweep_points(
             force, moment = ZERO, ZERO
             last = manifolds.points[m] - 1
             for k in range(last + 1):
-                p = last - k if turn % 2 else k
+                p = last - k if backwards else k
                 change = press(manifolds, m, p, velocity_at(v, w, manifolds, m, p), relaxation)
                 v, w = respond_to_normal(v, w, manifolds, m, p, change[2])
                 if manifolds.friction[m] > 0.0:
@@ -51,7 +51,7 @@ def sweep_points(
                 moment = add(moment, cross(row(manifolds.offset[m], p, 0), change))
             apply_wrench(bodies, bodies.twist, manifolds, m, options.rotation, force, moment)
         if push:
-            push_manifold(bodies, manifolds, m, options, relaxation, turn)
+            push_manifold(bodies, manifolds, m, options, relaxation, backwards)
 
 
 @inner_kernel
@@ -105,13 +105,15 @@ def drag(manifolds: Manifolds, m: int, p: int, u: Vector, relaxation: float) -> 
 
 
 @inner_kernel
-def push_manifold(bodies: Bodies, manifolds: Manifolds, m: int, options: Options, relaxation: float, turn: int) -> None:
+def push_manifold(
+    bodies: Bodies, manifolds: Manifolds, m: int, options: Options, relaxation: float, backwards: int
+) -> None:
     """Pseudo-velocity rows of manifold m (E16)."""
     v, w = relative_twist(bodies.pseudo, manifolds, m, options.rotation)
     total, moment = 0.0, ZERO
     last = manifolds.points[m] - 1
     for k in range(last + 1):
-        p = last - k if turn % 2 else k
+        p = last - k if backwards else k
         u = velocity_at(v, w, manifolds, m, p)
         old = manifolds.push[m, p]
         new = max(old - (relaxation / manifolds.matrix[m, p, 5]) * (u[2] - manifolds.push_target[m, p]), 0.0)
@@ -124,7 +126,7 @@ def push_manifold(bodies: Bodies, manifolds: Manifolds, m: int, options: Options
 
 
 @inner_kernel
-def sweep_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float, turn: int) -> None:
+def sweep_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows alone."""
     for m in range(len(manifolds)):
-        push_manifold(bodies, manifolds, m, options, relaxation, turn)
+        push_manifold(bodies, manifolds, m, options, relaxation, 0)

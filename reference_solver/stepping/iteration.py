@@ -37,12 +37,12 @@ from reference_solver.tally import UNCONVERGED
 
 
 @inner_kernel
-def sweep(bodies: Bodies, rows: Any, options: Options, relaxation: float, turn: int, push: int) -> None:
-    """One sweep of the solver chosen; ``turn``, ``push``: see `operations.sweep_rows`."""
+def sweep(bodies: Bodies, rows: Any, options: Options, relaxation: float, backwards: int, push: int) -> None:
+    """One sweep of the solver chosen; ``backwards``, ``push``: see `operations.sweep_rows`."""
     if options.solver == BLOCK:
         sweep_blocks(bodies, rows, options, relaxation)
     else:
-        sweep_rows(bodies, rows, options, relaxation, turn, push)
+        sweep_rows(bodies, rows, options, relaxation, backwards, push)
 
 
 @inner_kernel
@@ -68,7 +68,7 @@ def sweep_to_residual(bodies: Bodies, rows: Any, problem: Problem, options: Opti
             mend_velocities(bodies, rows, options)
             residual, stale = natural_map(bodies, rows, options), False
             continue
-        sweep(bodies, rows, options, relaxation, sweeps, 0)
+        sweep(bodies, rows, options, relaxation, 0, 0)
         problem.size[HELD], stale = 0, handed
         sweeps += 1
         if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
@@ -118,6 +118,6 @@ def solve_velocities(
         sweep_to_residual(bodies, rows, problem, options, tally)
         return
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
-    for turn in range(options.iterations):
-        sweep(bodies, rows, options, relaxation, turn, push)
+    for k in range(options.iterations):
+        sweep(bodies, rows, options, relaxation, int(2 * k >= options.iterations), push)
     enter(tally, natural_map(bodies, rows, options) if options.certified else 0.0, options.iterations)
