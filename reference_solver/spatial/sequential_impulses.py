@@ -24,7 +24,8 @@ def sweep_points(
 ) -> None:
     """One sweep over all manifolds in canonical order, at each point the normal row and then the friction rows.
 
-    ``backwards``: whether points are taken from the last to the first. ``push``: whether the pseudo-velocity rows (E16) are solved along with them.
+    ``backwards``: whether points are taken from the last to the first. ``push``: whether the pseudo-velocity rows (E16)
+    are solved along with them.
     """
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
