@@ -200,7 +200,7 @@ def close_gaps(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> bo
         rows.real[c, TARGET], rows.real[c, SPEED] = -closable(bodies, rows, c), widest
         rows.real[c, FRICTION] = 0.0
     for k in range(CLOSING_SWEEPS):
-        sweep(bodies, rows, options, 1.0)
+        sweep(bodies, rows, options, 1.0, 0, 0)
         if k % CHECK_INTERVAL == 0 and natural_map(bodies, rows, options) <= CLOSED:
             break
     farthest = 0.0
