@@ -84,16 +84,16 @@ def check_drive(body: Body, dimension: int) -> None:
     check_length(f"{body.name}.surface_velocity", body.surface_velocity, dimension)
     if any(body.surface_velocity):
         if body.motion == "free":
-            raise SceneError(f"{body.name}.surface_velocity: only the surface of a body that is not free can run")
+            raise SceneError(f"{body.name}.surface_velocity: only a body that is not free can have a surface velocity")
         if isinstance(body.shape, HalfSpace):
             lifting = sum(v * n for v, n in zip(body.surface_velocity, body.shape.normal, strict=True))
             if abs(lifting) > 1e-9 * math.hypot(*body.surface_velocity):
-                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} leaves the face")
+                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} does not lie in the face")
     course = body.course
     if course is None:
         return
     if not isinstance(course, Harmonic):
-        raise SceneError(f"{body.name}.course: {course!r} is no course")
+        raise SceneError(f"{body.name}.course: {course!r} is not a course")
     if body.motion != "prescribed":
         raise SceneError(f"{body.name}.course: only a prescribed body has a course")
     check_finite(f"{body.name}.course.amplitude", course.amplitude)

@@ -89,10 +89,10 @@ def covering(engine: str, version: str, profile: str, scene: str, metric: str) -
     Raises
     ------
     EngineError
-        If the engine has laws that cannot be had.
+        If the engine has laws that cannot be loaded.
     """
     if _laws(engine)[1]:
-        raise EngineError(f"{engine}: its laws cannot be had: {_laws(engine)[1]}")
+        raise EngineError(f"{engine}: its laws cannot be loaded: {_laws(engine)[1]}")
     return (law for law in laws_of(engine) if law.covers(engine, version, profile, scene, metric))
 
 
@@ -124,16 +124,16 @@ def unset_of(engine: str) -> tuple[Unset, ...]:
 
 
 def fault_of_tuning(engine: str) -> str:
-    """What is wrong with the file or the module that says how ``engine`` is tuned; empty where nothing is."""
+    """Error in the file or module with the tuning of ``engine``; empty if there is none."""
     return _tuning(engine)[1] or _experiments(engine)[1]
 
 
 def problems() -> list[str]:
-    """One line for each engine and part, of laws, experiments and ``tuning.toml``, that cannot be had."""
+    """One line for each engine and part, of laws, experiments and ``tuning.toml``, that cannot be loaded."""
     found = []
     for engine in registry.names():
         parts = ((LAWS, _laws(engine)), (EXPERIMENTS, _experiments(engine)), (TUNING, _tuning(engine)))
-        found += [f"{engine}: its {part} cannot be had: {said}" for part, (_, said) in parts if said]
+        found += [f"{engine}: its {part} cannot be loaded: {said}" for part, (_, said) in parts if said]
     return found
 
 
@@ -182,7 +182,7 @@ def _laws(engine: str) -> tuple[tuple[Deviation, ...], str]:
 def _guarded(engine: str, law: Any) -> Deviation:
     """A law of another package: its texts made plain, and its answers checked."""
     if not isinstance(law, Deviation) or law.engine != engine:
-        raise TypeError(f"DEVIATIONS has what is no Deviation of {engine}")
+        raise TypeError(f"DEVIATIONS has an entry that is not a Deviation of {engine}")
     checked = _checked(f"law: {engine} {one_line(law.scene)}/{one_line(law.metric)}", law.law)
     return replace(law, law=checked, because=one_line(law.because), source=one_line(law.source))
 
@@ -209,10 +209,10 @@ def _experiments(engine: str) -> tuple[tuple[Experiment, ...], str]:
     module, why = _module(engine, EXPERIMENTS)
     for name, kind in (("EXPERIMENTS", Experiment), ("CURED", Cured)):
         if not all(isinstance(each, kind) for each in getattr(module, name, ())):
-            return (), f"{name} has what is no {kind.__name__}"
+            return (), f"{name} has an entry that is not of type {kind.__name__}"
     for name in ("CANDIDATES", "BELONGS"):
         if not isinstance(getattr(module, name, {}), Mapping):
-            return (), f"{name} is no mapping"
+            return (), f"{name} is not a mapping"
     return tuple(getattr(module, "EXPERIMENTS", ())), why
 
 

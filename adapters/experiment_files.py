@@ -94,7 +94,7 @@ def checked(label: str, table: Any, known: Fields, needed: Collection[str] = ())
         raise ValueError(f"{label} must be a table")
     for name in (*table, *needed):
         if name not in known:
-            raise ValueError(f"{label}: {name} is no field; there are {', '.join(known)}")
+            raise ValueError(f"{label}: {name} is not a field; fields are {', '.join(known)}")
         if name not in table:
             raise ValueError(f"{label}: {name} is missing")
         fits, what = known[name]

@@ -81,5 +81,7 @@ class Materials:
 def single(a: str, b: str, said: _Said) -> tuple[float, float]:
     """The one value that entries say for a pair; smooth and plastic if none says anything."""
     if len(said) > 1:
-        raise SceneError(f"pair {a}-{b}: {len(said)} entries say different things; name both bodies in one")
+        raise SceneError(
+            f"pair {a}-{b}: {len(said)} entries contradict each other; give an entry that names both bodies"
+        )
     return next(iter(said), (0.0, 0.0))

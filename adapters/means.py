@@ -30,7 +30,7 @@ def no_means(scene: Scene) -> str | None:
     """Why an engine that mixes so refuses a scene: a table of pairs that no numbers of bodies give; None if some do."""
     for coefficient in ("restitution", "friction"):
         if means(scene, coefficient) is None:
-            return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
+            return f"pairs: {coefficient} of a pair is the mean of two values here; no values per body give this table"
     return None
 
 

@@ -115,7 +115,7 @@ def _is_plain(value: Any) -> bool:
 
 def _inside(recorded: Recorded) -> tuple[Recording, Any, str]:
     held = recorded.__dict__
-    assert not (held["_once"] and held["_used"]), f"{held['_text']} is used twice: it needs a name"
+    assert not (held["_once"] and held["_used"]), f"{held['_text']} is used twice and needs a name"
     held["_used"] = True
     return held["_recording"], held["_value"], held["_text"]
 
@@ -163,7 +163,7 @@ def written(
 
     made = Written(*world, Recorded(recording, module, name))
     lost = [_inside(each)[2] for each in recording.unnamed if not each.__dict__["_used"]]
-    assert not lost, f"{lost} are used nowhere: each needs a name"
+    assert not lost, f"{lost} are not used, and each needs a name"
     lines, recording.lines, recording.calls = recording.lines, [], False
     made.advance(1)
     step, recording.lines, recording.calls = recording.lines, [], True

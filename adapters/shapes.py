@@ -169,7 +169,7 @@ class Polygon:
                 raise SceneError(f"{label}: not convex and counter-clockwise at number {k}, {(bx, by)!r}")
             turns += turn
         if turns > 3.0 * math.pi:
-            raise SceneError(f"{label}: go round more than once")
+            raise SceneError(f"{label}: go round the centre more than once")
         centre = area_and_centroid(self.vertices)[1]
         if math.hypot(*centre) > CENTRED * self.reach:
             raise SceneError(f"{label}: their centroid is {centre!r}, it must be the origin")
@@ -200,7 +200,7 @@ class Hull:
         label = f"{owner}.shape.vertices"
         check_points(label, self.vertices, 3, 4)
         if self.smallest_size <= 1e-6 * self.reach:
-            raise SceneError(f"{label}: lie in one plane, or nearly")
+            raise SceneError(f"{label}: lie in one plane, or almost")
 
     @property
     def smallest_size(self) -> float:
@@ -230,11 +230,11 @@ def check_points(label: str, points: Any, dimension: int, least: int) -> None:
         raise SceneError(f"{label}: {least} to {MOST_VERTICES} points are needed")
     for k, point in enumerate(points):
         if not isinstance(point, tuple):
-            raise SceneError(f"{label}.{k}: {point!r} is no point")
+            raise SceneError(f"{label}.{k}: {point!r} is not a point")
         check_finite(f"{label}.{k}", point)
         check_length(f"{label}.{k}", point, dimension)
     if len(set(points)) < len(points):
-        raise SceneError(f"{label}: a point stands there twice")
+        raise SceneError(f"{label}: a point is given twice")
 
 
 def area_and_centroid(points: tuple[tuple[float, float], ...]) -> tuple[float, tuple[float, float], float]:

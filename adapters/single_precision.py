@@ -54,7 +54,7 @@ def without_a_place(scene: Scene) -> str | None:
         moments = body.inertia if isinstance(body.inertia, tuple) else (body.inertia,)
         for name, value in (("mass", body.mass), *(("inertia", moment) for moment in moments)):
             if body.motion == "free" and not SMALLEST <= value <= LARGEST:
-                return f"{body.name}.{name}: {value:g} has no place in single precision"
+                return f"{body.name}.{name}: {value:g} cannot be represented in single precision"
     return None
 
 

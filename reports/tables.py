@@ -23,8 +23,8 @@ Plain = Mapping[str, Any]
 FEW = 4
 #: Said below facts that were measured without an adapter.
 AFTERWARDS = (
-    "Chosen afterwards: the source leaves a value open, and it was chosen so that the measurement agrees. This "
-    "agreement is therefore no test. The conditions that the reason of a contradiction names were found afterwards too."
+    "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
+    "agreement is no test. The conditions in the reason of a contradiction were found afterwards too."
 )
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {

@@ -52,7 +52,7 @@ class Plugin:
 
     def pytest_report_header(self) -> str:
         """What is checked."""
-        return f"crosscheck: {self.engine} {self.version}, {plural(len(self.slots), 'cell')}"
+        return f"crosscheck: {self.engine} {self.version}, {plural(len(self.slots), 'case')}"
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> None:

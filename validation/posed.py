@@ -64,7 +64,7 @@ def pinned(argument: str, drop: bool = False) -> str:
 
     path, wanted = found["path"], found["digest"]
     if not is_visible(path):
-        raise SceneError(f"scene: the name of {one_line(path)} has characters that steer a terminal; rename the file")
+        raise SceneError(f"scene: the name of {one_line(path)} has control characters; rename the file")
     text = read_text(Path(path))
     if Path(path).suffix.lower() not in _OWN:
         from validation.files import model_files
@@ -98,7 +98,7 @@ def remember(texts: Mapping[str, str]) -> None:
     for name, text in texts.items():
         found = _FILE.fullmatch(name)
         if found is None or found["digest"] != _digest(text):
-            raise SceneError(f"scene: the text kept for {name} is not that file's")
+            raise SceneError(f"scene: the stored text of {name} is not that of the file")
         _texts[name] = text
 
 

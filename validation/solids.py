@@ -83,7 +83,7 @@ def hull_properties(vertices: Array) -> tuple[float, Array, Array]:
     try:
         hull = ConvexHull(vertices)
     except QhullError:
-        raise SceneError("vertices: lie in one plane, or nearly") from None
+        raise SceneError("vertices: lie in one plane, or almost") from None
     inside = sorted(set(range(len(vertices))) - {int(k) for k in hull.vertices})
     if inside:
         raise SceneError(f"vertices: number {inside[0]} lies within the hull of the others")

@@ -44,12 +44,17 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
     """As shipped, in metres."""
     said = "as shipped"
     return [
-        Setting("iterations", VELOCITY_ITERATIONS, f"{said}: sweeps over velocities", "manual, Simulating the World"),
+        Setting("iterations", VELOCITY_ITERATIONS, f"{said}: velocity iterations", "manual, Simulating the World"),
         Setting("position_iterations", POSITION_ITERATIONS, f"{said}", "manual, Simulating the World"),
-        Setting("continuous", True, f"{said}: bodies are swept against what does not move", "b2World.h"),
+        Setting("continuous", True, f"{said}: bodies are swept against static ones", "b2World.h"),
         Setting("skin", POLYGON_RADIUS, f"{said}: around each polygon", "b2Settings.h, b2_polygonRadius"),
         Setting("units_per_metre", 1.0, "the manual's MKS units", "manual, Units"),
-        Setting("early_restitution", False, f"{said}: sampled after this step's gravity", "b2Island.cpp, Solve"),
+        Setting(
+            "early_restitution",
+            False,
+            f"{said}: velocities are taken after gravity of this step",
+            "b2Island.cpp, Solve",
+        ),
     ]
 
 
@@ -59,10 +64,10 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             _sweeps(needs.mass_ratio),
-            "100 hold a column of twenty; a load needs as many as it is times heavier than what carries it",
+            "100 hold a column of twenty; a heavy load needs about as many as its mass ratio to the body below it",
             "measured: columns and unequal masses",
         ),
-        Setting("position_iterations", 10, "as many as its testbed allows by default", "measured"),
+        Setting("position_iterations", 10, "the default of its testbed", "measured"),
         Setting(
             "continuous",
             True,
@@ -72,9 +77,9 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "skin",
             THIN if needs.regime == "rest" else 0.0,
-            "a hundredth of the shipped one: faces that touch at the start stay in touch whatever their rounding"
+            "1 % of the shipped one; faces that touch at the start stay in contact, whatever their rounding"
             if needs.regime == "rest"
-            else "boxes are as large as they are",
+            else "boxes have their own size",
             "b2PolygonShape, m_radius",
         ),
         Setting("units_per_metre", units(needs, dt), _WHY_UNITS, "manual, Units; b2Settings.h"),
@@ -87,8 +92,8 @@ def _sweeps(ratio: float) -> int:
 
 
 _WHY_UNITS = (
-    "slop and threshold of restitution are lengths that are compiled in, and small in a finer unit; "
-    "what moves farther than 2 units in a step is cut, so that speed sets a limit"
+    "slop and restitution threshold are compiled-in lengths, and small in a smaller unit of length; motion beyond "
+    "2 units a step is cut off, which limits the choice by the speed"
 )
 
 

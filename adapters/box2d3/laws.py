@@ -68,8 +68,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(profile, metric),
-        "numbers are singles, 2^-24 of their size; nothing rebounds at an approach below the threshold; and friction "
-        "knows the impulse of compression only, as the rebound comes last",
+        "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
+        "of compression only, as restitution is applied last",
         "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
         CHECKED_ON,
     )
@@ -84,8 +84,9 @@ DEVIATIONS += tuple(
         scene,
         metric,
         ball_law(metric, _chosen(profile), sampled=metric == "rest_time"),
-        "a rebound is that of the velocity at the start of its step, comes after friction, above the threshold only; "
-        "the rest of that step is lost; the point that a ball is held by turns with it within a step, and lifts it",
+        "restitution uses the velocity at the start of the step, is applied after friction and above the threshold "
+        "only, and the rest of the step is lost; the contact point is fixed to the ball within a step, turns with "
+        "it and lifts it",
         "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
         CHECKED_ON,
     )
@@ -100,7 +101,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", _lengths(profile)),
-        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -116,7 +117,7 @@ DEVIATIONS += tuple(
         corner_law(
             metric, _lengths(profile), math.nextafter(RESTITUTION_THRESHOLD, 0.0) if profile == "default" else 0.0
         ),
-        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to the threshold",
+        "single precision, 2^-24 relative; restitution is 0 up to the threshold",
         "types.h, restitutionThreshold; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -131,7 +132,7 @@ DEVIATIONS += tuple(
         "rack",
         "momentum_defect",
         kept_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -145,7 +146,7 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
         CHECKED_ON,
     )

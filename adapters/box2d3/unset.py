@@ -61,7 +61,7 @@ UNSET = (
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-5),
     Unset("at 1 mm/s asleep after [s]", "0.5: B2_TIME_TO_SLEEP, below sleepThreshold, 5 cm/s", f"core.h; {_BODY}", 0.5,
           partial(unset.sleep, Bare), 2.0 * Bare.dt),
-    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against what is fixed", _WORLD, None,
+    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against static bodies", _WORLD, None,
           partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "not documented", "constants.h, B2_LINEAR_SLOP: 5 mm", None,
           partial(unset.left, Bare)),

@@ -133,11 +133,12 @@ _BALL_METRICS = {
     ),
 }
 _BECAUSE = {
-    "default": "speculative contact takes gap/dt off a rebound, Baumgarte adds 8 % of an overlap over dt, restitution "
-    "includes gravity's own g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v brakes the flight",
-    "tuned": "an impact is found up to v dt late and bounces from there; one met within the slop loses slop/dt of its "
-    "rebound; at rest settings 8 % of an overlap per step become speed",
-    "one": "Baumgarte adds 1 % of the overlap that an impact is found with, over dt, to the rebound",
+    "default": "speculative contact subtracts gap/dt from a rebound, Baumgarte correction adds 8 % of an overlap "
+    "over dt, restitution includes gravity's g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v "
+    "brakes the flight",
+    "tuned": "an impact is found up to v dt late and rebounds from there; one found within the slop loses slop/dt "
+    "of its rebound; with the settings for rest 8 % of an overlap per step become speed",
+    "one": "Baumgarte correction adds 1 % of the overlap at an impact, over dt, to the rebound",
 }
 _SOURCE = {
     "default": "btMultiBodyConstraintSolver.cpp:770-815, btMultiBody.cpp:843, btMultiBody.h:486 (bullet3 6c888f4)",
@@ -169,7 +170,7 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         passing_law(metric),
-        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
         "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
         CHECKED_ON,
     )
@@ -193,7 +194,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         shoved_law(metric, push),
-        "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is on",
+        "there is no swept collision detection: the step that finds the ball in the plate finds it beyond the "
+        "middle, and pushes it out on the far side",
         "contactProcessingThreshold 0, contactERP 0 or 0.01: btPersistentManifold.cpp (bullet3 6c888f4)",
         CHECKED_ON,
     )

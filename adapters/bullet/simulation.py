@@ -51,7 +51,7 @@ class BulletSimulation(Simulation):
         self._solved_gap = float(material.get("contactProcessingThreshold", math.inf))
         self._client = self._p.connect(self._p.DIRECT)
         if self._client < 0:
-            raise EngineError("client: bullet has no free client, 1024 are the limit of a process")
+            raise EngineError("client: bullet allows 1024 clients in a process, and none is free")
         try:
             self._build()
         except self._p.error as error:
@@ -75,7 +75,7 @@ class BulletSimulation(Simulation):
         heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
         restitution, friction = factors(scene, "restitution"), factors(scene, "friction")
         if restitution is None or friction is None:
-            raise EngineError("pairs: no product of two bodies' values gives this table of materials")
+            raise EngineError("pairs: this table of materials is no product of two bodies' values")
         self._ids: list[int] = []
         self._mass: list[float] = []
         self._offset: list[tuple[float, ...]] = []  # of the centre of what stands for a body from the scene's pose

@@ -88,7 +88,7 @@ UNSET = (
           partial(unset.restitution, Bare, RESTITUTIONS)),
     Unset("no rebound below [m/s]", "0.2: restitutionVelocityThreshold", f"{_GUIDE}, setPhysicsEngineParameter",
           RESTITUTION_THRESHOLD, partial(unset.least_rebound, Bare)),
-    Unset("from afar half a rebound from [m/s]", "not documented: what is left of the way is taken off", _AHEAD, None,
+    Unset("from afar half a rebound from [m/s]", "not documented: the remaining gap is subtracted", _AHEAD, None,
           partial(unset.least_rebound, Bare, 3.0)),
     Unset("linear damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "along"), 2e-4),
     Unset("angular damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "spin"), 2e-4),

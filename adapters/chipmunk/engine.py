@@ -44,7 +44,7 @@ class ChipmunkEngine(CheckedEngine):
         quirks=(
             Quirk("external forces are cleared by every step", "they are set again before each", "cpBody.c:502"),
             Quirk(
-                "restitution and friction of a pair are products of the two shapes' numbers",
+                "restitution and friction of a pair are products of the two shapes' values",
                 "factors are chosen whose products are the pairs' values; a table without such factors is refused",
                 "cpArbiter.c:334-335",
             ),
@@ -56,7 +56,7 @@ class ChipmunkEngine(CheckedEngine):
             Quirk("Body.kinetic_energy is twice the energy", "energies are computed from twists", "cpBody.c:588"),
             Quirk(
                 "mass, moment, elasticity, friction or iterations out of range abort the process",
-                "every number is checked before it is handed over",
+                "every number is checked before it is set",
                 "cpBody.c:258, cpShape.c:141, cpSpace.c:208",
             ),
             Quirk(
@@ -65,18 +65,22 @@ class ChipmunkEngine(CheckedEngine):
                 "cpSpaceStep.c:344",
             ),
             Quirk(
-                "with the shipped persistence of 3, a contact that re-forms within three steps keeps its old "
-                "accumulated impulse although it is not applied: totals over-report and contacts can pull",
-                "left alone in `default`, persistence 1 in `tuned`",
+                "with the shipped persistence of 3, a contact that forms again within three steps keeps its old "
+                "accumulated impulse although it is not applied: totals are too large and contacts can pull",
+                "unchanged in `default`, persistence 1 in `tuned`",
                 "cpArbiter.c:324 and :390",
             ),
-            Quirk("the threaded solver gives a different answer each run", "it is not used", "cpHastySpace.c:594"),
+            Quirk("the threaded solver gives a different result in each run", "it is not used", "cpHastySpace.c:594"),
             Quirk(
                 "a shape query between a circle and a polygon flips the sign of the depth",
-                "only its magnitude is used, where the resting overlap looks for touching pairs",
+                "only its magnitude is used, in the search for touching pairs",
                 "measured on pymunk 7.3.1",
             ),
-            Quirk("nothing is swept: a fast body passes a thin one", "the ground is 1 km thick", "cpSpaceStep.c:400"),
+            Quirk(
+                "there is no swept collision detection: a fast body passes through a thin one",
+                "the ground is 1 km thick",
+                "cpSpaceStep.c:400",
+            ),
         ),
     )
     module = "pymunk"
@@ -93,7 +97,7 @@ class ChipmunkEngine(CheckedEngine):
                 return f"{body.name}.mass: the inverse of mass or inertia overflows, the engine's state would be NaN"
         for quantity in ("restitution", "friction"):
             if factors(scene, quantity) is None:
-                return f"pairs: {quantity} of a pair is a product of two factors here, this table has none"
+                return f"pairs: {quantity} of a pair is a product of two factors here; no factors give this table"
         return None
 
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
@@ -136,5 +140,5 @@ class ChipmunkEngine(CheckedEngine):
         kept = {s.name: s.value for s in self.settings(profile, needs, dt)}["collision_persistence"] > 1
         if not kept or needs.restitution < 1.0 or needs.friction == 0.0:
             return {}
-        half, because = 0.5 * (SLIDE_TIME / dt - 1.0), "contacts that re-form tell their old impulses once more"
+        half, because = 0.5 * (SLIDE_TIME / dt - 1.0), "contacts that form again report their old impulses once more"
         return {"impulse": Declared(1.0 + half, half + IMPULSE_SHARE, because)}

@@ -28,13 +28,14 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for law, because, source in (
         (
             passing_law(metric),
-            "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+            "there is no swept collision detection: no step ends with the ball in the plate, so the contact is "
+            "never found",
             "cpSpaceStep.c:400 (positions, then overlaps)",
         ),
         (
             shoved_law(metric, _pushed(profile)),
-            "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is "
-            "on",
+            "there is no swept collision detection: the step that finds the ball in the plate finds it beyond the "
+            "middle, and pushes it out on the far side",
             "cpSpaceStep.c:400 (positions, then overlaps), cpCollision.c (normal of the least overlap)",
         ),
     )

@@ -45,7 +45,7 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting("collision_slop", COLLISION_SLOP, shipped, source),
         Setting("collision_bias", COLLISION_BIAS, f"{shipped}: 0.9 to the 60th per second", source),
         Setting("collision_persistence", COLLISION_PERSISTENCE, shipped, source),
-        Setting("start_overlap", 0.0, "the scene starts as posed", ""),
+        Setting("start_overlap", 0.0, "the scene starts as given", ""),
     ]
 
 
@@ -57,38 +57,40 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             100 if heavy else 30,
-            "sweeps grow with the mass ratio: 30 lets a column carrying 100 times its mass fall at 1/60 s, 100 holds"
+            "the mass ratio needs them: at 1/60 s a column under 100 times its mass falls with 30 iterations, "
+            "not with 100"
             if heavy
-            else "brings a flat landing to 1e-8 and a column of ten to rest; error shrinks with every sweep",
-            "measured: flat box against sweeps, columns",
+            else "a flat landing is right to 1e-8 and a column of ten rests; each iteration reduces the error",
+            "measured: flat box against iterations, columns",
         ),
         Setting(
             "collision_slop",
             slop,
-            "a thousandth of the smallest body: the shipped 0.1 m is a tenth of it, 0 makes contacts flicker",
+            "a thousandth of the smallest body; the shipped 0.1 m is a tenth of it, and with 0 contacts come and go",
             "cpArbiter.c, cpArbiterPreStep",
         ),
         Setting(
             "collision_bias",
             COLLISION_BIAS if resting else 1.0,
-            "as shipped: resting bodies need the push-out"
+            "as shipped: resting bodies need their overlaps corrected"
             if resting
-            else "1 switches the push-out off, which would add potential energy to every impact found late",
+            else "1 switches the overlap correction off, which would add energy to every impact that is found late",
             "cpSpaceStep.c; measured: a ball with e = 1 then keeps its energy to 2e-15 over 100 s",
         ),
         Setting(
             "collision_persistence",
             1,
-            "the shipped 3 revives old impulses when a contact re-forms, so that contacts can pull",
+            "with the shipped 3 a contact that forms again starts from old impulses, and can pull",
             "cpArbiter.c, cpArbiterUpdate and cpArbiterApplyCachedImpulse",
         ),
         Setting(
             "start_overlap",
             _start_overlap(needs, slop, dt) if resting else 0.0,
-            "touching pairs start 0.3 g dt^2 deep, inside the slop that is never corrected: an exactly touching start "
-            "flickers by g dt^2 and costs a transient"
+            "touching pairs start 0.3 g dt^2 deep, inside the slop, which is never corrected; in an exactly "
+            "touching start contacts come and go, and bodies move by g dt^2"
             if resting
-            else "bodies that hit must not start inside each other: a shock would pass an overlapping chain at once",
+            else "bodies that collide must not start with an overlap: a shock would pass through the whole "
+            "chain at once",
             "crosscheck tune chipmunk --group stand: half the slop was deeper than needed and no steadier",
         ),
     ]

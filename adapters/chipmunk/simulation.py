@@ -72,8 +72,8 @@ class ChipmunkSimulation(Simulation):
         shift = overlap_displacement(self.scene, touching, overlap)
         if shift is None:
             self.initial_change = (
-                "none: no displacement lets all touching pairs overlap by "
-                f"{overlap:.3g} m, so the scene starts touching as posed",
+                "none: no displacement gives all touching pairs an overlap of "
+                f"{overlap:.3g} m, so the scene starts as given",
             )
             return
         if not touching:

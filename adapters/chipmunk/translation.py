@@ -72,7 +72,7 @@ def leaves_ground(scene: Scene, dt: float) -> str | None:
         return None
     speed = needs(scene).top_speed
     if speed * dt > 0.5 * GROUND_DEPTH:
-        return f"dt: at {speed:.3g} m/s a body passes {0.5 * GROUND_DEPTH:g} m of ground in one step unseen"
+        return f"dt: at {speed:.3g} m/s a body passes {0.5 * GROUND_DEPTH:g} m of ground in one step, undetected"
     return None
 
 

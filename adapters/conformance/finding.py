@@ -62,4 +62,4 @@ def judged(name: str, wrong: str, meant: str, expected: Expected | None) -> Find
         return Finding(name, "FAIL" if wrong else "ok", wrong or meant)
     if wrong:
         return Finding(name, "expected", one_line(f"{expected.because} ({expected.source}): {wrong}"))
-    return Finding(name, "unexpected pass", one_line(f"it holds, but is listed: {expected.because}"))
+    return Finding(name, "unexpected pass", one_line(f"it passes, but is listed as failing: {expected.because}"))

@@ -84,7 +84,7 @@ def free_fall(engine: Engine) -> str:
             ),
         ):
             if not off <= band:
-                return f"{profile}: {what} misses the law of free fall by {off:.2g}, {band:.2g} is allowed"
+                return f"{profile}: {what} differs from free fall by {off:.2g}, {band:.2g} is allowed"
     return ""
 
 
@@ -167,7 +167,7 @@ def contacts(engine: Engine) -> str:
 def _wrong_contact(scene: Scene, rows: Contacts, round_off: float) -> str:
     floor, up = scene.index("floor"), scene.dimension - 1
     if not (rows.a < rows.b).all():
-        return "a contact has its bodies not in order of the scene"
+        return "the bodies of a contact are not in the scene's order"
     if not ((rows.a == floor) | (rows.b == floor)).all():
         return "bodies far apart are in contact"
     upwards = np.where(rows.a == floor, rows.normal[:, up], -rows.normal[:, up])
@@ -178,7 +178,7 @@ def _wrong_contact(scene: Scene, rows: Contacts, round_off: float) -> str:
         return "a normal does not point from the first to the second body"
     # 0.05 m: bodies sink by centimetres at most, and every other place of a body is farther from the floor.
     if not np.abs(rows.point[:, up]).max() <= 0.05 or (np.abs(rows.gap) > 0.05).any():
-        return "a contact point or a gap is not where bodies touch"
+        return "a contact point or a gap does not fit the surfaces"
     pushes = (rows.impulse * rows.normal).sum(axis=1)
     if (pushes < -round_off).any():
         return "an impulse pulls: it must act on the second body, along the normal"
@@ -201,7 +201,7 @@ def impulse(engine: Engine) -> str:
             told = np.nansum(total, axis=0)
             for name, gain, sign in (("b", gained[1][-1], 1.0), ("a", gained[0][-1], -1.0)):
                 if np.abs(gain - sign * told).max() > slack:
-                    return f"{profile}: body {name} gained {gain} N s, its contacts tell of {sign * told} N s"
+                    return f"{profile}: body {name} gained {gain} N s, its contacts report {sign * told} N s"
     if silent:
         raise NotAsked(silent)
     return ""

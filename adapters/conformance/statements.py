@@ -57,11 +57,12 @@ def facts(engine: Engine) -> str:
     for profile, role in stated.roles.items():
         if profile not in engine.profiles or role not in ROLES:
             return (
-                f"facts.roles: {profile!r} cannot be {role!r}: no such profile, or none of the roles {', '.join(ROLES)}"
+                f"facts.roles: {profile!r} cannot be {role!r}: no such profile, or no such role; roles are "
+                f"{', '.join(ROLES)}"
             )
     if not (math.isfinite(stated.customary_dt) and stated.customary_dt > 0.0):
         return f"facts.customary_dt: {stated.customary_dt!r} must be a positive number of seconds"
-    return "" if isinstance(engine.version(), str) and engine.version() else "version() must say which"
+    return "" if isinstance(engine.version(), str) and engine.version() else "version() must return the version"
 
 
 def profiles(engine: Engine) -> str:
@@ -164,7 +165,7 @@ def capabilities(engine: Engine) -> str:
                 if wrong:
                     return f"{profile}: {asked.name}, {asked.dimension}-D: {wrong}"
     if not able:
-        raise NotAsked(f"every scene is refused, {striking().name} as well")
+        raise NotAsked(f"every scene is refused, even {striking().name}")
     return ""
 
 
@@ -183,13 +184,13 @@ def _as_said(engine: Engine, scene: Scene, profile: str) -> str:
     try:
         simulation = built(engine, scene, profile)
     except EngineError as error:
-        return "" if reason else f"not refused, but {error}"
+        return "" if reason else f"not refused, but stopped by {error}"
     simulation.close()
     if reason:
-        return f"refused ({reason}), and yet built"
+        return f"refused ({reason}), but built"
     trajectory = driven(engine, scene, profile)
     for i, body in enumerate(scene.bodies):
         # A body that is moved as prescribed keeps its twist whatever hits it; so does a fixed one.
         if body.motion != "free" and abs(trajectory.twist[-1, i] - body.twist).max() > engine.facts.round_off:
-            return f"{body.name} is {body.motion} and does not move so"
+            return f"{body.name} is {body.motion} but does not move like that"
     return trajectory.reason

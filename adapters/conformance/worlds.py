@@ -61,7 +61,7 @@ def states(engine: Engine) -> str:
             return f"{profile}: bodies start with other velocities than the scene's"
         # A start that was changed on purpose is shown beside the result; it must be said.
         if not changed and not np.allclose(pose, asked, rtol=0.0, atol=slack):
-            return f"{profile}: bodies start in another pose than the scene's, and initial_change does not say so"
+            return f"{profile}: bodies start in another pose than the scene's, and initial_change does not report it"
     return ""
 
 
@@ -125,7 +125,7 @@ def fresh(engine: Engine) -> str:
         together = _interleaved(engine, profile, scenes)
         for scene, a, b in zip(scenes, alone, together, strict=True):
             if not np.array_equal(a, b):
-                return f"{profile}: {scene.name} comes out otherwise when another world is stepped in between"
+                return f"{profile}: the result of {scene.name} changes when another world is stepped in between"
     return ""
 
 
@@ -168,7 +168,7 @@ def history(engine: Engine) -> str:
         for other in (accepted(engine, profile, striking(), *lying), accepted(engine, profile, *lying)):
             driven(engine, other, profile)
             if driven(engine, scene, profile).state_hash() != before:
-                return f"{profile}: {scene.name} comes out otherwise after {other.name}"
+                return f"{profile}: the result of {scene.name} changes after {other.name}"
     return ""
 
 
@@ -178,7 +178,7 @@ def process(engine: Engine) -> str:
     try:
         asked = pickle.dumps(engine)
     except Exception as error:
-        raise NotAsked(f"the engine cannot be named to another process: {type(error).__name__}") from None
+        raise NotAsked(f"the engine cannot be sent to another process: {type(error).__name__}") from None
     try:
         child = Child(serve_hashes)
     except IsolationError as error:
@@ -191,9 +191,9 @@ def process(engine: Engine) -> str:
     finally:
         child.stop()
     if "not there" in there:
-        raise NotAsked(f"the engine cannot be had in another process: {there['not there']}")
+        raise NotAsked(f"the engine cannot be loaded in another process: {there['not there']}")
     differing = [profile for profile in here if there.get(profile) != here[profile]]
-    return f"{', '.join(differing)}: comes out otherwise in a fresh process" if differing else ""
+    return f"{', '.join(differing)}: the result differs in a new process" if differing else ""
 
 
 def serve_hashes(connection: Connection) -> None:
@@ -217,11 +217,14 @@ def stride(engine: Engine) -> str:
         scene = accepted(engine, profile, sliding(), rolling())
         ends = [_stepped(engine, scene, profile, strides) for strides in ((24,), (1,) * 24, (1, 7, 16))]
         if not all(np.array_equal(ends[0], end) for end in ends):
-            return f"{profile}: 24 steps at once end elsewhere than 24 single ones that are read in between"
+            return f"{profile}: 24 steps at once and 24 single steps with readings in between have different results"
         for samples, stride in ((24, 1), (8, 3)):
             wrong = _recorded_otherwise(engine, scene, profile, samples, stride)
             if wrong:
-                return f"{profile}: {wrong} recorded at once ({samples} of {stride} steps) are others than one by one"
+                return (
+                    f"{profile}: {wrong} recorded at once ({samples} of {stride} steps) differ from those of "
+                    "single steps"
+                )
     return ""
 
 
@@ -281,7 +284,7 @@ def _stepped(engine: Engine, scene: Scene, profile: str, strides: tuple[int, ...
 def memory(engine: Engine) -> str:
     """A thousand worlds that are built, stepped and closed leave no memory behind."""
     if resident() is None:
-        raise NotAsked("this system does not tell how much memory a process holds")
+        raise NotAsked("this system does not report the memory of a process")
     profile = next(iter(engine.profiles))
     scene = accepted(engine, profile, resting(), resting(box=False))
     posed, given = posed_for(engine, scene), values(engine, profile, scene)

@@ -46,10 +46,10 @@ def _corners(scene: Scene) -> float:
     return (1.0 + box.mass * (b * b / box.inertia[0] + a * a / box.inertia[1])) / 4.0
 
 
-_GIVES = "a contact gives way by 1e-5 of its own response to its load, and "
-_REBOUNDS = "a rebound throws back the velocity that gravity has made in its step, e g dt more than that of the impact"
-_AT_ONCE = _GIVES + "all blows of a step are one"
-_PUSHED = _GIVES + "overlaps are pushed out by 1 mm/s at most"
+_GIVES = "a contact yields by 1e-5 of its response to its load, and "
+_REBOUNDS = "restitution includes gravity of the step, so a rebound is e g dt faster than that of the impact"
+_AT_ONCE = _GIVES + "all blows of a step are solved together"
+_PUSHED = _GIVES + "overlaps are corrected at up to 1 mm/s"
 #: Bands of `meeting_law`, as a share and in the metric's unit. Of a fall: ten thousand roundings of numbers up to 10
 #: (1e-11), times what some bounces make of an error of a height, 1/e <= 2 each. Of balls that meet: roundings of some
 #: hundred steps, times what twenty blows in turn make of an error across a gap of a thousandth of a radius. In a line:
@@ -101,8 +101,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(metric, profile),
-        "a contact gives way by 1e-5 of the speed that it is to change; no rebound is slower than 0.1 m/s or faster "
-        "than 100 m/s; what overlaps is pushed out at up to 1 mm/s",
+        "a contact yields by 1e-5 of the speed that it changes; a rebound has 0.1 m/s to 100 m/s; overlaps are "
+        "corrected at up to 1 mm/s",
         "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
         ("6.20.",),
     )
@@ -137,7 +137,7 @@ DEVIATIONS += tuple(
         "flat_box",
         metric,
         shared_law(metric, profile),
-        "a contact gives way by 1e-5 of its own response, and sweeps leave open how corners share a blow",
+        "a contact yields by 1e-5 of its response, and the iterations do not determine how corners share a blow",
         "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
         ("6.20.",),
     )
@@ -166,8 +166,8 @@ DEVIATIONS += tuple(
         "kane",
         metric,
         rubbing_law(metric, profile),
-        "the point of a contact lies half-way into its overlap, which makes the rod's arm shorter; Dantzig's friction "
-        "is limited by the load without friction",
+        "the contact point lies half-way into the overlap, which makes the lever arm shorter; Dantzig's friction is "
+        "limited by the load without friction",
         "FCLCollisionDetector, DantzigBoxedLcpSolver; blow in adapters/dart/rubbing.py",
         ("6.20.",),
     )
@@ -181,7 +181,7 @@ DEVIATIONS += tuple(
         "edge_drop",
         metric,
         landing_law(metric, profile),
-        "a contact gives way by 1e-5 of its own response: corners that share a blow by more than one alone",
+        "a contact yields by 1e-5 of its response, corners that share a blow by more than a single one",
         "ContactConstraint, constraint force mixing; blow in adapters/dart/landing.py",
         ("6.20.",),
     )
@@ -195,8 +195,8 @@ DEVIATIONS += tuple(
         "oblique",
         metric,
         slipping_law(metric, profile),
-        "a contact gives way by 1e-5 of what it is to change, and friction with it; where its cone is a pyramid each "
-        "axis of the floor has the whole of it",
+        "a contact yields by 1e-5 of the speed that it changes, and so does friction; where the friction cone is a "
+        "pyramid each axis of the floor has full friction",
         "ContactConstraint, constraint force mixing; blow in adapters/dart/slipping.py",
         ("6.20.",),
     )
@@ -216,8 +216,8 @@ DEVIATIONS += tuple(
         scene,
         exactly(metric),
         pyramid_law(metric),
-        "the cone of friction is a pyramid: each axis of the floor has the whole of it, and what slips between them is "
-        "braked by up to sqrt(2) of Coulomb's friction",
+        "the friction cone is a pyramid: each axis of the floor has full friction, and slip between them is braked "
+        "by up to sqrt(2) times Coulomb's friction",
         "a boxed LCP, DantzigBoxedLcpSolver and PgsBoxedLcpSolver; recurrence in adapters/dart/pyramid.py",
         ("6.20.",),
     )
@@ -244,8 +244,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric),
-        "nothing is swept: what is on one side of a thin body where a step ends, and on the other where the next one "
-        "does, passes; other blows give way by 1e-5",
+        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+        "other at the end of the next, passes through; other blows yield by 1e-5",
         "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",
         ("6.20.",),
     )

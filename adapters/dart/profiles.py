@@ -46,10 +46,10 @@ _SOURCE = "dartpy 6.20, dart.constraint"
 def _second() -> list[Setting]:
     """Who answers where the solver finds nothing."""
     source = "BoxedLcpConstraintSolver, secondary solver; PgsBoxedLcpSolverOption"
-    why = "as shipped: where the solver finds no solution, projected Gauss-Seidel answers with so many sweeps"
+    why = "as shipped: iterations of projected Gauss-Seidel where the solver finds no solution"
     return [
         Setting("second_sweeps", SECOND_SWEEPS, why, source),
-        Setting("second_tolerance", SECOND_TOLERANCE, "as shipped: changes below it, as a share, stop them", source),
+        Setting("second_tolerance", SECOND_TOLERANCE, "as shipped: a smaller relative change stops them", source),
     ]
 
 
@@ -68,10 +68,10 @@ def _sweeping(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             SWEEPS[solver],
-            "30 as shipped leave a column unsolved" if solver == "pgs" else "100 as shipped leave two boxes unsolved",
+            "the shipped 30 do not solve a column" if solver == "pgs" else "the shipped 100 do not solve two boxes",
             _SOURCE,
         ),
-        Setting("tolerance", TOLERANCES[solver], "changes below it stop the sweeps", _SOURCE),
+        Setting("tolerance", TOLERANCES[solver], "a smaller relative change stops the iterations", _SOURCE),
         *([] if solver == "pgs" else _second()),
     ]
 
@@ -95,7 +95,7 @@ SECOND_SWEEPS, SECOND_TOLERANCE = 30, 1e-3
 
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": _pivoting,
-    "pgs": partial(_sweeping, "pgs", "the sweeps of a textbook on the pyramid of the shipped solver"),
+    "pgs": partial(_sweeping, "pgs", "projected Gauss-Seidel on the friction pyramid of the shipped solver"),
     "nsgs": partial(_sweeping, "nsgs", "the exact cone: friction opposes the slip, whatever its direction"),
     "fbf": partial(_sweeping, "fbf", "the exact cone by another method"),
 }

@@ -16,10 +16,10 @@ RELEASES = Releases(
                    "measured: 6.19.5 has none, 6.20.0 has it"),
         Difference("<6.19", "bodies at rest are never deactivated, and there is no option for it", "nothing is set",
                    "measured: 6.18.0 has no DeactivationOptions, 6.19.0 has them"),
-        Difference("<6.20", "positions are not corrected by split impulses, and nothing asks for it",
+        Difference("<6.20", "positions are not corrected by split impulses, and there is no option for it",
                    "it reads as off", "measured: 6.19.5 has no isSplitImpulseEnabled"),
-        Difference("<6.20", "the solver that answers where Dantzig's finds nothing is out of reach, and so are the "
-                   "solvers of the exact cone",
+        Difference("<6.20", "the fallback solver of Dantzig's has no interface, and there are no solvers with "
+                            "the exact cone",
                    "`default` leaves it as shipped; the other profiles are refused",
                    "measured: 6.19.5 has no getSecondaryBoxedLcpSolver, NsgsFrictionSolver or FbfFrictionSolver"),
     ),

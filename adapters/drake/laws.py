@@ -22,8 +22,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         landing_law(metric, profile),
-        "contacts are springs that dissipate: what overlaps when it is found is pushed out, by Hunt and Crossley at up "
-        "to 1/d, 20 mm/s as shipped, by SAP within its relaxation time",
+        "contacts are springs with dissipation: an overlap is corrected, with Hunt and Crossley's dissipation at up "
+        "to 1/d, 20 mm/s as shipped, with SAP within its relaxation time",
         "MultibodyPlant, discrete contact; recurrence in adapters/drake/landing.py",
         ("1.51.",),
     )

@@ -117,15 +117,15 @@ SILENT = frozenset(
 SOLVERS = frozenset(("ode", "bullet", "simbody", "dart", "max_contacts", "real_time_factor", "real_time_update_rate"))
 #: Elements that say nothing as long as they say this, and why they have no place where they say more.
 IDLE: Mapping[tuple[str, str], tuple[tuple[str, ...], str]] = {
-    ("link", "gravity"): (_TRUE, "in a scene gravity pulls at all bodies alike"),
+    ("link", "gravity"): (_TRUE, "in a scene gravity acts on all bodies alike"),
     ("link", "kinematic"): (_FALSE, "bodies of a scene are free or fixed"),
     ("link", "enable_wind"): (_FALSE, "a scene has neither wind nor water"),
     ("model", "enable_wind"): (_FALSE, "a scene has neither wind nor water"),
     ("velocity_decay", "linear"): (("0",), "a scene's bodies have no damping"),
     ("velocity_decay", "angular"): (("0",), "a scene's bodies have no damping"),
-    ("bounce", "restitution_coefficient"): (("0",), "Drake's contacts have no restitution"),
-    ("ode", "slip1"): (("0",), "a scene has Coulomb's friction alone"),
-    ("ode", "slip2"): (("0",), "a scene has Coulomb's friction alone"),
+    ("bounce", "restitution_coefficient"): (("0",), "Drake's contacts have no coefficient of restitution"),
+    ("ode", "slip1"): (("0",), "a scene has Coulomb friction only"),
+    ("ode", "slip2"): (("0",), "a scene has Coulomb friction only"),
     ("ode", "fdir1"): (("0 0 0",), "a scene's friction has no direction"),
 }
 #: Elements that a scene has no place for, or that another program reads, and why.
@@ -136,19 +136,19 @@ NO_PLACE = {
     "heightmap": "a scene has no height fields",
     "image": "a scene has no height fields",
     "empty": "a scene has no bodies without a shape",
-    "actor": "bodies of a scene follow no script",
+    "actor": "a scene has no scripted bodies",
     "state": "a saved state is not read",
     "population": "models are not replicated",
-    "gripper": "a scene has no joints but fixed ones",
+    "gripper": "a scene has no joints except fixed ones",
     "fluid_added_mass": "a scene has neither wind nor water",
-    "torsional": "torsional friction has no place in a scene",
-    "contact": "what Gazebo's engines alone read of contacts is not read",
+    "torsional": "a scene has no torsional friction",
+    "contact": "contact elements of Gazebo's engines are not read",
     "soft_contact": "bodies of a scene are rigid",
-    "bullet": "what Bullet alone reads is not read",
+    "bullet": "Bullet's own elements are not read",
     "density": "masses are not computed from densities",
 }
 #: Why another element is refused.
-NOWHERE = "there is no place for it in a scene"
+NOWHERE = "a scene has no such element"
 #: Attributes that are read.
 ATTRIBUTES = frozenset(
     ("name", "version", "relative_to", "degrees", "rotation_format", "canonical_link", "placement_frame", "attached_to",
@@ -274,7 +274,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         if _holds(e):
             kind = one_line(e.attributes.get("type", "nameless"), 20)
             line = f"{e}: a {kind} joint holds a link; bodies of a scene are free or fixed"
-            _refuse(line, drop, stated, "; it and what hangs on it")
+            _refuse(line, drop, stated, "; it and all links attached to it")
             kept.append(e)
             continue
         unread = _unread_shape(e)
@@ -283,7 +283,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
             _refuse(f"{unread}: {why}", drop, stated, "; the shape")
             continue
         if not places[e.tag].many and any(other.tag == e.tag for other in kept):
-            raise SceneError(f"model: {e}: stands twice in {element}")
+            raise SceneError(f"model: {e}: is given twice in {element}")
         _check(e, places[e.tag])
         _clean(e, drop, stated)
         kept.append(e)
@@ -294,7 +294,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         raise SceneError(f"model: {kept[1]}: is a second shape" if kept else f"model: {element}: has no shape")
     normal = child(element, "normal") if element.tag == "plane" else None
     if normal and not any(float(word) for word in normal.text.split()):
-        raise SceneError(f"model: {normal}: is no direction")
+        raise SceneError(f"model: {normal}: is not a direction")
     if element.tag == "inertia":
         _check_inertia(element)
     for needed in NEEDED.get(element.tag, ()):
@@ -345,7 +345,7 @@ def _check_inertia(inertia: Element) -> None:
     first, second, third = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if not first > 0.0 or not third - second - first <= _FLAT * third:
         said = f"{first:.4g}, {second:.4g} and {third:.4g} kg m^2"
-        raise SceneError(f"model: {inertia}: no body has principal moments of {said}")
+        raise SceneError(f"model: {inertia}: a body cannot have principal moments of {said}")
 
 
 def _make_alike(element: Element, drop: bool, stated: Stated) -> None:
@@ -375,7 +375,7 @@ def _state(root: Element, stated: Stated) -> None:
     if gravity is not None:
         stated.gravity = tuple(float(word) + 0.0 for word in gravity.text.split())
     else:
-        stated.notes.append(f"gravity {-GRAVITY[2]:g} m/s^2 down: SDF's own, the model states none")
+        stated.notes.append(f"gravity {-GRAVITY[2]:g} m/s^2 downwards: the default of SDF, the model states none")
     step = child(physics[0], "max_step_size") if physics else None
     if step is not None:
         stated.step = float(step.text)

@@ -49,14 +49,12 @@ def rule(approximation: str, why: str) -> list[Setting]:
     """Settings with which Drake runs as shipped but for its approximation of contact; boxes have surfaces."""
     return [
         Setting("approximation", approximation, why, f"{_PLANT}.discrete_contact_approximation"),
-        Setting(
-            "boxes", "hydroelastic", "a pair of shapes has one point of contact otherwise: boxes would rock", _PLANT
-        ),
+        Setting("boxes", "hydroelastic", "otherwise a pair of shapes has one contact point, and boxes rock", _PLANT),
         Setting("point_stiffness", POINT_STIFFNESS, "as shipped: of pairs with a ball [N/m]", _GRAPH),
         Setting("modulus", MODULUS, "as shipped: of free boxes [Pa]", _GRAPH),
         Setting("dissipation", DISSIPATION, "as shipped [s/m]; SAP has its own", _GRAPH),
         Setting("relaxation_time", RELAXATION, "as shipped: SAP's dissipation [s]", _GRAPH),
-        Setting("stiction_tolerance", STICTION, "as shipped: slower slips are viscous [m/s]", _PLANT),
+        Setting("stiction_tolerance", STICTION, "as shipped: friction of slower slips is viscous [m/s]", _PLANT),
     ]
 
 
@@ -66,7 +64,7 @@ def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting
 
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": partial(_rule, "lagged", "as shipped"),
-    "sap": partial(_rule, "sap", "the convex approximation, solved to its end"),
+    "sap": partial(_rule, "sap", "the convex approximation, solved to convergence"),
     "tamsi": partial(_rule, "tamsi", "the implicit step of earlier releases"),
     "similar": partial(_rule, "similar", "SAP's friction with Hunt's and Crossley's dissipation"),
 }

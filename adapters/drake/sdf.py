@@ -132,13 +132,15 @@ class _Reading:
         parts = list(self._parts())
         self._links(parts)
         if not any(part.free for part in parts):
-            raise SceneError("model: has no free body: nothing can move")
+            raise SceneError("model: has no free body, so nothing can move")
         names = unique(self._name(part, parts) for part in parts)
         dropped = list(self.stated.dropped) + list(self._apart(parts))
         bodies = tuple(self._bodies(parts, names))
         self._defaults(parts, names)
         scene = Scene(self._title(), 1, 3, bodies, self._pairs(parts, bodies), self.stated.gravity, DURATION)
-        self.notes.append("restitution 0 in all engines: Drake's contacts have none, and a model's own is refused")
+        self.notes.append(
+            "restitution 0 in all engines: Drake's contacts have none, and a model that states it is refused"
+        )
         return Model(scene, tuple(self.notes), tuple(dropped), tuple(self._settings(parts)), self.stated.step)
 
     def _title(self) -> str:
@@ -160,11 +162,11 @@ class _Reading:
             for e in [e for e in holder.children if e.tag == "joint"]:
                 name = e.attributes.get("name")
                 if (name, holder.attributes["name"]) in held or (holder.tag == "world" and name in dict(held)):
-                    found.append((holder, e, "holds two links together that move; a scene's body is one link"))
+                    found.append((holder, e, "connects two moving links; a scene's body is one link"))
         if found:
             raise _Refused(*found)
         if held:
-            raise SceneError(f"model: {one_line(held[0][0], 60)}: holds two links together that move")
+            raise SceneError(f"model: {one_line(held[0][0], 60)}: connects two moving links")
 
     def _parts(self) -> Iterator[_Part]:
         """Shapes that touch, in the order of the text."""
@@ -180,7 +182,7 @@ class _Reading:
                 for shape in (e for e in link.children if e.tag == "collision"):
                     path = (model.attributes["name"], link.attributes["name"], shape.attributes["name"])
                     if path not in found:
-                        raise SceneError(f"model: {shape}: is no shape of Drake's")
+                        raise SceneError(f"model: {shape}: is not a shape of Drake")
                     body, geometry = found[path]
                     yield _Part(model, link, shape, body, geometry, not plant.IsAnchored(body))
 
@@ -194,7 +196,7 @@ class _Reading:
                 own = count[id(link)]
                 if own == 1 or self.plant.IsAnchored(self.plant.GetBodyByName(link.attributes["name"], instance)):
                     continue
-                why = "has several shapes that touch; a scene's body has one" if own else "has no shape that touches"
+                why = "has several shapes that collide; a scene's body has one" if own else "has no shape that collides"
                 found.append((model, link, why))
         if found:
             raise _Refused(*found)
@@ -214,10 +216,13 @@ class _Reading:
             shy = {part.link.attributes["name"]: part.free for part in own if not _touches(part.link)}
             if _touches(model) or len(shy) < 2 or not any(shy.values()):
                 continue
-            line = f"{model}: its links pass through each other, self_collide is not true; in a scene all bodies touch"
+            line = (
+                f"{model}: its links do not collide with each other, as self_collide is not true; in a scene all "
+                "bodies can collide"
+            )
             if not self.drop:
                 raise SceneError(f"model: {line}")
-            yield f"{line}; that they pass"
+            yield f"{line}; that they do not collide"
 
     # ---- bodies ----
 
@@ -291,12 +296,14 @@ class _Reading:
             stated = [{e.tag for e in part.link.walk()} for part, _ in free]
             of = [name for (_, name), said in zip(free, stated, strict=True) if not said.issuperset(tags)]
             if of:
-                self.notes.append(f"{what} of {one_line(', '.join(of), 120)}: SDF's own, the model states none")
+                self.notes.append(
+                    f"{what} of {one_line(', '.join(of), 120)}: the default of SDF, the model states none"
+                )
         if any(
             child(part.collision, "surface", "friction") is None and not _drakes(part, "drake:mu_dynamic")
             for part in parts
         ):
-            self.notes.append("friction 1 of shapes that state none: SDF's own")
+            self.notes.append("friction 1 of shapes that state none: the default of SDF")
 
     # ---- contacts ----
 
@@ -315,7 +322,9 @@ class _Reading:
                 if a.free or parts[j].free:
                     found[i, j] = own[i] if own[i] == own[j] else pair_of(own[i], own[j])
         if len(set(own)) > 1:
-            self.notes.append("friction of a pair is the harmonic mean of its bodies', as in Drake: SDF does not say")
+            self.notes.append(
+                "friction of a pair is the harmonic mean of its bodies' values, as in Drake; SDF does not define it"
+            )
         return pairs_of(found, bodies)
 
     def _settings(self, parts: list[_Part]) -> Iterator[Setting]:
@@ -323,7 +332,10 @@ class _Reading:
         for setting in rule("lagged", "as shipped"):
             if setting.name == "boxes":
                 yield Setting(
-                    "boxes", "point", "as shipped: shapes that state no surface touch in a point", setting.source
+                    "boxes",
+                    "point",
+                    "as shipped: shapes without a stated surface have one contact point",
+                    setting.source,
                 )
             else:
                 yield setting
@@ -337,7 +349,7 @@ class _Reading:
             raise SceneError(f"model: {part.collision}: its surface is both rigid and compliant")
         kind = kinds[0] if kinds else "none"
         if kind == "compliant" and isinstance(self._shape(part.geometry), HalfSpace):
-            raise SceneError(f"model: {part.collision}: a plane that gives has a thickness, which is not read")
+            raise SceneError(f"model: {part.collision}: a compliant plane has a thickness, which is not read")
         numbers = [self._property(part, "hydroelastic", name) for name in ("resolution_hint", "hydroelastic_modulus")]
         names = ("point_contact_stiffness", "hunt_crossley_dissipation", "relaxation_time")
         numbers += [self._property(part, "material", name) for name in names]

@@ -30,14 +30,14 @@ FOREIGN = {
 #: Elements that a scene has no place for, and why.
 NO_PLACE = {
     "tendon": "a scene has no tendons",
-    "equality": "a scene has no constraints but contact",
+    "equality": "a scene has no constraints except contact",
     "actuator": "a scene has no motors",
-    "exclude": "in a scene all bodies touch",
+    "exclude": "in a scene all bodies can collide",
     "deformable": "bodies of a scene are rigid",
     "flexcomp": "bodies of a scene are rigid",
     "composite": "bodies of a scene are rigid and free",
     "skin": "bodies of a scene are rigid",
-    "mesh": "a scene has no meshes but hulls of vertices",
+    "mesh": "a scene has no meshes except convex hulls of vertices",
     "hfield": "a scene has no height fields",
 }
 #: What a mesh may state that is the hull of its vertices, a solid of one density.
@@ -85,7 +85,7 @@ def rid_of(
             if child.tag in silent:
                 continue
             if child.tag not in kept:
-                line = f"{child}: {no_place.get(child.tag, 'there is no place for it in a scene')}"
+                line = f"{child}: {no_place.get(child.tag, 'a scene has no such element')}"
                 if not drop:
                     raise SceneError(f"model: {line}")
                 dropped.append(line)
@@ -115,7 +115,7 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
         if "file" in child.attributes:
             why = "other files are not read"
         elif child.tag not in KEPT and child.tag not in NO_PLACE and element.tag != "default":
-            why = "there is no place for it in a scene"
+            why = "a scene has no such element"
         if why:
             if not drop:
                 raise SceneError(f"model: {child}: {why}")

@@ -161,6 +161,6 @@ class Matched:
         found: dict[str, Any] = {"rounds": self.most, "shifts_apart": self.apart}
         if self.unsolved:
             steps = "step" if self.unsolved == 1 else "steps"
-            reason = f"in {self.unsolved} {steps} the shifts of references do not settle: {self.apart:.2g} apart"
+            reason = f"in {self.unsolved} {steps} the shifts of references do not converge: {self.apart:.2g} apart"
             found |= {"certified": False, "reasons": [reason]}
         return found

@@ -91,7 +91,7 @@ def _without_what_hangs(root: Element, dropped: list[str]) -> None:
         dropped.append(f"{shape}: its shape was left out")
     for body in [e for e in root.walk() if e.tag == "body" and _is_hollow(e)]:
         root.without(body)
-        dropped.append(f"{body}: nothing is left of it that has a mass")
+        dropped.append(f"{body}: no part of it with a mass remains")
 
 
 def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
@@ -126,14 +126,14 @@ def filled_in(root: Element) -> Iterator[str]:
     owners = [(e, [g for g in e.children if g.tag == "geom"]) for e in root.walk() if e.tag in ("worldbody", "body")]
     rough = [g for _, geoms in owners for g in geoms if "friction" not in g.attributes]
     if rough and "friction" not in said:
-        yield f"friction 1 of {_count(rough)} none, MuJoCo's own; of two geoms the larger holds"
+        yield f"friction 1 of {_count(rough)} none, MuJoCo's default; a pair has the larger of two"
     heavy = [
         g for owner, geoms in owners for g in geoms
         if owner.tag == "body" and not any(e.tag == "inertial" for e in owner.children)
         and not {"mass", "density"} & set(g.attributes)
     ]  # fmt: skip
     if heavy and not {"mass", "density"} & said:
-        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's own"
+        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's default"
 
 
 def _count(geoms: Sequence[Element]) -> str:
@@ -176,7 +176,7 @@ class _Reading:
         shaped = list(self._shaped())
         bodies = tuple(self._body(g, names) for g, names in zip(shaped, self._names(shaped), strict=True))
         if not any(body.motion == "free" for body in bodies):
-            raise SceneError("model: has no free body: nothing can move")
+            raise SceneError("model: has no free body, so nothing can move")
         contacts = self._contacts(shaped, bodies)
         gravity = tuple(float(g) + 0.0 for g in m.opt.gravity)
         if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
@@ -185,12 +185,14 @@ class _Reading:
         if beside:
             which = one_line(", ".join(beside), 120)
             self.notes.append(
-                f"{which}: MuJoCo moves a body's origin, which is not its centre of mass; profile model moves the "
-                "centre: a step of a body that turns ends otherwise by |w|^2 dt^2/2 of the way between them"
+                f"{which}: MuJoCo moves a body's origin, which is not its centre of mass, and profile model moves "
+                "the centre; for a rotating body a step differs by |w|^2 dt^2/2 times the distance between them"
             )
         pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
         self.notes += filled_in(self.root)
-        self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
+        self.notes.append(
+            "restitution 0 in all engines but MuJoCo: the model states none, its contacts rebound by solref"
+        )
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)
         settings += self._softness(contacts)
@@ -229,15 +231,15 @@ class _Reading:
             weld = int(m.body_weldid[m.geom_bodyid[g]])
             owners[weld] += weld != 0
             if owners[weld] > 1:
-                raise Refused("body", self._name("body", weld), "has several geoms that touch; a scene's body has one")
+                raise Refused(
+                    "body", self._name("body", weld), "has several geoms that collide; a scene's body has one"
+                )
             yield g
         for body in range(1, m.nbody):
             if m.body_weldid[body] == body and not owners[body]:
-                raise Refused("body", self._name("body", body), "has no geom that touches")
+                raise Refused("body", self._name("body", body), "has no geom that collides")
             if m.body_gravcomp[body]:
-                raise Refused(
-                    "body", self._name("body", body), "gravcomp: in a scene gravity pulls at all bodies alike"
-                )
+                raise Refused("body", self._name("body", body), "gravcomp: in a scene gravity acts on all bodies alike")
 
     def _names(self, shaped: list[int]) -> list[str]:
         """Names of bodies: of the body if it is free, of the geom if it is fixed; of some several, numbered."""
@@ -354,7 +356,10 @@ class _Reading:
                 meets = (m.geom_contype[a] & m.geom_conaffinity[b]) or (m.geom_contype[b] & m.geom_conaffinity[a])
                 pair = stated.get(frozenset((a, b)))
                 if pair is None and not meets:
-                    why = f"contype and conaffinity keep it apart from {bodies[i].name}; in a scene all bodies touch"
+                    why = (
+                        f"contype and conaffinity exclude contact with {bodies[i].name}; in a scene all bodies can "
+                        "collide"
+                    )
                     raise Refused("geom", self._name("geom", b), why, fatal=True)
                 contact = contact_of(m, a, b, pair)
                 if contact.refusal and not self.drop:
@@ -377,7 +382,9 @@ class _Reading:
         ]
         settings.append(Setting("smooth_condim", max(smooth, default=3), "of the model's frictionless pairs", source))
         if len(smooth) > 1:
-            raise SceneError("model: some pairs without friction have condim 1, others 3; a model has one kind")
+            raise SceneError(
+                "model: some pairs without friction have condim 1, others 3; only one of them is supported"
+            )
         apart = tuple((i, j, *c.softness) for (i, j), c in contacts.items() if c.softness != usual)
         if apart:
             settings.append(Setting("apart", apart, "pairs of bodies that are softer or harder than the rest", source))

@@ -95,9 +95,9 @@ def option_settings(mujoco: Any, model: Any) -> list[Setting]:
     disabled = {bit.name.removeprefix("mjDSBL_").lower() for bit in _bits(mujoco.mjtDisableBit, option.disableflags)}
     enabled = {bit.name.removeprefix("mjENBL_").lower() for bit in _bits(mujoco.mjtEnableBit, option.enableflags)}
     for name in sorted(disabled - SILENT - CARRIED):
-        raise Refused("option/flag", name, "without it nothing touches", fatal=True)
+        raise Refused("option/flag", name, "without it there are no contacts", fatal=True)
     for name in sorted(enabled - MEASURING):
-        raise Refused("option/flag", name, "a scene has no word for what it changes", fatal=True)
+        raise Refused("option/flag", name, "a scene cannot express what it changes", fatal=True)
     integrator = mujoco.mjtIntegrator(int(option.integrator)).name.removeprefix("mjINT_").lower()
     words = {
         "integrator": {"euler": "Euler", "rk4": "RK4"}.get(integrator, integrator),

@@ -26,7 +26,7 @@ REFLECT = f"{DOC}, computation/speculative: elastic restitution"
 DE_SAXCE = "De Saxce and Feng, The bipotential method, 1998; adapters/mujoco/matched.py"
 NEWTON = "Newton's law of restitution; adapters/mujoco/matched.py"
 MEASURED = "measured with 4.0.1"
-CARRIES = "a load needs a spring of stiffness kappa/dt^2 to rest on"
+CARRIES = "a load rests on a spring of stiffness kappa/dt^2"
 
 #: Impedance as close to 1 as MuJoCo lets it be, the same at every depth.
 RIGID = (IMPEDANCE_RANGE[1], IMPEDANCE_RANGE[1], 0.001, 0.5, 1.0)
@@ -51,11 +51,11 @@ def default(needs: Needs, dt: float) -> list[Setting]:
         Setting("integrator", "Euler", shipped, DOC),
         Setting("cone", "pyramidal", shipped, DOC),
         Setting("impratio", 1.0, shipped, DOC),
-        Setting("iterations", ITERATIONS, f"{shipped}: at most so many Newton steps", DOC),
+        Setting("iterations", ITERATIONS, f"{shipped}: largest number of Newton steps", DOC),
         Setting("tolerance", TOLERANCE, shipped, DOC),
         Setting("noslip_iterations", 0, shipped, DOC),
         Setting("smooth_condim", 3, f"{shipped}: a pair with mu = 0 keeps friction rows, of mu = 1e-5", DOC),
-        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; e has no say", MANUAL),
+        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; no restitution", MANUAL),
         Setting("solimp", SOLIMP, shipped, MANUAL),
         Setting("solreffriction", None, f"{shipped}: friction is damped like the normal", FRICTION),
         Setting("margin", 0.0, f"{shipped} [m]: contact starts when bodies overlap", DOC),
@@ -65,23 +65,31 @@ def default(needs: Needs, dt: float) -> list[Setting]:
 def tuned(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for the scene's needs."""
     if needs.regime == "free":
-        return _replaced(default(needs, dt), Setting("integrator", "RK4", "nothing can touch: fourth order", DOC))
+        return _replaced(
+            default(needs, dt),
+            Setting("integrator", "RK4", "no contact is possible, so a fourth-order method is accurate", DOC),
+        )
     settings = _replaced(
         default(needs, dt),
-        Setting("cone", "elliptic", "the pyramid is an L1 cone: mu/sqrt(2) at 45 degrees", f"{DOC}, computation"),
+        Setting("cone", "elliptic", "the pyramid limits friction to mu/sqrt(2) at 45 degrees", f"{DOC}, computation"),
         Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
-        Setting("solref", "reflect", "asks for velocity -e v one step after contact: damping (1 + e)/dt", REFLECT),
-        Setting("solimp", RIGID, "d = 0.9999: only the 1e-4 that is left of the load gets through", MANUAL),
-        Setting("tolerance", 0.0, "Newton goes on to round-off: forces add up too, at no cost", MEASURED),
-        Setting("kappa_elastic", 0.0, "a stiffness kappa/dt^2 would add kappa times the phase to e", MEASURED),
-        Setting("kappa_plastic", 0.0, "without a load there is nothing to carry", MANUAL),
+        Setting("solref", "reflect", "target velocity -e v one step after contact: damping (1 + e)/dt", REFLECT),
+        Setting("solimp", RIGID, "d = 0.9999: only 1e-4 of the load yields", MANUAL),
+        Setting("tolerance", 0.0, "Newton's method converges to round-off; forces then balance, at no cost", MEASURED),
+        Setting(
+            "kappa_elastic",
+            0.0,
+            "a stiffness kappa/dt^2 would change e with the phase of the impact in its step",
+            MEASURED,
+        ),
+        Setting("kappa_plastic", 0.0, "there is no load to carry", MANUAL),
     )
     if needs.regime == "rest":
         settings = _replaced(settings, *_resting(needs, dt))
     elif needs.gravity > 0.0 and needs.restitution > 0.0:
         settings = _replaced(settings, Setting("kappa_plastic", KAPPA, CARRIES, MANUAL))
     if needs.friction > 0.0 and needs.restitution > 0.0:
-        reverses = "the normal's damping (1 + e)/dt would reverse the slip: 1/dt stops it"
+        reverses = "the damping of the normal, (1 + e)/dt, would reverse the slip; 1/dt stops it"
         settings = _replaced(settings, Setting("solreffriction", "stick", reverses, FRICTION))
     return settings
 
@@ -90,10 +98,12 @@ def _resting(needs: Needs, dt: float) -> list[Setting]:
     """What changes for bodies that only rest, stick and slide (e = 0 everywhere)."""
     settings = [Setting("kappa_plastic", KAPPA, CARRIES, MANUAL)]
     depth = (1.0 - RIGID[0]) / KAPPA * needs.pull * dt**2
-    touches = "the depth (1-d)/kappa g dt^2 at which a body rests: touching bodies then start and stay in contact"
+    touches = "the depth (1-d)/kappa g dt^2 at which a body rests; touching bodies then start and stay in contact"
     settings.append(Setting("margin", depth, touches, f"{MANUAL}; {DOC}, margin"))
     if needs.friction > 0.0:
-        creeps = "stick is viscous, creep (1-d)/(d b n impratio) g sin(theta): 100 puts it far below g dt^2/s"
+        creeps = (
+            "friction at rest creeps with (1-d)/(d b n impratio) g sin(theta); 100 makes that far less than g dt^2/s"
+        )
         settings.append(Setting("impratio", 100.0, creeps, FRICTION))
     if needs.slide:
         # Stiff friction damping throws a sliding body up, soft damping stops it late. Over 25 inclines with
@@ -116,14 +126,18 @@ def matched(needs: Needs, dt: float) -> list[Setting]:
         default(needs, dt),
         Setting("cone", "elliptic", "Coulomb's cone is round", f"{DOC}, computation"),
         Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
-        Setting("solref", (0.0, -firm[0] / dt), "asks for velocity 0 one step later; the loop adds the rest", MANUAL),
-        Setting("solimp", firm, "what is left of the load is small, and the loop asks for it", MANUAL),
-        Setting("tolerance", SOLVED, "Newton goes on until a step gains no more than round-off", MEASURED),
+        Setting("solref", (0.0, -firm[0] / dt), "target velocity 0 one step later; the loop adds the rebound", MANUAL),
+        Setting("solimp", firm, "a small part of the load yields, and the loop corrects it", MANUAL),
+        Setting("tolerance", SOLVED, "Newton's method stops when a step gains round-off only", MEASURED),
         Setting("margin", depth, "bodies that touch at a distance of exactly 0 are in contact", f"{DOC}, margin"),
-        Setting("rounds", _rounds(needs.friction), "enough for the shifts to agree without the secant", DE_SAXCE),
-        Setting("agreed", AGREED, "share of the contacts' largest acceleration that rounds end at", DE_SAXCE),
-        Setting("push_out", KAPPA, "share of an overlap that a step takes away", CARRIES),
-        Setting("push_out_speed", fall, "no faster than the load brings it back in a step: nothing hops", NEWTON),
+        Setting(
+            "rounds", _rounds(needs.friction), "enough for the shifts to converge without the secant method", DE_SAXCE
+        ),
+        Setting(
+            "agreed", AGREED, "rounds end when shifts agree to this share of the largest contact acceleration", DE_SAXCE
+        ),
+        Setting("push_out", KAPPA, "share of an overlap that a step corrects", CARRIES),
+        Setting("push_out_speed", fall, "no faster than the load returns it in a step, so nothing hops", NEWTON),
     )
 
 

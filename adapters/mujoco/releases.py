@@ -18,32 +18,33 @@ RELEASES = Releases(
     distributions=(Distribution("mujoco", "<4.0.0"), Distribution("mujoco-core", ">=4.0.0")),
     known=">=3.0.0,<5",
     requirements=(
-        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
-                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.3)"),
+        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's arrays "
+                                         "reads as the first one; the property check of impulses fails "
+                                         "(measured with 3.0.0 to 3.1.3)"),
     ),
     differences=(
         Difference("<3.2.4", "MjSpec is missing, or takes no attributes where a body, geom or pair is added",
-                   "the model is written as MJCF by `Mjcf`, which is the same model to the last bit",
+                   "`Mjcf` writes the model as MJCF, which gives the same model to the last bit",
                    "measured: 3.1.6 has none, 3.2.0 to 3.2.2 refuse attributes, 3.2.3 its own options, 3.2.4 "
                    "gives and takes all of them"),
-        Difference("<3.2.4", "there is no flag that disables autoreset: a state that is not finite starts anew",
-                   "the counters of bad states are read after every advance; one that counts ends the run",
+        Difference("<3.2.4", "autoreset cannot be disabled: a state that is not finite is reset",
+                   "the counters of bad states are read after every step; a bad state ends the run",
                    "measured: mjtDisableBit.mjDSBL_AUTORESET is there from 3.2.4 on"),
         Difference("<3.5.0", "a contact's margin is the larger of its geoms', not their sum",
-                   "a geom gets all of it there, and half of it where they are added",
+                   "a geom gets the whole margin there, and half of it where margins are added",
                    "change log of 3.5.0, item 12"),
         Difference("<3.1.3", "contact.geom holds floating-point numbers", "they are turned into integers",
                    "measured: 3.1.2 float64, 3.1.3 int32"),
         Difference("<3.10.0", "there is no MjLogConfig: warnings cannot be switched off",
-                   "none is expected; a file MUJOCO_LOG.TXT may be written where an unstable run warns",
+                   "an unstable run may write a file MUJOCO_LOG.TXT",
                    "measured: 3.3.7 has none, 3.10.0 has it"),
         Difference("==3.9.0", "a step ends with an error where the box-box collider, given a margin, returns 9 "
                    "contacts of the 8 that are announced",
-                   "such cells crash with MuJoCo's own words: another margin would be another profile than is judged "
-                   "elsewhere",
+                   "such cases crash with MuJoCo's own message; another margin would be another profile than in other "
+                   "releases",
                    "measured: with margin 0 the same stacks of 10 and 20 run through; 3.8.1 and 3.10.0 do with it"),
         Difference(">=4.0.0", "the bindings moved from the distribution mujoco to mujoco-core",
-                   "both are this engine; mujoco 4.0.0 itself holds no engine, only tools on top of mujoco-core",
+                   "both are this engine; mujoco 4.0.0 itself has only tools on top of mujoco-core",
                    "metadata of mujoco 4.0.0"),
     ),
 )  # fmt: skip

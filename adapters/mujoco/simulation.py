@@ -71,7 +71,7 @@ class MujocoSimulation(Simulation):
         kinds = self._mujoco.mjtWarning
         for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
             if self._data.warning[kind].number:
-                raise EngineError("memory: MuJoCo's arena is too small, it dropped contacts")
+                raise EngineError("memory: MuJoCo's arena is too small, so contacts were dropped")
 
     def _drive(self) -> None:
         """Make a step in which bodies move by a course, faces move, surfaces run or references are matched."""

@@ -27,7 +27,7 @@ Z_TO_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 
 def moments(body: Body) -> tuple[float, float, float]:
     """Principal moments of a body [kg m^2]."""
-    assert isinstance(body.inertia, tuple), "MuJoCo is spatial: planar scenes arrive lifted"
+    assert isinstance(body.inertia, tuple), "MuJoCo is a 3-D engine: 2-D scenes must be embedded in 3-D before"
     return body.inertia
 
 

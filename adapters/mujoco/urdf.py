@@ -27,12 +27,12 @@ SILENT = frozenset(["visual", "material", "transmission", "ros2_control", "verbo
 NO_PLACE = {
     "mesh": "a scene has no meshes",
     "sdf": "other files are not read",
-    "contact": "what Bullet alone reads of contacts is not read",
-    "gazebo": "what Gazebo alone reads is not read",
-    "mujoco": "what MuJoCo alone reads is not read",
-    "limit": "a scene has no joints but fixed ones",
-    "dynamics": "a scene has no joints but fixed ones",
-    "mimic": "a scene has no joints but fixed ones",
+    "contact": "Bullet's own contact elements are not read",
+    "gazebo": "Gazebo's own elements are not read",
+    "mujoco": "MuJoCo's own elements are not read",
+    "limit": "a scene has no joints except fixed ones",
+    "dynamics": "a scene has no joints except fixed ones",
+    "mimic": "a scene has no joints except fixed ones",
     "safety_controller": "a scene has no motors",
     "calibration": "a scene has no motors",
 }
@@ -57,11 +57,11 @@ def read(text: str, drop: bool) -> Model:
             line = f"{joint}: a {kind} joint holds a link; bodies of a scene are free or fixed"
             if not drop:
                 raise SceneError(f"model: {line}")
-            dropped.append(f"{line}: and what hangs on it")
+            dropped.append(f"{line}: and all links attached to it")
             _cut(root, joint)
     links = [child for child in root.children if child.tag == "link"]
     joints = [child for child in root.children if child.tag == "joint"]
-    notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's own"]
+    notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's default"]
     notes += _let_go(root, links, joints)
     own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false"}, 0)])
     root.children.insert(0, own)
@@ -93,8 +93,8 @@ def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[
     held = {_link_of(joint, "child") for joint in joints}
     roots = [link for link in links if link.attributes["name"] not in held]
     if len(roots) != 1:
-        which = f"{roots[1]}: is a second root" if roots else "no link is its root"
-        raise SceneError(f"model: {which}; a robot has one, on which all others hang")
+        which = f"{roots[1]}: is a second root" if roots else "no link is the root"
+        raise SceneError(f"model: {which}; a robot has one root, to which all other links are attached")
     name = roots[0].attributes["name"]
     if name == WORLD:
         return []
@@ -106,7 +106,9 @@ def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[
     free = Element("joint", {"name": f"{WORLD}@free", "type": "floating"}, roots[0].line)
     free.children = [Element("parent", {"link": WORLD}, 0), Element("child", {"link": name}, 0)]
     root.children += [Element("link", {"name": WORLD}, 0), free]
-    return [f"{one_line(name, 60)} is free: URDF does not say whether a robot's root is held, a link 'world' holds it"]
+    return [
+        f"{one_line(name, 60)} is free: URDF does not say whether a robot's root is fixed; a root link 'world' fixes it"
+    ]
 
 
 def _link_of(joint: Element, end: str) -> str:

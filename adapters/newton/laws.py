@@ -17,20 +17,28 @@ from adapters.newton.profiles import PROFILES
 from adapters.single_precision import UNIT, Method, plane_law, rounded_law
 from adapters.unswept import passing_law
 
-_SWEPT = "overlaps and slips are taken back by a share in each sweep, and what a sweep leaves or adds is a velocity"
-_REBOUNDS = "rebounds come after the sweeps, from approaches before them, without friction, and numbers are singles"
-_WALLS = (
-    "a wall along x leans by one rounding of its quaternion, 2^-24 rad, and each blow turns what meets in a line "
-    "further from it; numbers are singles"
+_SWEPT = "each iteration corrects a share of overlaps and slips, and its residual becomes a velocity"
+_REBOUNDS = (
+    "rebounds are solved after the iterations, from approach speeds before them, without friction, in single precision"
 )
-_ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
-_ROCKS = f"{_SWEPT}; as shipped what rubs resists rolling as well"
-_SPINS = _ROLLS + ", and a spin gains or loses what rounding leaves of its quaternion's size"
-_DIGITS = "numbers are singles: an overlap of 0.1 mm has three digits, and a load is made of it"
-_PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
+_WALLS = (
+    "a wall along x is tilted by one rounding of its quaternion, 2^-24 rad, and each blow turns bodies in a line "
+    "further from it; single precision"
+)
+_ROLLS = (
+    "contacts with friction also resist rolling and spinning as shipped, by 0.1 mm and 5 mm times the load; "
+    "single precision"
+)
+_ROCKS = f"{_SWEPT}; as shipped contacts with friction also resist rolling"
+_SPINS = _ROLLS + ", and rounding of the quaternion's length changes a spin"
+_DIGITS = "single precision resolves an overlap of 0.1 mm to three digits, and the load follows from it"
+_PAIRS = (
+    "a body moves by the mean of its contacts' corrections, which differs between the two bodies of a contact: "
+    "momentum is not conserved"
+)
 _COLUMNS = (
-    "a sweep gives a box the mean of what its contacts ask for, and tells of a face the mean of two boxes; what it "
-    "leaves of an overlap is a velocity"
+    "an iteration moves a box by the mean of its contacts' corrections, and the reported impulse of a face is the "
+    "mean of two boxes; the rest of an overlap becomes a velocity"
 )
 _STANDING = ("settle_time", "penetration", "kinetic_energy", "impulse_scatter")
 
@@ -71,7 +79,7 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "heavy_on_light": (_COLUMNS, (*_STANDING, "interface_impulse[1]", "interface_impulse[2]")),
 }
 
-_ROUNDED = "numbers are singles: what they round is not the same on both sides of a balance"
+_ROUNDED = "single precision rounds differently on both sides of a balance"
 #: Balances by scene: in doubles the recurrence makes nothing of them, or less than singles round.
 BALANCES: Mapping[str, tuple[str, ...]] = {
     "impact": ("momentum_defect",),
@@ -86,8 +94,8 @@ BALANCES: Mapping[str, tuple[str, ...]] = {
     "overlap": ("centre_moved",),
 }
 _STOPS = (
-    "numbers are singles; what sweeps leave below 0.1 mm/s is stopped, which no impulse tells: what overlaps ask for "
-    "after it makes up for it, but for roundings of places"
+    "single precision; velocities below 0.1 mm/s are set to 0 without a reported impulse, which later overlap "
+    "corrections make up for, except for rounding of positions"
 )
 #: Why by scene and metric; what is a balance in some cells alone keeps the reason of the others.
 _DECIDED = {(scene, metric): _ROUNDED for scene, metrics in BALANCES.items() for metric in metrics}
@@ -120,8 +128,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         passing_law(metric, PLACES),
-        "nothing is swept: what is farther than two gaps from a thin body where a step begins, and beyond it where the "
-        "step ends, passes",
+        "there is no swept collision detection: a body farther than two gaps from a thin body at the start of a "
+        "step, and beyond it at the end, passes through",
         "ModelBuilder.rigid_gap; motion in adapters/unswept.py",
         ("1.8.",),
     )
@@ -134,7 +142,7 @@ DEVIATIONS += tuple(
         scene,
         exactly(metric),
         rounded_law(metric, Method(lambda e, speed: e)),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "xpbd/restitution_kernels.py, built for floats; motion in adapters/single_precision.py",
         ("1.8.",),
     )
@@ -142,8 +150,8 @@ DEVIATIONS += tuple(
     for metric in metrics
 )
 _PLACES = (
-    "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost, so that nothing is found to "
-    "overlap or to slip, while speeds go on growing"
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost, so no "
+    "overlap or slip is found while speeds grow"
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -166,7 +174,7 @@ DEVIATIONS += tuple(
         scene,
         "out_of_plane",
         plane_law,
-        "numbers are singles: what they round is not the same on both sides of a plane",
+        "single precision rounds differently on both sides of a plane",
         "xpbd/kernels.py, built for floats; band in adapters/single_precision.py",
         ("1.8.",),
     )

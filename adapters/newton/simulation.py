@@ -298,7 +298,7 @@ def _mesh(newton: Any, shape: Hull) -> Any:
     vertices = np.array(shape.vertices, np.float32)
     mesh = newton.Mesh(vertices, triangles(shape).ravel(), compute_inertia=False)
     if len(mesh.vertices) != len(vertices):
-        raise EngineError(f"shape: newton keeps {len(mesh.vertices)} of {len(vertices)} vertices")
+        raise EngineError(f"shape: newton uses {len(mesh.vertices)} of {len(vertices)} vertices")
     return mesh
 
 

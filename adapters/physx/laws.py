@@ -62,7 +62,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(metric, profile),
-        "no approach of up to 2 m/s rebounds as shipped, and numbers are singles, 2^-24 of their size",
+        "restitution is 0 up to 2 m/s as shipped; single precision, 2^-24 relative",
         "PxSceneDesc, bounceThresholdVelocity; motion in adapters/single_precision.py",
         _RELEASES,
     )
@@ -78,8 +78,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
-        "nothing is swept: what is on one side of a thin body where a step ends, and on the other where the next one "
-        "does, passes",
+        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+        "other at the end of the next, passes through",
         "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
         _RELEASES,
     )
@@ -93,7 +93,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         "PxTransform, built of floats; motion in adapters/single_motions.py",
         _RELEASES,
     )
@@ -106,7 +106,7 @@ DEVIATIONS += tuple(
         scene,
         "momentum_defect",
         kept_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "PxVec3, built of floats; band in adapters/single_motions.py",
         _RELEASES,
     )
@@ -120,7 +120,7 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "PxVec3, built of floats; band in adapters/single_motions.py",
         _RELEASES,
     )
@@ -140,7 +140,7 @@ DEVIATIONS += tuple(
         scene,
         "out_of_plane",
         plane_law,
-        "numbers are singles: what they round is not the same on both sides of a plane",
+        "single precision rounds differently on both sides of a plane",
         "PxVec3, built of floats; band in adapters/single_precision.py",
         _RELEASES,
     )

@@ -43,7 +43,7 @@ class PhysxSimulation(Simulation):
         self.scene, self.dt, self.settings = scene, dt, settings
         length = settings["tolerance_length"]
         if other := next((held for held in _LIVING.values() if held != length), None):
-            raise EngineError(f"tolerance_length: {length:g} m, while a world of this process is made for {other:g} m")
+            raise EngineError(f"tolerance_length: {length:g} m, while another world of this process uses {other:g} m")
         self.engine: Any = sapien.physx.PhysxEngine(length, 0.2)
         _LIVING[self] = length
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
@@ -114,7 +114,7 @@ class PhysxSimulation(Simulation):
         if isinstance(shape, Hull):
             held = physx.PhysxCollisionShapeConvexMesh(np.array(shape.vertices, np.float32), (1.0, 1.0, 1.0), material)
             if len(held.vertices) != len(shape.vertices):
-                raise EngineError(f"{asked.name}.shape: physx keeps {len(held.vertices)} of its vertices")
+                raise EngineError(f"{asked.name}.shape: physx uses {len(held.vertices)} of its vertices")
             return held
         assert isinstance(shape, Box)
         return physx.PhysxCollisionShapeBox(shape.half_extents, material)

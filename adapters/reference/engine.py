@@ -34,7 +34,7 @@ from adapters.scene import Scene
 #: Largest whole number that a kernel can be handed.
 LARGEST = 2**63 - 1
 #: Steps cut at events, with constant accelerations between them.
-LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
+LOCATED = Scheme("detect, impacts, forces up to the next event, move; the rest of the step is the next part", 0)
 
 
 class ReferenceEngine(Engine):
@@ -53,13 +53,13 @@ class ReferenceEngine(Engine):
         profile_schemes=MappingProxyType({"reference": LOCATED}),
         quirks=(
             Quirk(
-                "classical advances velocity before position: free fall from rest is ahead by g t dt / 2",
-                "nothing: it is the scheme, and tolerances allow for a step; reference falls exactly",
+                "classical updates velocity before position: free fall from rest is ahead by g t dt / 2",
+                "unchanged: tolerances allow for a step; reference falls exactly",
                 SOURCE,
             ),
             Quirk(
-                "classical finds contact at the start of a step, so a bounce is found late by up to v dt",
-                "nothing: it is the scheme, and tolerances allow for a step; reference cuts its steps at events",
+                "classical detects contacts at the start of a step, so a bounce is late by up to v dt",
+                "unchanged: tolerances allow for a step; reference divides its steps at events",
                 SOURCE,
             ),
         ),
@@ -141,7 +141,7 @@ class ReferenceEngine(Engine):
         if not determined and "shared" not in broken:  # beyond the horizon
             reasons.insert(0, next(finding.meaning for finding in found.findings if finding.name == "shared"))
         if not same:
-            reasons.append("the run that was certified does not end where the run that is judged does")
+            reasons.append("the certified run does not end where the judged run does")
         return {
             "holds": found.holds and same and determined,
             "lawful": bool(same and light and broken <= {"shared"}),  # one of the motions that obey the laws
@@ -169,7 +169,10 @@ class ReferenceEngine(Engine):
         load = slide_load(needs.friction)
         slowest = slide_speed(needs.friction) - needs.friction * load * SLIDE_TIME
         share = 0.5 * ((1.0 + needs.restitution) * load * dt / slowest) ** 2
-        because = "a box that fixed sweeps let rock slips aside at its corners, by (1 + e) g dt: 1 - cos of friction"
+        because = (
+            "a box that rocks because of the fixed sweeps slips sideways at its corners, by (1 + e) g dt: 1 - "
+            "cos of friction"
+        )
         band = (0.5 * share + FRICTION_SHARE) * needs.friction
         told = Declared((1.0 - 0.5 * share) * needs.friction, band, because)
         return {"friction": told, "friction_impulse": told}
@@ -203,7 +206,7 @@ def _checked(settings: Mapping[str, Any], dt: float) -> Any:
         if name not in known:
             raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
         if isinstance(value, int) and value > LARGEST:
-            raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
+            raise EngineError(f"{name}: is larger than {LARGEST}, the largest integer of a kernel")
     return Settings(dt=dt, **settings)
 
 

@@ -24,8 +24,8 @@ def too_far_at_the_start(scene: Scene) -> str | None:
         last = float(np.finfo(float).eps) * place
         if last > limit * 0.5 * body.shape.smallest_size:
             return (
-                f"{body.name} lies {place:.3g} m away, where numbers have steps of {last:.2g} m: "
-                "too coarse for its size to certify a solution"
+                f"{body.name} lies {place:.3g} m from the origin, where numbers are {last:.2g} m apart: too coarse "
+                "for its size to certify a solution"
             )
     return None
 
@@ -46,6 +46,7 @@ def overlap_at_the_start(scene: Scene) -> str | None:
         depth = -float(np.atleast_1d(gap(first.shape, poses[0], second.shape, poses[1]))[0])
         if depth > limit * 0.5 * min(first.shape.smallest_size, second.shape.smallest_size):
             return (
-                f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid bodies have no solution"
+                f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid-body dynamics has no "
+                "solution"
             )
     return None

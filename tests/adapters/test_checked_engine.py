@@ -49,7 +49,7 @@ def test_a_world_gets_what_was_checked():
     (SCENE, 0.01, {"skin": 1.0}, "skin: planar has no such setting, it has iterations, slop"),
     (SCENE, 0.2, {}, "dt: too long"),
     (replace(SCENE, bodies=(FLOOR, replace(BALLS[0], mass=1e-31), BALLS[1])), 0.01, {},
-     "a.mass: 1e-31 has no place in single precision"),
+     "a.mass: 1e-31 cannot be represented in single precision"),
 ])  # fmt: skip
 def test_what_is_wrong_is_refused_before_a_world_is_made(scene, dt, changes, said):
     with pytest.raises(EngineError) as refused:

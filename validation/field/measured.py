@@ -122,9 +122,9 @@ def _fact(raw: Mapping[str, Any]) -> Fact:
         values["dt"] = parse_dt(str(values["dt"]))
     fact = Fact(**values)
     if sum(map(bool, (fact.scene, fact.test, fact.unasked))) != 1:
-        raise ValueError(f"{fact.says}: one of a cell, a test and why it is not asked")
+        raise ValueError(f"{fact.says}: needs one of a case, a test and a reason why it is not tested")
     if (fact.standing == CONTRADICTED) != bool(fact.because):
-        raise ValueError(f"{fact.says}: what a cell contradicts has a reason, and nothing else has")
+        raise ValueError(f"{fact.says}: a contradiction by a case needs a reason, and only that has one")
     if fact.chosen and fact.standing not in (SHOWN, TESTED):
-        raise ValueError(f"{fact.says}: a choice is told of what agrees by it")
+        raise ValueError(f"{fact.says}: a choice made afterwards is stated only for agreement")
     return fact

@@ -44,6 +44,6 @@ def centre(body: dict[str, Any], notes: list[str]) -> None:
     if np.linalg.norm(found) > 0.01 * CENTRED * size:  # what is centred to round-off keeps its bits
         shape["vertices"] = tuple(tuple(float(x) for x in np.array(p) - found) for p in points)
         told = ", ".join(f"{x:.6g}" for x in found)
-        notes.append(f"{label}.vertices: their centroid ({told}) was made the body's centre")
+        notes.append(f"{label}.vertices: their centroid ({told}) is now the body's centre")
     if shape["type"] == "polygon":
         Polygon(tuple(map(tuple, shape["vertices"]))).validate(body["name"])

@@ -69,7 +69,7 @@ def value_of(formula: float | str, names: Mapping[str, float]) -> float:
         why = "is no formula" if isinstance(error, SyntaxError | RecursionError | MemoryError) else one_line(error)
         raise FormulaError(f"{shown}: {why}") from None
     if not math.isfinite(found):
-        raise FormulaError(f"{shown}: is {found}, no finite number")
+        raise FormulaError(f"{shown}: is {found}, not a finite number")
     return found
 
 
@@ -94,4 +94,4 @@ def _value(node: ast.expr, names: Mapping[str, float]) -> float:
         if not least <= len(node.args) <= most:
             raise FormulaError(f"{node.func.id} takes {least if least == most else f'{least} to {most}'} numbers")
         return float(function(*(_value(part, names) for part in node.args)))
-    raise FormulaError("only numbers, names, + - * / **, parentheses and functions stand in a formula")
+    raise FormulaError("a formula has only numbers, names, + - * / **, parentheses and functions")

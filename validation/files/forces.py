@@ -73,7 +73,7 @@ def told(
         if what == "contacts":
             series = np.bincount(step, minlength=len(chosen))[chosen].astype(float)
         elif len(step) == 0:
-            return None, "there is no contact whose force could be told"
+            return None, "there is no contact with a known force"
         else:
             sign = np.where(rows.b == body, 1.0, -1.0)
             series = sign * rows.impulse[:, _axis(what)] / trajectory.dt

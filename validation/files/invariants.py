@@ -37,18 +37,19 @@ def checks(scene: Scene, dt: float) -> list[Check]:
         "J",
         0.0,
         energy_bound(scene, dt),
-        "a step order shows a conserved energy with half a step of its loads' work (taken off at each sample's own "
-        "speed), and what two bodies that start in each other get for parting is taken off: left is the work of a load "
-        "over the step that it starts in, F^2 dt^2/m, and round-off",
-        "contacts only take energy (e <= 1)",
+        "velocity and position are half a step apart, which changes a conserved energy by half a step of the loads' "
+        "work (subtracted at the speed of each sample), and the energy that separates bodies overlapping at the "
+        "start is subtracted; what remains is the work of a load in the step in which it starts, F^2 dt^2/m, and "
+        "round-off",
+        "contacts do not add energy (e <= 1)",
     )
     depth = Check(
         "penetration",
         "m",
         0.0,
         overlap_bound(scene, dt),
-        "a contact is found one step late at most: beyond one step of the pair's approach (taken off) only what the "
-        "loads add in that step, (a_1 + a_2) dt^2, and round-off",
+        "a contact is found at most one step late: beyond one step of the pair's approach (subtracted) only the "
+        "motion by loads in that step, (a_1 + a_2) dt^2, and round-off",
         "bodies are impenetrable",
     )
     why = fed_by(scene)
@@ -63,9 +64,9 @@ def fed_by(scene: Scene) -> str:
     Theory and Applications*, 1985, on a rod that hits the floor]. Round bodies have their centres on every normal.
     """
     if any(body.motion == "prescribed" for body in scene.bodies):
-        return "a prescribed body may feed energy in"
+        return "a prescribed body may add energy"
     if any(any(body.surface_velocity) for body in scene.bodies):
-        return "a surface that runs may feed energy in"
+        return "a surface with a velocity may add energy"
     boxes = [body.motion == "free" and not isinstance(body.shape, ROUND) for body in scene.bodies]
     if not any(boxes) or not any(e > 0.0 and mu > 0.0 for e, mu in scene.materials()):
         return ""  # without a look at every pair

@@ -65,7 +65,7 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     except SceneError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise SceneError(f"{one_line(path)}: is not a model as it is kept: {one_line(error)}") from None
+        raise SceneError(f"{one_line(path)}: is not a stored model: {one_line(error)}") from None
 
 
 def _canonical(engine: str, read: Model, title: str) -> CanonicalScene:
@@ -74,15 +74,17 @@ def _canonical(engine: str, read: Model, title: str) -> CanonicalScene:
     dimensions = tuple(sorted(posed))
     notes = [f"{one_line(line)}: left out" for line in read.dropped] + list(read.notes)
     if flat is not None:
-        notes.append("it lies in the plane y = 0 and runs in two dimensions as well")
-    notes.append(f"{engine}/{PROFILE} runs it with its own contacts, solver and step; all others as rigid bodies")
-    notes.append("failures of a model are shown and do not fail the command: no known failures are listed for it")
+        notes.append("it lies in the plane y = 0 and also runs in 2-D")
+    notes.append(
+        f"{engine}/{PROFILE} runs it with the model's own contacts, solver and step; all others run it as rigid bodies"
+    )
+    notes.append("failures of a model do not fail the command, as no known failures are listed for it")
     whole = stated.canonical_of(Stated(read.scene, (), ()), title)
     return replace(
         whole,
-        law="no closed form; energy never grows, bodies do not pass into each other, momentum is kept",
+        law="no closed form; energy never grows, bodies do not overlap, momentum is conserved",
         dimensions=dimensions,
-        parameters=(Parameter("duration", read.scene.duration, "s", "simulated time; a model states none", 0.0, LONGEST,
+        parameters=(Parameter("duration", read.scene.duration, "s", "simulated time; the model has none", 0.0, LONGEST,
                               positive=True),),
         make=lambda dimension, params: replace(posed[dimension], duration=params["duration"], params=dict(params)),
         exact=lambda scene: {"energy_growth": 0.0, "penetration": 0.0, "momentum_drift": 0.0},
@@ -135,12 +137,10 @@ def _momentum_check(scene: Scene, dt: float) -> Check:
     """Judged where nothing but free bodies touch; elsewhere it is as good as the impulses that are reported."""
     bodies = [body for body in scene.bodies if body.motion == "free"]
     if len(bodies) < len(scene.bodies):
-        because = "shown: it is as good as the impulses that the engine reports of its contacts"
+        because = "shown: as accurate as the contact impulses that the engine reports"
         return Check("momentum_drift", "N s", None, None, because, "")
     pull = sum(float(np.linalg.norm(b.mass * np.array(scene.gravity) + np.array(b.force))) for b in bodies)
     scale = sum(b.mass * float(np.linalg.norm(b.twist[: scene.dimension])) for b in bodies) + pull * scene.duration
     steps = max(1.0, scene.duration / dt / 1000.0)
-    because = (
-        "impulses between free bodies cancel: what is left is round-off of the momenta, a thousand steps each 1e-12"
-    )
+    because = "impulses between free bodies cancel; the round-off of the momenta remains, a thousand steps of 1e-12"
     return Check("momentum_drift", "N s", 0.0, ROUND_OFF * steps * scale, because, "Newton's third law")

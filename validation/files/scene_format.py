@@ -278,7 +278,7 @@ def _materials(model: SceneModel, scene: Scene) -> Iterator[str]:
     untold = Pair(restitution=-1.0, friction=-1.0)  # no scene has such numbers
     free = {body.name: body.motion == "free" for body in scene.bodies}
     if (-1.0, -1.0) in Materials((*scene.pairs, untold)).materials(free):
-        which = "pairs that no entry names" if scene.pairs else "all pairs"
+        which = "pairs without an entry" if scene.pairs else "all pairs"
         yield f"pairs: restitution {Pair.restitution:g} and friction {Pair.friction:g} of {which}, none was given"
 
 
@@ -290,9 +290,9 @@ def _growth(model: SceneModel, scene: Scene, names: dict[str, float], wrong: lis
         wrong.append(f"growth: {error}")
         return 1.0
     if not growth >= 1.0:
-        wrong.append(f"growth: {growth:g} is less than 1, which means that nothing grows")
+        wrong.append(f"growth: {growth:g} is less than 1; 1 means no growth")
     if scene.dimension == 3 and growth != 1.0:
-        wrong.append("growth: a spatial scene has no plane to leave")
+        wrong.append("growth: a 3-D scene has no plane that it could leave")
     return growth
 
 
@@ -319,7 +319,7 @@ def told(model: SceneModel, scene: Scene, wrong: list[str]) -> Iterator[tuple[st
     for name, formula in model.constants.items():
         label = f"constants.{one_line(name, 40)}"
         if not name.isidentifier() or name in (*names, *FUNCTIONS, "t", "dt"):
-            wrong.append(f"{label}: cannot be the name of a constant, or has a meaning already")
+            wrong.append(f"{label}: cannot be the name of a constant, or is already defined")
             continue
         try:
             names[name] = value_of(formula, names)
@@ -359,7 +359,7 @@ def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
         return
     label, normal, angle = f"{body['name']}.shape", shape["normal"], shape.pop("angle")
     if (normal is None) == (angle is None):
-        raise SceneError(f"{label}: a half-space is given by its normal or by its angle, one of them")
+        raise SceneError(f"{label}: a half-space needs either a normal or an angle")
     if angle is not None:
         flat = (0.0,) * (dimension - 2)
         shape["normal"] = (-math.sin(angle) + 0.0, *flat, math.cos(angle))
@@ -370,14 +370,14 @@ def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
     if abs(length - 1.0) > 1e-15:  # what is 1 to round-off keeps its bits
         shape["normal"] = tuple(component / length for component in normal)
     if abs(length - 1.0) > 1e-9:
-        notes.append(f"{label}.normal: its length {length:.6g} was made 1; the offset stays a distance [m]")
+        notes.append(f"{label}.normal: its length {length:.6g} was set to 1; the offset is still a distance [m]")
 
 
 def _mass(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
     """Give a body its mass and inertia, and say what was not given."""
     name, density = body["name"], body.pop("density")
     if density is not None and body["mass"] is not None:
-        raise SceneError(f"{name}.density: give the mass or the density, not both")
+        raise SceneError(f"{name}.density: give either mass or density")
     if density is not None and not density > 0.0:
         raise SceneError(f"{name}.density: {density!r} must be greater than 0")
     if body["motion"] != "free" or body["shape"]["type"] == "half_space":
@@ -429,13 +429,15 @@ def _is_right(label: str, check: CheckModel, scene: Scene, wrong: list[str]) -> 
         wrong.append(f"{label}.quantity: {what!r} is not one of {', '.join(known)}")
     is_over_time = forces.is_over_time(what)
     if partner is not None and not is_over_time:
-        wrong.append(f"{label}.quantity: {check.quantity!r}: only a force and its like is between two bodies")
+        wrong.append(
+            f"{label}.quantity: {check.quantity!r}: between two bodies there are only forces, impulses and the like"
+        )
     if partner is None and what == "overlap_without_force":
-        wrong.append(f"{label}.quantity: {check.quantity!r}: an overlap is of two bodies: BODY/BODY.{what}")
+        wrong.append(f"{label}.quantity: {check.quantity!r}: an overlap needs two bodies: BODY/BODY.{what}")
     if check.over is not None and not is_over_time:
-        wrong.append(f"{label}.over: only a force and its like is told over time")
+        wrong.append(f"{label}.over: only for forces, impulses and the like")
     elif check.over is not None and check.at is not None and not what.startswith("contact_"):
-        wrong.append(f"{label}.over: at an instant there is one number, without mean, least or greatest")
+        wrong.append(f"{label}.over: at an instant there is one number, not a mean, least or greatest")
     if check.at is not None and check.at > scene.duration:
         wrong.append(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
     return len(wrong) == before

@@ -84,7 +84,7 @@ def canonical_of(read: Stated, title: str) -> CanonicalScene:
         version=scene.version,
         title=title,
         figure="",
-        law="no closed form; energy never grows, bodies do not pass into each other",
+        law="no closed form; energy never grows, bodies do not overlap",
         dimensions=(scene.dimension,),
         parameters=(),
         make=lambda dimension, params: scene,
@@ -144,10 +144,10 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
 
 def _checks(read: Stated, dt: float) -> list[Check]:
     told = {check.metric: check for check in read.checks}
-    final = "shown for comparison between engines: the file states no number for it"
+    final = "shown to compare engines: the file states no value for it"
     names = {_metric(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
-    depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
+    depth = Check("deepest_overlap", "m", None, None, "shown: its tolerance is subtracted in `penetration`", "")
     return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
 
 

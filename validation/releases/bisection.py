@@ -78,7 +78,7 @@ class _Questions:
             found = [row.as_dict() for row in told.rows if _meant(row.metric, self._metric)]
             self.rows[index] = {_key(row): row for row in found if row["outcome"] in ANSWERS}
             if not self.rows[index]:
-                self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such row")
+                self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such check")
         return self.rows[index]
 
 
@@ -103,7 +103,7 @@ def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool
     first, last = (questions.at(index, [*cells, *moved]) for index in (0, count - 1))
     for index, rows in ((0, first), (count - 1, last)):
         if not rows:
-            return Unchanged(f"release {index} cannot be asked: {questions.silent[index]}")
+            return Unchanged(f"release {index} cannot run: {questions.silent[index]}")
     changes = sorted(_changes(first.values(), last.values()), key=by_seriousness)
     if not changes and all(row["value"] is None for row in (*first.values(), *last.values())):
         why = next(iter(last.values()))["reason"]

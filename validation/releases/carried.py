@@ -58,7 +58,7 @@ def _source(module: str) -> Path:
     places = list(spec.submodule_search_locations or []) if spec else []
     path = Path(places[0]) if places else Path(spec.origin) if spec and spec.origin else None
     if path is None or not path.exists():
-        raise EngineError(f"engine: the source of {module} is no file that could be run elsewhere")
+        raise EngineError(f"engine: the source of {module} is not a file that can be run elsewhere")
     return path
 
 

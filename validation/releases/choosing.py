@@ -76,7 +76,7 @@ def known_releases(engine: str) -> Releases:
     if adapter is not None and adapter.releases is not None:
         return adapter.releases
     if facts is None or engine == registry.solver():
-        raise EngineError(f"engine: {engine} has no releases of its own to choose from")
+        raise EngineError(f"engine: {engine} has no releases to choose from")
     return Releases((Distribution(facts.package),), known=_range(facts.package) if adapter is not None else "")
 
 
@@ -134,13 +134,13 @@ def release(engine: str, known: Releases, version: str) -> Release:
     """Return the release ``version`` with the distribution that carries it and what it needs."""
     carriers = [d for d in known.distributions if SpecifierSet(d.versions).contains(version, prereleases=True)]
     if not carriers:
-        raise EngineError(f"releases: no distribution of {engine} carries {version}")
+        raise EngineError(f"releases: no distribution of {engine} has {version}")
     needs = [r.needs for r in known.requirements if SpecifierSet(r.versions).contains(version, prereleases=True)]
     if not any(re.match(r"numpy\b", each) for each in needs):
         needs.append("numpy")  # the adapter's own need: not every engine brings it
     unknown = known.withheld.get(version, "")
     if not unknown and not SpecifierSet(known.known).contains(version, prereleases=True):
-        unknown = f"its adapter knows {known.known}; --try asks it all the same"
+        unknown = f"its adapter supports {known.known}; --try runs it all the same"
     return Release(engine, version, carriers[0].name, tuple(needs), unknown)
 
 

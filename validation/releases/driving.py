@@ -218,7 +218,7 @@ def _talk(environment: Environment, path: str, question: dict[str, Any], patienc
             try:
                 line = said.get(timeout=patience)
             except queue.Empty:
-                raise Unasked(f"its environment has said nothing for {patience:g} s") from None
+                raise Unasked(f"its environment has not answered for {patience:g} s") from None
             if line is None:
                 break
             yield json.loads(line)
@@ -226,11 +226,9 @@ def _talk(environment: Environment, path: str, question: dict[str, Any], patienc
         readers[1].join(5.0)
         if process.wait(10.0) or first:
             tail = one_line(lines("".join(written), LOG_LINES).rpartition("\n")[2])
-            raise Unasked(
-                f"cannot be driven: its process ended with {process.returncode}" + (f": {tail}" if tail else "")
-            )
+            raise Unasked(f"cannot be run: its process ended with {process.returncode}" + (f": {tail}" if tail else ""))
     except subprocess.TimeoutExpired:
-        raise Unasked("cannot be driven: its process does not end") from None
+        raise Unasked("cannot be run: its process does not end") from None
     finally:
         with suppress(OSError):
             process.stdin.close()

@@ -111,7 +111,7 @@ def build(release: Release, say: Callable[[str], None] = lambda line: None) -> E
             wrong = check(environment)
             if not wrong:
                 return environment
-            say(f"{path.name}: {wrong}; it is built anew")
+            say(f"{path.name}: {wrong}; it is built again")
             shutil.rmtree(path)
         for left in folder().glob(f"{UNFINISHED}{path.name}-*"):  # of a process that was killed: we hold the lock
             shutil.rmtree(left, ignore_errors=True)
@@ -190,7 +190,7 @@ def check(environment: Environment) -> str:
     if not environment.python.exists():
         return "its interpreter is gone"
     if receipt.get("files") != _hash(environment.path):
-        return "its files are not those that were installed"
+        return "its files have changed since it was installed"
     return ""
 
 

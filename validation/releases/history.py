@@ -130,7 +130,7 @@ def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapp
             doubts[observation.slot.profile] = f"receipt {broken[0]['quantity']} fails in {observation.slot.scene}"
     rows = tuple(_doubted(row, doubts) for row in rows_of(f"{engine}=={version}", found))
     answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)
-    reason = "" if answered else next((row.reason for row in rows), "it was not asked")
+    reason = "" if answered else next((row.reason for row in rows), "it was not run")
     said = tuple(f"{profile}: {why}" for profile, why in doubts.items())
     return Told(engine, version, rows, reason, said, taken or {})
 

@@ -74,7 +74,7 @@ def _note(label: str, entry: Any) -> Note:
     try:
         release = Version(entry["release"])
     except InvalidVersion:
-        raise FindingsError(f"{label}: release {one_line(entry['release'], 40)!r} is no version") from None
+        raise FindingsError(f"{label}: release {one_line(entry['release'], 40)!r} is not a version") from None
     said = (one_line(entry[name]) for name in ("says", "source"))
     return Note(release, tuple(entry["scenes"]), tuple(entry["profiles"]), *said)
 

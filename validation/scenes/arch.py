@@ -176,7 +176,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     found = [pushed.check(name, "weights", truth[name], source) for name in truth if name.startswith("face_load")]
     if "moved" in truth:
         moved = bounds.Bound(2.0 * late, because + "; and a corner sinks or slips as far")
-        carried = bounds.Bound((p["heavy"] + 0.5) * told, f"{pace.because}, before and after, of what it carries")
+        carried = bounds.Bound((p["heavy"] + 0.5) * told, f"{pace.because}, before and after, of its load")
         found += [carried.check(name, "weights", truth[name], source) for name in truth if name.startswith("floor")]
         return [moved.check("moved", "m", truth["moved"], "Coulomb's law: the floor holds the springers"), *found]
     # The keystone goes down by cot(beta) of what a springer goes out: so does what is forgiven.
@@ -215,8 +215,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= cot(beta)/(2 R + 1), N = W/(2 sin(beta)); else gives way, A = g (k - mu R)/(R + k cot(beta))",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction of the floor over what it takes", 0.01, 100.0),
-        Parameter("beta", 30.0, "degrees", "of the keystone's faces against the upright", 10.0, 45.0),
+        Parameter("ratio", 1.05, "1", "friction of the floor over the least that holds", 0.01, 100.0),
+        Parameter("beta", 30.0, "degrees", "angle of the keystone's faces to the vertical", 10.0, 45.0),
         Parameter("heavy", 3.0, "1", "mass R of a springer over that of the keystone", 1.0, 1e3),
         standard_gravity(),
         mass_of("the keystone"),
@@ -235,8 +235,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the arch that should stand, in heights; error of the sinking of the one that gives way, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the arch that should stand, in heights; relative error of the sinking of the one that "
+        "gives way",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [{}, {"ratio": 0.8}],
         error,
         "the whole scene: the arch stands",

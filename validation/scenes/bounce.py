@@ -113,7 +113,7 @@ def _force_in_flight(scene: Scene, trajectory: Trajectory, clearance: Array, vel
     is_far, end = clearance > (np.abs(velocity) + g * dt) * dt, contacts.step
     in_flight = metrics.forces(trajectory, 1, [0])[is_far[end] & is_far[np.maximum(end - 1, 0)]]
     if len(in_flight) == 0:
-        return None, "no step is one of flight"
+        return None, "no step is in flight"
     if np.isnan(in_flight).any():
         return None, metrics.UNAVAILABLE
     return float(np.linalg.norm(in_flight, axis=1).max() / (scene.params["mass"] * g)), ""
@@ -160,14 +160,16 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         apex = bound + g * dt * dt / 8.0
         velocity_error.append(apex * g / speed)
         name = f"apex[{n}]"
-        found.append(Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt"))
+        found.append(
+            Check(name, "m", truth[name], apex, because, "energy balance of a bounce that is found late by up to dt")
+        )
     found.append(_growth_check(height, g, dt, truth["apex_growth"]))
     if len(velocity_error) >= 3:
         found.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
     if "rest_time" in truth:
         found.append(_rest_check(e, height, g, dt, truth["rest_time"]))
     if height > 3.0 * g * dt * dt:  # falling from rest the first step is one of flight
-        source = "forces at a distance are none of contact"
+        source = "without contact there is no contact force"
         found.append(bounds.exact().check("force_in_flight", "1", truth["force_in_flight"], source))
     return found
 
@@ -187,8 +189,8 @@ def _growth_check(height: float, g: float, dt: float, truth: float) -> Check:
     a parabola whose top lies half a step beside that sample, g (dt/2)^2/2 = g dt^2/8 above it.
     """
     because = (
-        "e <= 1 adds no energy and both step orders keep their energy through a late impact: only the top of the first "
-        "parabola lies up to g dt^2/8 above the sample of release"
+        "e <= 1 adds no energy, and velocity-first and position-first schemes conserve energy in a late impact; "
+        "only the top of the first parabola lies up to g dt^2/8 above the sample of release"
     )
     bound = g * dt * dt / 8.0 / height + bounds.ROUND_OFF
     return Check("apex_growth", "1", truth, bound, because, "conservation of energy")
@@ -270,7 +272,7 @@ SCENE = CanonicalScene(
             1e4,
             positive=True,
         ),
-        Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
+        Parameter("mu", 0.0, "1", "friction of the pair; it has no effect on a central impact", 0.0, 10.0),
         standard_gravity(),
         mass_of("the ball"),
     ),
@@ -290,8 +292,8 @@ SCENE = CanonicalScene(
         "h0",
         f"largest |h_n - e^2n h0| / h0 over {len(HEIGHTS)} drop heights and all resolved apexes "
         f"(e^n v0 > {RESOLVED:g} g dt, n <= {APEXES})",
-        "heights are what one sees of a bounce, and the phase of the first impact decides them: a single "
-        "height may be right by luck at any step",
+        "heights are what one sees of a bounce; they depend on the phase of the first impact, so a single height "
+        "may be right by chance",
         lambda dt: [{"height": height} for height in HEIGHTS],
         apex_error,
         "the whole scene: fall, bounces, rest",

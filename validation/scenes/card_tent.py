@@ -167,8 +167,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= a cos(lean)/(2 a sin(lean) + r), which is the load of the heads over a card's weight",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction over what it takes", 0.01, 100.0),
-        Parameter("lean", 60.0, "degrees", "of the cards over the floor", 20.0, 85.0),
+        Parameter("ratio", 1.05, "1", "friction over the least that holds", 0.01, 100.0),
+        Parameter("lean", 60.0, "degrees", "angle of the cards to the floor", 20.0, 85.0),
         Parameter("length", 2.0, "m", "of a card", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.05, "1", "thickness over length", 0.0, 0.3, positive=True),
         standard_gravity(),
@@ -185,8 +185,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the tent that should stand, in lengths; error of the time of the one that slides, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the tent that should stand, in lengths; relative error of the time of the one that slides",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [dict(params) for params in leaning.STANDS_AND_SLIDES],
         error,
         "the whole scene: the tent stands",

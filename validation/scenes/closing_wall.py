@@ -104,7 +104,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     for n in range(1, BLOWS + 1):
         late = bounds.Bound(
             (4.0 * (n - 1) + 1.0) * dt + bounds.ROUND_OFF * truth[f"time[{n}]"],
-            "each of the blows before is found up to one step late and delays what follows by twice that; this one is "
+            "each earlier blow is found up to one step late, which delays the next ones by twice that; this one is "
             "found up to one step late",
         )
         speed = bounds.exact(fastest)
@@ -142,7 +142,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("closing", 0.25, "m/s", "speed V of the plate", 0.0, 1e2, positive=True),
         Parameter("v", 1.0, "m/s", "of the ball at the start", 0.0, 1e2, positive=True),
-        Parameter("length", 1.0, "m", "way that is left to the ball at the start", 0.0, 1e3, positive=True),
+        Parameter("length", 1.0, "m", "gap for the ball at the start", 0.0, 1e3, positive=True),
         Parameter("radius", 0.1, "m", "of the ball", 0.0, 1e3, positive=True),
         mass_of("the ball"),
     ),
@@ -158,8 +158,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "speed error",
         "1",
-        "error of the speed after three blows of the plate, over what they have added",
-        "what a moving wall adds is what it is there for",
+        "error of the speed after three blows of the plate, over the speed that they add",
+        "a moving wall acts by the speed that it adds",
         lambda dt: [{}],
         error,
         "the whole scene: to and fro, three times",

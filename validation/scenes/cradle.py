@@ -113,7 +113,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
             return None, reason
         if name.startswith("speed["):
             off.append(abs(value - truth) / scene.params["v"])
-    return (metrics.largest(off), "") if off else (None, "a touching row has no one answer")
+    return (metrics.largest(off), "") if off else (None, "a touching row has no unique solution")
 
 
 SCENE = CanonicalScene(
@@ -145,7 +145,7 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         f"largest error of a ball's speed over the striker's, of 4 balls, over {PHASES} phases of the first contact",
-        "a row of impacts hands on every error that one makes; with gaps, since touching there is no one answer",
+        "a row of impacts passes on the error of each; with gaps, since a touching row has no unique solution",
         phases,
         error,
         "the whole scene: approach, impacts, departure",

@@ -127,10 +127,10 @@ def make(dimension: int, params: Params) -> Scene:
     p, on = params, _pivot(params)
     spin, width, height = _spin(p), on.width, on.height
     if p["ratio"] == 1.0:
-        raise SceneError("domino.ratio: at 1 the domino balances on its foot, it takes less or more")
+        raise SceneError("domino.ratio: at 1 the domino balances on its foot; choose less or more")
     end = _top(p, spin) if p["ratio"] < 1.0 else _hit(p)
     if not _foot_holds(p, -on.alpha, spin, end - on.alpha):
-        raise SceneError(f"domino.mu: {p['mu']:g} does not hold the foot of the domino that is pushed")
+        raise SceneError(f"domino.mu: {p['mu']:g} does not hold the foot of the pushed domino")
     if p["ratio"] < 1.0:
         # By symmetry it is back after twice the time to the top.
         half = on.time(end - on.alpha, 0.0, -on.alpha)
@@ -230,9 +230,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
             math.inf if over else off,
             "the spin at the start to 1.5 steps of acceleration, step order and a late contact; an edge carried away",
         )
-        foot = bounds.Bound(
-            carried + bounds.ROUND_OFF * on.arm, "steps carry the foot away, rho (w dt)^2/2 each; g dt^2"
-        )
+        foot = bounds.Bound(carried + bounds.ROUND_OFF * on.arm, "steps move the foot, rho (w dt)^2/2 each; g dt^2")
         still = bounds.Bound(
             2.0 * g * dt * dt + bounds.ROUND_OFF * on.height,
             "one contact found one step late, g dt^2, and a corner that sinks or slips as far",
@@ -252,11 +250,12 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         + on.time_off(-on.alpha, second, STRUCK - on.alpha, dt, off)
     )
     late = bounds.Bound(
-        time, "what the fall before owes, one step for the blow, and the time of a spin that is as far off"
+        time, "the error of the fall before, one step for the blow, and the time of a spin with that error"
     )
     fast = bounds.Bound(
         on.spin_off(-on.alpha, second, STRUCK - on.alpha, dt, off),
-        "the second's share of what the first's spin owes, a step of acceleration for a blow found late, and its own",
+        "the second's share of the error of the first's spin, a step of acceleration for a blow found late, and its "
+        "own",
     )
     return [
         *fall_checks(on, -on.alpha, TOLD * _hit(p) - on.alpha, dt, truth, spin=spin),
@@ -279,14 +278,15 @@ SCENE = CanonicalScene(
     title="Domino that is pushed against the next one",
     symptoms=("dominoes fall too fast or too slowly",),
     figure=__doc__ or "",
-    law="goes over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); hands on (1 + e)/2 of its spin where sin(theta) = gap/height",
+    law="falls over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); passes on (1 + e)/2 of its spin where sin(theta) = "
+    "gap/height",
     dimensions=(2,),
     parameters=(
         Parameter(
             "ratio",
             1.5,
             "1",
-            "spin of the push over that which takes the centre over the foot",
+            "spin of the push over the least that moves the centre over the foot",
             0.0,
             10.0,
             positive=True,
@@ -315,9 +315,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "error of the spin that is handed on, and of the turn at which a domino that is pushed too little comes back, "
-        "relative to them",
-        "whether it goes over, and what it hands on, is what a row of dominoes is made of",
+        "relative errors of the spin that is passed on, and of the angle at which a domino with too small a push "
+        "turns back",
+        "a row of dominoes depends on whether each falls over, and on the spin that it passes on",
         lambda dt: [{}, {"ratio": 0.9}],
         error,
         "the whole scene: push, fall and blow",

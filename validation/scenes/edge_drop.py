@@ -143,7 +143,7 @@ SCENE = CanonicalScene(
         "blow error",
         "1",
         f"larger of the errors of rise and spin, relative, over {PHASES} contact times within a step",
-        "how a blow is shared between speed and spin is all there is to it",
+        "the scene is how a blow is divided between speed and spin",
         phases,
         error,
         "the whole scene: approach, contact, departure",

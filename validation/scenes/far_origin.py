@@ -51,7 +51,7 @@ SCENE = CanonicalScene(
     version=1,
     title="Box that slides to a stop far away from the origin",
     symptoms=(
-        "it behaves otherwise far away from the origin",
+        "it behaves differently far away from the origin",
         "a large world loses precision",
     ),
     figure=__doc__ or "",
@@ -77,8 +77,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
-        "one number for friction, depth and arms that are told by differences of large places",
+        "distance of the place where it stops from the exact one, over the length of its slide",
+        "one number for friction, overlap and lever arms, which are differences of large coordinates",
         lambda dt: [{}],
         sliding.error,
         "the sliding box",

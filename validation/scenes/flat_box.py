@@ -141,8 +141,8 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"larger of |v+/v- - e| and of a corner's speed by spin over v-, over {PHASES} contact times within a step",
-        "restitution of several contacts of one body has an exact answer only if they are solved together; spin is "
-        "what a pass over them one by one leaves",
+        "restitution at several contacts of a body is exact only if they are solved together; solving one after the "
+        "other leaves spin",
         phases,
         error,
         "the whole scene: approach, contact, departure",

@@ -172,8 +172,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"distance of both speeds from theirs on the circle of energy over its radius, {PHASES} phases of the contact",
-        "a dozen impacts in the right order: one too many, too few or too soft turns the point on the circle",
+        f"distance of both speeds from the exact point on the circle of energy, over its radius, {PHASES} phases of "
+        "the contact",
+        "a dozen impacts in the right order: one too many, too few or too soft moves the point on the circle",
         phases,
         error,
         "the whole scene: 12 impacts",

@@ -149,7 +149,7 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |(v2' - v1')/(v1 - v2) - e| over {PHASES} contact times within a step",
-        "the impact law between two free bodies: what a contact with a floor cannot show; the worst phase counts",
+        "the impact law between two free bodies, which a contact with a floor does not test; the worst phase counts",
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",

@@ -75,7 +75,7 @@ SCENE = CanonicalScene(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 5 s, per side of a box, at the default ratio",
-        "nothing may move, so whatever did is error, sideways or into the neighbour",
+        "nothing may move, so any motion is error, sideways or into the neighbour",
         lambda dt: [{}],
         lambda scene, dt, found: columns.displacement(found, SIDE),
         "the standing pair, half a second after the start",

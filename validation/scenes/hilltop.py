@@ -90,7 +90,7 @@ def make(dimension: int, params: Params) -> Scene:
     p = params
     reach = p["radius"] + p["hill"]
     if p["v"] ** 2 >= 0.5 * p["g"] * reach:
-        raise SceneError(f"hilltop.v: with {p['v']:g} m/s the disc all but leaves the top at once")
+        raise SceneError(f"hilltop.v: with {p['v']:g} m/s the disc leaves the top almost at once")
     hill = Body("hill", Disc(p["hill"]), pose=pose_at(dimension, (0.0, 0.0)), motion="fixed")
     disc = at(ball("disc", dimension, p["mass"], p["radius"], 0.0), dimension, (0.0, reach), (p["v"], 0.0))
     if p["mu"] > 0.0:
@@ -166,8 +166,8 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         found["leaving_angle"].append(abs(math.degrees(leaves) - truth["leaving_angle"]))
         found["leaving_time"].append(abs(later - time))
     because = (
-        "the hill pushes along the normal of a place up to one step away, steps take (a dt)^2/2 off the energy, a: "
-        "what keeps the disc on the hill; and a contact found late"
+        "the hill pushes along the normal of a place up to one step away; each step loses (a dt)^2/2 of energy, a: "
+        "acceleration towards the hill; and a contact found late"
     )
     source = "energy, Coulomb's law, and a normal force that fades to nothing"
     speed = bounds.Bound(turned + max(found["level_speed"]), because)
@@ -215,8 +215,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "speed error",
         "1",
-        "error of the level speed of the flight, over it, worst of rough and slippery",
-        "the level speed is set by where the hill stops to carry, and the flight keeps it",
+        "relative error of the horizontal speed of the flight, worst of rough and slippery",
+        "the horizontal speed depends on where the disc leaves the hill, and stays constant in flight",
         lambda dt: [{}, {"mu": 0.1}],
         error,
         "the whole scene: on the hill, then in flight",

@@ -138,7 +138,7 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
         delay(),
-        Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
+        Parameter("mu", 0.0, "1", "friction of the pair; it has no effect on a central impact", 0.0, 10.0),
         mass_of("the ball (worked example)", 0.5),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
     ),
@@ -161,8 +161,8 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |v+/v- - e| over {PHASES} contact times within a step",
-        "the impact law itself: no gravity, no apex, nothing else enters; an engine that acts before or after "
-        "the contact may depend on the phase, so the worst phase counts",
+        "the impact law alone, without gravity; an engine that acts before or after the contact may depend on the "
+        "phase, so the worst phase counts",
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",

@@ -176,8 +176,8 @@ SCENE = CanonicalScene(
         "g",
         "largest of |a - a_exact| / g where it slides and 2 creep / (g T) where it sticks, "
         "tan(theta)/mu = 1.1, 0.9, 0.5, 2",
-        "creep v over the run T leads as far astray as the acceleration 2 v / T: one unit for both sides of the "
-        "threshold, so that neither hides the other",
+        "creep v over the run T moves the box as far as an acceleration 2 v / T: one unit on both sides of the "
+        "threshold",
         lambda dt: [{"ratio": ratio} for ratio in (1.1, 0.9, 0.5, 2.0)],
         error,
         "the sliding box, half a second after the start",

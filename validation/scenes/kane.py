@@ -78,7 +78,7 @@ def _blow(p: Params) -> Array:
     """
     found = answers(_mobility(p), np.array([-p["v"], p["along"] * p["v"]]), p["e"], p["mu"])
     if len(found) != 1:
-        raise SceneError(f"kane.mu: at {p['mu']:g} the law has {len(found)} answers, it takes one")
+        raise SceneError(f"kane.mu: at {p['mu']:g} the law has {len(found)} solutions, the scene needs one")
     return found[0]
 
 
@@ -175,8 +175,10 @@ SCENE = CanonicalScene(
     dimensions=(2,),
     parameters=(
         Parameter("e", 0.9988, "1", "coefficient of restitution; near 1, so that little else is lost", 0.0, 1.0),
-        Parameter("mu", 0.883, "1", "friction: lets the end stick from a slide to either side", 0.0, 10.0),
-        Parameter("lean", 56.4, "degrees", "of the rod over the floor; near where a blow couples most", 30.0, 80.0),
+        Parameter("mu", 0.883, "1", "friction: stops the end from a slide in either direction", 0.0, 10.0),
+        Parameter(
+            "lean", 56.4, "degrees", "angle of the rod to the floor; near the strongest coupling in a blow", 30.0, 80.0
+        ),
         Parameter(
             "along",
             0.727,
@@ -203,7 +205,7 @@ SCENE = CanonicalScene(
         "1",
         f"largest error of the speeds of rise, along the floor and of an end by spin, over the approach, over {PHASES} "
         "contact times within a step",
-        "how normal and friction share one blow that they both enter is all there is to it",
+        "the scene is how normal and friction impulse share a blow",
         phases,
         error,
         "the whole scene: approach, contact, departure",

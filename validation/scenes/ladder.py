@@ -156,8 +156,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= (cot(lean) - w/L)/2, which is the load on the wall over the weight; else slides down",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction of the floor over what it takes", 0.01, 100.0),
-        Parameter("lean", 60.0, "degrees", "of the ladder over the floor", 20.0, 85.0),
+        Parameter("ratio", 1.05, "1", "friction of the floor over the least that holds", 0.01, 100.0),
+        Parameter("lean", 60.0, "degrees", "angle of the ladder to the floor", 20.0, 85.0),
         Parameter("length", 4.0, "m", "of the ladder", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.02, "1", "thickness over length", 0.0, 0.3, positive=True),
         standard_gravity(),
@@ -174,8 +174,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the ladder that should stand, in lengths; error of the time of the one that slides, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the ladder that should stand, in lengths; relative error of the time of the one that slides",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [dict(params) for params in leaning.STANDS_AND_SLIDES],
         error,
         "the whole scene: the ladder stands",

@@ -64,7 +64,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     hours = (scene.duration - SETTLED) / HOUR
     slip = bounds.slips(n, g, dt)
     rate = bounds.Bound(
-        (slip.value + bounds.ROUND_OFF * n * SIDE) / hours, f"{slip.because}, once within the run, told per hour"
+        (slip.value + bounds.ROUND_OFF * n * SIDE) / hours, f"{slip.because}, once within the run, given per hour"
     )
     source = "static equilibrium"
     return [rate.check(metric, "m/h", truth[metric], source) for metric in truth]
@@ -115,7 +115,7 @@ SCENE = CanonicalScene(
         "creep",
         "side/h",
         "largest of drift, sinking and turning per hour, in sides of a box",
-        "what never stops creeping is found by time alone",
+        "only a long run shows a creep that never stops",
         lambda dt: [{}],
         error,
         "the resting column, a second after the start",

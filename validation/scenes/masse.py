@@ -126,7 +126,8 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
     turned = bounds.Bound(
         4.0 * float(np.linalg.norm(_spin(p))) * depth / slip + bounds.ROUND_OFF * fastest / slip,
-        "friction keeps the slip's direction; told with the radius it is off by 4 w g dt^2/|u0| at a quarter of it",
+        "friction keeps the direction of the slip; measured with the radius it is off by 4 w g dt^2/|u0| at a "
+        "quarter of it",
     )
     found = {
         "final_vx": ("m/s", velocity(0)),
@@ -175,8 +176,10 @@ SCENE = CanonicalScene(
     dimensions=(3,),
     parameters=(
         Parameter("v", 2.0, "m/s", "of the centre, along x", 0.0, 1e2, positive=True),
-        Parameter("side", 3.0, "m/s", "of the surface at the floor by spin, across the motion", -1e2, 1e2),
-        Parameter("back", 1.0, "m/s", "of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2),
+        Parameter("side", 3.0, "m/s", "speed of the surface at the floor by spin, across the motion", -1e2, 1e2),
+        Parameter(
+            "back", 1.0, "m/s", "speed of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2
+        ),
         Parameter("mu", 0.2, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
         standard_gravity(),
@@ -196,8 +199,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "place error",
         "1",
-        "distance of the end from where it should be, over how far friction moves the end",
-        "friction whose direction is wrong for a moment shows in where the ball goes",
+        "distance of the end from the exact place, over the distance by which friction moves it",
+        "friction in a wrong direction, even for a moment, changes where the ball goes",
         lambda dt: [{}],
         error,
         "the whole scene: the ball slides askew, then rolls",

@@ -135,11 +135,18 @@ SCENE = CanonicalScene(
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 3.0, "m/s", "along the floor", 0.0, 1e2),
-        Parameter("spin", 0.0, "m/s", "of the surface, w r; positive: rolls along, negative: backspin", -1e3, 1e3),
+        Parameter(
+            "spin",
+            0.0,
+            "m/s",
+            "speed of the surface by spin, w r; positive: as in rolling, negative: backspin",
+            -1e3,
+            1e3,
+        ),
         Parameter("fall", 2.0, "m/s", "of the approach, v_n", 0.0, 1e2, positive=True),
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("mu", 0.5, "1", "friction of the pair; 0.5: the ball grips", 0.0, 10.0),
-        Parameter("heading", 0.0, "degrees", "of the motion against the axes; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the motion to the axes; 3-D only", 0.0, 90.0),
         delay(),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
         mass_of("the ball"),
@@ -165,8 +172,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"distance of speed and spin from theirs over the slip, worst of gripping and slipping, {PHASES} contact times",
-        "friction of an impact has two answers and a limit between them: both must be right, in speed and in spin",
+        f"distance of speed and spin from the exact ones, over the slip, worst of gripping and slipping, {PHASES} "
+        "contact times",
+        "an impact with friction either grips or slips, with a limit between: both must be right, in speed and spin",
         lambda dt: [cell | phase for cell in ({}, {"mu": 0.1}) for phase in phases(dt)],
         error,
         "the whole scene: approach, contact, departure",

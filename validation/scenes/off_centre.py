@@ -118,7 +118,7 @@ def make(dimension: int, params: Params) -> Scene:
     """
     p, struck = params, _struck(params)
     if struck <= 0.0:
-        raise SceneError(f"off_centre.whirl: with {p['whirl']:g} rad/s the bar gives way faster than the ball comes")
+        raise SceneError(f"off_centre.whirl: with {p['whirl']:g} rad/s the bar recedes faster than the ball approaches")
     before = _meets(p, -p["delay"], p["v"] + p["rise"], p["whirl"])
     if before is not None:
         raise SceneError(
@@ -241,7 +241,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
     if not p["whirl"]:
         return [*bounds.exact_laws(scales, truth, source), defect]
-    because = "the blow is found up to a step late, or ahead by as much, when the bar is turned by w dt: the law there"
+    because = "the blow is found up to a step late or early, when the bar has turned by w dt: the law there"
     off = dict.fromkeys((*scales, "sideways"), 0.0)
     for turned in (_blow(p, -dt), _blow(p, dt)):
         taken = (1.0 - p["e"] ** 2) * turned.available / blow.available
@@ -257,7 +257,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     sizes = p["mass"] * closing * (WIDTH + closing * scene.duration)
     swung = bounds.Bound(
         (apart + bounds.ROUND_OFF * sizes) / _swing(p),
-        "what a step finds acts where they are within it: their way in a step, across a normal that turns by w dt",
+        "the blow acts somewhere within their motion of a step, across a normal that turns by w dt",
     )
     turning = swung.check("angular_defect", "1", truth["angular_defect"], "conservation of angular momentum")
     return [*found, defect, turning]
@@ -297,9 +297,7 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
         Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
-        Parameter(
-            "whirl", 0.0, "rad/s", "spin of the bar before; above 0 it gives way where it is struck", -10.0, 10.0
-        ),
+        Parameter("whirl", 0.0, "rad/s", "spin of the bar before; above 0 the struck point recedes", -10.0, 10.0),
         delay(),
         mass_of("the ball", 0.5),
     ),
@@ -324,7 +322,7 @@ SCENE = CanonicalScene(
         "velocity error",
         "1",
         f"largest error of the ball's, the bar's and its end's speed over the closing speed, {PHASES} contact times",
-        "a blow beside the centre tests what a central one cannot: the mass that a turning body has where it is struck",
+        "a blow beside the centre tests the effective mass of a turning body at the struck point",
         phases,
         error,
         "the whole scene: approach, blow, departure",
@@ -333,9 +331,9 @@ SCENE = CanonicalScene(
         "ball_speed": "sends the ball off with {value}",
         "bar_speed": "leaves the bar with {value}",
         "spin": "turns the bar with {value}",
-        "energy_lost": "takes {value} of the energy that the blow has",
-        "energy_lost<0": "adds {value} of the energy that the blow has",
+        "energy_lost": "loses {value} of the energy of the blow",
+        "energy_lost<0": "gains {value} of the energy of the blow",
         "angular_defect": "changes the angular momentum by {value} (relative)",
-        "sideways": "throws ball or bar aside with {value}",
+        "sideways": "moves ball or bar sideways with {value}",
     },
 )

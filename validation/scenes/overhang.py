@@ -60,8 +60,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """A column whose loads are at its edges: the bounds are those of any column."""
-    told = bounds.Bound(0.5, "it stands or it falls; half a block lower, or leaning, is fallen")
-    found = [told.check("stands", "1", truth["stands"], "the centre of mass of each part lies over what carries it")]
+    told = bounds.Bound(0.5, "it stands or falls; half a block lower, or inclined, counts as fallen")
+    found = [told.check("stands", "1", truth["stands"], "the centre of mass of each part lies over its support")]
     return found + (columns.checks(scene, dt, truth) if scene.params["margin"] > 0.0 else [])
 
 
@@ -80,10 +80,10 @@ SCENE = CanonicalScene(
     dimensions=(2,),
     parameters=(
         Parameter("n", 4.0, "1", "number of blocks", 2.0, 20.0, integer=True),
-        Parameter("margin", 0.05, "1", "share of each step that is left; below 0 it falls", -0.5, 1.0),
+        Parameter("margin", 0.05, "1", "share of each overhang left as a margin; below 0 it falls", -0.5, 1.0),
         Parameter("mu", 0.5, "1", "friction of all pairs", 0.0, 10.0, positive=True),
         Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("duration", 4.0, "s", "of the run; beyond the limit it takes time to fall", 1.5, 100.0),
+        Parameter("duration", 4.0, "s", "of the run; beyond the limit a fall takes time", 1.5, 100.0),
         Parameter("mass", 1.0, "kg", "of each block", 0.0, 1e6, positive=True),
     ),
     make=make,
@@ -98,7 +98,7 @@ SCENE = CanonicalScene(
         "displacement",
         "block heights",
         "larger of the drift and of the deepest overlap",
-        "what does not stand shows in both",
+        "a stack that falls shows in both",
         lambda dt: [{}],
         error,
         "the resting stack",

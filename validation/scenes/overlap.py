@@ -66,10 +66,10 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     source = "conservation of energy and momentum: a contact that does not close does no work"
     thrown = bounds.Bound(
         bounds.ROUND_OFF * (deep / dt + scene.params["v"]),
-        "exact law at every dt: round-off of the speed that takes the depth out in a step",
+        "exact law at every dt: round-off of the speed that removes the overlap in a step",
     )
     reach = RADIUS + scene.params["v"] * scene.duration
-    placed = bounds.Bound(bounds.ROUND_OFF * reach, "exact law at every dt: round-off of places")
+    placed = bounds.Bound(bounds.ROUND_OFF * reach, "exact law at every dt: round-off of positions")
     return [
         thrown.check("thrown", "m/s", truth["thrown"], source),
         placed.check("centre_moved", "m", truth["centre_moved"], source),
@@ -79,7 +79,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
             "1",
             None,
             None,
-            "shown: no law of rigid bodies says how fast an overlap has to go",
+            "shown: rigid-body mechanics does not define how fast an overlap is corrected",
             "depth at the end over that at the start",
         ),
     ]
@@ -113,7 +113,7 @@ SCENE = CanonicalScene(
         "overlapping bodies fly apart",
     ),
     figure=__doc__ or "",
-    law="no speed comes of an overlap, the common centre stays; an overlap is no spring",
+    law="an overlap causes no speed and does not move the common centre; it is not a spring",
     dimensions=(2, 3),
     parameters=(
         Parameter("depth", 0.5, "radii", "of the overlap at the start", 0.0, 1.0, positive=True),
@@ -133,8 +133,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "thrown",
         "depth/dt",
-        "largest relative speed, over the speed that takes the overlap out in one step",
-        "the share of an overlap that an engine turns into motion, in the unit in which it does",
+        "largest relative speed, over the speed that removes the overlap in one step",
+        "the share of an overlap that an engine turns into motion",
         lambda dt: [{}],
         error,
         "the two balls coming apart",
@@ -148,8 +148,8 @@ SCENE = CanonicalScene(
             1.0,
             1.0,
             fate,
-            "came apart more slowly than both move on (1 m/s), their centre within a tenth of a radius, no deeper by a "
-            "tenth of the overlap",
+            "separated more slowly than both move on (1 m/s), with their centre within a tenth of a radius, and no "
+            "deeper by a tenth of the overlap",
         ),
     ),
     words={

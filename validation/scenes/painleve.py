@@ -108,7 +108,7 @@ def make(dimension: int, params: Params) -> Scene:
     """
     p = params
     if _arm(p, _tilt(p))[0] <= 0.0:
-        raise SceneError(f"painleve.lean: at {p['lean']:g} degrees a rod so thick stands over its end: nothing jams it")
+        raise SceneError(f"painleve.lean: at {p['lean']:g} degrees a rod so thick stands over its end and cannot jam")
     if p["ratio"] < 1.0:
         found = _slides(_key(p))
         if found is None:
@@ -193,7 +193,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     late = 1.5 * dt
     fast = max(abs(_acceleration(p, _tilt(p) + side * TOLD, 0.0)[0]) for side in (-1.0, 0.0, 1.0))
     brake = max(_acceleration(p, _tilt(p) + side * TOLD, 0.0)[1] for side in (-1.0, 0.0, 1.0))
-    because = "half a step by the order of a step, one for a contact found late, and an end that steps carry away"
+    because = "half a step by the order of the scheme, one for a contact found late, and an end that steps move"
     time = late + max(abs(other.time - found_turn.time) for other in others)
     spin_off = late * fast + max(abs(other.spin - found_turn.spin) for other in others)
     lost = late * brake + max(abs(other.gathered - found_turn.gathered) for other in others)
@@ -202,7 +202,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         bounds.Bound(time, because).check("turning_time", "s", truth["turning_time"], source),
         bounds.Bound(spin_off, because).check("turning_spin", "rad/s", truth["turning_spin"], source),
         bounds.Bound(lost, because).check("slowed", "m/s", truth["slowed"], source),
-        bounds.Bound(carried + bounds.ROUND_OFF * p["length"], "steps carry it, arm (w dt)^2/2 each; g dt^2").check(
+        bounds.Bound(carried + bounds.ROUND_OFF * p["length"], "steps move it, arm (w dt)^2/2 each; g dt^2").check(
             "lifted", "m", truth["lifted"], "the end stays on the floor"
         ),
     ]
@@ -225,8 +225,15 @@ SCENE = CanonicalScene(
     law="jams at once where mu > (1 + 3 c^2)/(3 s c), with w = -b v/(i^2 + a^2 + b^2); else slides",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.2, "1", "friction over that beyond which the end cannot slide", 0.01, 5.0),
-        Parameter("lean", 60.0, "degrees", "of the rod over the floor; near where the least friction jams", 20.0, 80.0),
+        Parameter("ratio", 1.2, "1", "friction over the limit beyond which the end cannot slide", 0.01, 5.0),
+        Parameter(
+            "lean",
+            60.0,
+            "degrees",
+            "angle of the rod to the floor; near the angle that jams with the least friction",
+            20.0,
+            80.0,
+        ),
         Parameter("v", 6.0, "m/s", "of the rod along the floor", 0.0, 1e3, positive=True),
         Parameter("length", 10.0, "m", "of the rod: the longer, the slower it turns", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.02, "1", "thickness over length of the rod", 0.0, 0.2, positive=True),
@@ -244,8 +251,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "spin error",
         "1",
-        "error of the spin with which the rod turns, relative to it, jammed and sliding",
-        "whether the end stops at once, and with what spin, is what no smooth law says",
+        "relative error of the spin of the rod, jammed and sliding",
+        "no smooth law predicts whether the end stops at once, and with which spin",
         lambda dt: [{}, {"ratio": 0.6}],
         error,
         "the whole scene: the end jams and the rod rises on it",

@@ -138,10 +138,12 @@ SCENE = CanonicalScene(
     symptoms=("friction or restitution of two materials is combined wrongly",),
     family="materials",
     figure=__doc__ or "",
-    law="each pair bounces with its own e and slips with its own mu, whatever its bodies do in other pairs",
+    law="each pair rebounds with its own e and slips with its own mu, independent of other pairs",
     dimensions=(2, 3),
     parameters=(
-        Parameter("cross", 1.0, "1", "fourth pair over what products would give; 1: products", 0.1, 1.5),
+        Parameter(
+            "cross", 1.0, "1", "values of the fourth pair over those of products of factors; 1: products", 0.1, 1.5
+        ),
         Parameter("v", 6.0, "m/s", "along the floor; fast enough to slip", 0.0, 1e3, positive=True),
         Parameter("fall", 2.0, "m/s", "of the approach", 0.0, 1e2, positive=True),
         delay("the floor"),
@@ -159,7 +161,7 @@ SCENE = CanonicalScene(
         "coefficient error",
         "1",
         f"largest error of a pair's e or mu of four pairs, over {PHASES} contact times within a step",
-        "what a pair realises is what all other scenes assume of it",
+        "all other scenes rely on the materials of a pair",
         phases,
         error,
         "the whole scene: four impacts",

@@ -127,8 +127,8 @@ SCENE = CanonicalScene(
     law="sticks if F <= mu (W + N), and the floor bears both; else a = (F - mu (W + N))/m",
     dimensions=(2, 3),
     parameters=(
-        Parameter("load", 1.0, "weights", "what presses on the box", 0.0, 1e4),
-        Parameter("shear", 0.8, "weights", "what pushes it along; 0.8 moves it unless it is pressed", 0.0, 1e4),
+        Parameter("load", 1.0, "weights", "force that presses on the box", 0.0, 1e4),
+        Parameter("shear", 0.8, "weights", "force that pushes it along; 0.8 moves it unless it is pressed", 0.0, 1e4),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
         standard_gravity(),
         mass_of("the box"),
@@ -146,8 +146,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "force error",
         "1",
-        "larger of the errors of what the floor carries and of what it holds back, over the load and the push",
-        "a force read-out is asked of engines more often than anything else of a contact",
+        "larger of the errors of normal force and friction, over the load and the push",
+        "forces are the values of a contact that users read most often",
         lambda dt: [{}, {"load": 0.0}],
         error,
         "the held box, half a second after the start",
@@ -156,7 +156,7 @@ SCENE = CanonicalScene(
     ),
     smooth=("creep", "acceleration"),
     words={
-        "carried": "carries {value} of what presses",
+        "carried": "carries {value} of the load",
         "sheared": "holds back {value} of the push",
     },
 )

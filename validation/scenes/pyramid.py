@@ -94,8 +94,8 @@ SCENE = CanonicalScene(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 4 s, per side of a box",
-        "nothing may move, so whatever did is error; loads are left out because any wall at rest carries its weight on "
-        "average",
+        "nothing may move, so any motion is error; loads are left out because any wall at rest carries its weight "
+        "on average",
         lambda dt: [{}],
         lambda scene, dt, found: columns.displacement(found, SIDE),
         "the standing wall, half a second after the start",

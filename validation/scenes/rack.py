@@ -96,7 +96,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return [
         bounds.bookkeeping(n).check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum"),
         bounds.exact(n).check("energy_defect", "1", truth["energy_defect"], "e = 1: conservation of energy"),
-        bounds.exact(n).check("asymmetry", "1", truth["asymmetry"], "no law of mechanics knows left from right"),
+        bounds.exact(n).check("asymmetry", "1", truth["asymmetry"], "the laws of mechanics are symmetric"),
         late.check("penetration", "m", truth["penetration"], "rigid bodies"),
     ]
 
@@ -118,7 +118,7 @@ SCENE = CanonicalScene(
     version=1,
     title="Break of a rack",
     figure=__doc__ or "",
-    law="momentum, energy and the mirror are kept at e = 1",
+    law="momentum, energy and mirror symmetry are conserved at e = 1",
     dimensions=(2,),
     parameters=(
         Parameter("rows", 4, "1", "of the rack: 10 balls", 1, 20, integer=True),
@@ -138,8 +138,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "defect",
         "1",
-        f"larger of the relative errors of energy and of the mirror, over {PHASES} phases of the first contact",
-        "what every law of impact keeps",
+        f"larger of the relative errors of energy and mirror symmetry, over {PHASES} phases of the first contact",
+        "every impact law conserves them",
         phases,
         error,
         "the whole scene: approach, break, departure",
@@ -147,6 +147,6 @@ SCENE = CanonicalScene(
     words={
         "momentum_defect": "changes the momentum by {value} (relative)",
         "energy_defect": "changes the energy by {value} (relative)",
-        "asymmetry": "throws left and right apart by {value} of the cue's speed",
+        "asymmetry": "makes left and right differ by {value} of the cue's speed",
     },
 )

@@ -83,11 +83,11 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     Each may be late by a step for its contact and one for the blow itself; where that adds up to the last half flight,
     one blow more or less is none.
     """
-    p, source = scene.params, "Newton's law of restitution, taken at its word"
+    p, source = scene.params, "Newton's law of restitution, with e above 1"
     left = 0.5 * APART / (p["v"] * p["e"] ** p["blows"])
     lost = 0.0 if 2.0 * dt * p["blows"] < left else 1.0
     count = bounds.Bound(
-        0.5 + lost, "a whole number: the run ends half a flight after the last blow, which late ones eat"
+        0.5 + lost, "a whole number: the run ends half a flight after the last blow, and late blows shorten that"
     )
     return [
         bounds.exact(p["e"]).check("growth", "1", truth["growth"], source),
@@ -118,10 +118,10 @@ SCENE = CanonicalScene(
         "energy grows at each collision",
     ),
     figure=__doc__ or "",
-    law="v_n = e^n v after n blows, for whoever takes e > 1",
+    law="v_n = e^n v after n blows, for engines that accept e > 1",
     dimensions=(2,),
     parameters=(
-        Parameter("e", 1.1, "1", "restitution; people set a little above 1 for a bumper", 1.0, 2.0),
+        Parameter("e", 1.1, "1", "restitution; values a little above 1 are used for bumpers", 1.0, 2.0),
         Parameter("v", 2.0, "m/s", "of the ball at the start", 0.0, 1e3, positive=True),
         Parameter("blows", 5, "1", "until it ends", 1, 100, integer=True),
         mass_of("the ball"),
@@ -139,7 +139,7 @@ SCENE = CanonicalScene(
         "growth error",
         "1",
         "|mean factor of the speed a blow - e|",
-        "whoever takes a number should do what it says",
+        "an engine that accepts a value should apply it",
         lambda dt: [{}, {"e": 1.5}],
         error,
         "the whole scene: five blows",

@@ -82,7 +82,7 @@ def make(dimension: int, params: Params) -> Scene:
     p, theta = params, math.radians(params["tilt"])
     r, h = p["radius"], 0.5 * p["thickness"]
     if r <= h:
-        raise SceneError(f"rocker.radius: {r:g} m does not hold a board of {2.0 * h:g} m, half as thick it would")
+        raise SceneError(f"rocker.radius: {r:g} m does not hold a board of {2.0 * h:g} m; half as thick it would")
     path = np.linspace(0.0, theta, 101)[1:]
     if r * theta > 0.45 * p["length"] or (np.diff(_raised(p, path)) <= 0.0).any():
         raise SceneError(f"rocker.tilt: at {p['tilt']:g} degrees the board falls off")
@@ -167,14 +167,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     other = [_swing({**p, "tilt": p["tilt"] * (1.0 + side * min(error, 0.2))}) for side in (-1.0, 1.0)]
     swing = bounds.Bound(
         2.0 * dt / (SWINGS - 1) + max(abs(each - truth["swing_time"]) for each in other),
-        "a step at both ends of the swings, and the time that an amplitude takes that steps of first order change",
+        "a step at both ends of the swings, and the time that follows from an amplitude error of a first-order scheme",
     )
     amplitude = bounds.Bound(
-        error, "steps take (a dt)^2/2 off the energy, a: what keeps the board on the log; and 1.5 steps at the start"
+        error, "each step loses (a dt)^2/2 of energy, a: acceleration towards the log; and 1.5 steps at the start"
     )
     slip = bounds.Bound(
         SWINGS * way * dt + g * dt * dt,
-        "a step leaves out dt^2/2 of the acceleration that keeps the board on the log; a contact found one step late",
+        "a step neglects dt^2/2 of the acceleration towards the log; a contact found one step late",
     )
     source = "Lagrange's equation of a board that rolls on a log; energy"
     found = [
@@ -225,8 +225,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "time error",
         "1",
-        "error of the time from side to side, over it",
-        "a period gathers inertia, gravity and the place of a contact that wanders",
+        "relative error of the time from side to side",
+        "a period contains inertia, gravity and the moving contact point",
         lambda dt: [{}],
         error,
         "the rocking board",

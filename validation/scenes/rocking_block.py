@@ -88,7 +88,7 @@ def make(dimension: int, params: Params) -> Scene:
         raise SceneError(f"rocking_block.aspect: a block of {p['aspect']:g} stays where it lands, below 1.41 it rocks")
     needed = 3.0 * math.sin(on.alpha) * math.cos(on.alpha) / (4.0 - 3.0 * square)
     if p["mu"] <= needed:
-        raise SceneError(f"rocking_block.mu: {p['mu']:g} lets it slide where it lands; it takes {needed:.3g}")
+        raise SceneError(f"rocking_block.mu: {p['mu']:g} lets it slide where it lands; it needs {needed:.3g}")
     tops = _amplitudes(p)
     angle = on.alpha - tops[0]
     centre = (on.arm * math.sin(angle), on.arm * math.cos(angle))
@@ -169,7 +169,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     turned = min(on.speed(on.alpha - tops[-1], 0.0, on.alpha) * late, on.alpha)
     moved = bounds.Bound(
         slid + 0.5 * on.width * (1.0 - math.cos(turned)),
-        "steps carry the edge away, rho (w dt)^2/2 each; g dt^2 for each contact found late; and the tilt at the end",
+        "steps move the edge, rho (w dt)^2/2 each; g dt^2 for each contact found late; and the tilt at the end",
     )
     return [*found, moved.check("slid", "m", truth["slid"], "friction holds")]
 
@@ -227,7 +227,7 @@ SCENE = CanonicalScene(
         "amplitude error",
         "1",
         "largest error of the amplitudes after three landings, over the first tilt",
-        "the landing at two edges at once, three times over",
+        "a landing on two edges at once, three times",
         lambda dt: [{}, {"aspect": 0.5, "tilt": 0.7}],
         error,
         "the whole scene: the block rocks and lands three times",

@@ -214,14 +214,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     length = p["room"] + 2.0 * RADIUS * n
     late = bounds.Bound(
         max(off) * dt + bounds.ROUND_OFF * length,
-        "each meeting is found up to one step late and puts its rods off by the way that they close in meanwhile, "
-        "twice that at a wall: the sum over the flight that has most",
+        "each collision is found up to one step late and displaces its rods by their approach in that time, twice "
+        "that at a wall: the largest sum over a flight",
     )
     line = bounds.Bound(
         strayed(p, seen) + bounds.ROUND_OFF * length,
-        "round ends spread what is rounded in a normal, from meeting to meeting: the largest sum over all of them",
+        "round ends amplify the rounding of a normal, from collision to collision: the largest sum over all of them",
     )
-    source = "Jepsen's free flights: momentum and energy of rods of equal mass, meeting after meeting"
+    source = "Jepsen's free flights: momentum and energy of rods of equal mass, collision after collision"
     found = [
         late.check("misplaced", "m", truth["misplaced"], source),
         bounds.exact(len(seen) * p["v"]).check("wrong_speed", "m/s", truth["wrong_speed"], source),
@@ -243,14 +243,14 @@ SCENE = CanonicalScene(
     title="Gas of rods in one line, between two walls",
     family="many impacts",
     figure=__doc__ or "",
-    law="sorted free flights in L - n d, and i d put back: speeds only change hands",
+    law="sorted free flights in L - n d, plus i d: collisions exchange speeds",
     dimensions=(2,),
     parameters=(
         Parameter("n", 6, "1", "number of rods", 1, 1000, integer=True),
         Parameter("v", 2.0, "m/s", "no rod is faster", 0.0, 1e2, positive=True),
-        Parameter("room", 5.0, "m", "length of the line that no rod takes up, L - n d", 0.0, 1e3, positive=True),
-        Parameter("duration", 3.75, "s", "16 meetings, none near the end", 0.0, 1e3, positive=True),
-        Parameter("delay", DELAY, "s", "time that the gas has flown at the start: phases of meetings", 0.0, 10.0),
+        Parameter("room", 5.0, "m", "free length of the line, L - n d", 0.0, 1e3, positive=True),
+        Parameter("duration", 3.75, "s", "16 collisions, none near the end", 0.0, 1e3, positive=True),
+        Parameter("delay", DELAY, "s", "time that the gas has moved before the start: phases of collisions", 0.0, 10.0),
         mass_of("each rod"),
     ),
     make=make,
@@ -268,8 +268,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"largest error of a rod's velocity at the end over the fastest flight's, {PHASES} phases of the meetings",
-        "velocities change hands and nothing else: one meeting missed, doubled or too soft gives a rod a wrong one",
+        f"largest error of a rod's velocity at the end over the fastest, {PHASES} phases of the collisions",
+        "collisions only exchange velocities: one missed, doubled or too soft gives a rod a wrong one",
         phases,
         error,
         "the whole scene",

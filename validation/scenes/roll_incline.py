@@ -66,7 +66,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     driven = bounds.driven(p["g"], dt, 0.5 * scene.duration - dt)
 
     def allowed(answer: Callable[[float], float]) -> bounds.Bound:
-        because = f"{driven.because}; and what an arm shortened by g dt^2, of a late contact, changes"
+        because = f"{driven.because}; and the effect of a lever arm shorter by g dt^2, from a late contact"
         return bounds.Bound(driven.value + of_the_arm(answer, r, p["g"] * dt * dt), because)
 
     source = "Newton's and Euler's laws with Coulomb's friction"
@@ -101,7 +101,7 @@ SCENE = CanonicalScene(
     title="Ball that rolls down an incline",
     symptoms=(
         "a wheel or ball rolls too slowly or too fast down a slope",
-        "there is rolling resistance that nobody set",
+        "there is rolling resistance that was not set",
     ),
     family="friction",
     figure=__doc__ or "",
@@ -129,8 +129,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "acceleration error",
         "1",
-        "larger error of the accelerations of centre and surface over the pull, worst of rolling and sliding",
-        "friction that only turns the ball, and friction at its limit: an engine may have one right and not the other",
+        "larger error of the accelerations of centre and surface, over g sin(theta), worst of rolling and sliding",
+        "friction that turns the ball, and friction at its limit: an engine may have only one of them right",
         lambda dt: [{}, {"ratio": 0.99}, {"ratio": 1.5}],
         error,
         "the rolling ball",

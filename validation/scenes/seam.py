@@ -77,8 +77,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
-        "an edge that is not there stops what slides over it, or throws it on",
+        "distance of the place where it stops from the exact one, over the length of its slide",
+        "a wrong contact at a flush edge stops a sliding body or throws it",
         lambda dt: [{}],
         sliding.error,
         "the sliding box",

@@ -120,15 +120,15 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     pace = bounds.driven(g, dt, 0.5 * scene.duration)
     load = bounds.Bound(
         p["ratio"] * pace.value / g,
-        f"{pace.because}, of the mass that it moves",
+        f"{pace.because}, of the moved mass",
     )
     apart = bounds.Bound(
         2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "one contact found one step late, g dt^2, on either side"
     )
     turn = bounds.Bound(
-        2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "a corner of either end found one step late sinks by g dt^2"
+        2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "a corner whose contact is found one step late sinks by g dt^2"
     )
-    source = "Newton's law for two bodies that one force ties"
+    source = "Newton's law for two bodies with one force between them"
     return [
         pace.check("down", "m/s^2", truth["down"], source),
         pace.check("ahead", "m/s^2", truth["ahead"], source),
@@ -169,7 +169,7 @@ SCENE = CanonicalScene(
         "acceleration error",
         "1",
         "larger of the relative errors of both accelerations",
-        "the two accelerations fit each other where all four contacts are solved together",
+        "the two accelerations agree if all four contacts are solved together",
         lambda dt: [{}, {"ratio": 20.0}],
         error,
         "the boxes on their way",

@@ -74,12 +74,12 @@ SCENE = CanonicalScene(
     ),
     family="friction",
     figure=__doc__ or "",
-    law="d = v^2/(2 mu g), straight on; friction does not know the heading, and is mu m g at every step",
+    law="d = v^2/(2 mu g), straight on; friction is mu m g at every step and heading",
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 3.0, "m/s", "speed at the start", 0.0, 1e2, positive=True),
         Parameter("mu", 0.4, "1", "friction; below aspect, so that the box does not tip", 0.0, 1.0, positive=True),
-        Parameter("heading", 0.0, "degrees", "of the slide against the box's edges; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the slide to the box's edges; 3-D only", 0.0, 90.0),
         Parameter("aspect", 1.5, "1", "width over height of the box", 1.1, 20.0),
         standard_gravity(),
         mass_of("the box"),
@@ -99,7 +99,7 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
+        "distance of the place where it stops from the exact one, over the length of its slide",
         "one number for too far, too short and astray",
         lambda dt: [{}],
         sliding.error,

@@ -107,7 +107,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
     time = bounds.Bound(
         dt + changed(lambda k: _time(p, k)) + bounds.ROUND_OFF * scene.duration,
-        "braking is constant in every scheme: only a contact found one step late, and the arm that it leaves",
+        "braking is constant in every scheme, except for a contact found one step late and the lever arm after it",
     )
     place = bounds.Bound(
         v * dt
@@ -115,11 +115,13 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         + p["mu"] * depth
         + changed(lambda k: _place(p, k))
         + bounds.ROUND_OFF * truth["rolling_place"],
-        "a contact found one step late is v dt without brakes, a step order shows (v - v') dt/2; and mu g dt^2",
+        "a contact found one step late gives v dt without friction, velocity and position half a step apart (v - "
+        "v') dt/2; and mu g dt^2",
     )
     rolls = on_a_late_arm(lambda arm: v / (1.0 + k * (r / arm) ** 2), r, depth, v)
     slip = bounds.Bound(
-        end * depth / r + bounds.ROUND_OFF * v, "it rolls on its arm; told with the radius that is a slip of v g dt^2/r"
+        end * depth / r + bounds.ROUND_OFF * v,
+        "it rolls on its lever arm; measured with the radius that is a slip of v g dt^2/r",
     )
     source = "Coulomb's law; angular momentum about the line of contact"
     found = [
@@ -169,7 +171,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("v", 3.0, "m/s", "speed at the start, without spin", 0.0, 1e2, positive=True),
         Parameter("mu", 0.3, "1", "friction of the pair: when rolling begins, not how fast", 0.0, 10.0, positive=True),
-        Parameter("heading", 0.0, "degrees", "of the motion against the axes; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the motion to the axes; 3-D only", 0.0, 90.0),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
         standard_gravity(),
         mass_of("the ball"),
@@ -190,8 +192,8 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         "|v'/v (1 + k) - 1| of the speed at the end, when the ball has rolled twice as long as it slid",
-        "the one number that no friction coefficient changes: sliding that ends too early or late does not show in "
-        "it, wrong rolling does",
+        "the one number that does not depend on friction: it shows wrong rolling, but not sliding that ends too "
+        "early or late",
         lambda dt: [{}, {"mu": 0.1}],
         error,
         "the whole scene: the ball slides, then rolls",
@@ -201,6 +203,6 @@ SCENE = CanonicalScene(
         "final_speed": "rolls off with {value}",
         "slip": "goes on sliding with {value} where it should roll",
         "rolling_time": "rolls after {value}",
-        "rolling_place": "rolls after a way of {value}",
+        "rolling_place": "rolls after {value}",
     },
 )

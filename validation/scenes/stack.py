@@ -133,7 +133,7 @@ SCENE = CanonicalScene(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 5 s, per side of a box, n = 10",
-        "nothing may move, so whatever did is error, sideways or into the neighbour; loads are left out because "
+        "nothing may move, so any motion is error, sideways or into the neighbour; loads are left out because "
         "any column at rest carries its weight on average",
         lambda dt: [{"n": 10.0}],
         lambda scene, dt, found: columns.displacement(found, SIDE),

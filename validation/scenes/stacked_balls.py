@@ -197,7 +197,7 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         f"larger error of the balls' speeds at the end over that of the fall, over {PHASES} phases of the first impact",
-        "what the second impact makes of the first shows whether they are resolved one by one; the worst phase counts",
+        "the second impact shows whether impacts are resolved one by one; the worst phase counts",
         phases,
         error,
         "the whole scene: fall, two or three impacts, departure",

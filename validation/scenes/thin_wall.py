@@ -152,7 +152,7 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |v+/v- - e| over {PHASES} contact times within a step; 1 + e for a ball that passes",
-        "the worst phase of the contact decides whether a ball passes",
+        "a ball passes if it does so at the worst phase",
         phases,
         error,
         "the whole scene: approach, contact, departure",

@@ -156,10 +156,10 @@ SCENE = CanonicalScene(
     title="Block on a tilted table: stays, slides or topples",
     symptoms=("a block topples instead of sliding",),
     figure=__doc__ or "",
-    law="stays if tan(theta) <= min(mu, width/height); else slides or topples, whichever limit is met first",
+    law="stays if tan(theta) <= min(mu, width/height); else slides or topples, whichever limit is reached first",
     dimensions=(2, 3),
     parameters=(
-        Parameter("ratio", 0.98, "1", "tan(theta) over the limit that is met first", 0.0, 10.0, positive=True),
+        Parameter("ratio", 0.98, "1", "tan(theta) over the limit that is reached first", 0.0, 10.0, positive=True),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("aspect", 0.3, "1", "width over height of the block; below mu it topples", 0.05, 10.0),
         Parameter("height", 1.0, "m", "of the block", 0.0, 1e3, positive=True),
@@ -183,9 +183,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the block that should stay, in heights; error of the time of the one that topples, and of the "
-        "acceleration of the one that slides, relative to them",
-        "which way it goes, and how fast, at both of its limits",
+        "displacement of the block that should stay, in heights; relative errors of the time of the one that "
+        "topples and of the acceleration of the one that slides",
+        "whether it slides or topples, and how fast, at both limits",
         lambda dt: [{}, {"ratio": 1.1}, {"ratio": 1.1, "aspect": 1.0}],
         error,
         "the whole scene: the block stays",

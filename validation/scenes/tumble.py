@@ -155,10 +155,10 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     )
     momentum = bounds.Bound(
         BEYOND * (lost + turned) * dt + bounds.ROUND_OFF,
-        "what steps of first order leave out of spin and attitude, w'' and w'",
+        "error of a first-order scheme in spin and attitude, w'' and w'",
     )
     energy = bounds.Bound(
-        BEYOND * given * dt + bounds.ROUND_OFF, "what steps of first order leave out of the spin, w'' dt^2/2"
+        BEYOND * given * dt + bounds.ROUND_OFF, "error of a first-order scheme in the spin, w'' dt^2/2"
     )
     source = "Euler's equations: angular momentum and energy are kept; period of Jacobi's elliptic functions"
     return [
@@ -185,7 +185,7 @@ SCENE = CanonicalScene(
     ),
     family="turning",
     figure=__doc__ or "",
-    law="L and E are kept; spin about the middle axis turns over after K(m)/n",
+    law="L and E are conserved; spin about the middle axis turns over after K(m)/n",
     dimensions=(3,),
     parameters=(
         Parameter("spin", 3.0, "rad/s", "about the middle axis", 0.0, 1e3, positive=True),
@@ -206,7 +206,7 @@ SCENE = CanonicalScene(
             1e3,
             1e3,
             fate,
-            "spun on: at no time more than half of its energy, or of its angular momentum, was gained or lost",
+            "spun on: at no time was more than half of its energy or angular momentum gained or lost",
         ),
     ),
     quick=(Variation({}), Variation({"delta": 0.01, "spin": 6.0})),
@@ -216,7 +216,7 @@ SCENE = CanonicalScene(
         "drift",
         "1",
         "larger of the relative drifts of angular momentum and energy until it has turned over",
-        "both are kept by the motion: an integrator that loses either turns over at another time and in another way",
+        "the motion conserves both: an integrator that loses either turns over at another time",
         lambda dt: [{}],
         error,
         "a free body that tumbles",

@@ -151,8 +151,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "displacement",
         "radius",
-        "farthest that the ball comes from its place within the run, over its radius",
-        "nothing may move, so whatever did is error; loads are left out because a ball at rest has the right ones",
+        "largest displacement of the ball within the run, over its radius",
+        "nothing may move, so any motion is error; loads are left out because a ball at rest has the right ones",
         lambda dt: [{}, {"left": 60.0, "right": 20.0}],
         error,
         "the ball at rest, half a second after the start",

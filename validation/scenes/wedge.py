@@ -202,8 +202,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "coupling error",
         "1",
-        "larger of the relative errors of both accelerations; way of what should stay, over the face",
-        "the load on the face decides both, and is not the weight",
+        "larger of the relative errors of both accelerations; displacement where nothing should move, over the face",
+        "both depend on the load on the face, which is not the weight",
         lambda dt: [{}, {"mu": 0.7}],
         error,
         "the whole scene: the block slides, the wedge gives way",

@@ -82,8 +82,8 @@ def sampling(scene: Scene) -> Sampling:
 #: A column stands while no body is off by half a side, overlaps by a tenth of one, or moves as if it had fallen one.
 OFF, DEEP = 0.5, 0.1
 STANDS = (
-    "stood: no body half a side off its place at the end, none a tenth of a side inside another, and the kinetic "
-    "energy of the last second below that of a fall by a side"
+    "stood: at the end no body is half a side off its place or a tenth of a side inside another, and the kinetic "
+    "energy of the last second is below that of a fall by a side"
 )
 
 

@@ -149,7 +149,7 @@ def standing_checks(
     """
     still = bounds.Bound(
         6.0 * p["g"] * dt * dt + bounds.ROUND_OFF * p["length"],
-        "both ends found one step late, 3/2 g dt^2 each, at the centre and by the turn",
+        "both ends found one step late, 3/2 g dt^2 each, in motion of the centre and by rotation",
     )
     found = [still.check("moved", "m", truth["moved"], "friction of the floor holds")]
     carried = bounds.carried(dt)
@@ -178,7 +178,7 @@ def sliding_checks(
     others = [again(side * carried_away / length) for side in (-1.0, 1.0)]
     start = math.radians(p["lean"])
     fast = max(abs(bent(start - TOLD, fall.spin**2)), abs(bent(start, 0.0)))
-    because = "half a step by the order of a step, one for a contact found late, and ends that steps carry away"
+    because = "half a step by the order of the scheme, one for a contact found late, and ends that steps move"
     time = 1.5 * dt + max(math.inf if other is None else abs(other.time - fall.time) for other in others)
     spin = 1.5 * dt * fast + max(math.inf if other is None else abs(other.spin - fall.spin) for other in others)
     bound = {"passing_time": ("s", bounds.Bound(time, because)), "passing_spin": ("rad/s", bounds.Bound(spin, because))}
@@ -187,6 +187,6 @@ def sliding_checks(
         unit, owed = bound[name.partition("[")[0]]
         found.append(owed.check(name, unit, truth[name], source))
     stays = bounds.Bound(
-        carried_away + bounds.ROUND_OFF * length, "steps carry the ends away, L (w dt)^2/2 each; one found a step late"
+        carried_away + bounds.ROUND_OFF * length, "steps move the ends, L (w dt)^2/2 each; one found a step late"
     )
-    return [*found, stays.check("let_go", "m", truth["let_go"], "both ends push until it is told")]
+    return [*found, stays.check("let_go", "m", truth["let_go"], "both ends push until then")]

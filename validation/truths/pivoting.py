@@ -139,11 +139,12 @@ def fall_checks(
     )
     time = bounds.Bound(
         1.5 * dt + truth["passing_time"] * carried / on.arm + other,
-        "half a step by the order of a step, one for a contact found late, and the torque of an edge that moved",
+        "half a step by the order of the scheme, one for a contact found late, and the torque of an edge that moved",
     )
     speed = bounds.Bound(
         sharp,
-        "half a step of the acceleration by the order of a step, one for a contact found late, and an edge that moved",
+        "half a step of the acceleration by the order of the scheme, one for a contact found late, and an edge that "
+        "moved",
     )
     source = "energy of a pendulum that is held by an edge; its integral"
     return [

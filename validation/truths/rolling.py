@@ -75,5 +75,5 @@ def of_the_arm(answer: Callable[[float], float], radius: float, depth: float) ->
 
 def on_a_late_arm(answer: Callable[[float], float], radius: float, depth: float, scale: float) -> bounds.Bound:
     """Bound of an answer that is exact at every step but for the ``depth`` [m] at which its contact is found."""
-    because = "exact at every dt but for the arm of friction, shorter by the depth at which a late contact is found"
+    because = "exact at every dt except for the lever arm of friction, which is shorter by the depth of a late contact"
     return bounds.Bound(of_the_arm(answer, radius, depth) + bounds.ROUND_OFF * scale, because)

@@ -98,9 +98,10 @@ def checks(scene: Scene, dt: float, truth: Mapping[str, float], place: float = 0
     place = max(place, truth["stopping_distance"])
     distance = bounds.Bound(
         1.5 * v * dt + (1.0 + mu) * g * dt * dt + bounds.ROUND_OFF * place,
-        "a step order shows v dt/2 of a parabola, a contact found one step late is v dt without brakes; and g dt^2",
+        "velocity and position half a step apart give v dt/2, a contact found one step late v dt without friction; "
+        "and g dt^2",
     )
-    stopped = bounds.Bound(bounds.STILL * g * dt, "slower than v1/100 = g dt/100 does not move")
+    stopped = bounds.Bound(bounds.STILL * g * dt, "a speed below v1/100 = g dt/100 counts as rest")
     # The window is the middle half of the slide, to a step: g dt/100 of speed within it.
     brakes = bounds.driven(g, dt, max(0.5 * stop(p) - dt, dt))
     level = bounds.found_late(g, dt, place)

@@ -172,7 +172,7 @@ class _Driver:
 
     def _check(self, silent: float) -> None:
         if self.client.status == "closed" or time.monotonic() - silent > SILENCE:
-            raise LimitError("cluster: the scheduler is gone; what finished is kept, the same command resumes")
+            raise LimitError("cluster: the scheduler is gone; finished cases are kept, the same command resumes")
 
     def _heard(self, said: dict[str, Any]) -> Iterator[Observation]:
         """A batch began, or one of its cells is back."""
@@ -207,14 +207,14 @@ class _Driver:
         here = prepare(observation.slot).cell
         if here.key() != observation.cell:
             said = f"{observation.slot.engine} {observation.engine_version} there, {here.engine_version} here"
-            raise LimitError(f"cluster: {worker} has other code than this machine ({said}); its rows would be others")
+            raise LimitError(f"cluster: {worker} has other code than this machine ({said}); its results would differ")
         self.same.add(key)
 
     def _ended(self, name: str) -> Iterator[Observation]:
         """A batch is over; what it did not bring back is asked again, or left."""
         batch, future = self.batches[name], self.futures.pop(name)
         if future.status == "cancelled":
-            raise LimitError("cluster: the scheduler is gone; what finished is kept, the same command resumes")
+            raise LimitError("cluster: the scheduler is gone; finished cases are kept, the same command resumes")
         told: dict[str, Any] | None = future.result() if future.status == "finished" else None
         if told is not None:
             for line in told["lines"]:  # what no event has brought: they come at their own time

@@ -208,7 +208,7 @@ def _started(memory: int) -> Child:
         if child.receive(START) == READY:
             child.written = b""
             return child
-        raise Lost("it did not say that it is ready")
+        raise Lost("it did not become ready")
     except Lost as lost:
         child.stop()
         said = child.tail().rpartition("\n")[2]

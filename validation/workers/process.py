@@ -54,7 +54,7 @@ def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[st
             _flush()
             changed = state.changed(before)
         if found.engine is None and job["installed"]:
-            reason = f"it can be loaded elsewhere, but not in its worker: {found.reason}"
+            reason = f"it can be loaded, but not in its worker process: {found.reason}"
             observation = replace(observation, outcome=Outcome.CRASHED, reason=reason)
     except OSError as error:  # what an engine raises is an outcome by now: this is the file that was to be kept
         unwritten = [error.errno or 0, error.strerror or said_by(error), str(error.filename or job["keep"])]

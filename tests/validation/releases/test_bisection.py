@@ -98,7 +98,7 @@ def test_the_most_serious_cell_is_followed():
 
 def test_a_check_that_no_row_has_is_said():
     found = bisect(2, [SLOT], "rebound", Engine([0.5, 0.4]))
-    assert isinstance(found, Unchanged) and "no such row" in found.reason
+    assert isinstance(found, Unchanged) and "no such check" in found.reason
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from validation.scenes import kane
 REFUSED = [
     ({"beta": 10.0}, "arch.beta: at 10 degrees springers of 3 times the keystone's mass tip"),
     ({"ratio": 0.01, "lean": 20.0}, "card_tent.ratio: at 0.01 the cards do not slide down on each other"),
-    ({"ratio": 1.0}, "domino.ratio: at 1 the domino balances on its foot, it takes less or more"),
+    ({"ratio": 1.0}, "domino.ratio: at 1 the domino balances on its foot; choose less or more"),
     ({"mu": 0.0}, "domino.mu: 0 does not hold the foot of the domino that is pushed"),
     ({"gap": 0.95}, "domino.mu: 0.6 does not hold both feet where the dominoes meet"),
     ({"mu": 0.707, "ratio": 1.09}, "domino.ratio: at 1.09 the second domino does not turn 3 degrees"),
@@ -61,4 +61,4 @@ def test_a_blow_with_no_answer_or_two_is_refused_by_the_friction_that_makes_it_s
     monkeypatch.setattr(kane, "answers", lambda *given: law(*given) * count)
     with pytest.raises(SceneError) as refused:
         CATALOGUE["kane"].scene(2, {"mu": 0.25})
-    assert str(refused.value) == f"kane.mu: at 0.25 the law has {count} answers, it takes one"
+    assert str(refused.value) == f"kane.mu: at 0.25 the law has {count} solutions, the scene needs one"
