@@ -198,7 +198,8 @@ def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from
     other = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: (2.0, 0.1), "another mechanism", "its manual")
     both = [*LAWFUL, (other, 2.0, 0.1)]
     assert judge(2.05, CHECK, both, NEW).reason == "another mechanism (predicted 2 +- 0.1)"
-    assert judge(3.0, CHECK, both, NEW).reason == "outside the band of its contact law, 1.5 +- 0.01: it does so by design"
+    said = judge(3.0, CHECK, both, NEW).reason
+    assert said == "outside the band of its contact law, 1.5 +- 0.01: it does so by design"
 
 
 def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_are_left_out():

@@ -1,10 +1,10 @@
-"""Models of an engine (MJCF) as scenes: what a model's file becomes once, and what of it is judged.
+"""Models of an engine (MJCF) as scenes, and their checks.
 
     model.xml --(adapters.model: its own engine's compiler, in a process of its own)--> JSON --> CanonicalScene
 
-The JSON takes the place of the file's text in slots and stores: whoever reads results needs neither file nor engine. A
-model that lies in the plane y = 0 is a planar scene as well. It runs on its own engine as its author made it, as
-profile ``model``; everywhere else as rigid bodies.
+The JSON replaces the file's text in slots and stores, so that reading results needs neither file nor engine. A model in
+the plane y = 0 is a 2-D scene as well. On its own engine it runs with its own settings, as profile ``model``; on others
+as rigid bodies.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from validation.canonical import Brought, CanonicalScene, Check, Measured, Param
 from validation.files import stated
 from validation.files.stated import Stated
 
-#: Longest time that a model is run [s]: contacts of every step are kept.
+#: Longest run of a model [s]: contacts of every step are stored.
 LONGEST = 60.0
-#: Most characters of a model as JSON: a thousand bodies and the pairs that differ.
+#: Most characters of a model as JSON: a thousand bodies and their pairs.
 MOST = 2**24
 
 
 def is_model(path: Path) -> bool:
-    """Whether an engine of ours reads files with this ending as models."""
+    """Whether one of our engines reads model files with this ending."""
     return path.suffix.lower() not in (".toml", ".json") and model.reader_of(path.suffix) is not None
 
 
 @cache
 def text_of(text: str, suffix: str, drop: bool) -> str:
-    """The model in ``text`` as the JSON that stands for it; see `adapters.model.read`."""
+    """The model in ``text`` as JSON; see `adapters.model.read`."""
     engine = model.reader_of(suffix)
     if engine is None:
         raise SceneError(f"model: no engine reads files ending in {suffix}")
@@ -55,7 +55,7 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     Raises
     ------
     SceneError
-        If it is not what `text_of` makes.
+        If it is not from `text_of`.
     """
     if len(text) > MOST:
         raise SceneError(f"{one_line(path)}: is larger than {MOST} characters, the most that is read")
@@ -134,7 +134,7 @@ def momentum_drift(scene: Scene, trajectory: Trajectory) -> Measured:
 
 
 def _momentum_check(scene: Scene, dt: float) -> Check:
-    """Judged where nothing but free bodies touch; elsewhere it is as good as the impulses that are reported."""
+    """Judged if only free bodies can touch; otherwise it depends on the reported impulses."""
     bodies = [body for body in scene.bodies if body.motion == "free"]
     if len(bodies) < len(scene.bodies):
         because = "shown: as accurate as the contact impulses that the engine reports"

@@ -1,14 +1,14 @@
-r"""What leans on its contacts and turns from rest: one angle, whose acceleration knows the angle and the spin's square.
+r"""Bodies that lean on their contacts and turn from rest: one angle with an acceleration by angle and squared spin.
 
             /       phi'' = a(phi, phi'^2)           d(phi'^2)/d(phi) = 2 a(phi, phi'^2)
            /
           /         time = integral of d(phi)/phi',  singular where it starts from rest:
     =====/=====     phi = start + (end - start) s^2  takes that out
 
-Ends that slide with Coulomb's friction are of this kind as long as none stops or lifts: friction is a share of a force
-that angle and spin decide. There is no energy to keep, so the square is integrated step by step.
+Ends that slide with Coulomb friction are of this kind as long as none stops or lifts: friction is a share of a force
+that depends on angle and spin. Energy is not conserved, so the square is integrated step by step.
 
-What leans and is held by friction stands, or slides down: what is measured and owed of both stands here as well.
+Metrics and checks of leaning bodies that stand or slide down are here as well.
 """
 
 from __future__ import annotations
@@ -24,15 +24,16 @@ from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.canonical import Check, Measured, Params, Variation
 
-#: Steps of the classical method of fourth order: twice as many change nothing at 1e-9.
+#: Steps of the classical Runge-Kutta method: twice as many change nothing at 1e-9.
 STEPS = 200
-#: Turn at which what slides down is told [rad], and how long it goes on [s]: whoever is late by what a step of 1/60 s
-#: may cost is told as well.
+#: Rotation at which sliding bodies are measured [rad], and the time beyond it [s], for runs that are late by the error
+#: of a step of 1/60 s.
 TOLD, AFTERMATH = math.radians(8.0), 0.2
-#: Duration of a run of what stands [s].
+#: Duration of a run of standing bodies [s].
 DURATION = 2.0
 
-#: Cells of what leans at 60 degrees with ``ratio`` times the friction that it takes: one that stands, one that slides.
+#: Cells of bodies that lean at 60 degrees with ``ratio`` times the necessary friction: one that stands, one that
+#: slides.
 STANDS_AND_SLIDES: tuple[Params, ...] = ({}, {"ratio": 0.8})
 QUICK = tuple(Variation(params) for params in STANDS_AND_SLIDES)
 FULL = tuple(Variation({"ratio": r, "lean": lean}) for r in (0.5, 0.8, 1.02, 1.05, 2.0) for lean in (45.0, 60.0, 75.0))
