@@ -2,7 +2,7 @@
 
     fall      gravity, step, sampling       a ball released from rest
     load      mass, inertia, turn           bodies under a constant force and torque
-    flight    dampings free bodies without load, for a second
+    flight    dampings                      free bodies without load, for a second
     landing   size, impulse                 a ball and a box on each of its faces touch a floor
     rebound   restitution                   balls hit a floor at several phases of a step
     slide     friction, friction_impulse    a box slides on a floor; its weight is an impulse as well

@@ -1,7 +1,7 @@
 """Shared contact laws: blows in free space in single precision, and the distance from a plane by rounding.
 
-    o->   o | straight flight, blow, straight flight: nothing else changes a velocity, so
-          o  o-> | the result of an engine follows from the scene up to a few roundings
+    o->   o      |        straight flight, blow, straight flight: nothing else changes a velocity, so
+          o  o-> |        the result of an engine follows from the scene up to a few roundings
 
 Most checks of impacts have tolerances of double precision. A single-precision engine misses them by some units of
 2^-24, which is no fault of its contact model. The motion is computed here in doubles, event by event; the band is the

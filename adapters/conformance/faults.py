@@ -1,7 +1,6 @@
-"""Ways in which an adapter is wrong, each with the check that must catch it and three sizes that it must be caught at.
+"""Faults of an adapter, each with the check that must notice it, at three sizes.
 
-A share is off by 10, 1 and 0.1 % unless something stands in the way: what a step of motion hides of an extent, or what
-solvers leave of a symmetry.
+Sizes are 10, 1 and 0.1 %, except where the motion of a step hides an extent, or solvers do not keep a symmetry.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from adapters.scene import Body, Box, Scene, Sphere
 
 SHARES = (0.1, 0.01, 0.001)
 COARSE = (1.0, 0.1, 0.01)
-#: Sizes of what must agree bit for bit.
+#: Sizes for values that must agree bit for bit.
 BITS = (1e-3, 1e-6, 1e-9)
 
 
-# ---- what the engine is told ---------------------------------------------------------------------------------------
+# ---- input of the engine -------------------------------------------------------------------------------------------
 
 
 def _each(change: Callable[[Body, float], Body]) -> Callable[[Scene, float], Scene]:
@@ -88,7 +87,7 @@ def _pair(name: str) -> Callable[[Scene, float], Scene]:
     return told
 
 
-# ---- what is read of a world ---------------------------------------------------------------------------------------
+# ---- output of a world ---------------------------------------------------------------------------------------------
 
 
 def _at(rows: Any, columns: Any, amount: Callable[[World], float]) -> Callable[[World, Array, float], Array]:
@@ -103,7 +102,7 @@ def _at(rows: Any, columns: Any, amount: Callable[[World], float]) -> Callable[[
 
 
 def _scaled(rows: Any, columns: Any, power: Callable[[World], float]) -> Callable[[World, Array, float], Array]:
-    """Take a share of ``size`` from some numbers, as often as ``power`` says."""
+    """Reduce some numbers by the share ``size``, ``power`` times."""
 
     def read(world: World, value: Array, size: float) -> Array:
         value = value.copy()
@@ -141,7 +140,7 @@ def _impulse(change: Callable[[Contacts, float], Array]) -> Callable[[World, Con
 
 
 def _late_impulse(world: World, told: Contacts, size: float) -> Contacts:
-    """What the step before reported, by a share; where it had no such contact, nothing."""
+    """A share of the impulse of the step before; nothing where it had no such contact."""
     before = world.before[2]
     if len(before.a) == len(told.a):
         return replace(told, impulse=(1.0 - size) * told.impulse + size * before.impulse)
@@ -169,17 +168,17 @@ def _tilted(world: World, told: Contacts, size: float) -> Contacts:
 
 
 def _tilted_once(world: World, told: Contacts, size: float) -> Contacts:
-    """The last normal alone: others beside it are right."""
+    """Only the last normal; others are right."""
     return replace(told, normal=np.vstack([told.normal[:-1], _tilted(world, told, size).normal[-1:]]))
 
 
 def _long_once(world: World, told: Contacts, size: float) -> Contacts:
-    """The last normal alone is too long."""
+    """Only the last normal is too long."""
     return replace(told, normal=np.vstack([told.normal[:-1], (1.0 + size) * told.normal[-1:]]))
 
 
 def _turned_aside(world: World, value: Array, size: float) -> Array:
-    """The last body moves along one axis for what it has along the other: components add up as before."""
+    """The last body gains along one axis what it loses along the other: the sum of components is unchanged."""
     value = value.copy()
     value[-1, [0, 2]] += np.array([size, -size]) * float(world.steps > 0)
     return value
@@ -198,7 +197,7 @@ def _mirrored_turn(world: World, value: Array, size: float) -> Array:
     return value * np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
 
 
-# ---- what the engine says and keeps --------------------------------------------------------------------------------
+# ---- statements of the engine --------------------------------------------------------------------------------------
 
 
 def _leaking(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) -> tuple[float, dict[str, Any]]:
@@ -246,7 +245,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "restitution too low": Fault("receipt restitution", SHARES, "share", told=_pair("restitution")),
     "restitution ignored": Fault("receipt restitution", told=lambda scene, _: _pair("restitution")(scene, 1.0)),
-    # A box is told to a step of its approach, which is half a per cent of it at 1/240 s.
+    # A box is measured to a step of its approach, half a per cent of it at 1/240 s.
     "extents too small": Fault("receipt size", (0.5, 0.1, 0.01), "share", told=_each(_extent)),
     "step of its own": Fault("receipt step", SHARES, "share", stepped=lambda dt, size: (1.0 - size) * dt),
     "state read late": Fault("receipt sampling", COARSE, "steps", pose=_late_pose, twist=_late_twist),
@@ -259,7 +258,7 @@ FAULTS: dict[str, Fault] = {
     "impulses reported too low": Fault("receipt impulse", SHARES, "share", contacts=_impulse(_low)),
     "friction reported too low": Fault("receipt friction_impulse", SHARES, "share", contacts=_impulse(_slipping)),
     "angles with the wrong sign": Fault("receipt turn", pose=_mirrored_turn),
-    # The wrong word is the fault, which the type checker sees as well.
+    # The wrong word is the fault, which the type checker notices as well.
     "role that does not exist": Fault("facts", facts=lambda facts: replace(facts, roles={"default": "best"})),  # type: ignore[dict-item]
     "setting without a reason": Fault("profiles", settings=_no_reason),
     "setting that is set twice": Fault("profiles", settings=lambda given: given * 2),
@@ -297,7 +296,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "one normal of several not of length 1": Fault("contacts", SHARES, "share", contacts=_long_once),
     "normal from the second body": Fault("contacts", contacts=lambda _, told, size: replace(told, normal=-told.normal)),
-    # Bodies may sink by centimetres, and every other place of a body is farther from the floor.
+    # Bodies may sink by centimetres, and every other point of a body is farther from the floor.
     "contact point elsewhere": Fault(
         "contacts", (1.0, 0.3, 0.1), "m", contacts=lambda _, told, size: replace(told, point=told.point + size)
     ),
@@ -309,7 +308,7 @@ FAULTS: dict[str, Fault] = {
         "impulse", COARSE, "share", contacts=_impulse(lambda told, size: (1.0 - 2.0 * size) * told.impulse)
     ),
     "impulse of the step before": Fault("sampling", COARSE, "share", contacts=_late_impulse),
-    # The sum over all steps is right: a check that looks at the sum alone sees nothing.
+    # The sum over all steps is right: a check of the sum alone does not notice it.
     "impulse spread over two steps": Fault("sampling", COARSE, "share", contacts=_spread),
     "first body drifts": Fault(
         "order", COARSE, "m/s", pose=_at(0, 0, lambda world: world.steps * world.dt), twist=_at(0, 0, lambda world: 1.0)
@@ -321,7 +320,7 @@ FAULTS: dict[str, Fault] = {
     "state shared with another world": Fault(
         "fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.others))
     ),
-    # Nothing is wrong with worlds that are stepped one after another, each to its end.
+    # Worlds that run one after another, each to its end, are right.
     "depends on steps of another world": Fault(
         "fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.interrupted))
     ),

@@ -1,4 +1,4 @@
-"""The toy engine with one fault: what it is told, what it does, or what is read of it, is spoilt by a given amount."""
+"""The toy engine with one fault of a given size in its input, motion or output."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from adapters.scene import Scene
 
 @dataclass(frozen=True)
 class Fault:
-    """One way in which an adapter is wrong.
+    """One fault of an adapter.
 
     Parameters
     ----------
     check
-        What must catch it: the name of a check, or ``receipt <quantity>``.
+        The check that must notice it: its name, or ``receipt <quantity>``.
     sizes
-        Three sizes in ``unit``, the largest first; empty where a thing is wrong or right.
+        Three sizes in ``unit``, the largest first; empty for a fault without size.
     told, stepped
-        What the engine is told instead of the scene and the step.
+        Changes of the scene and the step.
     pose, twist, contacts, readback, record
         What is read instead, made of the world, what is true, and the size; a record is kept only where it is spoilt.
     settings, refuses, facts, build

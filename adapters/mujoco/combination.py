@@ -1,8 +1,8 @@
-"""How MuJoCo combines what two geoms say of their contact.
+"""MuJoCo's combination of two geoms' contact parameters.
 
-[MuJoCo documentation: computation/contact parameters] The geom of higher ``priority`` decides alone. Otherwise the
+[MuJoCo documentation: computation/contact parameters] The geom of higher ``priority`` alone counts. Otherwise the
 dimension and the coefficients of friction are the larger ones; ``solref`` and ``solimp`` are weighted by ``solmix``
-(``solref`` in the direct format: the smaller ones); margins add up. A stated pair decides over both.
+(``solref`` in the direct format: the smaller ones); margins add up. A stated pair overrides both.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Contact:
     softness
         ``solref``, ``solimp``, ``solreffriction`` (None: as ``solref``), ``margin`` [m].
     refusal
-        What a scene has no word for; empty if it has all.
+        What a scene cannot express; empty if it can.
     """
 
     condim: int
@@ -84,7 +84,7 @@ def _share(first: float, second: float) -> float:
 
 
 def _moves_along(model: Any, a: int, b: int) -> str:
-    """What newer releases add to a contact, and no scene has."""
+    """Contact parameters of newer releases that no scene has."""
     for name in ("geom_surfacevel", "geom_adhesion"):
         values = getattr(model, name, None)
         if values is not None and (np.any(values[a]) or np.any(values[b])):

@@ -1,9 +1,9 @@
-"""MuJoCo behind the plugin line: soft, convex contact; velocity first, then position.
+"""Adapter of MuJoCo: soft, convex contact; velocity first, then position.
 
 A contact pushes with the force f >= 0 that makes its acceleration ``a = d aref + (1 - d) a0``, where a0 is the
-acceleration without the contact, ``aref = -b v - k r`` a spring and damper (``solref``) and 0 < d < 1 the
-impedance (``solimp``). This model has no coefficient of restitution and no static friction; what the profiles make
-of that stands in `adapters.mujoco.profiles`. [MuJoCo documentation: computation, modeling/solver parameters]
+acceleration without the contact, ``aref = -b v - k r`` a spring and damper (``solref``) and 0 < d < 1 the impedance
+(``solimp``). This model has no coefficient of restitution and no static friction; `adapters.mujoco.profiles`
+approximates them. [MuJoCo documentation: computation, modeling/solver parameters]
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PHASES = 128
 
 @final
 class MujocoEngine(Engine):
-    """MuJoCo behind the plugin line."""
+    """Adapter of MuJoCo."""
 
     facts = EngineFacts(
         name="mujoco",
@@ -118,7 +118,7 @@ class MujocoEngine(Engine):
         return str(mujoco.__version__)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse inertias that no mass distribution has, and those that count as none: MuJoCo does not compile them."""
+        """Refuse impossible and too small inertias, which MuJoCo does not compile."""
         for body in scene.bodies:
             if body.motion == "free":
                 a, b, c = sorted(moments(body))
@@ -143,7 +143,7 @@ class MujocoEngine(Engine):
         Raises
         ------
         EngineError
-            For a scene or a setting that MuJoCo cannot honour.
+            For a scene or a setting that MuJoCo does not support.
         """
         if not (math.isfinite(dt) and dt > 0.0):
             raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
@@ -170,7 +170,7 @@ class MujocoEngine(Engine):
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
             because = "spring and damper with force >= 0: the rebound depends on the phase of the step, not on e"
-            # Between two of the phases the rebound changes by no more than between them and their neighbours.
+            # Between two phases the rebound changes by no more than between neighbouring phases.
             steepest = max(abs(x - y) for x, y in pairwise(ratios))
             declared["restitution"] = Declared(middle, half + steepest + 1e-12, because)
         return declared
@@ -185,17 +185,17 @@ class MujocoEngine(Engine):
 
 
 def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declared:
-    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance and to round-off.
+    """Reported impulses over the momentum of the landing probe: forces are solved to a tolerance and to round-off.
 
-    Newton stops when a step gains less than ``tolerance`` of its cost, which counts in units of the mean inertia times
-    the unknowns, 6 for each of the four bodies. Short of its minimum by that, the gradient (what forces and momentum
-    differ by) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance /
-    (1 - d)) m/s^2 in each step of the probe.
+    Newton's method stops when a step gains less than ``tolerance`` of its cost, in units of the mean inertia times the
+    unknowns, 6 for each of the four bodies. That far from the minimum, the gradient (the difference of forces and
+    momentum) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance / (1 -
+    d)) m/s^2 in each step of the probe.
 
-    A force is stiffness times acceleration, and an acceleration of six components is known to six roundings: of all
-    impulses together ``6 epsilon H/m``. H is larger in a pyramid, whose edges have ``d/((1 - d) 2 mu^2)`` of a unit
-    mass each (documentation, computation: contact), four of them at each of the box's four corners; at mu = 1e-5,
-    which a pair without friction keeps, that is 1.5e12.
+    A force is stiffness times acceleration, and an acceleration of six components has six roundings: for all impulses
+    together ``6 epsilon H/m``. H is larger in a pyramid, whose edges have ``d/((1 - d) 2 mu^2)`` of a unit mass each
+    (documentation, computation: contact), four of them at each of the box's four corners; at mu = 1e-5, which a pair
+    without friction keeps, that is 1.5e12.
     """
     deep = min(float(settings["solimp"][1]), IMPEDANCE_RANGE[1])
     gradient = math.sqrt(2.0 * 24.0 * float(settings["tolerance"]) / (1.0 - deep))
@@ -210,12 +210,12 @@ def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declar
 
 
 def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:
-    """Friction over load of the box that the probe slides, by the law of its contacts, where that is not mu.
+    """Friction over load of the probe's sliding box, by the law of its contacts, where that is not mu.
 
-    Normal and friction are one convex problem: what stops a slip lifts the box. While it slides or flies that leaves mu
-    what it is. Above mu = 1 or so the box is thrown up and turned, lands on an edge, and there a pyramid's edges across
-    the slip, or an edge that stops, carry load without as much friction. Newton stops at a tolerance in each step
-    (`adapters.mujoco.predictions.solver_error`); a start that is off by it says how much that matters.
+    Normal and friction are one convex problem: stopping a slip lifts the box. While it slides or flies that does not
+    change mu. Above mu = 1 or so the box is thrown up and turned, and lands on an edge, where a pyramid's edges across
+    the slip, or a stopping edge, carry load with less friction. Newton's method stops at a tolerance in each step
+    (`adapters.mujoco.predictions.solver_error`), whose effect is found from a start with that error.
     """
     case = Case(needs.dimension, needs.restitution, needs.friction, dt, 0.0)
     scene, steps = slide(case), step_count(SLIDE_TIME, dt)
@@ -236,7 +236,7 @@ def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str,
 
 
 def _second_order_fall() -> dict[str, Declared]:
-    """What the free-fall probe sees of a scheme whose positions follow ``g t^2/2`` without an offset.
+    """Result of the free-fall probe for a scheme whose positions follow ``g t^2/2`` without an offset.
 
     It compares with velocity-first stepping: positions are half a step early, velocities are not; and the path of
     step n, ``(v_n + v_(n-1))/2 dt``, falls short of ``v_n dt``.

@@ -1,4 +1,4 @@
-"""Deviation laws of MuJoCo, as data: which law of `adapters.mujoco.predictions` speaks about which rows, and why."""
+"""Contact laws of MuJoCo, as data: rows covered by each law of `adapters.mujoco.predictions`, and reasons."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _ROLLING = {
     "slide_to_roll": ("final_speed", "slip", "rolling_time", "rolling_place", "hop"),
     "roll_incline": ("acceleration", "turning", "hop"),
 }
-#: Beside the centre the shipped contact lasts so long that the bar turns under it: what then acts is not predicted.
+#: Beside the centre the shipped contact lasts so long that the bar turns under it, which is not predicted.
 _BLOWS = (
     ("default", "head_on", ("rebound_ratio", "first_speed", "second_speed", "impulse")),
     ("default", "flat_box", ("rebound_ratio", "impulse")),

@@ -2,11 +2,10 @@
 
     text -> markup.py (nothing from outside, nothing that only draws) -> MuJoCo's own compiler -> Scene + settings
 
-MuJoCo's compiler says where everything is and what it weighs: frames, defaults, replication, densities and inertias are
-its business. What it compiled must be what a scene can hold: bodies with one shape about their centre of mass, free or
-fixed, which all touch each other. Contact softness, solver options and step become the settings of the profile that
-runs the model as MuJoCo would; other engines are asked for rigid bodies with the model's sliding friction, and for no
-rebound, since MJCF states none.
+MuJoCo's compiler resolves frames, defaults, replication, densities and inertias. The compiled model must fit a scene:
+bodies with one shape about their centre of mass, free or fixed, which can all collide. Contact softness, solver options
+and step become settings of the profile that runs the model as MuJoCo would; other engines run rigid bodies with the
+model's sliding friction, without rebound, since MJCF states none.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def read(text: str, drop: bool) -> Model:
     Raises
     ------
     SceneError
-        Naming the element that has no place in a scene, or with the compiler's complaint.
+        Naming the unsupported element, or with the compiler's error.
     """
     root = parsed(text, "mujoco", "a model of MJCF begins with <mujoco>")
     dropped = cleaned(root, drop)
@@ -55,11 +54,11 @@ def read_tree(
     Parameters
     ----------
     dropped, notes
-        What was left out of it so far, and what a reader of results must know.
+        Elements left out so far, and notes for readers of results.
     tags
-        Elements that the compiled model knows by their names.
+        Elements that the compiled model has by name.
     without
-        Takes one of them out, with what cannot be without it; whether it was there.
+        Removes one of them, with dependent ones; returns whether it was there.
 
     Raises
     ------
@@ -84,7 +83,7 @@ def read_tree(
 
 
 def _without_what_hangs(root: Element, dropped: list[str]) -> None:
-    """Leave out what hangs on something that was left out: shapes without their mesh, bodies without any mass."""
+    """Leave out elements that depend on removed ones: shapes without their mesh, bodies without any mass."""
     meshes = {e.attributes.get("name") for e in root.walk() if e.tag == "mesh"}
     for shape in [e for e in root.walk() if _is_shapeless(e, meshes)]:
         root.without(shape)
@@ -102,7 +101,7 @@ def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
 
 
 def _is_hollow(body: Element) -> bool:
-    """Whether a body can move, and neither states a mass nor has a geom or a body that brings one."""
+    """Whether a body can move but has no mass, itself or by a geom or child body."""
     moves = any(child.tag in ("freejoint", "joint") for child in body.children)
     heavy = any(child.tag in ("inertial", "body", "replicate", "frame") for child in body.children)
     given = [
@@ -114,13 +113,13 @@ def _is_hollow(body: Element) -> bool:
 
 
 def _shown(root: Element, refused: Refused) -> str:
-    """What was refused, where it is no body or geom of the text: an option, or what the compiler made."""
+    """Name of a refused element that is not in the text: an option, or one made by the compiler."""
     where = next((str(child) for child in root.children if child.tag == refused.kind.partition("/")[0]), refused.kind)
     return f"{where}: {one_line(refused.name, 60)}"
 
 
 def filled_in(root: Element) -> Iterator[str]:
-    """Numbers that MuJoCo takes where no geom and no default of geoms states one: friction, and density of bodies."""
+    """MuJoCo's defaults for values that no geom or geom default states: friction, and density of bodies."""
     defaults = [e for top in root.children if top.tag == "default" for e in top.walk() if e.tag == "geom"]
     said = {name for each in defaults for name in each.attributes}
     owners = [(e, [g for g in e.children if g.tag == "geom"]) for e in root.walk() if e.tag in ("worldbody", "body")]
@@ -141,7 +140,7 @@ def _count(geoms: Sequence[Element]) -> str:
 
 
 class _Reading:
-    """One attempt at a model, which either succeeds or says what stands in its way."""
+    """One attempt to read a model, which succeeds or names the obstacle."""
 
     def __init__(
         self, root: Element, drop: bool, dropped: list[str], lines: Mapping[str, Element], notes: list[str]
@@ -168,7 +167,7 @@ class _Reading:
         Raises
         ------
         Refused
-            Naming what has no place in one.
+            Naming an unsupported element.
         """
         m = self.compiled
         settings = option_settings(self.mujoco, m)
@@ -221,7 +220,7 @@ class _Reading:
                 raise Refused("body", body, "its joint has stiffness; a scene's bodies have none")
 
     def _shaped(self) -> Iterator[int]:
-        """Geoms that touch, in the order of the model; each free body has one."""
+        """Colliding geoms, in the order of the model; each free body has one."""
         m = self.compiled
         paired = {int(g) for k in range(m.npair) for g in (m.pair_geom1[k], m.pair_geom2[k])}
         owners: Counter[int] = Counter()
@@ -242,7 +241,7 @@ class _Reading:
                 raise Refused("body", self._name("body", body), "gravcomp: in a scene gravity acts on all bodies alike")
 
     def _names(self, shaped: list[int]) -> list[str]:
-        """Names of bodies: of the body if it is free, of the geom if it is fixed; of some several, numbered."""
+        """Names of bodies: of the body if it is free, of the geom if it is fixed; repeated ones are numbered."""
         m = self.compiled
         found = []
         for g in shaped:
@@ -302,7 +301,7 @@ class _Reading:
         )
 
     def _turns_beside_centre(self, g: int) -> bool:
-        """Whether a geom's body is free, and may turn about another point than its joint moves."""
+        """Whether a geom's body is free, and its centre of mass is not the origin of its joint."""
         weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
         apart = np.abs(self.data.xipos[weld] - self.data.xpos[weld]).max()
         return bool(weld) and float(apart) > ALIGNED * self._shape(g).smallest_size
@@ -323,12 +322,12 @@ class _Reading:
         named = kind.name.removeprefix("mjGEOM_").lower()
         weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
         why = f"{'an' if named[0] in 'aeiou' else 'a'} {named}; a scene has spheres, boxes, rods, hulls and planes"
-        if weld and self.drop:  # a body without its shape is none
+        if weld and self.drop:  # a body needs a shape
             raise Refused("body", self._name("body", weld), f"its geom is {why}")
         raise Refused("geom", self._name("geom", g), why)
 
     def _hull(self, g: int) -> Shape:
-        """Corners of a mesh that states vertices alone: those of its hull, in the compiler's singles."""
+        """Corners of a mesh of vertices only: those of its hull, in the compiler's single precision."""
         m, mesh = self.compiled, int(self.compiled.geom_dataid[g])
         first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
         graph = m.mesh_graph[int(m.mesh_graphadr[mesh]) :]
@@ -344,7 +343,7 @@ class _Reading:
     # ---- contacts ----
 
     def _contacts(self, shaped: list[int], bodies: tuple[Body, ...]) -> dict[tuple[int, int], Contact]:
-        """What MuJoCo does where two bodies touch, for all pairs of which one is free."""
+        """Contact parameters of all pairs with a free body."""
         m = self.compiled
         stated = {frozenset((int(m.pair_geom1[k]), int(m.pair_geom2[k]))): k for k in range(m.npair)}
         found = {}
@@ -370,8 +369,8 @@ class _Reading:
         return found
 
     def _softness(self, contacts: Mapping[tuple[int, int], Contact]) -> list[Setting]:
-        """Settings of the pairs: those of most of them, and the others one by one."""
-        if not contacts:  # one body alone: any softness will do
+        """Settings of the pairs: the most common, and the others one by one."""
+        if not contacts:  # one body only: any softness will do
             contacts = {(0, 0): contact_of(self.compiled, 0, 0, None)}
         usual = Counter(contact.softness for contact in contacts.values()).most_common(1)[0][0]
         smooth = {contact.condim for contact in contacts.values() if contact.friction == 0.0}
@@ -392,9 +391,9 @@ class _Reading:
 
 
 def _in_plane(turn: Any) -> Any:
-    """A turn of what is round about its first axis, about which it may lie anyhow: y stays y where that axis has none.
+    """Rotation of a body round about its first axis, so that y stays y where that axis has no y component.
 
-    MuJoCo's ``fromto`` turns a rod over that points down.
+    MuJoCo's ``fromto`` flips a rod that points down.
     """
     axis = np.where(np.abs(turn[:, 0]) < ROUNDING, 0.0, turn[:, 0])
     if axis[1] != 0.0:

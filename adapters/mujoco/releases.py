@@ -1,4 +1,4 @@
-"""MuJoCo over its releases: what changed in its Python interface, and a writer of MJCF for those without `MjSpec`.
+"""Releases of MuJoCo: changes of its Python interface, and a writer of MJCF for releases without `MjSpec`.
 
 `Mjcf` has the few methods of ``mujoco.MjSpec`` that `adapters.mujoco.spec` calls, and writes the same model as text.
 Numbers are written with all their digits, so that both ways compile to the same model, bit by bit
@@ -51,7 +51,7 @@ RELEASES = Releases(
 
 
 def empty_spec(mujoco: Any) -> Any:
-    """An empty ``MjSpec``, or what stands for it in releases whose own cannot be written as the adapter does."""
+    """An empty ``MjSpec``, or its replacement in releases whose own does not support the adapter's calls."""
     try:
         spec = mujoco.MjSpec()
         spec.worldbody.add_body(name="asked")
@@ -67,7 +67,7 @@ def no_autoreset(mujoco: Any) -> int:
 
 
 def check_state(mujoco: Any, data: Any) -> None:
-    """Refuse to go on from a state that was reset because it was not finite.
+    """Refuse to continue from a state that was reset because it was not finite.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def check_state(mujoco: Any, data: Any) -> None:
 
 
 def geom_margin(mujoco: Any, margin: float) -> float:
-    """What a geom must have for two of them to make a contact's ``margin`` [m]."""
+    """Margin of a geom so that two of them give a contact's ``margin`` [m]."""
     return margin if _older(mujoco, 3, 5) else 0.5 * margin
 
 
@@ -93,7 +93,7 @@ def _older(mujoco: Any, major: int, minor: int) -> bool:
 
 
 def silence(mujoco: Any) -> None:
-    """Switch the log off, where a release lets us."""
+    """Switch the log off, where a release allows it."""
     if hasattr(mujoco, "MjLogConfig"):
         log = mujoco.MjLogConfig.get()
         log.logto_file = log.logto_console = False
@@ -123,7 +123,7 @@ class Mjcf:
     def add_load(self, name: str, wrench: tuple[float, ...]) -> None:
         """Push a free body with a constant force and torque, (6,) world axes [N, N m].
 
-        An actuator without gain whose bias is 1: its gear is what acts. ``jointinparent`` means world axes.
+        An actuator without gain whose bias is 1, so its gear is the force. ``jointinparent`` means world axes.
         """
         joint = self.worldbody.element.find(f"body[@name='{name}']/freejoint")
         assert joint is not None
@@ -133,11 +133,11 @@ class Mjcf:
         ElementTree.SubElement(self._actuator, "general", given)
 
     def add_key(self, **attributes: Any) -> None:
-        """Add a state to start from."""
+        """Add a start state."""
         self._keys.append(ElementTree.Element("key", _text(attributes)))
 
     def add_mesh(self, *, name: str, uservert: list[float]) -> None:
-        """Add a mesh by its corners, whose hull is what touches."""
+        """Add a mesh by its corners, whose hull collides."""
         self._meshes.append(ElementTree.Element("mesh", {"name": name, "vertex": _written(uservert)}))
 
     def compile(self) -> Any:
@@ -159,7 +159,7 @@ class Mjcf:
             solver = mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_")
             said["solver"] = {"NEWTON": "Newton"}.get(solver, solver)
         option = ElementTree.SubElement(self._root, "option", _text(said))
-        members = mj.mjtDisableBit.__members__.values()  # one of them is their number
+        members = mj.mjtDisableBit.__members__.values()  # one of them is their count
         off = [bit.name for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
         on = [bit.name for bit in mj.mjtEnableBit.__members__.values() if int(bit) & enabled]
         if off or on:

@@ -2,9 +2,9 @@
 
     text -> nothing from outside, nothing that only draws -> MuJoCo's own compiler -> model.py
 
-URDF does not say whether a robot is held: as in Bullet and Gazebo its root is free, unless it is called ``world`` or
-has no mass. It states neither friction, nor softness, nor a floor: what MuJoCo takes for them is said. Joints that are
-neither fixed nor floating, and meshes, have no place in a scene.
+URDF does not define whether a robot is fixed: as in Bullet and Gazebo its root is free, unless it is called ``world``
+or has no mass. It has neither friction, nor softness, nor a floor: MuJoCo's defaults are used, with notes. Joints that
+are neither fixed nor floating, and meshes, are not supported.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ KEPT = frozenset(
     ("robot", "link", "joint", "inertial", "mass", "inertia", "origin", "collision", "geometry", "box", "sphere",
      "cylinder", "capsule", "parent", "child", "axis")
 )  # fmt: skip
-#: Elements that only draw, or speak of motors that a joint which is free or fixed has none of.
+#: Elements that only draw, or belong to motors, which free and fixed joints do not have.
 SILENT = frozenset(["visual", "material", "transmission", "ros2_control", "verbose", "sensor"])
-#: Elements that a scene has no place for, or that another program reads, and why.
+#: Unsupported elements, and those of other programs, with reasons.
 NO_PLACE = {
     "mesh": "a scene has no meshes",
     "sdf": "other files are not read",
@@ -36,7 +36,7 @@ NO_PLACE = {
     "safety_controller": "a scene has no motors",
     "calibration": "a scene has no motors",
 }
-#: Name of a link that holds what hangs on it.
+#: Name of a link that fixes its children.
 WORLD = "world"
 
 
@@ -67,7 +67,7 @@ def read(text: str, drop: bool) -> Model:
     root.children.insert(0, own)
 
     def without(gone: Element) -> bool:
-        """Leave out a link with the joint that it hangs by, or a shape."""
+        """Leave out a link with its joint, or a shape."""
         name = gone.attributes["name"]
         hung = [e for e in root.children if gone.tag == "link" and e.tag == "joint" and _link_of(e, "child") == name]
         for joint in hung:
@@ -78,7 +78,7 @@ def read(text: str, drop: bool) -> Model:
 
 
 def _cut(root: Element, joint: Element) -> None:
-    """Leave out a joint, the link that hangs by it, and all that hangs on that one."""
+    """Leave out a joint with its link and all descendants."""
     if not root.without(joint):
         return
     name = _link_of(joint, "child")
@@ -89,7 +89,7 @@ def _cut(root: Element, joint: Element) -> None:
 
 
 def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[str]:
-    """Hang the root on the world by a floating joint, unless it is the world or has no mass; says so."""
+    """Attach the root to the world by a floating joint, unless it is the world or has no mass; adds a note."""
     held = {_link_of(joint, "child") for joint in joints}
     roots = [link for link in links if link.attributes["name"] not in held]
     if len(roots) != 1:
@@ -112,5 +112,5 @@ def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[
 
 
 def _link_of(joint: Element, end: str) -> str:
-    """Name of the link at one end of a joint; empty where it states none."""
+    """Name of the link at one end of a joint; empty if missing."""
     return next((child.attributes.get("link", "") for child in joint.children if child.tag == end), "")

@@ -1,6 +1,6 @@
 """Quantities of contacts over time for checks of a scene file: forces, numbers of contacts, overlaps without force.
 
-    step by step:   |impulse of a step| / dt the finest resolution of a force
+    step by step:   |impulse of a step| / dt        the finest resolution of a force
     window:         the end of the run, or the step that contains an instant
     told by:        mean, least, greatest, spread   (`validation.metrics.OVER_TIME`)
 

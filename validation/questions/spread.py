@@ -1,8 +1,8 @@
 """Distance of engines on a scene without closed form, at the horizon of predictability.
 
     horizon    time until which a disturbance in the last place stays small, from the certified
-               run of our own solver says; the end of the run where it says nothing against
-    spread     largest distance of a free body's centre from where that run has it, at the horizon [m]
+               run of our own solver; at most the end of the run
+    spread     largest distance of a free body's centre from its place in that run, at the horizon [m]
 
 Beyond the horizon two correct engines differ; before it they must not. Distances are from recordings, whose positions
 are rounded to 1/32767 of half their range; smaller distances count as 0.
