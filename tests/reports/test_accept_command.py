@@ -42,7 +42,7 @@ def out(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "findings_folder", lambda engine: folder / engine)
         result = call("accept", "--engine", "chipmunk", "--jobs", 1, "--out", folder)
-    assert "4 cells with moved starts" in result.stderr, result.output
+    assert "4 cases with moved starts" in result.stderr, result.output
     return folder
 
 

@@ -6,8 +6,8 @@
         |   |             nothing moves, drifts or sinks
     ==============
 
-The light box is pressed between two large forces that all but cancel. What a solver leaves of them, or softness in
-units of the light box's own mass, squeezes it out or lets the heavy one sink in. It starts exactly touching.
+The light box is pressed between two large forces that nearly cancel. The residual of a solver, or softness in units of
+the light box's mass, squeezes it out or lets the heavy one sink in. It starts in exact contact.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def track(scene: Scene) -> Track:
-    """The heavy box stays where it is."""
+    """The heavy box at rest."""
     top = scene.bodies[-1]
     return Track(top.name, lambda t: top.pose[: scene.dimension])
 

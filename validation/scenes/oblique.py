@@ -6,8 +6,8 @@ r"""A ball is thrown at the floor with spin: it grips, slips or comes back.
     ========|/=====           slips otherwise:
                                  v' = v -+ mu (1 + e) v_n,      w' r = w r +- mu (1 + e) v_n/k
 
-Coulomb's law of friction for an impact, with Newton's restitution along the normal; no gravity. Backspin that is fast
-enough sends the ball back: v' < 0 where -k w r > v, what a table tennis ball does.
+Coulomb's law of friction for an impact, with Newton's restitution along the normal; no gravity. Enough backspin sends
+the ball back: v' < 0 where -k w r > v, as with a table tennis ball.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """One contact: exact at every step, but that the ball is found up to one step of its fall inside the floor."""
+    """One contact: exact at every step, except that the ball is found up to one step of its motion inside the floor."""
     p, r = scene.params, scene.params["radius"]
     depth, scale = p["fall"] * dt, abs(p["v"]) + abs(p["spin"]) + p["fall"]
     source = "Coulomb's law of friction for an impact, Newton's law of restitution; angular momentum"
@@ -114,7 +114,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Distance of speed and spin from theirs, over the slip at the start."""
+    """Distance of speed and spin from the exact ones, over the slip at the start."""
     truth, p, off = exact(scene), scene.params, []
     for name in ("forward_speed", "spin_speed"):
         value, reason = found[name]

@@ -1,11 +1,12 @@
-"""A ball is released on an incline: it rolls, or slides and turns where friction cannot keep up.
+"""A ball is released on an incline: it rolls, or slides and turns where friction is too small.
 
         ( ) ->                 mu >= tan(theta) k/(1 + k):   a = g sin(theta)/(1 + k),  w' r = a
     ==============             less:                         a = g (sin(theta) - mu cos(theta)),
       gravity turned                                         w' r = mu g cos(theta)/k
 
-k = I/(m r^2): a disc needs a third of tan(theta) to roll, a ball two sevenths. Gravity is turned by theta, not the
-floor, as a tilted, touching start is not representable exactly. ``ratio`` is tan(theta) k/((1 + k) mu): 1 is the limit.
+k = I/(m r^2): a disc needs a third of tan(theta) to roll, a ball two sevenths. Gravity is rotated by theta, not the
+floor, as a tilted start in contact is not exactly representable. ``ratio`` is tan(theta) k/((1 + k) mu): 1 is the
+limit.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def _rates(scene: Scene, arm: float) -> tuple[float, float]:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Rolling friction is what rolling takes, up to Coulomb's limit."""
+    """The friction of rolling, up to Coulomb's limit."""
     acceleration, turning = _rates(scene, scene.params["radius"])
     return {"acceleration": acceleration, "turning": turning, "hop": 0.0}
 

@@ -1,11 +1,11 @@
-"""A ball rolls and spins about the vertical as well: a point of contact cannot brake that spin.
+"""A ball rolls and spins about the vertical: a contact point cannot brake that spin.
 
          | s                  spin about the normal: s for ever
         (|)  -->  v           speed:                 v for ever, straight on
     ====================
 
-Friction at a point has no lever arm about the normal, and a rolling point does not slip: Coulomb's law takes nothing
-from either. Spin that decays is torsional friction, speed that decays is resistance to rolling; neither was asked for.
+Friction at a point has no lever arm about the normal, and a rolling point does not slip: Coulomb's law changes neither.
+A decay of spin is torsional friction, a decay of speed rolling resistance; the scene has neither.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Nothing acts but the load and what carries it."""
+    """Only weight and normal force act."""
     return {"spin": scene.params["spin"], "speed": scene.params["v"], "hop": 0.0, "astray": 0.0}
 
 
@@ -50,9 +50,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Exact at every step, but that a contact found one step late is g dt^2 deep: rolling there needs less speed.
+    """Exact at every step, except that a contact found one step late is g dt^2 deep: rolling there needs less speed.
 
-    The impulse that makes it roll on the shorter arm is told by the law of an impact that grips.
+    The impulse that makes it roll on the shorter lever arm follows from the law of a gripping impact.
     """
     p, r = scene.params, scene.params["radius"]
     depth = p["g"] * dt * dt
@@ -77,7 +77,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Spin that is lost, relative to the spin."""
+    """Lost share of the spin."""
     value, reason = found["spin"]
     return (None, reason) if value is None else (abs(value / scene.params["spin"] - 1.0), "")
 

@@ -1,13 +1,12 @@
-r"""The same scene in millimetres and in kilometres, in grams and in tons: lengths and masses carry no physics here.
+r"""The same scene in millimetres and kilometres, in grams and tons: the results must not depend on the scale.
 
        o  h = 2 L               the ball rises to  e^2  of its fall
        |        _____
        v       |_____| v ->     the box stops after  v^2/(2 mu g)
     ==========================  every length times L, gravity too: times stay what they are, and so does the step
 
-All numbers are told in units of L, and all answers must be the same. What differs is what an engine measures in metres
-of its own: slops, margins and thresholds of speed that suit bodies of about one metre. A threshold of 1 cm is nothing
-for a ship and all of a pebble.
+All numbers are in units of L, and all results must be equal. Differences come from fixed lengths of an engine: slops,
+margins and speed thresholds that suit bodies of about one metre. 1 cm is nothing for a ship and the size of a pebble.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Param
 from validation.scenes.parts import along, at, ball, floor, states, upward
 from validation.truths import sliding
 
-#: In units of L: radius and drop of the ball, size of the box, and how far apart they are.
+#: In units of L: radius and drop of the ball, size of the box, and their distance.
 RADIUS, DROP, SIDE, APART = 0.5, 2.0, 1.0, 5.0
 #: Restitution of the ball; friction, speed of the box in L/s, and gravity in L/s^2.
 E, MU, SPEED = 0.5, 0.3, 2.0
 
 
 def _sliding(p: Params) -> dict[str, float]:
-    """What `validation.truths.sliding` asks of a scene, in metres."""
+    """Parameters for `validation.truths.sliding`, in metres."""
     return {"v": SPEED * p["length"], "mu": MU, "g": GRAVITY * p["length"], "mass": p["mass"]}
 
 
@@ -60,12 +59,12 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def _slide(scene: Scene) -> Scene:
-    """The same scene, with the parameters of what slides."""
+    """The same scene, with the parameters of the slide."""
     return replace(scene, params=_sliding(scene.params))
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Way and braking of the box, and the first apex of the ball, over L."""
+    """Distance and braking of the box, and the first apex of the ball, over L."""
     length, d = scene.params["length"], scene.dimension
     found = sliding.measure(_slide(scene), trajectory)
     measured = {name: (None if value is None else value / length, why) for name, (value, why) in found.items()}
@@ -75,7 +74,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a slide and a rebound owe in metres, over L: the same at every length."""
+    """The checks of a slide and a rebound in metres, over L: the same at every length."""
     p, length = scene.params, scene.params["length"]
     metres = {name: value * length for name, value in truth.items()}
     found = [
@@ -99,7 +98,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Larger of the relative errors of the way of the box and of the apex of the ball."""
+    """Larger of the relative errors of the box's distance and the ball's apex."""
     return metrics.relative_error(found, exact(scene), ("stopping_distance", "apex"))
 
 

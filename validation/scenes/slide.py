@@ -5,7 +5,7 @@
     ==================      straight on, without turning or hopping;
        |<------ d ------>|      pressed by m g and braked by mu m g at every step
 
-In space it may head in any direction against the box's edges, which Coulomb's law does not know of: a cone that is a
+In 3-D it may move in any direction relative to the box's edges, on which Coulomb's law does not depend: a friction
 pyramid brakes less along its diagonals or turns the path.
 """
 
@@ -31,13 +31,13 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """A slide's truth, and its forces: relative to the weight and to mu times it."""
+    """The truth of a slide, and its forces, relative to the weight and to mu times it."""
     forces = {f"{force}[{by}]": 1.0 for force in ("normal", "friction") for by in ("mean", "least", "greatest")}
     return sliding.exact(scene) | forces
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """What is measured of a slide, and the floor's force over its middle half, upwards and against the heading."""
+    """The metrics of a slide, and the floor's force over its middle half, upwards and against the heading."""
     p, long = scene.params, sliding.stop(scene.params)
     floor_force = metrics.forces(trajectory, 1, [0], 0.25 * long, 0.75 * long) / (p["mass"] * p["g"])
     along_way = floor_force[:, : scene.dimension - 1] @ heading(scene)
@@ -49,7 +49,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a slide owes, and its forces: it moves neither up nor down, and friction is mu times the normal force."""
+    """The checks of a slide, and of its forces: no vertical motion, and friction is mu times the normal force."""
     window = 0.5 * sliding.stop(scene.params)
     return [
         *sliding.checks(scene, dt, truth),

@@ -1,4 +1,4 @@
-r"""A block slides down a wedge that is free to give way: each pushes the other, and what the floor cannot hold moves.
+r"""A block slides down a free wedge, which gives way on a smooth floor.
 
     |\                A = N (sin(alpha) - mu cos(alpha))/M           the wedge, to the left
     | \[]  a ->       N = m g cos(alpha)/(1 + (m/M) sin(alpha) (sin(alpha) - mu cos(alpha)))
@@ -7,7 +7,8 @@ r"""A block slides down a wedge that is free to give way: each pushes the other,
   ================    no friction on the floor:  m u + M U = 0 at all times
 
 [Any textbook of mechanics, with mu = 0.] Two bodies accelerate at once through a contact that accelerates too: a solver
-that holds the wedge while it moves the block, or gives way step by step, misses the load on the face and with it both.
+that holds the wedge while it moves the block, or moves them in turns, gets the load on the face wrong, and so both
+accelerations.
 """
 
 from __future__ import annotations
