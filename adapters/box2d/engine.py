@@ -1,9 +1,9 @@
-"""Box2D 2.3 behind the plugin line: planar, sequential impulses, warm starting, and positions put right afterwards.
+"""The adapter of Box2D 2.3: planar, sequential impulses, warm starting, and position correction afterwards.
 
     step:  detect  ->  v += (g + f/m) dt  ->  restitution from v  ->  warm start  ->  N sweeps over velocities
            ->  x += v dt  ->  sweeps over positions (no velocities)  ->  sweep what moves against what does not
 
-It computes in single precision. Names in the sources are those of Box2D's own files.
+It computes in single precision. Names in sources are Box2D's own files.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Box2DEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """The skin around what is landed on and what lands."""
+        """The skin around both shapes of a landing."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
         skin = settings["skin"] / settings["units_per_metre"]
         declared = {}
@@ -100,7 +100,7 @@ class Box2DEngine(CheckedEngine):
         return declared
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: arguments of a step, attributes of the world and of shapes, and the unit to choose."""
+        """Python: arguments of a step, attributes of the world and of shapes, and the unit of length."""
         lines = [
             f"# world: your b2World, stepped with world.Step({dt:.9g}, {settings['iterations']}, "
             f"{settings['position_iterations']})"

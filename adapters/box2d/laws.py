@@ -1,4 +1,4 @@
-"""What Box2D does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Box2D from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 
 
 def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, and none that rebounds at up to one unit a second."""
+    """Blows in single precision, without restitution at up to one unit per second."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
@@ -113,7 +113,7 @@ DEVIATIONS += tuple(
         "b2Settings.h, float32; band in adapters/single_motions.py",
         CHECKED_ON,
     )
-    # What the threshold takes of the energy as shipped is no rounding: that is a finding.
+    # The threshold's loss of energy as shipped is no round-off, but a finding.
     for profile, metrics in (
         ("default", ("momentum_defect", "asymmetry")),
         ("tuned", ("momentum_defect", "energy_defect", "asymmetry")),

@@ -1,10 +1,10 @@
-"""Profiles of Box2D 2.3: settings with their reasons.
+"""Profiles of Box2D 2.3: settings and their reasons.
 
 default   as shipped
-tuned     best stock settings for what a scene needs
+tuned     best stock settings for the needs of a scene
 
-Most numbers of Box2D are lengths that are compiled in. What a user can choose instead is the unit: its manual says to
-scale a world whose bodies are not between 0.1 and 10 units large. ``units_per_metre`` is that choice.
+Most parameters of Box2D are compiled-in lengths. A user can choose the unit instead: its manual recommends scaling a
+world whose bodies are not between 0.1 and 10 units large. ``units_per_metre`` is that choice.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
 )
 #: Largest unit that `tuned` chooses: slop and threshold are then 0.08 mm and 16 mm/s.
 FINEST = 64.0
-#: Skin of boxes that rest, in `tuned` [length].
+#: Skin of resting boxes in `tuned` [length].
 THIN = 1e-4
 
 
@@ -98,10 +98,10 @@ _WHY_UNITS = (
 
 
 def units(needs: Needs, dt: float) -> float:
-    """Largest power of two, at most `FINEST` and at least 1, in which the fastest body of a scene is not cut."""
-    # A rebound can double a speed, and blows can give the energy of a heavy body to a light one.
+    """Largest power of two, at most `FINEST` and at least 1, without clamping the fastest body of a scene."""
+    # A rebound can double a speed, and blows can transfer the energy of a heavy body to a light one.
     gain = max(2.0, math.sqrt(needs.mass_ratio)) if needs.regime == "impact" else 2.0
-    # Receipts are measured with these settings too, on a box that slides so fast.
+    # Property checks use these settings too, with a box that slides so fast.
     fastest = dt * max(gain * needs.top_speed, slide_speed(needs.friction))
     return min(FINEST, max(1.0, 2.0 ** math.floor(math.log2(MAX_TRANSLATION / fastest))))
 

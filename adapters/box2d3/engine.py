@@ -1,9 +1,9 @@
-"""Box2D 3.1 behind the plugin line: planar, soft contacts, small steps with warm starting, single precision.
+"""The adapter of Box2D 3.1: planar, soft contacts, substeps with warm starting, single precision.
 
     step:  detect  ->  n times: v += g dt/n, contacts as springs that are solved with the velocities, x += v dt/n,
            contacts once more without their springs  ->  restitution  ->  sweep what moves against what does not
 
-Names in the sources are those of Box2D's own files.
+Names in sources are Box2D's own files.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Box2D3Engine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         if restitutions(scene) is None:
             return "pairs: restitution of a pair is the larger of two values here; no values per body give this table"
         if frictions(scene) is None:
@@ -100,7 +100,7 @@ class Box2D3Engine(CheckedEngine):
         return super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing so far."""
+        """No deviations so far."""
         return {}
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:

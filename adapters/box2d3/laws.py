@@ -1,4 +1,4 @@
-"""What Box2D 3.1 does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Box2D 3.1 from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def _chosen(profile: str) -> Chosen:
 
 
 def _lengths(profile: str) -> Callable[[Scene, float], tuple[float, float]]:
-    """Units a metre of a profile, and its skin around polygons."""
+    """Units per metre of a profile, and its skin around polygons."""
     return lambda scene, dt: (_chosen(profile)(scene, dt)["units_per_metre"], 0.0)
 
 
 def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, that rebound above the threshold, after friction."""
+    """Blows in single precision, with restitution above the threshold, after friction."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         threshold = Threshold(_chosen(profile)(scene, dt)["restitution_threshold"], rebounds_at=True)
@@ -113,7 +113,7 @@ DEVIATIONS += tuple(
         (profile,),
         "edge_drop",
         metric,
-        # What approaches just as fast as the threshold rebounds here.
+        # An impact exactly at the threshold rebounds here.
         corner_law(
             metric, _lengths(profile), math.nextafter(RESTITUTION_THRESHOLD, 0.0) if profile == "default" else 0.0
         ),

@@ -1,7 +1,7 @@
-"""Profiles of Box2D 3.1: settings with their reasons.
+"""Profiles of Box2D 3.1: settings and their reasons.
 
 default   as shipped
-tuned     contacts as stiff as the small steps resolve, more of those, and a threshold of what gravity adds in a step
+tuned     contacts as stiff as the substeps resolve, more substeps, and the speed of one step of gravity as threshold
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from adapters.box2d3.shipped import (
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
-#: Small steps of `tuned`.
+#: Substeps of `tuned`.
 TUNED_SUBSTEPS = 8
-#: Units a metre of `tuned`, for what rests or slides.
+#: Units per metre of `tuned`, for resting or sliding bodies.
 FINEST = 64.0
-#: Damping ratios of `tuned`: of what slides, and of all else.
+#: Damping ratios of `tuned`: for sliding bodies, and for all others.
 SLIDING_DAMPING, RESTING_DAMPING = 50.0, 2000.0
 
 KINDS: Mapping[str, settings.Check] = MappingProxyType(

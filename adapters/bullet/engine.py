@@ -1,6 +1,6 @@
-"""Bullet behind the plugin line: facts, refusals, and what its profiles declare.
+"""The adapter of Bullet: facts, refusals, and declarations of its profiles.
 
-Source references are to bulletphysics/bullet3 at 6c888f4, the commit that the 3.2.7 wheels were built from.
+Source references are to bulletphysics/bullet3 at 6c888f4, the commit of the 3.2.7 wheels.
 """
 
 from __future__ import annotations
@@ -120,11 +120,11 @@ class BulletEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
-        """Version of the installed wheel; PyBullet itself does not know it, and prints a line where it is imported."""
+        """Version of the installed wheel; PyBullet itself has no version, and prints a line at import."""
         return version("pybullet")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse sizes and moments that Bullet cannot hold, too much friction, and unfactorable materials."""
+        """Refuse sizes and moments beyond Bullet's range, too much friction, and unfactorable materials."""
         for body in scene.bodies:
             if body.shape.smallest_size < SMALLEST_SIZE:
                 return f"{body.name}.shape: bullet needs sizes of at least {SMALLEST_SIZE:g} m"
@@ -166,7 +166,7 @@ class BulletEngine(CheckedEngine):
         return {name: (word, settings[name]) for name, word in _WORDS.items() if name in settings}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
+        """Drag and rebounds of the multibody path as shipped; the too fast rebounds of `one`; friction of all."""
         law = law_of(profile, needs, dt)
         declared = _sliding(profile, law, needs, dt) if 0.0 < needs.friction <= MOST_FRICTION else {}
         if profile == "one":
@@ -186,16 +186,16 @@ class BulletEngine(CheckedEngine):
         return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
 
 
-#: What pybullet calls a setting otherwise than we do.
+#: Settings with another name in pybullet.
 _WORDS = {"iterations": "numSolverIterations"}
 
 
 def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str, Declared]:
     """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
 
-    A contact point under a fast box that comes or goes holds the friction of a step without its load; a slide has one
-    at each end at most, and more where the box hops (`_hopping`). On the rigid-body path that adds friction and never
-    takes any (measured at 1/60 .. 1/960 s).
+    A contact point that appears or disappears under a fast box has friction in a step without load; a slide has one at
+    each end at most, and more where the box hops (`_hopping`). On the rigid-body path that adds friction and never
+    reduces it (measured at 1/60 .. 1/960 s).
     """
     friction, share = needs.friction, dt / SLIDE_TIME
     because = "contact points under a fast box come and go: at each end of the slide a step may lack its load"
@@ -211,24 +211,24 @@ def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str
     slowed = drag_share(law, slide_speed(friction), friction * slide_load(friction), dt, SLIDE_TIME)
     drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
     return {
-        # What is measured is all that slows the box over its load: a step without load counts for the drag as well.
+        # The probe measures the whole deceleration over the load: drag counts in a step without load as well.
         "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction * (1.0 + slowed), drag),
         "friction_impulse": Declared(friction, 2.0 * share * friction, because),
     }
 
 
-#: Slop from which a box that hops within it may unload a point, in falls of a step: half of that at which it must.
+#: Slop from which a hopping box may unload a point, in falls of a step: half of the slop at which it must.
 UNLOADS = 0.25
 
 
 def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
-    """Share of the sliding probe's steps in which the box may hop on its floor instead of resting on it.
+    """Share of the sliding probe's steps in which the box may hop instead of rest on its floor.
 
-    A box sinks by the slop in a step, ``q g dt^2``, and with restitution leaves by it in the next, for both ends of the
-    hop are contacts; the step down carries 1 - 2 q of the weight, the step up 1 + 2 q. From q = 1/2 on a step carries
-    nothing, and a point of a tilted load loses its own before (measured from 0.45 on, at 1/240 and 1/960 s): half of
-    that is asked for here. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Solved without
-    the last step's impulses, without slop or with a higher threshold the friction is exact.
+    A box sinks by the slop in a step, ``q g dt^2``, and with restitution rises by it in the next, because both ends of
+    the hop are contacts; the step down carries 1 - 2 q of the weight, the step up 1 + 2 q. From q = 1/2 on a step
+    carries nothing, and a point with less load loses it earlier (measured from 0.45 on, at 1/240 and 1/960 s): the
+    limit here is half of that. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Without warm
+    starting, without slop or with a higher threshold the friction is exact.
     """
     load = slide_load(friction)
     hop = 0.5 * load * dt
@@ -239,7 +239,7 @@ def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
 
 
 def _gain(law: ContactLaw, e: float, dt: float) -> Declared:
-    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and one met within the slop loses slop/dt."""
+    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and an impact within the slop loses slop/dt."""
     lost = law.slop / (REBOUND_SPEED * dt)
     because = (
         "found 0 .. v dt deep; a share contactERP of that per step becomes speed; within the slop, slop/dt is lost"

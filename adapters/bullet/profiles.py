@@ -1,6 +1,6 @@
-"""Bullet's profiles: settings with their reasons.
+"""Bullet's profiles: settings and their reasons.
 
-default   Featherstone multibody path, as shipped: what `createMultiBody` gives whoever changes nothing
+default   Featherstone multibody path, as shipped: `createMultiBody` without further settings
 tuned     rigid-body path; settings for rebounds where the scene has impacts, else settings for rest; faces are clipped
           where there are hulls
 one       rigid-body path, one compromise for every scene
@@ -54,7 +54,7 @@ BODY = frozenset(
         "spinningFriction",
     }
 )
-#: Settings that PyBullet takes as an int.
+#: Integer settings of PyBullet.
 WHOLE = frozenset(
     {
         "constraintSolverType",
@@ -97,7 +97,7 @@ def default(needs: Needs, dt: float) -> list[Setting]:
 
 
 def _rigid_body() -> list[Setting]:
-    """Settings that every tuned scene shares."""
+    """Common settings of all tuned scenes."""
     solver = "btSequentialImpulseConstraintSolver.cpp"
     return [
         Setting(
@@ -127,7 +127,7 @@ def _rigid_body() -> list[Setting]:
 
 
 def _faces(needs: Needs) -> list[Setting]:
-    """Clipping of faces, where there are hulls: boxes against boxes have a way of their own without it."""
+    """Clipping of faces where there are hulls: two boxes have their own algorithm without it."""
     if not needs.hulls:
         return []
     because = (
@@ -138,7 +138,7 @@ def _faces(needs: Needs) -> list[Setting]:
 
 
 def tuned(needs: Needs, dt: float) -> list[Setting]:
-    """Choose between settings for impacts and for rest: one knob, the split impulse, helps one and harms the other."""
+    """Choose between settings for impacts and for rest: the split impulse improves one and harms the other."""
     if needs.regime == "rest":
         return [
             *_rigid_body(),
@@ -190,7 +190,7 @@ def law_of(profile: str, needs: Needs, dt: float) -> ContactLaw:
 
 
 def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """World and body parameters of a profile, validated: PyBullet ignores a bad value without a word.
+    """World and body parameters of a profile, validated: PyBullet silently ignores a bad value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Chipmunk (Munk2D) through pymunk, behind the plugin line: planar, impulse-based, fixed sweeps.
+"""The adapter of Chipmunk (Munk2D) through pymunk: planar, impulse-based, a fixed number of iterations.
 
     step:  x += (v + v_bias) dt  ->  detect  ->  bounce = e v.n (before forces)  ->  v += (g + f/m) dt
            ->  warm start  ->  N sweeps over the contacts (accumulated clamping, friction with the current total)
@@ -91,7 +91,7 @@ class ChipmunkEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Pair tables that no product of two numbers can represent, and masses whose inverse overflows."""
+        """Pairs that are no product of two body values, and masses whose inverse overflows."""
         for body in scene.bodies:
             if body.motion == "free" and not math.isfinite(1.0 / body.mass + 1.0 / moment(body)):
                 return f"{body.name}.mass: the inverse of mass or inertia overflows, the engine's state would be NaN"
@@ -109,7 +109,7 @@ class ChipmunkEngine(CheckedEngine):
         return checked(settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: attributes of the space, and how deep touching bodies start."""
+        """Python: attributes of the space, and the start overlap of touching bodies."""
         needed = needs(scene)
         told = {"collision_slop": "  # a thousandth of the smallest body"}
         if settings["collision_slop"] != SLOP_SHARE * needed.smallest_size:
@@ -123,7 +123,7 @@ class ChipmunkEngine(CheckedEngine):
         return "\n".join(["# space: your pymunk.Space", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
-        """Chipmunk has no setting for where bodies start."""
+        """Chipmunk has no setting for the start overlap."""
         deep = settings["start_overlap"]
         is_share = deep > 0.0 and deep == START_SHARE * (needs(scene).pull * dt * dt)
         said = f"{START_SHARE:g}*g*dt^2" if is_share else deep
@@ -132,10 +132,10 @@ class ChipmunkEngine(CheckedEngine):
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Single contacts and constant forces are exact here; totals of impulses are not where e = 1 and friction meet.
 
-        A contact that parts and touches again within the persistence keeps its old impulse and does not apply it: what
-        it tells is that plus what acted, so that no step tells less than what acted in it, nor more than all that has
-        acted so far. Over the probe's N steps that is from 1 to N times the sum. Where anything of a hop is lost the
-        probe's box lies still before its impulses count, and they are exact (measured: e = 0.99, 1/60 to 1/960 s).
+        A contact that opens and closes again within the persistence keeps its old impulse without applying it. It
+        reports the sum of both: no less than the step's impulse, and no more than the sum of all impulses so far. Over
+        the probe's N steps that is from 1 to N times the sum. With any loss the probe's box rests before its impulses
+        count, and they are exact (measured: e = 0.99, 1/60 to 1/960 s).
         """
         kept = {s.name: s.value for s in self.settings(profile, needs, dt)}["collision_persistence"] > 1
         if not kept or needs.restitution < 1.0 or needs.friction == 0.0:

@@ -1,4 +1,4 @@
-"""What Chipmunk does by design instead of the textbook, predicted from scene and step alone: it sweeps nothing."""
+"""Designed deviations of Chipmunk from the textbook, predicted from scene and step only: it has no swept detection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.unswept import Push, passing_law, shoved_law
 
 
 def _pushed(profile: str) -> Push:
-    """Push-out of overlaps beyond the slop, in the step after; ``collision_bias`` is the share that a second leaves."""
+    """Correction of overlaps beyond the slop, in the next step; ``collision_bias`` is the share left after a second."""
 
     def push(scene: Scene, dt: float, overlap: float) -> float:
         chosen = {s.name: s.value for s in PROFILES[profile](needs(scene), dt)}

@@ -1,7 +1,7 @@
-"""Chipmunk's profiles: settings with their reasons.
+"""Chipmunk's profiles: settings and their reasons.
 
 default   as shipped
-tuned     best stock settings for what a scene needs
+tuned     best stock settings for the needs of a scene
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, Check, finite, number, whole
 
-#: What a setting may be. Those of `UNSET` are Chipmunk's own as long as nobody sets them.
+#: Ranges of settings. Those of `UNSET` are Chipmunk's own unless they are set.
 KINDS: Mapping[str, Check] = MappingProxyType(
     {
         "iterations": whole(1, LARGEST_INT),
@@ -30,15 +30,15 @@ KINDS: Mapping[str, Check] = MappingProxyType(
     }
 )
 UNSET = ("damping", "idle_speed_threshold", "sleep_time_threshold")
-#: Overlap that is never pushed out, as a share of the smallest body.
+#: Overlap without correction, as a share of the smallest body.
 SLOP_SHARE = 1e-3
-#: How deep touching bodies start, as a share of the way that they fall in a step.
+#: Start overlap of touching bodies, as a share of the fall in a step.
 START_SHARE = 0.3
 SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
-    """As shipped: what ``pymunk.Space()`` holds."""
+    """As shipped: the values of ``pymunk.Space()``."""
     shipped, source = "as shipped", "cpSpace.c, cpSpaceInit"
     return [
         Setting("iterations", ITERATIONS, shipped, source),
@@ -97,7 +97,7 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
 
 
 def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
-    """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
+    """Start overlap of touching bodies [m]: a share of g dt^2, and at most half the slop."""
     fall = START_SHARE * (needs.pull * dt * dt)
     return min(0.5 * slop, fall) if fall > 0.0 else 0.5 * slop
 
@@ -106,7 +106,7 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profi
 
 
 def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; a bad number would abort the process."""
+    """Settings with valid names and values for the engine; a bad value would abort the process."""
     for name in settings:
         if name not in KINDS:
             raise EngineError(f"{name}: chipmunk has no such setting, it has {', '.join(SETTING_NAMES)}")

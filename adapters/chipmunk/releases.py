@@ -1,4 +1,4 @@
-"""pymunk over its releases: what changed in what the adapter reads."""
+"""pymunk over its releases: changes of the readings of the adapter."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Drake behind the plugin line: spatial, compliant contact that is solved implicitly, discrete steps.
+"""The adapter of Drake: spatial, compliant contact, solved implicitly in discrete steps.
 
     step:  detect  ->  solve  M (v' - v) = dt (M g + f) + J^T j(x, v')  ->  q' = q + dt N(q) v'
 
-Profiles differ in the approximation of ``j``, and in nothing else.
+Profiles differ in the approximation of ``j`` only.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
 from adapters.scene import Capsule, Cylinder, Scene, Sphere
 
-#: What the solver of a convex step leaves, as a share of what it changes, and of a speed [m/s]; measured 6e-6 at most.
+#: Residual of a convex step's solver, as a share of the change, and of a speed [m/s]; measured 6e-6 at most.
 SOLVED_SHARE, SOLVED = 1e-5, 1e-6
-#: Profiles whose friction does not keep to the load of the step, and why.
+#: Profiles whose friction does not follow the load of the step, and why.
 APPROXIMATE: Mapping[str, str] = MappingProxyType(
     {
         "default": "friction is limited by the load that the springs would have at the velocities of the step's "
@@ -40,7 +40,7 @@ APPROXIMATE: Mapping[str, str] = MappingProxyType(
 
 
 def _unsound(scene: Scene) -> str | None:
-    """Why a capsule or a cylinder that can meet anything but a ball is refused; see the quirk."""
+    """Why a capsule or a cylinder that can touch another shape than a ball is refused; see the quirk."""
     if not any(isinstance(body.shape, Capsule | Cylinder) for body in scene.bodies):
         return None
     for i, j, _ in meeting_pairs(scene):
@@ -125,13 +125,13 @@ class DrakeEngine(CheckedEngine):
     )
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse restitution, moved bodies, tables that no single bodies' numbers give, and rods that touch no ball."""
+        """Refuse restitution, moved bodies, pairs that no body values give, and some capsules and cylinders."""
         for body in scene.bodies:
             if body.motion == "prescribed":
                 return f"{body.name}.motion: the adapter does not support prescribed motion"
         if any(restitution > 0.0 for restitution, _ in scene.materials()):
             return "pairs: contacts of drake have no coefficient of restitution"
-        if profile != PROFILE and frictions(scene) is None:  # a model brings its bodies' own numbers
+        if profile != PROFILE and frictions(scene) is None:  # a model has its bodies' own values
             return "pairs: friction of a pair is a harmonic mean of two values here; no values per body give this table"
         return None if profile == PROFILE else _unsound(scene)
 
@@ -140,11 +140,11 @@ class DrakeEngine(CheckedEngine):
         return checked(settings)
 
     def profile_of(self, settings: Mapping[str, Any]) -> str:
-        """Profile of a model, if it brings its bodies' own numbers."""
+        """Profile of a model, if it has its bodies' own values."""
         return PROFILE if OWN in settings else ""
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What springs throw back, and friction where the approximation of contact does not keep to the load."""
+        """Rebounds of springs, and friction where the approximation of contact does not follow the load."""
         declared = {}
         if needs.regime == "impact":
             most = slowest_rebound(profile, REBOUND_SPEED, dt) / REBOUND_SPEED
@@ -154,15 +154,14 @@ class DrakeEngine(CheckedEngine):
             declared["impulse"] = Declared(1.0, SOLVED_SHARE, because)
         if needs.friction > 0.0 and profile in APPROXIMATE:
             because = APPROXIMATE[profile]
-            # A convex step keeps to its cone whatever it lifts: friction is at most mu times the load. Lagged's is not.
+            # A convex step satisfies its friction cone: friction is at most mu times the load. In Lagged it may be
+            # more.
             half = 0.5 * needs.friction
             capped = Declared(
                 half, half + FRICTION_SHARE * needs.friction, f"{because}: less than the scene's value, never more"
             )
             told = Declared(needs.friction, UNTOLD, because) if profile == "default" else capped
             declared |= {"friction": told, "friction_impulse": told}
-            if (
-                profile == "sap"
-            ):  # measured: 1 but for a box that lands in space at 1/60 s, 1.42, of which no law is known
+            if profile == "sap":  # measured: 1 except for a box that lands in 3-D at 1/60 s: 1.42, without a known law
                 declared["impulse"] = Declared(1.0, UNTOLD, because)
         return declared

@@ -1,4 +1,4 @@
-"""What Drake does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Drake from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from adapters.drake.landing import landing_law
 from adapters.drake.profiles import PROFILES
 from adapters.law import Deviation, exactly
 
-#: Scenes of a ball that falls straight onto a floor without a rebound, or of two that overlap, and what that decides.
+#: Scenes of a ball that falls straight onto a floor without restitution, or of two overlapping balls, and the metrics
+#: that this determines.
 FALLING: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_growth", "rest_time"),

@@ -1,7 +1,7 @@
-"""Profiles of Drake: everything alike but the approximation of contact that a step solves.
+"""Profiles of Drake: they differ only in the approximation of contact in a step.
 
 default   Lagged, as shipped: a convex problem whose friction is regularised by the last step's load
-sap       SAP: linear dissipation, and friction that glides
+sap       SAP: linear dissipation, and friction with gliding (separation proportional to slip)
 tamsi     TAMSI: an implicit step by Newton's method, sub-stepped until it converges
 similar   SAP's friction with the dissipation of the others
 """
@@ -33,8 +33,8 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
         "stiction_tolerance": settings.number(1e-12, 1.0),
     }
 )
-#: Setting that a model brings: what each body's contacts are made of, in the order of the bodies. A row is friction;
-#: the kind of surface: ``none``, ``rigid`` or ``compliant``; how finely it is resolved [m]; modulus [Pa]; stiffness of
+#: Setting of a model: contact parameters of each body, in the order of the bodies. A row is friction;
+#: the kind of surface: ``none``, ``rigid`` or ``compliant``; its resolution [m]; modulus [Pa]; stiffness of
 #: a point [N/m]; dissipation [s/m]; relaxation time [s].
 OWN = "own"
 _KINDS_OF_A_ROW: tuple[settings.Check, ...] = (
@@ -46,7 +46,7 @@ _PLANT, _GRAPH = "MultibodyPlantConfig", "SceneGraphConfig.default_proximity_pro
 
 
 def rule(approximation: str, why: str) -> list[Setting]:
-    """Settings with which Drake runs as shipped but for its approximation of contact; boxes have surfaces."""
+    """Drake's settings as shipped except for the approximation of contact; boxes have surfaces."""
     return [
         Setting("approximation", approximation, why, f"{_PLANT}.discrete_contact_approximation"),
         Setting("boxes", "hydroelastic", "otherwise a pair of shapes has one contact point, and boxes rock", _PLANT),
@@ -72,7 +72,7 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`. `OWN` may be missing."""
+    """Settings with valid names and values for the engine; see `adapters.settings.checked`. `OWN` may be missing."""
     found = settings.checked("drake", KINDS, {name: value for name, value in asked.items() if name != OWN})
     for row in asked.get(OWN, ()):
         if not isinstance(row, tuple) or len(row) != len(_KINDS_OF_A_ROW):

@@ -1,12 +1,12 @@
 """SDF models of free and fixed links with one primitive shape each, as scenes.
 
-    text -> markup.py (numbers checked, nothing from outside, nothing that only draws) -> Drake's parser -> Scene
+    text -> markup.py (checks values, refuses external files, removes drawing) -> Drake's parser -> Scene
 
-Drake's parser is libsdformat's, and strict here: frames and poses are its business, and an inertia that no body has it
-refuses instead of guessing another. What it made must be what a scene can hold: bodies with one shape about their
-centre of mass, free or fixed, which all touch each other. SDF does not say what friction a pair has of its two bodies'
-numbers: the harmonic mean, as in Drake. Contact properties of Drake's own and the step become the settings of the
-profile that runs the model as Drake would; other engines are asked for rigid bodies without rebound.
+Drake's parser is libsdformat's, in strict mode: it resolves frames and poses, and refuses impossible inertias instead
+of replacing them. The result must fit into a scene: bodies with one shape about their centre of mass, free or fixed,
+which all may touch each other. SDF does not define the friction of a pair from its bodies' values: the harmonic mean,
+as in Drake. Drake's own contact properties and the step become settings of the profile that runs the model as Drake
+would; other engines run it with rigid bodies without restitution.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, 
 from adapters.plain import one_line
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, SceneError, Shape, Sphere
 
-#: Where Drake's parser says that something is wrong: the text that it is handed keeps its lines.
+#: Line in an error of Drake's parser: its text has the same lines as the model.
 _WHERE = re.compile(r"^(?:<[\w-]+>(?:\.sdf)?:(?P<line>\d+): )?(?:error: )?(?:Error: )?")
 
 
 class _Refused(Exception):
-    """Elements have no place in a scene.
+    """Elements that a scene cannot represent.
 
     Parameters
     ----------
     found
-        Each with what holds it, and why in half a sentence.
+        Each with its parent, and a short reason.
     """
 
     def __init__(self, *found: tuple[Element, Element, str]) -> None:
@@ -48,7 +48,7 @@ class _Refused(Exception):
 
 @dataclass(frozen=True)
 class _Part:
-    """One shape that touches, with the elements that state it."""
+    """One collision shape, with its elements."""
 
     model: Element
     link: Element
@@ -64,7 +64,7 @@ def read(text: str, drop: bool) -> Model:
     Raises
     ------
     SceneError
-        Naming the element that has no place in a scene, or with the parser's complaint.
+        Naming the element that a scene cannot represent, or with the parser's message.
     """
     root = parsed(text, "sdf", "a model of SDF begins with <sdf>")
     stated = cleaned(root, drop)
@@ -86,13 +86,13 @@ def read(text: str, drop: bool) -> Model:
 
 
 def _drop_empty(root: Element) -> None:
-    """A model of which all links were left out is none."""
+    """Drop a model without links."""
     for holder in [e for e in root.walk() if e.tag in ("sdf", "world")]:
         holder.children = [e for e in holder.children if e.tag != "model" or child(e, "link")]
 
 
 class _Reading:
-    """One attempt at a model, which either succeeds or says what stands in its way."""
+    """One attempt at a model, which either succeeds or raises with all obstacles."""
 
     def __init__(self, root: Element, drop: bool, stated: Stated) -> None:
         import pydrake.geometry
@@ -100,7 +100,7 @@ class _Reading:
         import pydrake.multibody.plant
         import pydrake.systems.framework
 
-        # Its stubs know no arrays as NumPy types them.
+        # Its stubs have no NumPy array types.
         self.drake: Any = pydrake.geometry
         builder: Any = pydrake.systems.framework.DiagramBuilder()
         plant: Any
@@ -110,7 +110,7 @@ class _Reading:
         try:
             parser.AddModelsFromString(text_of(told(root)), "sdf")
             plant.Finalize()
-        except (RuntimeError, ValueError, SystemExit) as error:  # it leaves where its C++ would end the process
+        except (RuntimeError, ValueError, SystemExit) as error:  # it raises where its C++ would abort the process
             raise SceneError(f"model: Drake does not read it: {_complaint(error)}") from None
         self.root, self.drop, self.stated, self.plant = root, drop, stated, plant
         self.diagram = builder.Build()
@@ -126,7 +126,7 @@ class _Reading:
         Raises
         ------
         _Refused
-            Naming what has no place in one.
+            Naming elements that a scene cannot represent.
         """
         self._joints()
         parts = list(self._parts())
@@ -147,10 +147,10 @@ class _Reading:
         named = next(e for e in self.root.children if e.tag in ("world", "model"))
         return one_line(named.attributes.get("name", ""), 60) or "model"
 
-    # ---- what there is ----
+    # ---- elements ----
 
     def _joints(self) -> None:
-        """A fixed joint holds its link to the world; two links that move as one are no body of a scene."""
+        """A fixed joint holds its link to the world; two rigidly joined moving links are no body of a scene."""
         plant = self.plant
         held = [
             (joint.name(), plant.GetModelInstanceName(joint.model_instance()))
@@ -169,7 +169,7 @@ class _Reading:
             raise SceneError(f"model: {one_line(held[0][0], 60)}: connects two moving links")
 
     def _parts(self) -> Iterator[_Part]:
-        """Shapes that touch, in the order of the text."""
+        """Collision shapes, in the order of the text."""
         plant, inspector = self.plant, self.inspector
         found = {}
         for geometry in inspector.GetAllGeometryIds(self.drake.Role.kProximity):
@@ -202,7 +202,7 @@ class _Reading:
             raise _Refused(*found)
 
     def _name(self, part: _Part, parts: list[_Part]) -> str:
-        """The shortest of model, model::link and model::link::collision that is its own."""
+        """The shortest unique one of model, model::link and model::link::collision."""
         words = [e.attributes["name"] for e in (part.model, part.link, part.collision)]
         for count, element in ((1, part.model), (2, part.link)):
             if sum(element is other.model or element is other.link for other in parts) == 1:
@@ -210,7 +210,7 @@ class _Reading:
         return "::".join(words)
 
     def _apart(self, parts: list[_Part]) -> Iterator[str]:
-        """Links of one model touch each other only where the model says so."""
+        """Links of one model touch each other only if the model says so."""
         for model in self.models.values():
             own = [part for part in parts if part.model is model]
             shy = {part.link.attributes["name"]: part.free for part in own if not _touches(part.link)}
@@ -277,7 +277,7 @@ class _Reading:
             if not isinstance(shape, Sphere):
                 why = "its principal axes are not its shape's; a scene's body has both in one direction"
                 raise _Refused((part.model, part.link, why))
-            axes = np.linalg.eigh(about)[1]  # a ball has no axes but those of its inertia
+            axes = np.linalg.eigh(about)[1]  # the only axes of a ball are those of its inertia
             axes[:, 2] *= np.linalg.det(axes)
             moments, turn = axes.T @ about @ axes, held.rotation().matrix() @ axes
         first, second, third = _numbers(np.diag(moments))
@@ -290,7 +290,7 @@ class _Reading:
         return unit(pydrake.math.RotationMatrix(turn).ToQuaternion().wxyz())
 
     def _defaults(self, parts: list[_Part], names: list[str]) -> None:
-        """Say what was filled in."""
+        """Note the default values."""
         free = [(part, name) for part, name in zip(parts, names, strict=True) if part.free]
         for what, tags in (("mass 1 kg", ["mass"]), ("moments of inertia 1 kg m^2", ["ixx", "iyy", "izz"])):
             stated = [{e.tag for e in part.link.walk()} for part, _ in free]
@@ -328,7 +328,7 @@ class _Reading:
         return pairs_of(found, bodies)
 
     def _settings(self, parts: list[_Part]) -> Iterator[Setting]:
-        """As Drake ships, with what the shapes' contacts say."""
+        """Drake's defaults with the contact properties of the shapes."""
         for setting in rule("lagged", "as shipped"):
             if setting.name == "boxes":
                 yield Setting(
@@ -370,7 +370,7 @@ def _numbers(values: Any) -> tuple[float, ...]:
 
 
 def _complaint(error: BaseException) -> str:
-    """What the parser says, with the line in the model instead of its own name for the text."""
+    """The parser's message, with the line in the model instead of its own name for the text."""
     said = one_line(" ".join(str(error).split()), 300)
     where = _WHERE.match(said)
     line = f"line {where['line']}: " if where and where["line"] else ""

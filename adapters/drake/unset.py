@@ -1,4 +1,4 @@
-"""What Drake does when nothing is set; see `adapters.unset`."""
+"""Drake without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from adapters.unset import (
     Unset,
 )
 
-#: Half thickness of the box that is the ground [m].
+#: Half thickness of the ground's box [m].
 DEPTH = 5.0
-#: Friction of a pair where nothing is set.
+#: Default friction of a pair.
 FRICTION = 0.5
 
 
 class Bare:
-    """A plant with one body above a box that belongs to the world; its mass is 1 kg, as there is none unless told.
+    """A plant with one body above a box of the world; its mass is 1 kg, because there is no default.
 
     ``pull`` is an acceleration along the ground [m/s^2], given with gravity.
     """
@@ -106,15 +106,15 @@ def _stiffness() -> float:
 def _viscous() -> float:
     """Slip [m/s] at which friction is mu N/sqrt(2): it is mu N s/sqrt(s^2 + v^2), with v the tolerance.
 
-    Friction of a rolling ball is two sevenths of what pulls at it.
+    Friction of a rolling ball is two sevenths of the pull.
     """
     world = Bare(Asked(gap=0.0, gravity=GRAVITY), pull=3.5 * FRICTION * GRAVITY / math.sqrt(2.0))
     world.advance(round(SLIDE_TIME / world.dt))
     return world.slip
 
 
-#: A ball, as a box has one point of contact, over whose corners it rocks; so fast that it does not roll within a time
-#: in which friction that is a step late hardly matters [m/s, s].
+#: A ball, because a box has one point of contact and rocks; so fast that it does not roll within a time in which one
+#: step of delay of friction is negligible [m/s, s].
 _SLIDE: tuple[Any, ...] = ("ball", 30.0, 0.25)
 _PROPERTIES, _CONFIG = "SceneGraphConfig.default_proximity_properties", "MultibodyPlantConfig"
 _LEAVES = f"{_PROPERTIES}, hunt_crossley_dissipation"

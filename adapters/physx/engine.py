@@ -1,9 +1,9 @@
-"""PhysX 5 behind the plugin line: spatial, velocity-level contact with positions in the same sweeps, single precision.
+"""The adapter of PhysX 5: spatial, velocity-level contact with positions in the same iterations, single precision.
 
     tgs:  detect  ->  v += g dt  ->  n times: solve contacts and friction for dt/n, x += v dt/n  ->  velocities alone
     pgs:  detect  ->  v += g dt  ->  n sweeps over contacts and friction  ->  x += v dt  ->  velocities alone
 
-Contacts are made ahead of a touch; what would not touch within the step is left alone.
+Contacts exist before a touch; bodies that do not touch within the step get no impulse.
 """
 
 from __future__ import annotations
@@ -107,19 +107,19 @@ class PhysxEngine(CheckedEngine):
 
     def version(self) -> str:
         """Version of the installed bindings, which bring their own PhysX."""
-        imported()  # without the warning of its first import
+        imported()  # without the warning at its first import
         return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """As shipped spins are damped and slow approaches do not rebound."""
+        """As shipped spins are damped and slow impacts do not rebound."""
         if profile == "tuned":
             return {}
         steps = round(1.0 / dt)
-        # A spin is scaled by a root of its moment and back in every step, each rounded to a single number.
+        # A spin is scaled by a root of its moment and back in every step, each rounded to single precision.
         left, band = (1.0 - ANGULAR_DAMPING * dt) ** steps, ROUNDINGS * self.facts.epsilon
         lost = Declared(1.0 - left, band, "5 % of a spin per second")
         declared = {"angular_damping": lost}

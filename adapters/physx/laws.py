@@ -1,4 +1,4 @@
-"""What PhysX does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of PhysX from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
 from adapters.unswept import passing_law
 
-#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+#: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
@@ -25,19 +25,19 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "oblique": ("rebound_ratio",),
     "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
 }
-#: Blows that `tuned` sees so far ahead that one begins before the one before it is over.
+#: Blows that `tuned` finds so early that they overlap with the blow before.
 CROWDED = ("galperin",)
-#: Round-off of a place after a thousand steps, as a share of the way.
+#: Round-off of a place after a thousand steps, as a share of the distance.
 PLACES = 1000.0 * UNIT
 _RELEASES = ("3.0.",)
 
 
 def blow_law(metric: str, profile: str) -> Law:
-    """Blows in free space; approaches of up to a speed do not rebound."""
+    """Blows in free space; no restitution up to a threshold speed."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         least = least_rebound(needs(scene), dt) if profile == "tuned" else BOUNCE_THRESHOLD
-        # TGS leaves a share of a blow that it finds in an overlap; contacts are made from two offsets ahead.
+        # TGS solves a blow found in an overlap only in part; contacts exist from two offsets ahead.
         ahead = math.inf if profile == "pgs" else 2.0 * CONTACT_OFFSET
         return rounded_law(metric, Method(Threshold(least), ahead=ahead))(scene, dt, measure)
 
@@ -45,7 +45,7 @@ def blow_law(metric: str, profile: str) -> Law:
 
 
 def wall_law(metric: str, profile: str) -> Law:
-    """What no step finds in a thin wall passes it; what one finds rebounds as any other blow."""
+    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
     passing, blow = passing_law(metric, PLACES), blow_law(metric, profile)
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -127,8 +127,8 @@ DEVIATIONS += tuple(
     for profile in PROFILES
 )
 
-#: Blows of edges and faces in free space after which no more than roundings leave the plane, by profile; in small
-#: steps, or where sweeps end early, more does.
+#: Blows of edges and faces in free space after which the motion is planar to round-off, by profile; not in small steps,
+#: or with too few iterations.
 PLANES: Mapping[str, tuple[str, ...]] = {
     "pgs": ("edge_drop", "flat_box"),
     "tuned": ("edge_drop",),

@@ -1,8 +1,8 @@
-"""Profiles of PhysX: settings with their reasons.
+"""Profiles of PhysX: settings and their reasons.
 
-default   as SAPIEN ships it: TGS, which makes a small step of each sweep
+default   as SAPIEN ships it: TGS, whose iterations are substeps
 pgs       the same with projected Gauss-Seidel, PhysX's own default
-tuned     TGS without losses, with friction and rebounds wherever bodies touch
+tuned     TGS without losses, with friction and restitution for all contacts
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from adapters.physx.shipped import (
     VELOCITY_ITERATIONS,
 )
 
-#: What the engine can count: iterations are bytes. [PxRigidDynamic.setSolverIterationCounts]
+#: Largest iteration count: a byte. [PxRigidDynamic.setSolverIterationCounts]
 MOST_ITERATIONS = 255
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
@@ -68,9 +68,9 @@ def _shipped(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
 
 
 def least_rebound(needs: Needs, dt: float) -> float:
-    """Speed of approach up to which nothing rebounds in `tuned` [m/s].
+    """Threshold speed of restitution in `tuned` [m/s].
 
-    What a step of gravity brings about is no impact: a body at rest would hop.
+    Above the speed of one step of gravity, else a body at rest would hop.
     """
     return max(2.0 * needs.gravity * dt, 1e-4)
 

@@ -1,9 +1,9 @@
-"""Rapier behind the plugin line: spatial, soft contacts, small steps with warm starting, single precision.
+"""The adapter of Rapier: spatial, soft contacts, substeps with warm starting, single precision.
 
     step:  detect  ->  n times: v += g dt/n, contacts as springs that are solved with the velocities, x += v dt/n,
            contacts once more without their springs  ->  restitution
 
-Every number of a step belongs to all of its small steps: impulses are their sum.
+Readings of a step cover all of its substeps: impulses are their sum.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class RapierEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Spin but for the roundings of all small steps, which add up: each in singles, to within 2 units."""
+        """Spin except for round-off of all substeps, which adds up: each in single precision, to within 2 units."""
         small = next(each.value for each in self.settings(profile, needs, dt) if each.name == "substeps") / dt
         because = "each substep rounds a spin, always upwards: measured, 1 unit of the last digit"
         return {"angular_damping": Declared(0.0, (ROUNDINGS + 2.0 * small) * self.facts.epsilon, because)}

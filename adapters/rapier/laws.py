@@ -1,4 +1,4 @@
-"""What Rapier does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Rapier from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from adapters.law import Deviation, exactly
 from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import Method, rounded_law
 
-#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+#: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),

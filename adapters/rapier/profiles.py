@@ -1,7 +1,7 @@
-"""Profiles of Rapier: settings with their reasons.
+"""Profiles of Rapier: settings and their reasons.
 
 default   as shipped
-tuned     stiffer contacts and more of the small steps that a step is made of
+tuned     stiffer contacts and more substeps
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
-#: Small steps of a step, as shipped. [`IntegrationParameters.num_solver_iterations`]
+#: Substeps of a step, as shipped. [`IntegrationParameters.num_solver_iterations`]
 SUBSTEPS = 4
-#: Small steps of `tuned`: more of them add up their roundings.
+#: Substeps of `tuned`: more of them have more round-off.
 TUNED_SUBSTEPS = 8
 #: Rates of the springs of contacts between moving bodies, and against fixed ones [1/s].
 FREQUENCY, STATIC_FREQUENCY = 30.0, 60.0
 #: Damping ratio of both.
 DAMPING = 10.0
-#: Overlap that is left alone, and distance at which contacts are seen ahead, in units of length.
+#: Overlap without correction, and prediction distance of contacts, in units of length.
 ALLOWED, PREDICTION = 0.005, 0.02
-#: Speed that no body exceeds, and at which overlaps are pushed out at most, in units of length per second.
+#: Largest speed of a body, and largest correction speed of overlaps, in units of length per second.
 FASTEST, PUSH_OUT = 400.0, 3.0
-#: A speed that is none: what moves faster is no scene of ours.
+#: A speed without effect: no scene of ours moves faster.
 NO_LIMIT = 1e9
 
 KINDS: Mapping[str, settings.Check] = MappingProxyType(

@@ -1,4 +1,4 @@
-"""What Rapier does when nothing is set; see `adapters.unset`."""
+"""Rapier without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 

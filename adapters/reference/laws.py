@@ -1,4 +1,4 @@
-"""What the textbook profile of our own solver does by design instead of the textbook's physics."""
+"""Designed deviations of the classical profile of our own solver from the textbook's physics."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Profiles of our own solver: its settings with their reasons.
+"""Profiles of our own solver: its settings and their reasons.
 
-classical   a fixed number of sweeps, as textbooks do
+classical   a fixed number of sweeps, as in textbooks
 reference   the same contact equations solved to a residual and certified, in steps that are cut where bodies meet
 and where slides end
 """
@@ -18,7 +18,7 @@ from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, Check, either, flag, number, whole, word
 
 SOURCE = "reference_solver/README.md"
-#: Why each of the solver's settings has its value; the values themselves are the solver's own.
+#: Reasons of the solver's settings; the values themselves are the solver's own.
 REASONS = {
     "iterations": "as in textbooks and engines: a fixed cost, with a residual of any size",
     "residual": "sweep until every contact equation holds to this share of its own speed; null: fixed sweeps",
@@ -63,7 +63,7 @@ def _as_settings(chosen: Any) -> list[Setting]:
     ]
 
 
-#: What a setting may be; the solver's own `Settings` says more of each.
+#: Ranges of settings; the solver's own `Settings` describes each.
 KINDS: Mapping[str, Check] = MappingProxyType(
     {
         "iterations": whole(1, LARGEST_INT),
