@@ -1,9 +1,9 @@
-"""DART behind the plugin line: spatial, velocity-level contact, one engine with pyramids and exact cones of friction.
+"""The adapter of DART: spatial, velocity-level contact, with friction pyramids and exact cones in one engine.
 
     step:  v += (g + f/m) dt  ->  detect  ->  restitution from v  ->  solve the contact problem of all islands
            ->  v += M^-1 J  ->  x += v dt
 
-Profiles differ in what solves the contact problem, and in nothing else.
+Profiles differ in the solver of the contact problem only.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class DartEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse bodies that are moved as prescribed, tables that no bodies' own numbers give, and piles of cones."""
+        """Refuse bodies with prescribed motion, pairs that no body values give, and piles with exact cones."""
         for body in scene.bodies:
             if body.motion == "prescribed":
                 return f"{body.name}.motion: the adapter does not support prescribed motion"
@@ -112,11 +112,11 @@ class DartEngine(CheckedEngine):
         return checked(settings)
 
     def profile_of(self, settings: Mapping[str, Any]) -> str:
-        """Name of the solver, after which the profiles of cones are named."""
+        """Name of the solver, which is also the name of the profiles with cones."""
         return str(settings["solver"])
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""
+        """Restitution with the compliance of contacts, and no friction below the engine's threshold."""
         smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} counts as none")
         told = dict.fromkeys(("friction", "friction_impulse"), smooth) if needs.friction <= SMOOTH else {}
         if needs.regime != "impact" or (profile in CONES and needs.friction > MOST_FRICTION):

@@ -1,4 +1,4 @@
-"""What DART does when nothing is set; see `adapters.unset`."""
+"""DART without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from adapters import unset
 from adapters.dart.shipped import THRESHOLD
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
-#: Half thickness of the box that is the ground [m].
+#: Half thickness of the ground's box [m].
 DEPTH = 5.0
 
 
 class Bare:
-    """A world with one body above a box that is welded to it."""
+    """A world with one body above a welded box."""
 
     def __init__(self, asked: Asked) -> None:
         import dartpy

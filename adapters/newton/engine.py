@@ -1,9 +1,9 @@
-"""Newton's XPBD solver behind the plugin line: spatial, position-based contact, single precision.
+"""The adapter of Newton's XPBD solver: spatial, position-based contact, single precision.
 
-    step:  detect  ->  v += g dt, x += v dt  ->  n sweeps: each contact takes back its overlap, friction its slip, and
-           v with them  ->  rebounds, on velocities alone
+    step:  detect  ->  v += g dt, x += v dt  ->  n iterations: each contact corrects its overlap, friction its slip,
+           and v with them  ->  restitution, on velocities only
 
-Overlaps of a step's end are taken back, all contacts at once; a body gets the mean of what its contacts ask for.
+Overlaps at a step's end are corrected, all contacts at once; a body gets the mean of its contacts' corrections.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from adapters.probes import GRAVITY, SLIDE_TIME
 from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
 
-#: Most that the mass of a box is above what its corner feels, on any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 + c^2).
+#: Largest ratio of a box's mass to the effective mass at a corner, for any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 +
+#: c^2).
 LEAST_SHARE = 7.0
 
 
@@ -98,30 +99,30 @@ class NewtonEngine(CheckedEngine):
 
     def version(self) -> str:
         """Version of the installed distribution."""
-        imported()  # without the words of its first import
+        imported()  # without the output of its first import
         return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What two sweeps leave of an approach, what stopping takes, and rebounds without friction."""
+        """Residual approach speeds after two iterations, momentum lost by stopping, and rebounds without friction."""
         declared, sweeps = {}, TUNED_ITERATIONS if profile == "tuned" else ITERATIONS
         left = (1.0 - RELAXATION) ** sweeps
         if needs.regime == "impact" and needs.restitution == 0.0 and left > self.facts.epsilon:
-            # Two steps of a ball: the first leaves a share of its overlap, which the second pushes out.
+            # Two steps of a ball: the first leaves a share of its overlap, which the second corrects.
             most = left * (1.0 - 2.0 * left)
             because = "the rest of an overlap is corrected in the next step"
             declared["restitution"] = Declared(0.5 * most, 0.5 * most + self.facts.round_off, because)
-        # Each sweep stops what is slow and tells its impulse all the same. What a sweep is asked for falls by the share
-        # of an overlap that it takes back, for a box on four corners a seventh of the relaxation or more.
+        # Each iteration stops slow bodies but still reports its impulse. Corrections fall with each iteration by the
+        # corrected share of an overlap, for a box on four corners a seventh of the relaxation or more.
         stopped = STOPPED * min(sweeps, LEAST_SHARE / RELAXATION)
         because = "impulses of iterations that end below 0.1 mm/s are reported but not applied"
         band = stopped / (GRAVITY * dt) + self.facts.round_off
         declared["impulse"] = Declared(1.0, band, because)
         if needs.friction > 0.0 and needs.restitution > 0.0 and profile != "tuned":
-            # A corner that came in at over 2 g dt is thrown back, by an impulse of at most (1 + e) 3 g dt a mass.
+            # A corner with an impact above 2 g dt rebounds, with an impulse of at most (1 + e) 3 g dt per mass.
             most = (1.0 + needs.restitution) * (LEAST_APPROACH + 1.0) * dt / SLIDE_TIME
             because = "rebounds of a rocking body have no friction"
             declared["friction"] = Declared(

@@ -1,9 +1,9 @@
-"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone.
+"""Designed deviations of Newton's XPBD from the textbook, predicted from scene and step only.
 
-The recurrence of its sweeps is ten times as long as a law is meant to be, and stays: it explains 1 097 rows of the
-standard suite, of 32 scenes, 643 of balls and boxes among planes and 454 of columns. As findings they would be as many
-lines, in some forty families, and hold at one step and for these parameters alone. And five families of what trembles,
-sinks through, settles late or creeps have their proof from it: the same recurrence in doubles does not.
+The recurrence of its iterations is ten times as long as a usual law, but it explains 1 097 rows of the standard suite,
+of 32 scenes: 643 of balls and boxes among planes and 454 of columns. As known failures they would need as many lines,
+in some forty families, valid only at one step and for these parameters. It is also the proof of five families
+(trembling, sinking through, late rest, creep): the same recurrence in double precision shows none of these.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ _COLUMNS = (
 )
 _STANDING = ("settle_time", "penetration", "kinetic_energy", "impulse_scatter")
 
-#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook. Scenes and metrics
-#: were chosen at 1/240 s.
+#: Metrics by scene predicted by the solver's recurrence, and why they differ from the textbook. Scenes and metrics were
+#: chosen at 1/240 s.
 MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse")),
     "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),
@@ -80,7 +80,7 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 
 _ROUNDED = "single precision rounds differently on both sides of a balance"
-#: Balances by scene: in doubles the recurrence makes nothing of them, or less than singles round.
+#: Balances by scene: in double precision the recurrence gives 0, or less than the round-off of single precision.
 BALANCES: Mapping[str, tuple[str, ...]] = {
     "impact": ("momentum_defect",),
     "head_on": ("momentum_defect",),
@@ -97,7 +97,7 @@ _STOPS = (
     "single precision; velocities below 0.1 mm/s are set to 0 without a reported impulse, which later overlap "
     "corrections make up for, except for rounding of positions"
 )
-#: Why by scene and metric; what is a balance in some cells alone keeps the reason of the others.
+#: Reasons by scene and metric; a metric that is a balance in some cells only has the reason of the others.
 _DECIDED = {(scene, metric): _ROUNDED for scene, metrics in BALANCES.items() for metric in metrics}
 _DECIDED[("impact", "momentum_defect")] = _STOPS
 _DECIDED |= {(scene, metric): because for scene, (because, metrics) in MOTIONS.items() for metric in metrics}
@@ -119,7 +119,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for (scene, metric), because in _DECIDED.items()
 )
 
-#: Round-off of a place after a thousand steps, as a share of the way.
+#: Round-off of a place after a thousand steps, as a share of the distance.
 PLACES = 1000.0 * UNIT
 DEVIATIONS += tuple(
     Deviation(
@@ -166,7 +166,7 @@ DEVIATIONS += tuple(
     )
     for metric in ("stopping_distance", "braking", "end_speed")
 )
-#: Blows of edges and faces in free space, after which no more than roundings leave the plane.
+#: Blows of edges and faces in free space, after which the motion is planar to round-off.
 DEVIATIONS += tuple(
     Deviation(
         "newton",

@@ -1,7 +1,7 @@
-"""Profiles of Newton's XPBD solver: settings with their reasons.
+"""Profiles of Newton's XPBD solver: settings and their reasons.
 
 default   `SolverXPBD` and its shapes as constructed
-tuned     more sweeps, without friction that no scene asks for
+tuned     more iterations, without rolling and spinning friction
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from adapters.newton.shipped import (
     TORSIONAL,
 )
 
-#: Sweeps of `tuned`: a fifth to the 50th power is nothing in singles.
+#: Iterations of `tuned`: a fifth to the 50th power is 0 in single precision.
 TUNED_ITERATIONS = 50
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
@@ -39,7 +39,7 @@ _SOLVER, _SHAPE = "SolverXPBD", "ModelBuilder.ShapeConfig"
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
-    """As constructed; restitution is asked for where the scene has one, since it is off otherwise."""
+    """As constructed; restitution is switched on if the scene has one, because it is off by default."""
     said = "as shipped"
     return [
         Setting("iterations", ITERATIONS, f"{said}: iterations on positions", f"{_SOLVER}, iterations"),
