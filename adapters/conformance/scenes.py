@@ -80,7 +80,7 @@ def sliding() -> Scene:
 
 
 def odd_pairs() -> Scene:
-    """Pairs whose coefficients are not products of two values."""
+    """Pairs with coefficients that are not products of two values."""
     bodies = tuple(Body(name, Disc(0.5), pose=(2.0 * k, 0.0, 0.0)) for k, name in enumerate("abc"))
     pairs = (Pair("a", "b", 0.9), Pair("b", "c", 0.5), Pair("a", "c", 0.0))
     return Scene("check_pairs", 1, 2, bodies, pairs, (0.0, 0.0), 12 * DT)
@@ -109,12 +109,12 @@ def leaning() -> Scene:
 
 
 def mirrored(scene: Scene) -> Scene:
-    """Planar scene with x and all turns reversed."""
+    """Planar scene with x and all rotations reversed."""
     return _mapped(scene, lambda v: (-v[0], v[1]), -1.0, 0.0)
 
 
 def quarter_turned(scene: Scene) -> Scene:
-    """Planar scene turned by +90 degrees about the origin."""
+    """Planar scene rotated by +90 degrees about the origin."""
     return _mapped(scene, lambda v: (-v[1], v[0]), 1.0, 0.5 * math.pi)
 
 
