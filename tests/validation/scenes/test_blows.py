@@ -160,7 +160,7 @@ def test_a_bar_that_meets_the_ball_once_more_or_before_is_refused_and_only_that(
 
 
 def test_a_bar_that_gives_way_faster_than_the_ball_comes_is_refused():
-    with pytest.raises(SceneError, match=r"off_centre.whirl: with 7 rad/s the bar gives way"):
+    with pytest.raises(SceneError, match=r"off_centre.whirl: with 7 rad/s the bar recedes"):
         CATALOGUE["off_centre"].scene(2, {"whirl": 7.0})
 
 
