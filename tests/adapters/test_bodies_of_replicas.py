@@ -32,7 +32,7 @@ def twice(inner, joint="<freejoint/>", more="", after=""):
         (twice(SPHERE, '<joint name="j" type="free" stiffness="1"/>'),
          "body: b0: its joint has stiffness; a scene's bodies have none"),
         (twice(SPHERE + SPHERE.replace('"g"', '"h"')),
-         "body: b0: has several geoms that touch; a scene's body has one"),
+         "body: b0: has several geoms that collide; a scene's body has one"),
         (twice(SPHERE.replace("/>", ' contype="0" conaffinity="0"/>')), "body: b0: has no geom that collides"),
         (twice(SPHERE, more=' gravcomp="1"'), "body: b0: gravcomp: in a scene gravity acts on all bodies alike"),
         (twice(SPHERE + '<inertial pos="0 0 .05" mass="1" diaginertia="1 1 1"/>'),
@@ -42,7 +42,7 @@ def twice(inner, joint="<freejoint/>", more="", after=""):
         (twice(SPHERE.replace("sphere", "ellipsoid").replace('".1"', '".1 .1 .1"')),
          "geom: g0: an ellipsoid; a scene has spheres, boxes, rods, hulls and planes"),
         (twice(SPHERE.replace("/>", ' contype="1" conaffinity="2"/>')),
-         "geom: g1: contype and conaffinity keep it apart from b0; in a scene all bodies touch"),
+         "geom: g1: contype and conaffinity exclude contact with b0; in a scene all bodies can collide"),
         (twice(SPHERE.replace("/>", ' condim="6"/>')), "geom: g1: with b0: condim 6"),
     ],
 )  # fmt: skip

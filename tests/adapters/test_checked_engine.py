@@ -92,5 +92,6 @@ def test_a_table_without_means_is_refused_by_name():
     pairs = tuple(Pair(a, b, 0.0, mu) for a, b, mu in (("floor", "a", 1.0), ("floor", "b", 0.0), ("a", "b", 0.0)))
     scene = replace(SCENE, pairs=pairs, bodies=(FLOOR, BALLS[0], replace(BALLS[1], pose=(0.0, 1.5, 0.0))))
     assert means(scene, "friction") is None
-    assert no_means(scene) == "pairs: friction of a pair is the mean of two numbers here, this table has none"
+    refusal = "pairs: friction of a pair is the mean of two values here; no values per body give this table"
+    assert no_means(scene) == refusal
     assert no_means(SCENE) is None

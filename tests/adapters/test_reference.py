@@ -289,4 +289,4 @@ def test_what_lies_too_far_to_be_certified_is_refused_before_it_runs_and_nothing
         found = drive(scene, "reference").certificate
         assert found["resolution"] == pytest.approx(share * 1e-8, rel=1e-12)
         assert (refusal is not None) == (share > 1.0) == ("coordinates too large" in " ".join(found["reasons"]))
-    assert refusal is not None and refusal.startswith(f"ball lies {1.1 * limit:.3g} m away")
+    assert refusal is not None and refusal.startswith(f"ball lies {1.1 * limit:.3g} m from the origin")
