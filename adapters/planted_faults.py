@@ -56,11 +56,11 @@ class Planted(Engine):
         return self.inner.version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """What the engine refuses."""
+        """The engine's refusal."""
         return self.inner.refuses(scene, profile)
 
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
-        """What the engine's steps are too long for."""
+        """The engine's refusal of too long steps."""
         return self.inner.too_coarse(scene, dt)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:

@@ -47,7 +47,7 @@ def motion(p: Params) -> tuple[float, float, float]:
 
 
 def _way() -> float:
-    """What the block slides until it is told [m]."""
+    """Sliding distance of the block at the measurement [m]."""
     return FACE - WIDTH - 2.0 * LEFT
 
 
@@ -155,7 +155,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track:
-    """Where the block is."""
+    """Place of the block."""
     away, pull, _ = motion(scene.params)
     start = np.array(scene.bodies[2].pose[:2])
     along, _ = _face(scene.params)

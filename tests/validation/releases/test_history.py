@@ -372,7 +372,8 @@ def test_without_notes_everything_is_unexplained():
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [('release = "2.5"', 'release = "two"', "release 'two' is not a version"), ('["*"]', '"*"', "profiles must be a list"),
+    [('release = "2.5"', 'release = "two"', "release 'two' is not a version"),
+     ('["*"]', '"*"', "profiles must be a list"),
      ("says", "tells", "needs exactly"), ('"notes of 2.5"', '" "', "source is missing"),
      ("[[change]]", "[[change]", ":")],
 )  # fmt: skip
