@@ -1,8 +1,8 @@
-"""What the terminal says of a run: the matrix first, then the short answers, then where the details are.
+"""Summary of a run for the terminal: the matrix, then the short answers, then commands for details.
 
 matrix -> unexpected results (if any) -> best engine per scene -> what is wrong and what fixes it -> commands
 
-More scenes than fit a screen are shown by group (`reports.overview`), unless every one is asked for.
+If the scenes do not fit on a screen, groups are shown (`reports.overview`), unless all are requested.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from reports.matrix import Matrix, leaving, legend, matrix_of, status_of, sweeps
 from reports.wording import at, plural
 
 Plain = Mapping[str, Any]
-#: Families of alarms that are named one by one; `crosscheck findings --new` names all.
+#: Largest number of alarm families in the list; `crosscheck findings --new` lists all.
 MOST_ALARMS = 6
-#: Lines of a table above its first row.
+#: Number of lines of a table above its first row.
 HEAD = 2
 
 
@@ -40,9 +40,9 @@ def show(
     out: Path | None = None,
     run: str = "",
 ) -> None:
-    """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene.
+    """Print the summary of a run, fitted to the width of ``console``; with ``every``, of each scene.
 
-    ``out`` is where its results lie, and ``run`` its id if it is not the latest: the commands that are named get both.
+    ``out`` is the folder of its results, and ``run`` its id if it is not the latest: printed commands contain both.
     """
     place = at(out, run)
     matrix = matrix_of(rows)
@@ -104,7 +104,7 @@ def _heading(text: str, console: Console) -> None:
 
 
 def _folded(text: str, console: Console, indent: str = "  ") -> Text:
-    """Text in lines of the console's width; later lines stand in by four more."""
+    """Text in lines of the console's width; later lines are indented by four more."""
     later = indent + "    "
     folded = textwrap.fill(
         text, console.width, initial_indent=indent, subsequent_indent=later, break_on_hyphens=False,
@@ -143,7 +143,7 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
 
 
 def _nothing_wrong(rows: Sequence[Plain]) -> str:
-    """What is said of a run in which no profile fails at its own iteration count."""
+    """Text for a run in which no profile fails at its own iteration count."""
     if all(row["outcome"] in REFUSED for row in rows):
         return "Nothing was judged: no engine of this run can run any of it"
     judged = [row for row in rows if row["tolerance"] is not None and row["outcome"] not in REFUSED]
@@ -176,7 +176,7 @@ def _where(
     whole = [(command + place, what) for command, what in commands]
     wide = max(len(command) for command, _ in whole)
     for command, what in whole:
-        # A command stays whole, to be copied: where its explanation has no room beside it, it stands above.
+        # A command is not broken, so it can be copied; without room beside it, its explanation comes above.
         if wide + max(len(other) for _, other in whole) + 4 <= console.width:
             console.print(Text(f"  {command:<{wide}}  {what}"))
         else:

@@ -526,7 +526,7 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
         (0.9e-6, "does not rebound"),
         (-0.9e-6, "does not rebound"),
         (1e-6, "rebounds at 1.0e-6 instead of 1"),
-        (-1e-6, "goes on at 1.0e-6 of its speed; true: rebounds at 1"),
+        (-1e-6, "moves on with 1.0e-6 of its speed; true: rebounds at 1"),
     ],
 )
 def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):

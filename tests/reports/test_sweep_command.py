@@ -79,7 +79,7 @@ def test_whole_numbers_are_rounded():
     (("--random", "e=0:1", "--samples", "0"), "samples: 0 must be"),
     (("--random", "e=0:1", "--list", "e=1"), "e is varied twice"),
     (("--random", "e=0:1", "--sobol", "e=0:1"), "e is varied twice"),
-    (("--list", "e=1", "--param", "e=0.5"), "e is fixed and varied"),
+    (("--list", "e=1", "--param", "e=0.5"), "e is both fixed and varied"),
     (("--grid", "e=0:1:1000", "--grid", "v=1:2:1000"), f"are more than the {MOST_CELLS} of one sweep"),
 ])  # fmt: skip
 def test_a_wrong_call_is_one_line_and_runs_nothing(words, said, tmp_path):

@@ -153,7 +153,7 @@ def test_a_scheduler_that_dies_loses_nothing_and_the_same_command_goes_on(cluste
     cluster.scheduler.kill()
     assert run.wait(timeout=300) == 4
     said = run.stderr.read()
-    assert "the scheduler is gone; what finished is kept, the same command resumes" in said
+    assert "the scheduler is gone; finished cases are kept, the same command resumes" in said
     kept = finished_cells(out)
     assert 3 <= kept < len({row["cells"][0] for row in undisturbed})
     done = CliRunner().invoke(main, [*SWEEP, "--jobs", "1", "--out", str(out)])  # or on another cluster, or here

@@ -33,7 +33,7 @@ def test_what_lies_elsewhere_is_moved_to_its_centroid_and_said(kind, points, by,
     assert all(type(x) is float for p in given["shape"]["vertices"] for x in p)
     assert len(notes) == 2 and notes[0] == "before"
     words = notes[1].replace("-0,", "0,")
-    assert words.startswith("b.shape.vertices: their centroid (") and words.endswith(") was made the body's centre")
+    assert words.startswith("b.shape.vertices: their centroid (") and words.endswith(") is now the body's centre")
     told = [float(x) for x in notes[1].partition("(")[2].partition(")")[0].split(", ")]
     assert told == pytest.approx([float(x) for x in said[1:-1].split(", ")], abs=1e-9)
 
