@@ -33,6 +33,7 @@ from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
 from validation.bench.units import Unit, prepared
+from validation.bench.work import certified_of
 from validation.cells import Outcome, Slot, parse_dt
 from validation.posed import primary_of
 from validation.records.store import MissingError, Run, Store
@@ -61,6 +62,9 @@ AGREEMENT = 0.9
 @OUT
 def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
     """Measure error against time, over steps and iterations.
+
+    SCENES are names, globs, scene files or models, as for run. The error on a file is the distance from the certified
+    run of our own solver at the end; where there is none, a line says why.
 
     Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
     cases are timed one at a time. --quick takes under two minutes on two cores, --full up to two hours (piles of a
@@ -108,12 +112,23 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
         units = timed_units(wanted, store.observations(run))
+        if not _measurable(store, run, units):
+            store.close()
+            sys.exit(statuses.INCOMPLETE)
         time_units(store, run, request.scenes, units, limits, seed, console)
     store.finish(run)
     _show(store, run, out, as_json, brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(statuses.verdict(not agrees, not absent))
+
+
+def _measurable(store: Store, run: Run, units: Sequence[Unit]) -> bool:
+    """Whether there is an error to time; says in a line what has none to be measured from."""
+    for each in certified_of(store.observations(run)).values():
+        if each.reason:
+            click.echo(f"crosscheck: bench: {each.slot.scene} {each.slot.dimension}-D: {each.reason}", err=True)
+    return any(unit.purpose == "work" for unit in units)
 
 
 def _earlier(store: Store, name: str | None) -> Run | None:

@@ -44,7 +44,7 @@ class StatedCheck:
     @property
     def metric(self) -> str:
         """Name of the metric that it judges."""
-        return _metric(self.quantity, self.at, self.over)
+        return metric_of(self.quantity, self.at, self.over)
 
     def bound(self, dt: float) -> float:
         """Tolerance at step ``dt`` [s], in the quantity's unit."""
@@ -109,7 +109,7 @@ def _exact(read: Stated) -> dict[str, float]:
     return {"energy_growth": 0.0, "penetration": 0.0, **{check.metric: check.value for check in read.checks}}
 
 
-def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
+def metric_of(name: str, at: float | None = None, over: str | None = None) -> str:
     """Name of a quantity's metric: ``final[ball.y]``, ``at[0.25 s][ball.y]``, ``least[floor/ball.fy]``."""
     when = "final" if at is None else f"at[{at:.12g} s]"
     if over in (None, "mean"):
@@ -136,7 +136,7 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
         "deepest_overlap": depth,
     }
     for name in shown_quantities(read.scene):
-        measured[_metric(name)] = quantity(read.scene, trajectory, name)
+        measured[metric_of(name)] = quantity(read.scene, trajectory, name)
     for check in read.checks:
         measured[check.metric] = quantity(read.scene, trajectory, check.quantity, check.at, check.over)
     return measured
@@ -145,7 +145,7 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
 def _checks(read: Stated, dt: float) -> list[Check]:
     told = {check.metric: check for check in read.checks}
     final = "shown for comparison between engines: the file states no number for it"
-    names = {_metric(name): name for name in shown_quantities(read.scene)}
+    names = {metric_of(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
     depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
     return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
