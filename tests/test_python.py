@@ -15,6 +15,7 @@ import contact_crosscheck as cc
 from adapters import registry
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import EngineError, EngineFacts, Scheme
+from adapters.extras import install
 from adapters.scene import SceneError
 from reports.command import main
 from validation.records.store import MissingError
@@ -218,7 +219,7 @@ def test_without_the_libraries_a_chart_says_what_to_install(monkeypatch, engine)
     monkeypatch.setitem(sys.modules, "altair", None)
     with pytest.raises(EngineError) as caught:
         result.plot()
-    assert str(caught.value) == "plot: altair is missing; pip install 'contact-crosscheck[report]'"
+    assert str(caught.value) == f"plot: altair is missing; {install('report')}"
 
 
 def test_names_from_files_and_engines_are_text_in_html(tmp_path, monkeypatch, own, engine):

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from adapters.extras import install
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
 from validation import metrics
@@ -129,7 +130,7 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
         overlaps = metrics.overlaps(read.scene, trajectory)
         beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
-        beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
+        beyond = depth = None, f"overlaps of cylinders and hulls need coal: {install('shapes')}"
     measured: dict[str, Measured] = {
         "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
