@@ -384,6 +384,24 @@ def test_a_model_is_a_scene(engine):
         cc.Scene.from_file("model.txt")
 
 
+@pytest.mark.parametrize(
+    ("read", "name", "reader"),
+    [(cc.Scene.from_urdf, "ball_alone.urdf", "mujoco"), (cc.Scene.from_sdf, "ball_dropped.sdf", "drake"),
+     (cc.Scene.from_sdf, "moon_slope.world", "drake")],
+)  # fmt: skip
+def test_a_model_in_urdf_and_sdf_is_a_scene(engine, read, name, reader):
+    """Its own engine runs it as its author made it, from where and as our solver does."""
+    if registry.find(engine(reader)).engine is None:
+        pytest.skip(f"{reader} is not installed")
+    scene = read(MODELS / name)
+    assert scene.title == f"Model {name}" and 3 in scene.dimensions and scene.notes
+    assert list(scene.parameters.name) == ["duration"]
+    own, solved = (cc.run(scene, engine=each, duration=0.05, dimension=3) for each in (reader, engine("reference")))
+    assert own.observation.slot.profile == "model" and own.observation.slot.dt != solved.observation.slot.dt
+    there, here = (each.trajectory.pose[-1, :, :3] for each in (own, solved))
+    assert np.abs(there - here).max() < 9.81 * 0.05 / 240.0  # g t dt: what a step can make of a start from rest [m]
+
+
 def test_engines_and_scenes_are_tables(engine):
     engines, scenes = cc.engines(), cc.scenes().set_index("name")
     assert engines.set_index("name").loc[engine("chipmunk")].status == "installed"
