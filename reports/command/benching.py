@@ -27,8 +27,8 @@ from reports.command.piles import show_piles
 from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, request_from, selection
 from reports.progress import run_plan
 from reports.stages import stage
-from reports.terminal import terminal
-from reports.wording import at, plural
+from reports.terminal import print_roles, terminal
+from reports.wording import at, plural, profiles_called
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
@@ -191,6 +191,7 @@ def _print_tables(tables: speed.Tables, console: Console) -> None:
     for table in speed.level_tables(tables["work_points"], ranked):
         console.print(table)
     console.print(Text(speed.key(ranked), style="dim"))
+    print_roles(tables["work_points"][["engine", "profile"]].itertuples(index=False, name=None), console)
     beside = speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"])
     for table in beside:
         if table.row_count:  # a short bench may have come to none of it
@@ -236,7 +237,7 @@ def profile_(
     from reference_solver.timeline import timeline
 
     ours = registry.solver()
-    chosen = profile or registry.profile_of(ours, "solution") or ""
+    chosen = profiles_called([profile or "solution"], [ours])[0]
     slot = Slot(scene, tuple(map(parameter, param)), dim, ours, chosen, parse_dt(dt))
     engine, posed, settings, _ = prepared(slot)
     simulation: Any = engine.build(posed, slot.dt, settings)

@@ -75,9 +75,10 @@ RUN = {
     "crosscheck ask my ball does not bounce": ["ask my ball does not bounce"],
     "crosscheck show": ["show"],
     "crosscheck findings --engine mujoco": [
-        "findings --engine mujoco", "findings --scene bounce --profile default", "findings --new", "findings --all"
+        "findings --engine mujoco", "findings --scene bounce --profile default", "findings --profile shipped",
+        "findings --new", "findings --all",
     ],
-    "crosscheck explain mujoco/default/bounce": ["explain mujoco/default/bounce"],
+    "crosscheck explain mujoco/default/bounce": ["explain mujoco/default/bounce", "explain 'mujoco/as shipped/bounce'"],
     "crosscheck compare A B": ["compare latest crosscheck-out", "compare crosscheck-out/rows.jsonl latest"],
     "crosscheck merge laptop-out": ["merge crosscheck-out --out both"],
     "crosscheck list scenes|suites|engines|checks|runs": [
@@ -103,12 +104,14 @@ SAID = {
     "run my-scene.toml --engine chipmunk --profile tuned --out elsewhere": "box.mass: 2 kg, its density times its area",
     "ask grip slips mujoco": 'cone="elliptic"',
     "ask my ball does not bounce": "bounce: Dropped ball",
-    "show": "default 2-D",
+    "show": "default 2-D (as shipped)",
     "findings --engine mujoco": "mujoco/default bounce",
     "findings --scene bounce --profile default": "mujoco/default bounce",
+    "findings --profile shipped": "mujoco/default bounce",
     "findings --new": "no unexpected result",
     "findings --all": "mujoco/default bounce",
     "explain mujoco/default/bounce": "crosscheck run bounce --param",
+    "explain 'mujoco/as shipped/bounce'": "crosscheck run bounce --param",
     "compare latest crosscheck-out": "nothing changed",
     "compare crosscheck-out/rows.jsonl latest": "nothing changed",
     "releases --environments": "environments in",
