@@ -9,6 +9,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
+from adapters.extras import install, packages
 from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
 from adapters.plain import NAME, is_visible, one_line
 
@@ -184,9 +185,9 @@ def loaded(entry: EntryPoint, distribution: str = "") -> Found:
 
 
 def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:
-    """What to install where an import fails: an extra for ours, the package of another engine."""
-    if is_ours(entry):
-        return f"pip install 'contact-crosscheck[{entry.name}]' ({facts.package if facts else entry.name})"
+    """What to install where an import fails: the packages of the extra of one of ours, else the engine's own."""
+    if is_ours(entry) and packages(entry.name):
+        return install(entry.name)
     if facts is not None:
         return f"pip install {one_line(facts.package, NAME)}"
     return f"it is an engine of {distribution or 'another distribution'}, which must be installed with all it needs"

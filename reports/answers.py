@@ -208,6 +208,8 @@ def _case(row: Plain) -> tuple[Any, ...]:
 
 #: Kinds of metric that are speeds: the text says that they should be 0.
 RATES = ("creep",)
+#: Two numbers with this many digits are compared at a glance; if they need more, their difference is stated.
+GLANCE = 5
 #: Values below this share of the truth are described as none.
 NOTHING = 1e-6
 
@@ -305,11 +307,24 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
     value = "0" if nothing else measured(row, _digits(row))
     # A file's own quantities have only the body's name and the read quantity.
     own = is_file(row["scene"]) and kind != row["metric"]
-    words = f"{row['metric']} is {value}" if own else spoken(row["scene"], kind, value)
-    text = "never settles" if value == NEVER else words
-    if row["truth"] == 0.0 and kind in RATES and row["value"] and "should" not in text:
+
+    def words(told: str) -> str:
+        return f"{row['metric']} is {told}" if own else spoken(row["scene"], kind, told)
+
+    text = "never settles" if value == NEVER else words(value)
+    as_size = value.startswith("-") and value not in text
+    if row["truth"] and value != NEVER and _digits(row) > GLANCE:
+        text = words(_apart(row, as_size))
+    elif row["truth"] == 0.0 and kind in RATES and row["value"] and "should" not in text:
         text += " instead of 0"
-    if row["truth"] and text != SILENT:
-        text += _instead(row, kind, told_as_size=value.startswith("-") and value not in text)
+    elif row["truth"] and text != SILENT:
+        text += _instead(row, kind, told_as_size=as_size)
     where = params_text(row["slot"]["params"])
     return text + (f" ({where})" if where else "")
+
+
+def _apart(row: Plain, as_size: bool) -> str:
+    """``2.0e-10 more than 1``, of numbers that are alike at a glance; of sizes where the direction is told in words."""
+    value, truth = (abs(row[name]) if as_size else row[name] for name in ("value", "truth"))
+    than = f"{'more' if value > truth else 'less'} than {quantity(truth, row['unit'], 3)}"
+    return f"{'-' if as_size else ''}{quantity(abs(value - truth), row['unit'], 2)} {than}"

@@ -252,25 +252,71 @@ def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
         return tuple(sorted(params.items()))
 
 
+@dataclass(frozen=True)
+class Told:
+    """What is said of a cure, piece by piece; what does not apply is empty.
+
+    Parameters
+    ----------
+    settings
+        Names and values in the engine's own words.
+    check, at
+        The check that tells it, and its parameters.
+    before, after, truth, unit
+        Its values; the truth only where it is neither 0 nor the value after.
+    left
+        How many checks still fail.
+    times
+        Cost in times of that before.
+    """
+
+    settings: list[tuple[str, str]]
+    check: str
+    at: str
+    before: str
+    after: str
+    truth: str
+    unit: str
+    left: str
+    times: str
+
+
+def told(cure: Cure) -> Told:
+    """The pieces of which terminal and page say a cure."""
+    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
+    return Told(
+        changes_in_words(cure, cure.changes),
+        cure.metric,
+        params_text(cure.params),
+        before,
+        after,
+        truth if truth not in ("0", after) else "",
+        "" if cure.unit == "1" else cure.unit,
+        f"{cure.left} of {cure.failing} checks still fail" if cure.left else "",
+        f"{cure.times:.2g}" if cure.times else "",
+    )
+
+
 def cure_text(cure: Cure, where: str = "") -> str:
     """``2-D: cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
     where = where or f"{cure.dimension}-D"
     if not cure.helps:
         return f"{where}: {NONE_HELPS} ({cure.tried} tried)"
-    settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
-    unit = "" if cure.unit == "1" else f" {cure.unit}"
-    at = params_text(cure.params)
-    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
-    aim = f" (true: {truth})" if truth not in ("0", after) else ""
-    numbers = f"{cure.metric}{f' at {at}:' if at else ''} {before} -> {after}{unit}{aim}"
-    left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
-    times = f"{cure.times:.2g}" if cure.times else ""
-    cost = "" if not times else ", at the same cost" if times == "1" else f", at {times} times the cost"
+    said = told(cure)
+    unit = f" {said.unit}" if said.unit else ""
+    aim = f" (true: {said.truth})" if said.truth else ""
+    numbers = f"{said.check}{f' at {said.at}:' if said.at else ''} {said.before} -> {said.after}{unit}{aim}"
+    left = f", {said.left}" if said.left else ""
+    cost = f", at {said.times} times the cost" if said.times else ""
+    cost = ", at the same cost" if said.times == "1" else cost
     alone = ""
     if cure.alone:
-        said = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.alone))
-        alone = f"; {said} alone: {number(cure.alone_after, 3)}{unit}"
-    return f"{where}: {settings}; {numbers}{left}{cost}{alone}"
+        alone = f"; {_assigned(changes_in_words(cure, cure.alone))} alone: {number(cure.alone_after, 3)}{unit}"
+    return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}"
+
+
+def _assigned(settings: Iterable[tuple[str, str]]) -> str:
+    return ", ".join(f"{name}={value}" for name, value in settings)
 
 
 def told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:

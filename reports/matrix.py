@@ -18,7 +18,7 @@ from rich.text import Text
 from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
-from reports.wording import LABELS, MARKS, STATUS, mark_of
+from reports.wording import LABELS, MARKS, STATUS, mark_of, word_of
 from validation.metrics import OUT_OF_PLANE
 
 #: Colours; they support the words and never replace them.
@@ -135,14 +135,15 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(told)}"] if told else []
 
 
-def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:
+def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:
     """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
 
-    Dimensions with equal fields share a line. Scenes that do not fit beside each other form another table. A profile
-    with a user's own settings has a line for each of them if its name leaves no room for a scene.
+    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table. A profile
+    with settings of a user's own has a line for each of them where its name leaves no room for a scene. With ``roles``
+    what a profile is stands beside its first line, where its name does not say so.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
-    body = list(_body(matrix, scenes, versions))
+    body = list(_body(matrix, scenes, versions, roles))
     texts, wide = _texts(scenes, body, short=False)
     if max((len(label) for label, _ in body), default=0) + sum(wide) + GAP * len(wide) > width:
         texts, wide = _texts(scenes, body, short=True)
@@ -187,14 +188,17 @@ def _table(
 Line = tuple[str, tuple[Field | None, ...]]
 
 
-def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) -> Iterator[Line]:
+def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str], roles: bool) -> Iterator[Line]:
     for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
         yield f"{engine} {_version(versions.get(engine, ''))}".strip(), ()
         profiles = [profile for name, profile in matrix.columns if name == engine]
         refused = _never_asked(matrix, engine)
         for profile in profiles:
             dimensions = [d for d in sorted({d for _, d in matrix.lines}) if d not in refused]
-            yield from _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}")
+            role = f" ({word_of(engine, profile)})" if roles and word_of(engine, profile) else ""
+            for label, fields in _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}"):
+                yield label + role, fields
+                role = ""
         for dimension in refused:
             yield from _lines(matrix.fields, scenes, (engine, profiles[0]), [dimension], "  every profile")
 

@@ -22,7 +22,7 @@ from adapters.registry import is_ranked
 from reports.answers import FIXES, Answer, answers, configured
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
-from reports.wording import MARKS, plural
+from reports.wording import MARKS, plural, word_of
 from validation.canonical import FAMILIES
 from validation.posed import resolve
 
@@ -48,8 +48,8 @@ def by_family(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> M
     return matrix_of({**row, "scene": family[row["scene"]], "dimension": 0} for row in rows)
 
 
-def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
-    """Terminal table: a line per engine and profile, a column per family, headings with one word per line."""
+def table_of(matrix: Matrix, families: Sequence[str], roles: bool = False) -> Table:
+    """Terminal table: a line per engine and profile, with its role if asked; a column per family, a word a line."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
     table.add_column("engine,\nprofile", no_wrap=True)
     for name in families:
@@ -58,7 +58,8 @@ def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
         table.add_row(Text(engine, style="bold"))
         for column in (column for column in matrix.columns if column[0] == engine):
             fields = [matrix.fields.get(((name, 0), column)) for name in families]
-            name = column[1].replace("+", "\n    +")  # a user's own settings, one line each
+            role = f" ({word_of(*column)})" if roles and word_of(*column) else ""
+            name = column[1].replace("+", "\n    +") + role  # a user's own settings, a line each
             table.add_row(Text(f"  {name}"), *(_cell(field) for field in fields))
     return table
 

@@ -22,7 +22,7 @@ from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import Matrix, leaving, legend, matrix_of, status_of, sweeps_of, tables_of, unranked, versions_of
-from reports.wording import at, plural
+from reports.wording import at, plural, roles_line
 
 Plain = Mapping[str, Any]
 #: Largest number of alarm families in the list; `crosscheck findings --new` lists all.
@@ -46,19 +46,30 @@ def show(
     """
     place = at(out, run)
     matrix = matrix_of(rows)
-    tables = tables_of(matrix, versions_of(rows), console.width)
+    tables, wider = (tables_of(matrix, versions_of(rows), console.width, roles) for roles in (False, True))
     families = overview.families_of(rows)
-    short = overview.table_of(overview.by_family(rows, families), list(families))
+    grouped = overview.by_family(rows, families)
+    short = overview.table_of(grouped, list(families))
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
-    fits = console.measure(short, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
-    if long and fits and not every:
-        _show_families(rows, families, short, console, place)
+    if long and _fits(short, console) and not every:
+        told = overview.table_of(grouped, list(families), roles=True)
+        roles = [] if _fits(told, console) else [roles_line(matrix.columns)]
+        _show_families(rows, families, short if roles else told, roles, console, place)
         _where(rows, console, files, place, {"crosscheck show --all": "the same for every scene"})
         return
-    for table in tables:
+    # What profiles are stands beside them where that makes no further table, else in a line below.
+    roles = [roles_line(matrix.columns)] if len(wider) > len(tables) else []
+    for table in tables if roles else wider:
         console.print(table)
     explained = [legend(matrix)] if any(row["outcome"] not in REFUSED for row in rows) else []
-    for line in (*explained, *_beside(matrix), *sweeps_of(matrix), *unranked(matrix.columns), *leaving(rows)):
+    for line in (
+        *explained,
+        *filter(None, roles),
+        *_beside(matrix),
+        *sweeps_of(matrix),
+        *unranked(matrix.columns),
+        *leaving(rows),
+    ):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
@@ -69,13 +80,18 @@ def show(
 
 
 def _show_families(
-    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console, place: str
+    rows: Sequence[Plain],
+    families: Mapping[str, Sequence[str]],
+    table: Table,
+    roles: Sequence[str],
+    console: Console,
+    place: str,
 ) -> None:
-    """The same by family of scenes."""
+    """The same by family of scenes; ``roles`` says what profiles are, where the table does not."""
     console.print(table)
     matrix = matrix_of(rows)
     explained = overview.legend(overview.by_family(rows, families))
-    for line in (explained, *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
+    for line in (explained, *filter(None, roles), *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
     console.print(_folded(ran, console, ""), style="dim")
@@ -91,6 +107,11 @@ def _show_families(
     _heading(f"What is wrong as shipped, and what fixes it: the worst scene of each group{count}", console)
     for answer in worst:
         console.print(_folded(answer.line, console))
+
+
+def _fits(table: Table, console: Console) -> bool:
+    """Whether a table is no wider than the terminal."""
+    return console.measure(table, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
 
 
 def _beside(matrix: Matrix) -> list[str]:

@@ -18,7 +18,7 @@ import pytest
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
-from reports.wording import measured, plural, quantity, reproduce
+from reports.wording import measured, plural, profiles_called, quantity, reproduce
 from validation.catalogue import matching
 from validation.cells import Slot, plane_of, slot_from_dict
 from validation.judging.rows import Row, rows_of
@@ -80,7 +80,7 @@ class Plugin:
 def _slots(engine: str, scenes: str, profiles: str) -> list[Slot]:
     names = [scene.name for word in (scenes or "*").split(",") for scene in matching(word.strip())]
     chosen = [word.strip() for word in profiles.split(",") if word.strip()]
-    return slots(Request(list(dict.fromkeys(names)), [engine], chosen))
+    return slots(Request(list(dict.fromkeys(names)), [engine], profiles_called(chosen, [engine])))
 
 
 class _Cells(pytest.Collector):

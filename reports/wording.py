@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from adapters.registry import facts
 from adapters.settings import text_of
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
 from validation.metrics import NEVER as NEVER
@@ -46,6 +47,34 @@ ROLE_WORDS: dict[str, str] = {
     "shipped": "as shipped", "tuned": "tuned", "one": "compromise", "textbook": "textbook", "solution": "exact",
     "matched": "custom loop",
 }  # fmt: skip
+
+
+def word_of(engine: str, profile: str) -> str:
+    """What a profile is called for people beside its name; empty where that is its name, or where it has no role."""
+    told = facts(engine)
+    word = ROLE_WORDS.get(told.roles.get(profile.partition("+")[0], "") if told else "", "")
+    return "" if word == profile else word
+
+
+def roles_line(columns: Iterable[tuple[str, str]]) -> str:
+    """What the profiles of ``(engine, profile)`` are, in one line, where their names do not say so; else empty."""
+    named = {profile.partition("+")[0]: word for engine, profile in columns if (word := word_of(engine, profile))}
+    return f"Profiles: {'; '.join(f'{name}: {word}' for name, word in named.items())}." if named else ""
+
+
+def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
+    """Profiles that words name on engines: by name, or by role (``shipped``, ``as shipped``); else the word itself."""
+    roles = [told.roles for engine in engines if (told := facts(engine))]
+    found: dict[str, None] = {}
+    for word in words:
+        own = [
+            name
+            for each in roles
+            for name, role in each.items()
+            if name == word or (word not in each and word in (role, ROLE_WORDS.get(role)))
+        ]
+        found.update(dict.fromkeys(own or [word]))
+    return list(found)
 
 
 def mark_of(row: Mapping[str, Any]) -> str:

@@ -87,6 +87,11 @@ def texts_of(scenes: Iterable[str]) -> dict[str, str]:
     return {scene: _texts[scene] for scene in dict.fromkeys(scenes) if scene in _texts}
 
 
+def known_texts() -> dict[str, str]:
+    """Texts of all pinned scene files that this process knows, by name."""
+    return dict(_texts)
+
+
 def remember(texts: Mapping[str, str]) -> None:
     """Register pinned scenes in this process, so that their files are not needed.
 
@@ -153,14 +158,18 @@ def resolve(argument: str) -> CanonicalScene:
 
 
 def primary_of(argument: str) -> Primary:
-    """Return the declared error of a scene.
+    """Return the declared error of a scene; of one from a file the distance from the certified run.
 
     Raises
     ------
     SceneError
-        If none is declared: a benchmark needs one number, and a scene from a file has no truth.
+        If none is declared: a bench needs one number.
     """
     found = resolve(argument).primary
+    if found is None and is_file(argument):
+        from validation.files.distance import DISTANCE
+
+        return DISTANCE
     if found is None:
         declared = [name for name, scene in CATALOGUE.items() if scene.primary]
         raise SceneError(f"scene: no primary error is declared for {argument!r}, only for {', '.join(declared)}")

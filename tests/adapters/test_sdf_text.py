@@ -196,7 +196,7 @@ def test_what_hangs_on_a_joint_that_is_left_out_goes_with_it():
 @pytest.fixture
 def no_drake(monkeypatch):
     """As where the extra is not installed."""
-    real, reason = registry.find, "No module named 'pydrake'; pip install 'contact-crosscheck[drake]' (drake)"
+    real, reason = registry.find, "No module named 'pydrake'; pip install 'drake<1.52'"
 
     def find(name):
         return Found(name, None, "", reason, registry.facts(name)) if name == "drake" else real(name)
@@ -212,4 +212,4 @@ def test_without_drake_one_line_says_what_installs_it_and_the_status_that_an_eng
     done = CliRunner().invoke(main, ["run", str(MODELS / "ball_dropped.sdf"), "--out", str(tmp_path / "out")])
     assert done.exit_code == statuses.INCOMPLETE
     (line,) = done.stderr.splitlines()
-    assert "pip install 'contact-crosscheck[drake]'" in line and not (tmp_path / "out").exists()
+    assert "pip install 'drake<1.52'" in line and not (tmp_path / "out").exists()

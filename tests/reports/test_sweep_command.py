@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from adapters.extras import install
 from reports.command import main
 from validation.questions.sweeping import MOST_CELLS, Range, Study, grid, listed, points, study_slots
 from validation.records.store import Store
@@ -149,4 +150,4 @@ def test_parquet_has_the_same_table(tmp_path):
 def test_sobol_without_scipy_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "scipy.stats", None)
     done = call(*CELL, "--sobol", "e=0:1", "--out", tmp_path, status=2)
-    assert "pip install 'contact-crosscheck[report]'" in done.output
+    assert install("report") in done.output

@@ -14,7 +14,7 @@ from validation.cells import Observation, Outcome, Slot, prepare
 from validation.workers import LimitError, batch, cluster
 from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _client, _Driver, checked, run_cells_on
 
-pytest.importorskip("distributed", reason="pip install 'contact-crosscheck[dask]'")
+pytest.importorskip("distributed", reason="pip install -e '.[dask]'")
 pytest.importorskip("pymunk")
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from adapters.extras import install
 from adapters.scene import SceneError
 from validation.files.centring import ALIGNED, centre
 
@@ -87,5 +88,5 @@ def test_without_the_library_of_hulls_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setattr("validation.files.centring.hull_properties", missing)
     with pytest.raises(SceneError) as error:
         centre(body("hull", BRICK), [])
-    assert str(error.value) == "b.shape.vertices: a hull needs scipy, pip install 'contact-crosscheck[shapes]'"
+    assert str(error.value) == f"b.shape.vertices: a hull needs scipy: {install('shapes')}"
     centre(body("polygon", SQUARE), [])  # needs none

@@ -23,6 +23,7 @@ from typing import Any
 
 from adapters.isolation import end_with
 from adapters.registry import load_engines_here
+from validation import posed
 from validation.bench.statistics import spread
 from validation.bench.stopwatch import Lap, serve
 from validation.bench.timing import Timing
@@ -106,7 +107,7 @@ class Lane:
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         with _one_thread():
-            self._process = context.Process(target=_child, args=(theirs, os.getpid()), daemon=True)
+            self._process = context.Process(target=_child, args=(theirs, os.getpid(), posed.known_texts()), daemon=True)
             self._process.start()
         theirs.close()
         self.count += 1
@@ -135,8 +136,9 @@ class Lane:
             self._process = None
 
 
-def _child(connection: Connection, parent: int) -> None:
+def _child(connection: Connection, parent: int, scenes: dict[str, str]) -> None:
     end_with(parent)
+    posed.remember(scenes)  # a model was read by an engine in a process of its own, and this one may start none
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     load_engines_here()
     serve(connection)

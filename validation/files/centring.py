@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.extras import install
 from adapters.scene import SceneError
 from adapters.shapes import CENTRED, Polygon, area_and_centroid, check_points
 from validation.solids import hull_properties
@@ -37,7 +38,7 @@ def centre(body: dict[str, Any], notes: list[str]) -> None:
             if body["inertia"] is None and body["motion"] == "free" and beside > ALIGNED * np.abs(tensor).max():
                 raise SceneError("vertices: the main axes of inertia are not the body's; turn it, or give inertia")
     except ModuleNotFoundError:
-        raise SceneError(f"{label}.vertices: a hull needs scipy, pip install 'contact-crosscheck[shapes]'") from None
+        raise SceneError(f"{label}.vertices: a hull needs scipy: {install('shapes')}") from None
     except SceneError as error:
         raise SceneError(f"{label}.{error}") from None
     size = float(np.abs(np.array(points)).max())

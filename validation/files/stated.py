@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from adapters.extras import install
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
 from validation import metrics
@@ -44,7 +45,7 @@ class StatedCheck:
     @property
     def metric(self) -> str:
         """Name of the metric that it judges."""
-        return _metric(self.quantity, self.at, self.over)
+        return metric_of(self.quantity, self.at, self.over)
 
     def bound(self, dt: float) -> float:
         """Tolerance at step ``dt`` [s], in the quantity's unit."""
@@ -109,7 +110,7 @@ def _exact(read: Stated) -> dict[str, float]:
     return {"energy_growth": 0.0, "penetration": 0.0, **{check.metric: check.value for check in read.checks}}
 
 
-def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
+def metric_of(name: str, at: float | None = None, over: str | None = None) -> str:
     """Name of a quantity's metric: ``final[ball.y]``, ``at[0.25 s][ball.y]``, ``least[floor/ball.fy]``."""
     when = "final" if at is None else f"at[{at:.12g} s]"
     if over in (None, "mean"):
@@ -129,14 +130,14 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
         overlaps = metrics.overlaps(read.scene, trajectory)
         beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
-        beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
+        beyond = depth = None, f"overlaps of cylinders and hulls need coal: {install('shapes')}"
     measured: dict[str, Measured] = {
         "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
         "deepest_overlap": depth,
     }
     for name in shown_quantities(read.scene):
-        measured[_metric(name)] = quantity(read.scene, trajectory, name)
+        measured[metric_of(name)] = quantity(read.scene, trajectory, name)
     for check in read.checks:
         measured[check.metric] = quantity(read.scene, trajectory, check.quantity, check.at, check.over)
     return measured
@@ -145,7 +146,7 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
 def _checks(read: Stated, dt: float) -> list[Check]:
     told = {check.metric: check for check in read.checks}
     final = "shown to compare engines: the file states no value for it"
-    names = {_metric(name): name for name in shown_quantities(read.scene)}
+    names = {metric_of(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
     depth = Check("deepest_overlap", "m", None, None, "shown: its tolerance is subtracted in `penetration`", "")
     return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]

@@ -24,6 +24,7 @@ from typing import Any
 from uuid import uuid4
 
 from adapters.engine import EngineError
+from adapters.extras import install
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from validation import posed
@@ -66,7 +67,7 @@ def checked(address: str) -> str:
     if not ADDRESS.fullmatch(address):
         raise SceneError(f"cluster: {one_line(address, 80)!r} is neither local:N nor tcp://HOST:PORT")
     if find_spec("distributed") is None:
-        raise EngineError("cluster: distributed is missing; pip install 'contact-crosscheck[dask]'")
+        raise EngineError(f"cluster: distributed is missing; {install('dask')}")
     return address
 
 
