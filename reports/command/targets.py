@@ -33,11 +33,11 @@ HEADINGS = (
 )
 #: Errors are shown in thousandths of these.
 SMALL = {"m": "mm", "J": "mJ"}
-KEY = (
-    "Ratio: their CPU time of a step over ours in the same round; median [95 % interval]; above 1 ours is faster.\n"
-    "Equal error: ours with the fewest sweeps (sw.), 10 or more, whose errors are no larger than theirs by over 1 %.\n"
-    "*: floor and target hold for this ratio. Ten sweeps: of engines that sweep; others as their profile says."
-)
+KEY = """\
+Ratio: their CPU time of a step over ours in the same round, median [95 % interval]; above 1 ours
+is faster. Equal error: ours with the fewest sweeps (sw.), 10 or more, whose errors are larger
+than theirs by at most 1 %. Ten sweeps are of engines that sweep; others run as their profile
+says. Floor and target hold for the ratio with a star."""
 MARKS = {"target": "meets target", "floor": "meets floor"}
 
 

@@ -115,7 +115,7 @@ class Row:
     sweeps
         Ours; None where no number of them is known to reach their error.
     counts
-        Bodies and timed steps, rounds; of both sides contacts at the end of the run for errors, a hash of the state that
+        Bodies, timed steps, rounds; of both sides contacts at the end of the run for errors, a hash of the state that
         the timed steps ended in, and the median CPU time of a step [s].
     """
 
