@@ -117,7 +117,10 @@ def _line(cells: Sequence[Any]) -> str:
 
 
 def _names(rows: Sequence[Row]) -> str:
-    """Names of a scene's errors with the units that they are shown in."""
+    """Names of a scene's errors with the units that they are shown in; of the share what it is a share of."""
+    counts = rows[0].counts
+    if "levels" in counts:
+        return f": {counts['ahead']} of {counts['levels']}; {counts['only_ours']} more are reached by ours only"
     names = next((row.our_error or row.their_error for row in rows if row.our_error or row.their_error), {})
     shown = (f"{name} [{SMALL.get(unit, unit)}]" for name, unit in map(_parts, names))
     return f"; error: {', '.join(shown)}" if names else ""
@@ -163,7 +166,7 @@ def _digits(ratio: float) -> str:
 
 def _errors(errors: Mapping[str, float]) -> str:
     shown = (number((1e3 if _parts(name)[1] in SMALL else 1.0) * value, 2) for name, value in errors.items())
-    return ", ".join(shown) or "-"
+    return ", ".join(shown)
 
 
 def _owed(row: Row) -> str:

@@ -13,6 +13,7 @@ from validation.bench.targets import AT_END, AT_ERROR, AT_SWEEPS, Row
 from validation.records.store import Store
 
 OURS, THEIRS = {"drift [m]": 3.5e-3, "sag [m]": 8.4e-4}, {"drift [m]": 1e-9, "sag [m]": 1.1e-3}
+SHARE = {"ahead": 6, "levels": 40, "only_ours": 8}
 
 
 def rows():
@@ -29,7 +30,7 @@ def rows():
         pair("second/tuned", AT_ERROR, none, none[:2], None, f"{targets.NOT_THERE} up to 640 sweeps"),
         pair("third/default", AT_SWEEPS, none, (5.0, 8.0), 10, "it broke"),
         Row("it stands", "first/default", AT_END, 0.46, None, None, 0.1, None, OURS, THEIRS, 10, {}),
-        Row("a share", "best engine", AT_ERROR, 0.15, None, None, 0.5, 0.8, {}, {}, None, {}),
+        Row("a share", "others", AT_ERROR, 0.15, None, None, 0.5, 0.8, {}, {}, None, SHARE),
     ]
 
 
@@ -54,7 +55,9 @@ def test_the_table_has_a_line_for_each_opponent_and_at_most_a_hundred_columns():
     assert "third - 3.5, 0.84 1.0e-6, 1.1 5/8 below floor" in plain
     standing = plain[plain.index("it stands; error: drift [mm], sag [mm]") + 1]
     assert standing == "first 3.5, 0.84 1.0e-6, 1.1 <= 100 below floor"
-    assert "*15%" in told[told.index("a share") + 1]
+    assert (
+        plain[plain.index("a share: 6 of 40; 8 more are reached by ours only") + 1] == "others *15% 0.5/0.8 below floor"
+    )
 
 
 def test_json_has_a_row_for_each_ratio_with_both_errors(measured, tmp_path):
