@@ -23,7 +23,7 @@ from validation.bench import reading, targets
 from validation.bench.targets import AT_END, AT_ERROR, AT_SWEEPS, Row, Table
 from validation.bench.work import work_points
 from validation.identity import machine
-from validation.records.store import Store
+from validation.records.store import MissingError, Store
 
 #: Widths of the columns, 99 characters in all, and their headings in two lines.
 WIDTHS = (8, 18, 18, 4, 12, 12, 8, 12)
@@ -86,9 +86,10 @@ def _absent(asked: Table) -> dict[str, str]:
 
 def _lead(out: Path, asked: Table) -> list[Row]:
     """The row that is read from the newest benchmark in ``out``, if there is one."""
-    if not out.exists():
+    try:
+        store = Store(out, create=False)
+    except MissingError:
         return []
-    store = Store(out)
     try:
         runs = [run for run in reading.bench_runs(store) if run.finished]
         return [targets.lead(work_points(store, runs[-1]), asked.twice)] if runs else []

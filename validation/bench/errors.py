@@ -69,6 +69,8 @@ def errors_of(kind: str, slot: Slot, seconds: float) -> Found:
         found = _primary(slot) if kind == "primary" else _sampled(kind, slot, seconds)
     except BaseException as failure:  # whatever an engine raises costs this run only
         found = Found({}, {}, 0, 0, 0.0, said_by(failure))
+    if not all(map(math.isfinite, found.errors.values())):
+        found = Found({}, {}, found.contacts, found.steps, 0.0, "an error is not finite")
     return replace(found, seconds=time.process_time() - started)
 
 

@@ -21,11 +21,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pandas as pd
 
 from adapters import registry
+from adapters.engine import Role
 from adapters.stepping import step_count
 from validation.bench.agreement import ratio
 from validation.bench.errors import Found, errors_of
@@ -51,7 +52,7 @@ class Opponent:
     """An engine's profile by its role, the sweeps it gets (None: its own), and where floor and target hold."""
 
     engine: str
-    role: Literal["shipped", "tuned"]
+    role: Role
     sweeps: int | None
     floor: str
 
