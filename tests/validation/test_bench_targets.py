@@ -100,7 +100,7 @@ def test_the_scenes_of_the_table_are_there_with_as_many_bodies_as_they_say(case)
     assert max(overlap.values(), default=0.0) < 1e-9  # a place of a hundred sides is rounded
     for name, owed in case.against.items():
         assert ASKED.opponents[name].profile and len(owed) in (0, 2) and list(owed) == sorted(owed)
-    assert (case.clock is None) == (case.drift is not None)
+    assert (case.clock is None) == (case.drift is not None) and set(case.timed_only) <= set(case.against)
 
 
 def test_side_contacts_are_where_boxes_of_a_row_touch():

@@ -45,6 +45,7 @@ LIMITS = Limits(width=0.03, fewest=7, most=9, unit_seconds=10.0, lane_seconds=24
 MOST_SWEEPS, SEARCH_SECONDS = 640, 40.0
 AT_SWEEPS, AT_ERROR, AT_END = "10 sweeps", "equal error", "end of the run"
 NOT_THERE = "not at this error"
+TIMED_ONLY = "not run for its errors, which would take minutes"
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Case:
     seconds: float = 0.0
     clock: tuple[float, float] | None = None
     drift: float | None = None
+    timed_only: Sequence[str] = ()
 
     def slot(self, engine: str, profile: str, sweeps: int | None) -> Slot:
         """What is run of it."""
@@ -108,7 +110,7 @@ class Row:
         ``10 sweeps`` or ``equal error``; ``end of the run`` where nothing is timed.
     measured, low, high
         Their CPU time a step over ours, median over rounds and 95 % interval; where nothing is timed our error.
-        None where there is none, for ``reason``.
+        None where there is none.
     floor, target
         Least value that is owed, and aimed for; where nothing is timed the largest error allowed. None: shown only.
     our_error, their_error
@@ -118,6 +120,8 @@ class Row:
     counts
         Bodies, timed steps, rounds; of both sides contacts at the end of the run for errors, a hash of the state that
         the timed steps ended in, and the median CPU time of a step [s].
+    reason
+        Why a ratio or their error is missing; empty where neither is.
     """
 
     scene: str
@@ -251,7 +255,10 @@ class _Errors:
             slot = case.slot(name, opponent.profile, opponent.sweeps)
             if runs(slot):
                 self.opponents.append((opponent, slot))
-        self.theirs = {slot: ask(slot) for _, slot in self.opponents}
+        timed = Found({}, {}, 0, 0, 0.0, TIMED_ONLY)
+        self.theirs = {
+            slot: timed if opponent.engine in case.timed_only else ask(slot) for opponent, slot in self.opponents
+        }
         self.ours = Ours(lambda sweeps: ask(case.ours(sweeps)))
         self.ours.at(case.sweeps)
         self.equal = {
@@ -267,7 +274,9 @@ class _Errors:
         begin, lasting = case.clock
         warm_up = step_count(begin, case.dt) if begin else 0
         bodies = sum(body.motion == "free" for body in scene_of(case.ours(case.sweeps)).bodies)
-        slots = [case.ours(count) for count in sweeps] + [s for s, found in self.theirs.items() if not found.reason]
+        slots = [case.ours(count) for count in sweeps] + [
+            slot for slot, found in self.theirs.items() if found.reason in ("", TIMED_ONLY)
+        ]
         return [Unit("work", slot, "", bodies, warm_up, step_count(lasting, case.dt)) for slot in slots]
 
     def rows(self, timings: Mapping[Slot, Mapping[int, Timing]]) -> Iterator[Row]:
