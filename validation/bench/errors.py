@@ -41,7 +41,7 @@ class Found:
     Parameters
     ----------
     contacts
-        Contact points that the engine tells at the end.
+        Contact points that the engine tells at the end; None where it was not asked.
     seconds
         CPU time of all that was run for it [s].
     reason
@@ -50,7 +50,7 @@ class Found:
 
     errors: Mapping[str, float]
     round_off: Mapping[str, float]
-    contacts: int
+    contacts: int | None
     steps: int
     seconds: float
     reason: str = ""
@@ -62,13 +62,13 @@ class Found:
         )
 
 
-def errors_of(kind: str, slot: Slot, seconds: float) -> Found:
-    """Run a slot and measure its errors; an engine that fails gives a reason, not an exception."""
+def errors_of(kind: str, slot: Slot, seconds: float, count: bool = True) -> Found:
+    """Run a slot and measure its errors, and ``count`` its contacts; an engine that fails gives a reason."""
     started = time.process_time()
     try:
-        found = _primary(slot) if kind == "primary" else _sampled(kind, slot, seconds)
+        found = _primary(slot) if kind == "primary" else _sampled(kind, slot, seconds, count)
     except BaseException as failure:  # whatever an engine raises costs this run only
-        found = Found({}, {}, 0, 0, 0.0, said_by(failure))
+        found = Found({}, {}, None, 0, 0.0, said_by(failure))
     if not all(map(math.isfinite, found.errors.values())):
         found = Found({}, {}, found.contacts, found.steps, 0.0, "an error is not finite")
     return replace(found, seconds=time.process_time() - started)
@@ -92,7 +92,7 @@ def _primary(slot: Slot) -> Found:
     return Found({name: metrics.largest(worst)}, {name: ROUND_OFF}, contacts, steps, 0.0)
 
 
-def _sampled(kind: str, slot: Slot, seconds: float) -> Found:
+def _sampled(kind: str, slot: Slot, seconds: float, count: bool) -> Found:
     engine, posed, settings, lifted = prepared(slot)
     scene, steps = scene_of(slot), step_count(seconds, slot.dt)
     simulation = engine.build(posed, slot.dt, settings)
@@ -101,7 +101,7 @@ def _sampled(kind: str, slot: Slot, seconds: float) -> Found:
         poses = [np.array(view.pose())]
         for _ in advances(simulation, steps, step_count(SAMPLE, slot.dt)):
             poses.append(np.array(view.pose()))
-        twist, contacts = np.array(view.twist()), len(simulation.contacts().a)
+        twist, contacts = np.array(view.twist()), len(simulation.contacts().a) if count else None
     finally:
         simulation.close()
     if not (np.isfinite(poses).all() and np.isfinite(twist).all()):

@@ -50,12 +50,16 @@ TIMED_ONLY = "not run for its errors, which would take minutes"
 
 @dataclass(frozen=True)
 class Opponent:
-    """An engine's profile by its role, the sweeps it gets (None: its own), and where floor and target hold."""
+    """An engine's profile by its role, the sweeps it gets (None: its own), where floor and target hold.
+
+    ``contacts``: whether its contacts are counted.
+    """
 
     engine: str
     role: Role
     sweeps: int | None
     floor: str
+    contacts: bool = True
 
     @property
     def profile(self) -> str:
@@ -155,7 +159,7 @@ def table(path: Path = TABLE) -> Table:
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     sweeps = data["sweeps"]
     opponents = {
-        name: Opponent(name, told["role"], sweeps if told["sweeps"] else None, told["floor"])
+        name: Opponent(name, **{**told, "sweeps": sweeps if told["sweeps"] else None})
         for name, told in data["opponents"].items()
     }
     cases = (Case(**{"sweeps": sweeps, **told, "dt": parse_dt(told.get("dt", data["dt"]))}) for told in data["scenes"])
@@ -244,10 +248,10 @@ class _Errors:
     """Errors of one scene: theirs, ours at all sweeps that were tried, and our sweeps at equal error."""
 
     def __init__(self, case: Case, asked: Table, lane: Lane, tell: Callable[[str], None]) -> None:
-        def ask(slot: Slot) -> Found:
+        def ask(slot: Slot, contacts: bool = True) -> Found:
             tell(f"errors: {case.title}, {slot.engine}{f' at {slot.iterations} sweeps' if slot.iterations else ''}")
-            found, reason = lane.ask(partial(errors_of, case.errors, slot, case.seconds))
-            return found or Found({}, {}, 0, 0, 0.0, reason)
+            found, reason = lane.ask(partial(errors_of, case.errors, slot, case.seconds, contacts))
+            return found or Found({}, {}, None, 0, 0.0, reason)
 
         self.case, self.opponents = case, list[tuple[Opponent, Slot]]()
         for name in case.against:
@@ -255,9 +259,10 @@ class _Errors:
             slot = case.slot(name, opponent.profile, opponent.sweeps)
             if runs(slot):
                 self.opponents.append((opponent, slot))
-        timed = Found({}, {}, 0, 0, 0.0, TIMED_ONLY)
+        timed = Found({}, {}, None, 0, 0.0, TIMED_ONLY)
         self.theirs = {
-            slot: timed if opponent.engine in case.timed_only else ask(slot) for opponent, slot in self.opponents
+            slot: timed if opponent.engine in case.timed_only else ask(slot, opponent.contacts)
+            for opponent, slot in self.opponents
         }
         self.ours = Ours(lambda sweeps: ask(case.ours(sweeps)))
         self.ours.at(case.sweeps)
