@@ -39,7 +39,7 @@ from validation.cells import Slot, parse_dt
 
 TABLE = Path(__file__).with_name("targets.toml")
 #: Nine rounds for what is cheap; three where a round of one engine takes seconds.
-LIMITS = Limits(width=0.03, fewest=7, most=9, unit_seconds=10.0, lane_seconds=200.0, patience=300.0, renew=3)
+LIMITS = Limits(width=0.03, fewest=7, most=9, unit_seconds=10.0, lane_seconds=300.0, patience=300.0, renew=3)
 #: Most sweeps that are tried, and CPU time for the tries of a scene [s]: all that the largest scenes need is then known
 #: in half of the ten minutes.
 MOST_SWEEPS, SEARCH_SECONDS = 640, 40.0
