@@ -25,6 +25,7 @@ from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.piles import show_piles
 from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, request_from, selection
+from reports.command.targets import show_targets
 from reports.progress import run_plan
 from reports.stages import stage
 from reports.terminal import print_roles, terminal
@@ -57,10 +58,15 @@ AGREEMENT = 0.9
     metavar="N",
     help="Instead, time the reference solver on piles of 20 to N bodies.",
 )
+@click.option(
+    "--targets",
+    is_flag=True,
+    help="Instead, compare the textbook step with each engine, and with the ratios that it owes.",
+)
 @click.option("--brief", is_flag=True, help="Print no tables; they are in OUT/bench and in the report.")
 @AS_JSON
 @OUT
-def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
+def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: bool, **options: Any) -> None:
     """Measure error against time, over steps and iterations.
 
     SCENES are names, globs, scene files or models, as for run. The error on a file is the distance from the certified
@@ -69,11 +75,16 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
     cases are timed one at a time. --quick takes under two minutes on two cores, --full up to two hours (piles of a
     thousand boxes). With --against, exits with 1 if fewer than 90 % of the time ratios agree. With --piles, times the
-    reference solver on piles, in its exact and in its textbook profile.
+    reference solver on piles, in its exact and in its textbook profile. With --targets, times the textbook profile
+    against other engines at 10 sweeps and at equal error, in under ten minutes on one core; a ratio below its floor is
+    shown and is no failure.
     """
     console = terminal(stderr=True)
     if piles is not None:
         show_piles(console, as_json, piles, options["seed"] or 0)
+        return
+    if targets:
+        show_targets(console, as_json, out, options["scenes"], options["seed"])
         return
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; it has no meaning for a benchmark")
