@@ -1,6 +1,6 @@
-"""The vocabulary that both sides of the plugin line speak, and one file per engine.
+"""Types shared by engines and judging, and one folder per engine.
 
-Importing this package imports no engine and no numba; `adapters.registry` loads engines late.
+Importing this package imports no engine and no numba; `adapters.registry` loads engines when needed.
 """
 
 from adapters.engine import (

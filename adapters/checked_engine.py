@@ -1,4 +1,4 @@
-"""What adapters do alike before a world is made: the step, the settings and the scene are checked."""
+"""Common checks of adapters before a world is made: step, settings and scene."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from adapters.single_precision import without_a_place
 
 
 class CheckedEngine(Engine):
-    """An engine of one Python package, whose settings are those of `Engine.kinds` and whose worlds are of one class."""
+    """An engine of one Python package, with the settings of `Engine.kinds` and one class of worlds."""
 
     #: Name by which the engine is imported.
     module: str
-    #: ``simulation(scene, dt, settings)`` makes a world of what was checked.
+    #: ``simulation(scene, dt, settings)`` makes a world from checked arguments.
     simulation: Callable[[Scene, float, Mapping[str, Any]], Simulation]
 
     def version(self) -> str:
@@ -33,11 +33,11 @@ class CheckedEngine(Engine):
         return version(self.facts.package)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse masses and moments that single precision cannot hold, if the engine computes in it."""
+        """Refuse masses and moments beyond single precision, if the engine computes in it."""
         return without_a_place(scene) if self.facts.precision == "single" else None
 
     def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Settings that the engine can take, as its world gets them.
+        """Valid settings, as passed to the world.
 
         Raises
         ------
@@ -47,7 +47,7 @@ class CheckedEngine(Engine):
         return checked(self.name, self.kinds, settings)
 
     def profile_of(self, settings: Mapping[str, Any]) -> str:
-        """Name of the profile that `refuses` is asked for; empty where it says the same of all."""
+        """Name of the profile for `refuses`; empty if it is the same for all."""
         return ""
 
     def check_settings(self, settings: Mapping[str, Any]) -> None:
@@ -60,7 +60,7 @@ class CheckedEngine(Engine):
         Raises
         ------
         EngineError
-            For a spatial scene in a planar engine, a scene that `refusal` names, a bad step or setting.
+            For a spatial scene in a planar engine, a refused scene, a bad step or setting.
         """
         if scene.dimension == 3 and 3 not in self.facts.dimensions:
             raise EngineError(f"dimension: {self.name} is planar and cannot run a spatial scene")

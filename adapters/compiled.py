@@ -1,4 +1,4 @@
-"""Loops of laws as machine code, by the decorators of our solver's kernels; only what compiles something imports it."""
+"""Compiles loops of contact laws, with the decorators of our solver's kernels; imported only where needed."""
 
 from __future__ import annotations
 

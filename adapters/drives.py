@@ -1,14 +1,14 @@
-"""What moves bodies from outside: surfaces that run, courses that are prescribed, and what of it an adapter can honour.
+"""Driven motion: surface velocities, prescribed courses, and the abilities of an adapter for them.
 
-A conveyor is a body that stays where it is while its surface runs along itself. Of a half-space that is the same as a
-half-space that moves along itself, and engines without a surface velocity get it so (`as_moving`).
+A conveyor is a body at rest whose surface moves along itself. For a half-space that is the same as a half-space that
+moves along itself, which engines without surface velocities get (`as_moving`).
 
 A course adds an oscillation to the constant twist of a prescribed body:
 
     x(t) = x0 + v t + A (sin(2 pi f t + phase) - sin(phase))
 
-Engines move a body by a velocity. Over each step they are given the mean one, ``(x(t + dt) - x(t)) / dt``, so that the
-body is where its course says at the end of every step; what touches it meets that velocity, not the one at an instant.
+Engines move a body by a velocity. For each step they get the mean one, ``(x(t + dt) - x(t)) / dt``, so the body is on
+its course at the end of every step; bodies that touch it see that velocity.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from adapters.shapes import HalfSpace, SceneError, check_finite, check_length, c
 if TYPE_CHECKING:
     from adapters.scene import Body, Scene
 
-#: What a scene may ask for beyond discs, balls, boxes, fixed half-spaces, constant twists and passive contacts. An
-#: adapter names what it honours (`adapters.engine.EngineFacts.abilities`); the rest is refused before it sees it.
+#: Features of a scene beyond discs, balls, boxes, fixed half-spaces, constant twists and passive contacts. An adapter
+#: lists those that it supports (`adapters.engine.EngineFacts.abilities`); others are refused before it is called.
 Ability = Literal[
     "surface velocity",
     "moving half-space",
@@ -48,7 +48,7 @@ class Harmonic:
 
     @property
     def top_speed(self) -> float:
-        """Fastest that the oscillation alone moves [m/s]."""
+        """Largest speed of the oscillation [m/s]."""
         return 2.0 * math.pi * self.frequency * math.hypot(*self.amplitude)
 
 
@@ -73,27 +73,27 @@ def place_after(body: Body, time: float) -> tuple[float, ...]:
 
 
 def top_speed(body: Body) -> float:
-    """Fastest that a body moves by what is prescribed, or its surface runs [m/s]; of a free body at the start."""
+    """Largest prescribed or surface speed of a body [m/s]; of a free body its initial speed."""
     own = math.hypot(*body.twist[: len(body.force)]) + (body.course.top_speed if body.course else 0.0)
     return own + math.hypot(*body.surface_velocity)
 
 
 def check_drive(body: Body, dimension: int) -> None:
-    """Raise `SceneError` for a surface or a course that is none; the body's pose and twist are checked already."""
+    """Raise `SceneError` for an invalid surface velocity or course; pose and twist are already checked."""
     check_finite(f"{body.name}.surface_velocity", body.surface_velocity)
     check_length(f"{body.name}.surface_velocity", body.surface_velocity, dimension)
     if any(body.surface_velocity):
         if body.motion == "free":
-            raise SceneError(f"{body.name}.surface_velocity: only the surface of a body that is not free can run")
+            raise SceneError(f"{body.name}.surface_velocity: only a body that is not free can have a surface velocity")
         if isinstance(body.shape, HalfSpace):
             lifting = sum(v * n for v, n in zip(body.surface_velocity, body.shape.normal, strict=True))
             if abs(lifting) > 1e-9 * math.hypot(*body.surface_velocity):
-                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} leaves the face")
+                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} does not lie in the face")
     course = body.course
     if course is None:
         return
     if not isinstance(course, Harmonic):
-        raise SceneError(f"{body.name}.course: {course!r} is no course")
+        raise SceneError(f"{body.name}.course: {course!r} is not a course")
     if body.motion != "prescribed":
         raise SceneError(f"{body.name}.course: only a prescribed body has a course")
     check_finite(f"{body.name}.course.amplitude", course.amplitude)
@@ -103,7 +103,7 @@ def check_drive(body: Body, dimension: int) -> None:
 
 
 def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:
-    """What a scene asks for beyond the common ground: the field that asks, and what."""
+    """Features that a scene needs: field and ability."""
     kinds: dict[str, Ability] = {"Capsule": "capsule", "Polygon": "polygon", "Cylinder": "cylinder", "Hull": "hull"}
     for body in scene.bodies:
         kind = type(body.shape).__name__
@@ -122,12 +122,12 @@ def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:
 
 
 def turns(body: Body) -> bool:
-    """Whether a half-space turns, about what was the origin at the start."""
+    """Whether a half-space rotates, about the initial origin."""
     return isinstance(body.shape, HalfSpace) and any(body.twist[len(body.force) :])
 
 
 def as_moving(scene: Scene) -> Scene:
-    """The same physics with half-spaces that move along themselves in place of fixed ones whose surface runs."""
+    """The same physics with half-spaces that move along themselves instead of fixed ones with a surface velocity."""
     bodies = tuple(_moving(body) for body in scene.bodies)
     return scene if bodies == scene.bodies else replace(scene, bodies=bodies)
 

@@ -1,9 +1,9 @@
-"""The plugin line: what an engine promises and what a simulation gives back.
+"""The plugin interface: what an engine declares, and what a simulation returns.
 
-An adapter is one final subclass of `Engine` and one of `Simulation`, in the engine's folder
-(`adapters.engine_folder`). It translates, refuses what
-it cannot honour (`Engine.refuses`), and reads back what the engine now holds. It never approximates in silence,
-never sees a scene's truth, and contains no loop over steps: the only one is `adapters.stepping.run`.
+An adapter is one final subclass of `Engine` and one of `Simulation`, in the engine's folder (`adapters.engine_folder`).
+It translates scenes, refuses those that the engine cannot represent (`Engine.refuses`), and reads back what the engine
+holds. It never approximates in silence, has no access to a scene's truth, and contains no loop over steps: the only one
+is `adapters.stepping.run`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class EngineError(RuntimeError):
 
 @dataclass(frozen=True)
 class Setting:
-    """One parameter of a profile: what it is set to, why, and where that is known from."""
+    """One parameter of a profile: its value, the reason and the source."""
 
     name: str
     value: Any
@@ -42,7 +42,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Quirk:
-    """A habit of an engine that the adapter had to deal with."""
+    """A peculiarity of an engine, and how the adapter handles it."""
 
     what: str
     what_we_do: str
@@ -51,16 +51,16 @@ class Quirk:
 
 @dataclass(frozen=True)
 class Scheme:
-    """In which order an engine moves bodies; the discrete oracle selects on it, never on an engine's name.
+    """Order in which an engine updates bodies; predictions select by it, never by an engine's name.
 
     Parameters
     ----------
     order
         Phases of a step, for people.
     position_offset
-        Free fall from rest is sampled at ``x(t) + position_offset * g * t * dt / 2`` along gravity: +1 velocity
-        first (semi-implicit Euler falls too far), -1 position first (lags behind), 0 second order, 1/n where a step
-        is made of n semi-implicit ones.
+        Free fall from rest is sampled at ``x(t) + position_offset * g * t * dt / 2`` along gravity: +1 velocity first
+        (semi-implicit Euler falls too far), -1 position first (lags behind), 0 second order, 1/n where a step consists
+        of n semi-implicit ones.
     """
 
     order: str
@@ -69,7 +69,7 @@ class Scheme:
 
 @dataclass(frozen=True)
 class Expected:
-    """A conformance check that an engine is known to fail: which, why, and where that is known from."""
+    """A conformance check that an engine is known to fail: name, reason and source."""
 
     check: str
     because: str
@@ -78,7 +78,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Declared:
-    """What a profile claims to realise on a probe: a value and the band it may lie in (same unit)."""
+    """What a profile is declared to realise on a probe: a value and its band (same unit)."""
 
     value: float
     band: float
@@ -86,7 +86,7 @@ class Declared:
 
 
 def _vectors(told: Sequence[Any], dimension: int) -> Array:
-    """Rows (k, d) of vectors; a number stands for a vector of it, as NaN does for an impulse that is not told.
+    """Rows (k, d) of vectors; a number is repeated for all components, such as NaN for an unreported impulse.
 
     Raises
     ------
@@ -102,13 +102,13 @@ def _vectors(told: Sequence[Any], dimension: int) -> Array:
     return found
 
 
-#: A contact as adapters tell it: bodies by index, point, normal from the first to the second, impulse on that one, gap.
+#: A contact of an adapter: bodies by index, point, normal from the first to the second, impulse on that one, gap.
 Row = tuple[int, int, Any, Any, Any, float]
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts of one instant as arrays over k contacts; NaN where the engine does not say.
+    """Contacts of one instant as arrays over k contacts; NaN where the engine reports nothing.
 
     ``a``, ``b``: body indices of the scene (k,); ``point``, ``normal`` (from a to b), ``impulse`` on b of the
     last step in world axes [N s]: (k, d); ``gap`` [m], < 0 is overlap: (k,).
@@ -142,16 +142,16 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Recorded:
-    """States of a stretch of a run, one after another.
+    """Successive states of a part of a run.
 
     Parameters
     ----------
     pose, twist
-        (s, n, 3 | 7) and (s, n, 3 | 6), as `Simulation.pose` and `Simulation.twist` tell each of them.
+        (s, n, 3 | 7) and (s, n, 3 | 6), as from `Simulation.pose` and `Simulation.twist`.
     counts
-        (s,) how many contacts belong to each.
+        (s,) number of contacts of each.
     contacts
-        Those of all, in that order; None where they were not asked for.
+        Contacts of all, in that order; None where not requested.
     """
 
     pose: Array
@@ -161,9 +161,9 @@ class Recorded:
 
 
 class Simulation(ABC):
-    """One built world. Built fresh for every run, never reset. What is missing is an error, not a zero."""
+    """One world, built anew for every run and never reset. A missing value is an error, not a zero."""
 
-    #: What the adapter had to change in the scene's start state, in words; shown beside the result.
+    #: Changes of the scene's start state by the adapter, in words; shown beside the result.
     initial_change: tuple[str, ...] = ()
 
     @abstractmethod
@@ -183,39 +183,39 @@ class Simulation(ABC):
         """Contacts with the impulses of the last step made."""
 
     def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
-        """Make ``samples`` times ``stride`` steps and tell the state after each ``stride`` of them, or None: make none.
+        """Make ``samples`` times ``stride`` steps, a state after each ``stride``; None, without a step: not supported.
 
-        For engines that can do so without a call per step. It must be, bit for bit, what `advance` and the readers tell
-        sample after sample.
+        For engines that can do so without a call a step. The result must equal that of `advance` and the readers, bit
+        for bit.
         """
         return None
 
     @abstractmethod
     def readback(self) -> dict[str, Any]:
-        """What the engine now holds (masses, materials, dt, solver settings), read from the engine."""
+        """Values read from the engine: masses, materials, dt, solver settings."""
 
     def certificate(self) -> dict[str, Any]:
-        """How well the answers solve their own equations; empty where an engine does not say.
+        """How well the results satisfy the engine's equations; empty where it does not report that.
 
-        Where a profile promises a solution, ``certified`` says whether it was found and ``reasons`` why not: a run
-        that is not certified is INVALID, and so never a truth nor a partner of comparison.
+        For an exact profile ``certified`` says whether the solution was found, and ``reasons`` why not. A run that is
+        not certified is INVALID: it is no truth and takes part in no comparison.
         """
         return {}
 
     def close(self) -> None:  # noqa: B027  (most engines hold nothing that needs closing)
-        """Release what the engine holds."""
+        """Release the engine's resources."""
 
 
 ProfileRule = Callable[[Needs, float], list[Setting]]
-#: ``write(scene, dt, settings, steps)``: the run of so many steps of a scene, as a text that needs the engine alone.
-#: `Engine.check_settings` has let the settings pass.
+#: ``write(scene, dt, settings, steps)``: the run of a scene as a text that needs the engine only.
+#: The settings have passed `Engine.check_settings`.
 Writer = Callable[[Scene, float, Mapping[str, Any], int], str]
 
 
-#: What a profile is among those of its engine. Comparisons and marks select on it, never on a profile's name.
+#: Role of a profile. Comparisons and marks select by role, never by a profile's name.
 Role = Literal["shipped", "textbook", "tuned", "one", "solution", "matched"]
 ROLES: Mapping[Role, str] = {
-    "shipped": "what a user gets without changing anything",
+    "shipped": "the engine's own settings",
     "textbook": "a textbook's method at a fixed cost",
     "tuned": "best stock settings, chosen by what a scene needs",
     "one": "one set of stock settings for all scenes",
@@ -223,10 +223,10 @@ ROLES: Mapping[Role, str] = {
     "matched": "the textbook law instead of the engine's own, by a loop around its solver. This is not the engine's "
     "contact model, so it is not ranked",
 }
-#: Roles of profiles that are asked and shown, but neither compared nor recommended: nobody gets them by settings.
+#: Roles of profiles that run and are shown, but neither compared nor recommended: settings alone do not give them.
 UNRANKED: frozenset[Role] = frozenset({"matched"})
 Precision = Literal["double", "single"]
-#: Name of the profile in the rows of an engine that cannot be asked for its own.
+#: Name of the profile in the rows of an engine whose profiles are unknown.
 NOT_KNOWN = "?"
 
 
@@ -242,30 +242,31 @@ class EngineFacts:
     customary_dt: float
     quirks: tuple[Quirk, ...] = ()
     known_bad_versions: Mapping[str, str] = field(default_factory=dict)
-    #: Profiles that step differently, by name.
+    #: Schemes of profiles with another scheme, by name.
     profile_schemes: Mapping[str, Scheme] = field(default_factory=dict)
-    #: What the profiles are, by name; one that is none of these has no role.
+    #: Roles of profiles, by name; others have no role.
     roles: Mapping[str, Role] = field(default_factory=dict)
     #: Colour of the engine in pictures, ``#rrggbb``; reports choose one where it is empty.
     colour: str = ""
     #: Numbers that the engine computes with.
     precision: Precision = "double"
-    #: Whether an extra of its own alone installs it: a run that names no engine leaves it out where it is not there.
+    #: Whether the engine is optional: only its own extra installs it, and a run without --engine leaves it out if
+    #: missing.
     apart: bool = False
-    #: What the adapter honours beyond discs, balls, boxes and half-spaces that are fixed. A scene that asks for more is
-    #: UNSUPPORTED before the adapter sees it.
+    #: What the adapter supports beyond discs, balls, boxes and fixed half-spaces. A scene that needs more is
+    #: UNSUPPORTED before it reaches the adapter.
     abilities: frozenset[Ability] = frozenset()
 
     @property
     def epsilon(self) -> float:
-        """Distance from 1 to the next number that the engine knows."""
+        """Distance from 1 to the next number of the engine's precision."""
         return 2.0**-52 if self.precision == "double" else 2.0**-23
 
     @property
     def round_off(self) -> float:
-        """What a number of order 10 may be off after some tens of steps, or a quaternion's root and product.
+        """Error of a number of order 10 after some tens of steps, or of a quaternion's root and product.
 
-        A hundred roundings of single numbers; of double ones far more, since nothing near it is of interest.
+        A hundred roundings in single precision; far more in double precision, where such errors do not matter.
         """
         return 1e-9 if self.precision == "double" else 1e3 * self.epsilon
 
@@ -275,21 +276,21 @@ class EngineFacts:
 
 
 class Engine(ABC):
-    """A physics engine behind the plugin line; subclasses are final and hold no state."""
+    """A physics engine; subclasses are final and have no state."""
 
     facts: EngineFacts
-    #: Profile name -> rule that chooses the settings from a scene's needs and the step.
+    #: Profile name -> rule that gives the settings for a scene's needs and the step.
     profiles: Mapping[str, ProfileRule]
-    #: What the adapter knows of other releases; None: nothing, its package is the only distribution.
+    #: Other releases that the adapter supports; None: only the installed package.
     releases: Releases | None = None
-    #: Settings that a user may set beside a profile's own, by name, with what each must be (`adapters.settings`).
+    #: Further settings that a user may change, by name, with a check of each (`adapters.settings`).
     kinds: Mapping[str, Callable[[Any], str]] = MappingProxyType({})
-    #: Conformance checks that it is known to fail.
+    #: Conformance checks that the engine is known to fail.
     expected: tuple[Expected, ...] = ()
-    #: What a run can be written as for the engine alone, by the name of the format (``crosscheck export --to``). The
-    #: scene has a dimension the engine knows; what a format has no word for is an `EngineError`.
+    #: Writers of a run for the engine alone, by format (``crosscheck export --to``). The scene has a dimension of the
+    #: engine; what a format cannot express raises `EngineError`.
     exports: Mapping[str, Writer] = MappingProxyType({})
-    #: Readers of models that people have for this engine, by the ending of their files (`adapters.model`).
+    #: Readers of model files of this engine, by file ending (`adapters.model`).
     reads: Mapping[str, Callable[[str, bool], Any]] = MappingProxyType({})
 
     @property
@@ -298,7 +299,7 @@ class Engine(ABC):
         return self.facts.name
 
     def scheme(self, profile: str) -> Scheme:
-        """How ``profile`` moves bodies."""
+        """Scheme of ``profile``."""
         return self.facts.profile_schemes.get(profile, self.facts.scheme)
 
     @abstractmethod
@@ -307,10 +308,10 @@ class Engine(ABC):
 
     @abstractmethod
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Why this engine cannot honour ``scene``, or None; the scene has a dimension the engine knows."""
+        """Why this engine cannot represent ``scene``, or None; the scene has a dimension of the engine."""
 
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
-        """Why steps of ``dt`` [s] are too long for ``scene`` here, or None; of a scene that is not refused."""
+        """Why steps of ``dt`` [s] are too long for ``scene``, or None; the scene is not refused."""
         return None
 
     def refusal(self, scene: Scene, profile: str, dt: float) -> str | None:
@@ -318,11 +319,11 @@ class Engine(ABC):
         return self.refuses(scene, profile) or self.too_coarse(scene, dt)
 
     def settable(self) -> Mapping[str, Callable[[Any], str]]:
-        """`kinds` of the release that is installed."""
+        """`kinds` of the installed release."""
         return self.kinds
 
     def check_settings(self, settings: Mapping[str, Any]) -> None:  # noqa: B027  (`build` checks them in any case)
-        """Refuse settings that `build` would refuse, whatever the scene is, before anything runs.
+        """Refuse settings that `build` would refuse for every scene, before anything runs.
 
         Raises
         ------
@@ -336,38 +337,37 @@ class Engine(ABC):
 
     @abstractmethod
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What the profile realises on the probes where that differs from what a scene asks for.
+        """What the profile realises on the probes, where that differs from the scene's values.
 
-        Keys are names of `adapters.receipts.QUANTITIES`; what is absent is declared to be as asked.
+        Keys are names of `adapters.receipts.QUANTITIES`; absent ones are declared to equal the scene's values.
         """
 
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
     ) -> dict[str, Any] | None:
-        """Certify the run of ``steps`` steps that ended in ``final_pose`` independently; None where nothing can.
+        """Certify independently the run of ``steps`` steps that ended in ``final_pose``; None if the engine cannot.
 
-        The dictionary has ``holds``, ``reasons`` and whatever numbers stand behind them.
+        The dictionary has ``holds``, ``reasons`` and the numbers behind them.
         """
         return None
 
     def kernels(self) -> Path | None:
-        """Folder that keeps machine code which this engine compiles at its first steps; None if it compiles nothing."""
+        """Folder of machine code that this engine compiles at its first steps; None if it compiles nothing."""
         return None
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Settings ``names`` of ``settings`` in the engine's own language, as a user would paste them.
+        """Settings ``names`` of ``settings`` in the engine's own language, for pasting.
 
-        Numbers are those of step ``dt`` [s] and of the scene's materials. Where one is made of the restitution e, the
-        step or gravity, its formula stands in a comment beside it, with ``dt`` and ``g`` and ``e`` for them. Where
-        pairs of different materials need different lines, each material has its own. Empty where an adapter knows no
-        such lines.
+        Numbers are for step ``dt`` [s] and the scene's materials. A number that depends on restitution e, step or
+        gravity has its formula in a comment beside it, with ``e``, ``dt`` and ``g``. Pairs of different materials have
+        their own lines where these differ. Empty where an adapter has no such lines.
         """
         return ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
-        """What the engine itself calls settings: by our name its own name, and the value or the formula in its words.
+        """The engine's own terms for settings: our name -> the engine's name, and the value or formula in its terms.
 
-        A setting that is not among them has one name for both. An empty name: the setting is told with another one.
+        Settings that are missing have the same name in both. An empty name: another setting includes this one.
         """
         return {}
 

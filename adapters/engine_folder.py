@@ -1,4 +1,4 @@
-"""What an engine brings: all that is about one engine stands in one folder, and its one entry point names it.
+"""The folder of an engine: everything about one engine is in one folder, named by its entry point.
 
     [project.entry-points."contact_crosscheck.engines"]
     myengine = "mypackage.myengine:MyEngine"
@@ -6,23 +6,22 @@
     mypackage/myengine/
         __init__.py       MyEngine: the adapter, which imports the engine inside functions
         releases.py       RELEASES: what older releases do differently (`adapters.releases`)
-        changes.toml      what the engine's own notes say of steps over its releases (`validation.releases.notes`)
+        changes.toml      notes of the engine on changes over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
-        tuning.toml       what tuning tries, and cures whose settings are measured (`adapters.experiment_files`)
+        tuning.toml       settings for tuning, and fixes whose settings are measured (`adapters.experiment_files`)
         findings/         families.toml, which proves them too, and members.csv (`validation.findings`), breaks.toml
                           and breaks.csv
         experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
                           where there is no tuning.toml (`adapters.experiment`)
         unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
-        decisive.csv      which settings of its cures matter, as measured (`validation.settings.decisive`)
-        cures.csv         what mends it, scene by scene, at what cost, as measured (`validation.settings.cures`)
+        decisive.csv      decisive settings of its fixes, as measured (`validation.settings.decisive`)
+        cures.csv         fixes by scene, and their cost, as measured (`validation.settings.cures`)
 
-All but the first may be missing; an entry point that names a plain module brings an adapter only. Ours stand in
-``adapters/<engine>/`` and are found in the same way.
+All except the first are optional; an entry point that names a plain module provides an adapter only. Ours are in
+``adapters/<engine>/`` and found in the same way.
 
-Laws and experiments judge, so they are loaded wherever rows are. Those of another package are first imported in a
-process of their own; what is wrong with them costs that engine its laws and experiments, and is said by
-``crosscheck doctor`` (`problems`).
+Laws and experiments are loaded wherever rows are judged. Those of another package are first imported in a separate
+process; with an error that engine has no laws and experiments, and ``crosscheck doctor`` shows it (`problems`).
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ CURES, TUNING = "cures.csv", "tuning.toml"
 
 
 def located(module: str) -> Path | None:
-    """File of a module, found without importing the packages it is in: a plugin's import may do anything."""
+    """File of a module, found without importing its packages: a plugin's import may do anything."""
     first, *rest = module.split(".")
     spec = find_spec(first)
     for name in rest:
@@ -64,7 +63,7 @@ def located(module: str) -> Path | None:
 
 
 def folder_of(engine: str) -> Path | None:
-    """Folder of ``engine``; None if nobody registered it, or only as a plain module. Nothing is imported."""
+    """Folder of ``engine``; None if it is not registered, or only as a plain module. Nothing is imported."""
     entry = registry.entry(engine)
     path = located(entry.module) if entry is not None else None
     return path.parent if path is not None and path.name == "__init__.py" else None
@@ -79,20 +78,20 @@ def inside(engine: str, name: str) -> Path | None:
 
 @cache
 def laws_of(engine: str) -> tuple[Deviation, ...]:
-    """All laws of ``engine``; none if its folder has none, or if they cannot be had (`problems`)."""
+    """All laws of ``engine``; none if its folder has none, or if they cannot be loaded (`problems`)."""
     return _laws(engine)[0]
 
 
 def covering(engine: str, version: str, profile: str, scene: str, metric: str) -> Iterator[Deviation]:
-    """Laws that speak about a row.
+    """Laws that cover a row.
 
     Raises
     ------
     EngineError
-        If the engine has laws that cannot be had.
+        If the engine has laws that cannot be loaded.
     """
     if _laws(engine)[1]:
-        raise EngineError(f"{engine}: its laws cannot be had: {_laws(engine)[1]}")
+        raise EngineError(f"{engine}: its laws cannot be loaded: {_laws(engine)[1]}")
     return (law for law in laws_of(engine) if law.covers(engine, version, profile, scene, metric))
 
 
@@ -102,43 +101,43 @@ def experiments_of(engine: str) -> tuple[Experiment, ...]:
 
 
 def cured_of(engine: str) -> tuple[Cured, ...]:
-    """Cures whose settings are measured one by one."""
+    """Fixes whose settings are measured one by one."""
     return _tuning(engine)[0].cured
 
 
 def candidates_of(engine: str) -> Mapping[str, tuple[Any, ...]]:
-    """Stock settings that tuning may change, and the values it tries."""
+    """Stock settings for tuning, with their values."""
     return _tuning(engine)[0].candidates
 
 
 def belongs_of(engine: str) -> Mapping[str, str]:
-    """Settings that mean nothing without another one, and which; they are switched with it."""
+    """Settings that need another one, with which they are switched."""
     return _tuning(engine)[0].belongs
 
 
 @cache
 def unset_of(engine: str) -> tuple[Unset, ...]:
-    """What is documented, and can be measured, of ``engine`` with nothing set; none where its folder does not say."""
+    """Documented and measurable defaults of ``engine``; none if its folder has no table."""
     module, _ = _module(engine, UNSET)
     return tuple(each for each in getattr(module, "UNSET", ()) if isinstance(each, Unset))
 
 
 def fault_of_tuning(engine: str) -> str:
-    """What is wrong with the file or the module that says how ``engine`` is tuned; empty where nothing is."""
+    """Error in the file or module with the tuning of ``engine``; empty if there is none."""
     return _tuning(engine)[1] or _experiments(engine)[1]
 
 
 def problems() -> list[str]:
-    """One line for each engine and part, of laws, experiments and ``tuning.toml``, that cannot be had."""
+    """One line for each engine and part, of laws, experiments and ``tuning.toml``, that cannot be loaded."""
     found = []
     for engine in registry.names():
         parts = ((LAWS, _laws(engine)), (EXPERIMENTS, _experiments(engine)), (TUNING, _tuning(engine)))
-        found += [f"{engine}: its {part} cannot be had: {said}" for part, (_, said) in parts if said]
+        found += [f"{engine}: its {part} cannot be loaded: {said}" for part, (_, said) in parts if said]
     return found
 
 
 def forget() -> None:
-    """Look again at what is installed."""
+    """Clear caches, so that installed packages are searched again."""
     registry.find.cache_clear()
     for each in (laws_of, unset_of, _laws, _experiments, _tuning, _module):
         each.cache_clear()
@@ -149,7 +148,7 @@ def forget() -> None:
 
 @cache
 def _module(engine: str, part: str) -> tuple[ModuleType | None, str]:
-    """Module ``part`` of the folder, or None and why it cannot be had; None and nothing where there is none."""
+    """Module ``part`` of the folder, or None and the error; None and nothing where it does not exist."""
     entry = registry.entry(engine)
     if entry is None or inside(engine, f"{part}.py") is None:
         return None, ""
@@ -161,7 +160,7 @@ def _module(engine: str, part: str) -> tuple[ModuleType | None, str]:
         return None, why
     try:
         return import_module(name), ""
-    except BaseException as error:  # it could be imported a moment ago, in another process
+    except BaseException as error:  # its import worked in another process
         return None, said_by(error)
 
 
@@ -175,14 +174,14 @@ def _laws(engine: str) -> tuple[tuple[Deviation, ...], str]:
         return tuple(found), ""
     try:
         return tuple(_guarded(engine, law) for law in found), ""
-    except Exception as error:  # whatever else a package of others holds under that name
+    except Exception as error:  # another package may have anything under that name
         return (), said_by(error)
 
 
 def _guarded(engine: str, law: Any) -> Deviation:
-    """A law of another package: its texts made plain, and its answers checked."""
+    """A law of another package, with cleaned texts and checked results."""
     if not isinstance(law, Deviation) or law.engine != engine:
-        raise TypeError(f"DEVIATIONS has what is no Deviation of {engine}")
+        raise TypeError(f"DEVIATIONS has an entry that is not a Deviation of {engine}")
     checked = _checked(f"law: {engine} {one_line(law.scene)}/{one_line(law.metric)}", law.law)
     return replace(law, law=checked, because=one_line(law.because), source=one_line(law.source))
 
@@ -205,14 +204,14 @@ def _checked(label: str, law: Callable[..., Any]) -> Law:
 
 @cache
 def _experiments(engine: str) -> tuple[tuple[Experiment, ...], str]:
-    """What the module says, if all that it holds is of the right kind."""
+    """Content of the module, if everything has the right type."""
     module, why = _module(engine, EXPERIMENTS)
     for name, kind in (("EXPERIMENTS", Experiment), ("CURED", Cured)):
         if not all(isinstance(each, kind) for each in getattr(module, name, ())):
-            return (), f"{name} has what is no {kind.__name__}"
+            return (), f"{name} has an entry that is not of type {kind.__name__}"
     for name in ("CANDIDATES", "BELONGS"):
         if not isinstance(getattr(module, name, {}), Mapping):
-            return (), f"{name} is no mapping"
+            return (), f"{name} is not a mapping"
     return tuple(getattr(module, "EXPERIMENTS", ())), why
 
 

@@ -1,8 +1,7 @@
-"""Experiments on engines, as data: what tuning tries, what proves a reason, what cures.
+"""Experiments on engines, as data: for tuning, proofs of causes, and fixes.
 
-An experiment switches off the mechanism that a reason names and says what must come of it; where nothing can be
-switched, a deviation law predicts the value independently. `tuning`, `proofs` and `decisive` in `validation.settings`
-run them.
+An experiment switches off the mechanism of a cause and states the expected effect; where it cannot be switched, a
+contact law predicts the value independently. `tuning`, `proofs` and `decisive` in `validation.settings` run them.
 """
 
 from __future__ import annotations
@@ -14,25 +13,25 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Experiment:
-    """One mechanism, switched off on one row that fails because of it.
+    """A mechanism that is switched off on a row that fails because of it.
 
     Parameters
     ----------
     family
-        Identifier of the reason in the engine's findings.
+        Identifier of the family in the engine's findings.
     says
-        What is shown, in one sentence.
+        The result, in one sentence.
     profile, scene, dimension, params, iterations, metric
-        The row: it must FAIL as it is.
+        The row, which must FAIL without changes.
     off
         Settings that switch the mechanism off: the row must PASS with them, or come ``within``.
     idle
-        Settings that another explanation would blame: with them the row must still FAIL.
+        Settings of another explanation: with them the row must still FAIL.
     within
-        How near the truth counts as a PASS with the mechanism off, in the metric's unit: round-off of an engine whose
-        numbers are coarser than what the check allows. A row that is this near as it is shows nothing.
+        Distance from the truth that counts as a PASS with the mechanism off, in the metric's unit: round-off of an
+        engine with less precision than the tolerance. A row that is this near without changes proves nothing.
     dt
-        Step of the row [s], where it fails at another than that of the quick suite.
+        Step of the row [s], if not that of the quick suite.
     """
 
     family: str
@@ -51,16 +50,16 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Cured:
-    """What fails as shipped and passes with a better profile; `validation.settings.decisive` finds by which settings.
+    """Checks that fail as shipped and pass with a better profile; `validation.settings.decisive` finds the settings.
 
     Parameters
     ----------
     shipped, better
         The two profiles.
     scene, cells
-        The cells that are asked, as what differs from the scene's defaults: an easy one and the hard ones.
+        Cells, by what differs from the scene's defaults: an easy one and hard ones.
     metrics
-        Checks that are asked of them; all by default. Named where the better profile does not pass all.
+        Their checks; all by default. Given where the better profile does not pass all.
     """
 
     shipped: str

@@ -1,4 +1,4 @@
-"""Experiments as they stand in files: what they share with ``[[family.proof]]``, and ``tuning.toml`` of an engine.
+"""Reads experiments from files: fields shared with ``[[family.proof]]``, and ``tuning.toml`` of an engine.
 
     [candidates]            stock settings that tuning may change, each with the values that it tries
     cone = ["elliptic", "pyramidal"]
@@ -12,7 +12,7 @@
     scene = "stack"
     cells = [{}, { n = 10 }]
 
-A setting that is None stands as ``"none"``, one of several values as a list. Proofs of families are read by
+None is written as ``"none"``, several values as a list. Proofs of families are read by
 `validation.findings.proofs`.
 """
 
@@ -28,16 +28,16 @@ from adapters.engine import EngineError
 from adapters.experiment import Cured
 from adapters.plain import one_line
 
-#: Of a field: whether a value fits, and what it must be, in words.
+#: A test of a field's value, and what it must be, in words.
 Kind = tuple[Callable[[Any], bool], str]
 Fields = Mapping[str, Kind]
-#: Stands for None, as on the command line.
+#: Word for None, as on the command line.
 NONE = "none"
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """What is tuned of an engine: settings and values to try, settings that belong to others, cures to measure."""
+    """Tuning of an engine: settings and values to try, settings that need others, fixes to measure."""
 
     candidates: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     belongs: Mapping[str, str] = field(default_factory=dict)
@@ -45,22 +45,22 @@ class Tuning:
 
 
 def is_word(value: Any) -> bool:
-    """Whether it is a text that is not empty."""
+    """Whether a value is a nonempty text."""
     return isinstance(value, str) and bool(value.strip())
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a number; true and false are none."""
+    """Whether a value is a number; true and false are not."""
     return type(value) in (int, float)
 
 
 def is_numbers(value: Any) -> bool:
-    """Whether it is a table of numbers."""
+    """Whether a value is a table of numbers."""
     return isinstance(value, dict) and all(map(is_number, value.values()))
 
 
 def is_list_of(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Whether it is a list of what ``fits``."""
+    """A test for lists of values that ``fits`` accepts."""
     return lambda value: isinstance(value, list) and all(map(fits, value))
 
 
@@ -83,7 +83,7 @@ _CURED: Fields = {
 
 
 def checked(label: str, table: Any, known: Fields, needed: Collection[str] = ()) -> dict[str, Any]:
-    """Return a table that has the fields it needs, no unknown one, and in each what fits.
+    """Return the table if it has all needed fields, no unknown one, and valid values.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def checked(label: str, table: Any, known: Fields, needed: Collection[str] = ())
         raise ValueError(f"{label} must be a table")
     for name in (*table, *needed):
         if name not in known:
-            raise ValueError(f"{label}: {name} is no field; there are {', '.join(known)}")
+            raise ValueError(f"{label}: {name} is not a field; fields are {', '.join(known)}")
         if name not in table:
             raise ValueError(f"{label}: {name} is missing")
         fits, what = known[name]
@@ -104,19 +104,19 @@ def checked(label: str, table: Any, known: Fields, needed: Collection[str] = ())
 
 
 def setting_of(value: Any) -> Any:
-    """Value of a setting as it stands in a file: lists are tuples there, and None is a word."""
+    """Value of a setting from a file: lists become tuples, a word None."""
     if isinstance(value, list):
         return tuple(map(setting_of, value))
     return None if value == NONE else value
 
 
 def settings_of(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings as they stand in a file, with their values."""
+    """Settings from a file."""
     return {name: setting_of(value) for name, value in table.items()}
 
 
 def params_of(table: Mapping[str, Any]) -> dict[str, float]:
-    """Parameters of a scene as they stand in a file: numbers, whole or not."""
+    """Parameters of a scene from a file."""
     return {name: float(value) for name, value in table.items()}
 
 
@@ -131,7 +131,7 @@ def read_tuning(path: Path) -> Tuning:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         return _tuning(data)
-    except (OSError, ValueError) as error:  # what is no UTF-8 or no TOML is a ValueError as well
+    except (OSError, ValueError) as error:  # invalid UTF-8 and TOML are ValueErrors as well
         raise EngineError(f"{path}: {one_line(error)}") from None
 
 

@@ -1,9 +1,9 @@
-"""Engines of others are looked at from outside: imported, asked and judged in a process that may die.
+"""Engines of other packages are imported and queried in a separate process, which may die.
 
     parent: ForeignEngine --("settings", profile, needs, dt)--> child: the plugin itself
 
-A plugin that aborts, exits or hangs when it is imported is a reason in a table; values of the wrong type are an error
-of that engine. Only worker processes load a plugin for good (`adapters.registry.load_engines_here`).
+A plugin that aborts, exits or hangs on import becomes a reason in a table; values of the wrong type are an error of
+that engine. Only worker processes load plugins themselves (`adapters.registry.load_engines_here`).
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ from adapters.needs import Needs
 from adapters.plain import NAME, lines, one_line, plain
 from adapters.scene import Scene
 
-#: Seconds for an import: the largest engines with Python bindings take about ten on a cold disk.
+#: Time limit of an import [s]: the largest engines with Python bindings take about ten on a cold disk.
 PATIENCE = 30.0
-#: Seconds for a question to an engine that is loaded.
+#: Time limit of a query to a loaded engine [s].
 ANSWER = 10.0
-#: Lines of a traceback that are kept: ten calls deep.
+#: Lines of a traceback: ten calls deep.
 TRACE = 30
 
 
 @dataclass(frozen=True)
 class Found:
-    """An engine that was looked for: loaded (or described by its process), or the reason why not.
+    """Result of a search for an engine: loaded (or described by its process), or the reason why not.
 
-    ``fatal``: the plugin ends or hangs the process that imports it. ``trace``: where it raised what is the reason.
+    ``fatal``: the plugin ends or hangs the process that imports it. ``trace``: where the error was raised.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Found:
 
 
 class ForeignEngine(Engine):
-    """An engine whose plugin lives in another process: it has facts and settings, and builds nothing."""
+    """An engine whose plugin is in another process: it has facts and settings, but cannot build worlds."""
 
     def __init__(self, entry: EntryPoint, child: Child, told: Mapping[str, Any]) -> None:
         self.facts = facts_from(told["facts"])
@@ -73,7 +73,7 @@ class ForeignEngine(Engine):
         self._entry, self._child = entry, child
 
     def version(self) -> str:
-        """Version that the plugin told."""
+        """Version reported by the plugin."""
         return self._version
 
     def _ask(self, profile: str, needs: Needs, dt: float) -> list[Setting]:
@@ -90,20 +90,20 @@ class ForeignEngine(Engine):
         return [Setting(**setting) for setting in told["settings"]]
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Only the plugin itself can say."""
+        """Not available outside the plugin's process."""
         raise EngineError(f"engine: {self.name} is loaded in worker processes only")
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Only the plugin itself can."""
+        """Not available outside the plugin's process."""
         raise EngineError(f"engine: {self.name} is loaded in worker processes only")
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Only the plugin itself can say."""
+        """Not available outside the plugin's process."""
         raise EngineError(f"engine: {self.name} is loaded in worker processes only")
 
 
 def probe(entry: EntryPoint) -> Found:
-    """Look at a plugin from outside; never raises for what it does."""
+    """Load a plugin in a separate process; never raises because of it."""
     try:
         child, told = _asked(entry)
     except IsolationError as error:
@@ -131,7 +131,7 @@ def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
 
 
 def serve(connection: Connection) -> None:
-    """Answer for one plugin until the other end closes; runs in the child."""
+    """Serve one plugin until the other end closes; runs in the child."""
     from adapters.registry import loaded
 
     name, value, group, distribution = json.loads(connection.recv_bytes())
@@ -151,7 +151,7 @@ def serve(connection: Connection) -> None:
 
 
 def importable(module: str) -> str:
-    """Import a module of somebody else in a process that may die: why that fails, or nothing."""
+    """Import a module of another package in a separate process; returns why that fails, or nothing."""
     try:
         child = Child(serve_import)
     except IsolationError as error:
@@ -166,11 +166,11 @@ def importable(module: str) -> str:
 
 
 def serve_import(connection: Connection) -> None:
-    """Import one module and say what came of it; runs in the child."""
+    """Import one module and report the result; runs in the child."""
     try:
         import_module(connection.recv_bytes().decode())
         said = ""
-    except BaseException as error:  # whatever it raises
+    except BaseException as error:  # it may raise anything
         said = said_by(error)
     connection.send_bytes(said.encode())
 
@@ -179,27 +179,27 @@ def _settings(engine: Engine, asked: Mapping[str, Any]) -> dict[str, Any]:
     try:
         given = engine.settings(asked["profile"], Needs(**asked["needs"]), asked["dt"])
         return {"settings": [plain(asdict(setting)) for setting in checked_settings(given)]}
-    except BaseException as error:  # whatever a plugin raises is its own error
+    except BaseException as error:  # an error of the plugin
         return {"error": said_by(error)}
 
 
 def trace_of(error: BaseException) -> str:
-    """Last lines of the traceback of what was raised, each cleaned."""
+    """Last lines of the traceback, each cleaned."""
     return lines("".join(traceback.format_exception(error)), TRACE)
 
 
 def said_by(error: BaseException) -> str:
-    """Type and first line of what was raised, in one line."""
+    """Type and first line of an error, in one line."""
     return one_line(f"{type(error).__name__}: {one_line(error)}".rstrip(": "))
 
 
 def checked_settings(given: Any) -> list[Setting]:
-    """Settings as an engine gave them, if they are settings.
+    """Settings from an engine, if they are valid.
 
     Raises
     ------
     EngineError
-        Naming what is of the wrong type.
+        Naming the value of the wrong type.
     """
     if not isinstance(given, list | tuple):
         raise EngineError(f"settings: a {type(given).__name__} was given, a list is needed")
@@ -212,7 +212,7 @@ def checked_settings(given: Any) -> list[Setting]:
 
 
 def checked_refusal(given: Any) -> str | None:
-    """Refusal as an engine gave it: a line, or None.
+    """Refusal by an engine: a line, or None.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def checked_refusal(given: Any) -> str | None:
 
 
 def checked_facts(facts: Any) -> EngineFacts:
-    """Facts of an engine with every text cleaned and every type right.
+    """Facts of an engine with cleaned texts and checked types.
 
     Raises
     ------

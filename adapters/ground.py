@@ -1,4 +1,4 @@
-"""How wide and deep the body that stands for a half-space must be, for engines that have no half-space of their own."""
+"""Width and depth of the body that replaces a half-space in engines without one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GROUND = 100.0
 
 
 def reach(scene: Scene) -> float:
-    """Half width and depth of the ground [m]: twice as far as anything of the scene gets."""
+    """Half width and depth of the ground [m]: twice the reach of the scene."""
     farthest = 0.0
     for body in scene.bodies:
         if not isinstance(body.shape, HalfSpace):

@@ -1,4 +1,4 @@
-"""Impulses of contacts of which an engine tells a part: what is unknown is NaN, never zero."""
+"""Contact impulses of engines that report only a part: unknown components are NaN, never zero."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from adapters.engine import Array
 
-#: Share of a unit normal's other components that single precision leaves along an axis.
+#: Largest other component of a unit normal along an axis in single precision.
 ALONG = 1e-5
 
 
 def along_normal(impulse: float, normal: Array, rough: bool) -> Array:
-    """Impulse [N s] as far as it is known where an engine tells the part along the ``normal`` (d,) alone.
+    """Known part of an impulse [N s] where an engine reports only the part along the ``normal`` (d,).
 
-    Without friction that is all of it. Of a ``rough`` contact the components across the normal are known to be unknown
-    (NaN); where the normal is not along an axis, all are.
+    Without friction that is all of it. For a ``rough`` contact the components across the normal are unknown (NaN);
+    where the normal is not along an axis, all are.
     """
     told = impulse * normal
     if rough:

@@ -1,10 +1,10 @@
-"""A process that may die: foreign code runs in it, and whatever that code does, the parent goes on.
+"""A separate process for foreign code: whatever that code does, the parent continues.
 
     parent --(bytes)--> child: serve(connection) in a session of its own, with limits, its output in a pipe
-       ^ an answer; or the child's end with its reason and the last of what it wrote
+       ^ an answer; or the reason of the child's end and its last output
 
-The pipe needs no file and no semaphore, so neither a full temporary folder nor a missing /dev/shm matters. When a child
-is stopped, everything that it started is stopped as well.
+The pipe needs no file and no semaphore, so neither a full temporary folder nor a missing /dev/shm matters. Stopping a
+child also stops everything that it started.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from typing import Any
 from adapters.plain import lines, one_line
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # <linux/prctl.h>
-#: Seconds that a child's guardian has to end what the child has started.
+#: Time limit [s] of a child's guardian to end the child's processes.
 GRACE = 10.0
-#: Bytes of a child's output that are kept: enough for the last lines of a traceback.
+#: Stored bytes of a child's output: enough for the last lines of a traceback.
 LOG_BYTES = 2**16
 LOG_LINES = 5
 #: Largest answer [bytes]: an observation takes some kilobytes, a recording about one megabyte.
@@ -36,11 +36,11 @@ _children: weakref.WeakSet[Child] = weakref.WeakSet()
 
 
 class IsolationError(RuntimeError):
-    """The machine does not let us start a process; one line."""
+    """A process cannot be started; one line."""
 
 
 class Lost(RuntimeError):
-    """A child that ended, or that did not answer; the message says how, in one line."""
+    """A child ended, or did not answer; the reason in one line."""
 
 
 class Child:
@@ -51,7 +51,7 @@ class Child:
     serve
         Function of a module, called with the connection in the child; it returns when the other end closes.
     memory
-        Address space [bytes], or None for no limit of ours.
+        Address space [bytes], or None for no limit.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class Child:
     """
 
     def __init__(self, serve: Callable[[Connection], None], memory: int | None = None) -> None:
-        context = multiprocessing.get_context("spawn")  # forks would inherit what the parent has open and loaded
+        context = multiprocessing.get_context("spawn")  # forks would inherit open files and modules of the parent
         try:
             self.connection, theirs = context.Pipe()
             self.log, writing = context.Pipe(duplex=False)
@@ -77,17 +77,17 @@ class Child:
 
     @property
     def sentinels(self) -> list[Any]:
-        """What becomes ready when the child answers, writes or ends."""
-        written = [self.log] if self.drain() else []  # a closed output is always ready, and says nothing more
+        """Objects that become ready when the child answers, writes or ends."""
+        written = [self.log] if self.drain() else []  # a closed output is always ready, without further data
         return [self.connection, *written, self._process.sentinel]
 
     def send(self, message: bytes) -> None:
-        """Ask; a child that is gone is noticed when its answer is read."""
+        """Send a message; a dead child is noticed when its answer is read."""
         with contextlib.suppress(OSError):
             self.connection.send_bytes(message)
 
     def has_answer(self) -> bool:
-        """Whether `receive` returns or raises at once; reads what the child wrote meanwhile."""
+        """Whether `receive` returns or raises at once; also reads the child's output."""
         self.drain()
         try:
             return self.connection.poll()
@@ -115,14 +115,14 @@ class Child:
             raise Lost(self.stop()) from None
 
     def drain(self) -> bool:
-        """Read what the child wrote, keep the end of it; False if it closed its output."""
+        """Read the child's output and keep its end; False if it closed its output."""
         if self._process is None:
             return False
         try:
             while chunk := os.read(self.log.fileno(), LOG_BYTES):
                 self.written = (self.written + chunk)[-LOG_BYTES:]
             return False
-        except OSError:  # nothing there at the moment
+        except OSError:  # no data at the moment
             return True
 
     def ended(self) -> bool:
@@ -130,23 +130,23 @@ class Child:
         return self._process is None or bool(wait([self._process.sentinel], 0.0))
 
     def tail(self) -> str:
-        """Last lines of what the child wrote since `written` was cleared."""
+        """Last lines of the child's output since `written` was cleared."""
         self.drain()
         return lines(self.written.decode(errors="replace"), LOG_LINES)
 
     def stop(self) -> str:
-        """End the child and everything it started; says how it had ended if it did so itself."""
+        """End the child and everything it started; returns how it had ended if it did so itself."""
         if self._process is None:
             return self._reason
         process = self._process
         self.drain()
-        # A child that has just closed its connection is about to end: its own reason says more than ours.
+        # A child that has just closed its connection is about to end: its own reason is more useful.
         wait([process.sentinel], 0.5 if self._closed() else 0.0)
         ended = _has_ended(process)
         if not ended:
-            process.terminate()  # its guardian ends all it started, and then itself
+            process.terminate()  # its guardian ends all its processes, and then itself
             process.join(GRACE)
-            for other in _descendants(process.pid):  # of a guardian that was stopped by what it guards
+            for other in _descendants(process.pid):  # for a guardian that was stopped by its child
                 _kill(other)
             process.kill()
         process.join()
@@ -169,7 +169,7 @@ def _main(
     serve: Callable[[Connection], None], connection: Connection, log: Connection, parent: int, memory: int | None
 ) -> None:
     if hasattr(os, "setsid"):
-        os.setsid()  # Ctrl-C is the parent's business
+        os.setsid()  # the parent handles Ctrl-C
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         _guard(parent, connection)
@@ -184,9 +184,9 @@ def _main(
 
 
 def end_with(parent: int) -> None:
-    """Let this process be killed when the thread of ``parent`` ends that started it; end at once if it has.
+    """Let this process be killed when the starting thread of ``parent`` ends; end at once if it has ended.
 
-    For pools that a library makes: their processes notice that nobody waits for them after what they are doing.
+    For pools of a library, whose processes would notice the end of the parent only after their task.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -195,17 +195,17 @@ def end_with(parent: int) -> None:
 
 
 def _guard(parent: int, connection: Connection) -> None:
-    """Divide this process: its child returns and serves, itself it waits, and ends all that the child leaves behind.
+    """Fork: the child returns and serves, the parent process waits, and ends everything that the child leaves behind.
 
-    The guardian adopts whatever its descendants orphan, so it finds also what has left its group. It ends with the
-    child, in the same way, or when its own parent dies.
+    The guardian adopts orphaned descendants, so it also finds those that left its group. It ends like the child, or
+    when its own parent dies.
     """
     blocked = {signal.SIGTERM, signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     libc = ctypes.CDLL(None)
     libc.prctl(_PR_SET_CHILD_SUBREAPER, 1)
     libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it died before we asked
+    if os.getppid() != parent:  # it had already ended
         os._exit(1)
     guardian = os.getpid()
     child = os.fork()
@@ -228,7 +228,7 @@ def _guard(parent: int, connection: Connection) -> None:
 
 
 def _sweep() -> None:
-    """End all descendants: killing one may orphan others, which come to us."""
+    """End all descendants: killing one may orphan others, which this process adopts."""
     ends = time.monotonic() + GRACE / 2.0
     while time.monotonic() < ends:
         for other in _descendants(os.getpid()):
@@ -237,7 +237,7 @@ def _sweep() -> None:
             while os.waitpid(-1, os.WNOHANG)[0]:
                 pass
         except ChildProcessError:
-            return  # nobody is left
+            return  # none is left
         time.sleep(0.01)
 
 
@@ -245,7 +245,7 @@ def _end_like(status: int) -> None:
     """End as a child with this status has ended."""
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        with contextlib.suppress(OSError, ValueError):  # of signals that cannot be handled
+        with contextlib.suppress(OSError, ValueError):  # signals that cannot be handled
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
         limit(None)
@@ -267,9 +267,9 @@ def limit(memory: int | None) -> None:
 
 
 def _has_ended(process: Any) -> bool:
-    """Whether a process has ended by itself; its closed sentinel proves nothing.
+    """Whether a process has ended by itself; a closed sentinel is no proof.
 
-    It is not waited for here. `multiprocessing` does so for each process that has ended when it starts another one.
+    It is not waited for here; `multiprocessing` does that for ended processes when it starts another one.
     """
     if not hasattr(os, "waitid"):
         return bool(wait([process.sentinel], 0.0))
@@ -297,7 +297,7 @@ def _cause(code: int | None) -> str:
 
 
 def _descendants(pid: int | None) -> list[int]:
-    """Processes that ``pid`` started, and theirs, where the system says so: some leave the group."""
+    """Processes that ``pid`` started, and theirs, where the system reports them: some leave the group."""
     found: list[int] = []
     todo = [pid]
     while todo:

@@ -1,4 +1,4 @@
-"""The one lift: planar scenes in 3-D engines, and back.
+"""Embedding of planar scenes in 3-D engines, and back.
 
     planar  (x, y, theta)   ->   spatial (x, 0, z = y), turned by theta about -Y
 
@@ -6,9 +6,9 @@
           | /                      | /        Y points into the page: a turn from x to z
           +------ x                +------ x  is a right-handed turn about -Y.
 
-Inertia is stated, not derived from the 3-D shape: a disc becomes a sphere that keeps the disc's own moment.
-What leaves the plane afterwards is measured (`Trajectory.out_of_plane`) and judged: the lifted scene is its own mirror
-image in the plane, so that no law of contact moves anything out of it.
+Inertia is stated, not derived from the 3-D shape: a disc becomes a sphere that keeps the disc's own moment. The
+distance from the plane is measured (`Trajectory.out_of_plane`) and judged: the embedded scene is symmetric about the
+plane, so no contact law moves a body out of it.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def _lift_body(body: Body) -> Body:
 
 
 def lowered(scene: Scene) -> Scene | None:
-    """The planar scene that a spatial one is, if all of it lies in the plane y = 0 and moves and acts along it.
+    """The planar scene equal to a spatial one whose bodies, motions and loads lie in the plane y = 0.
 
-    None for a scene that does not: a body beside the plane, tilted out of it, moved, turned or pulled out of it.
+    None for other scenes: a body beside the plane or tilted out of it, or with a motion or load out of it.
     """
     bodies = [_lowered_body(body) for body in scene.bodies]
     if scene.gravity[1] != 0.0 or None in bodies:
@@ -131,23 +131,23 @@ def lower_twist(twist: Array) -> Array:
 
 
 def size_across(scene: Scene) -> float:
-    """Largest number whose round-off may move a planar scene across its plane: places of points, ways of flight [m]."""
+    """Largest number whose round-off may move a planar scene across its plane: coordinates, distances of flight [m]."""
     place = max(math.hypot(*body.pose[:2]) + reach(body.shape) for body in scene.bodies)
     speed = max(math.hypot(*body.twist[:2]) + reach(body.shape) * abs(body.twist[2]) for body in scene.bodies)
     return max(place, speed * scene.duration)
 
 
 def out_of_plane(pose: Array, reaches: Array) -> float:
-    """Farthest that any point of a lifted scene has left its plane [m].
+    """Largest distance of a point of an embedded 2-D scene from its plane [m].
 
-    A tilt by an angle a moves what lies r from the centre by the chord 2 r sin(a/2) at most, and sin(a/2) is the length
-    of the quaternion's part across the plane.
+    A tilt by an angle a moves a point at distance r from the centre by at most the chord 2 r sin(a/2), and sin(a/2) is
+    the length of the quaternion's part across the plane.
 
     Parameters
     ----------
     pose
-        Spatial poses (samples, n, 7). Of those that are no numbers nothing is told, so that a run which ends in NaN
-        tells what it had left the plane by before.
+        Spatial poses (samples, n, 7). Poses that are not finite are skipped, so a run that ends in NaN gives its
+        distance before that.
     reaches
         Distance of each body's outermost point from its centre (n,) [m].
     """

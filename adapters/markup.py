@@ -1,8 +1,8 @@
-"""Models that are written in XML, as trees of elements: read without harm, before an engine's own parser sees them.
+"""XML models as trees of elements, checked before an engine's own parser reads them.
 
-Parsers of engines open files that a model includes and reserve whatever a model asks for. So the text is parsed here
-first: no document types or entities, no more elements and levels than a model of a thousand bodies has. Each element
-knows its line, so that what has no place in a scene is refused by it (`adapters.model`).
+Parsers of engines open included files and reserve any amount of memory. So the text is parsed here first: no document
+types or entities, no more elements and levels than a model of a thousand bodies has. Each element has its line for
+messages about unsupported elements (`adapters.model`).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from adapters.scene import SceneError
 
 #: Most elements, and most levels of them: a model of a thousand bodies has some ten thousand, ten deep.
 MOST_ELEMENTS, MOST_LEVELS = 50_000, 64
-#: Most bodies and shapes that a model may make of its elements: as many bodies as a scene file may have.
+#: Most bodies and shapes of a model: as many bodies as a scene file may have.
 MOST_MADE = 1000
 
 
 @dataclass
 class Element:
-    """One element, with the line it begins on; ``text`` is what stands in it, its children aside."""
+    """One element, with its line; ``text`` is its text without children."""
 
     tag: str
     attributes: dict[str, str]
@@ -44,7 +44,7 @@ class Element:
             yield from child.walk()
 
     def without(self, gone: Element) -> bool:
-        """Take ``gone`` out of what is below this element; whether it was there."""
+        """Remove ``gone`` below this element; returns whether it was there."""
         kept = [child for child in self.children if child is not gone]
         if len(kept) < len(self.children):
             self.children = kept
@@ -53,7 +53,7 @@ class Element:
 
 
 def parsed(text: str, tag: str, otherwise: str) -> Element:
-    """Root of the model, which is called ``tag``; ``otherwise`` says so of another one.
+    """Root of the model, which must be a ``tag``; ``otherwise`` is the error for another one.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def parsed(text: str, tag: str, otherwise: str) -> Element:
 
 
 def named(root: Element, tags: Collection[str]) -> None:
-    """Give elements a name by their line where they have none."""
+    """Name unnamed elements by their line."""
     taken: Counter[str] = Counter()
     for element in root.walk():
         if element.tag in tags and "name" not in element.attributes:
@@ -107,7 +107,7 @@ def named(root: Element, tags: Collection[str]) -> None:
 
 
 def text_of(root: Element) -> str:
-    """The model as text again; each element begins on the line it had, so that a parser complains of the right one."""
+    """The model as text; each element begins on its original line, so that a parser's errors name the right one."""
     line, pieces = 1, []
 
     def write(element: Element) -> None:

@@ -1,4 +1,4 @@
-"""Materials: restitution and friction belong to the pair that touches, and entries name both bodies, one, or none."""
+"""Materials: restitution and friction of pairs; entries name both bodies, one, or none."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from adapters.shapes import SceneError
 
 @dataclass(frozen=True)
 class Pair:
-    """Material of a pair of bodies; ``"*"`` stands for every body that no other entry names."""
+    """Material of a pair of bodies; ``"*"`` is every body without another entry."""
 
     a: str = "*"
     b: str = "*"
@@ -20,12 +20,12 @@ class Pair:
     friction: float = 0.0
 
 
-#: Restitution and friction that one or several entries give.
+#: Restitution and friction of one or several entries.
 _Said = frozenset[tuple[float, float]]
 
 
 class Materials:
-    """The pairs of a scene, sorted by what they name: both bodies, one, or none."""
+    """The pairs of a scene: entries with both bodies, one, or none."""
 
     def __init__(self, pairs: tuple[Pair, ...]) -> None:
         self.both: dict[frozenset[str], _Said] = {}
@@ -43,13 +43,13 @@ class Materials:
                 self.none |= value
 
     def said(self, a: str, b: str) -> _Said:
-        """What the most specific entries for two bodies say; empty: smooth and plastic."""
+        """The most specific entries for two bodies; empty: smooth and plastic."""
         return (
             self.both.get(frozenset((a, b))) or self.one.get(a, frozenset()) | self.one.get(b, frozenset()) or self.none
         )
 
     def materials(self, free: Mapping[str, bool]) -> set[tuple[float, float]]:
-        """Values of all pairs of which one body is free; bodies that no entry tells apart are looked at together.
+        """Values of all pairs with a free body; bodies with the same entries are grouped.
 
         ``free``: whether each body is free, by name.
         """
@@ -79,7 +79,9 @@ class Materials:
 
 
 def single(a: str, b: str, said: _Said) -> tuple[float, float]:
-    """The one value that entries say for a pair; smooth and plastic if none says anything."""
+    """The value of a pair from its entries; smooth and plastic without any."""
     if len(said) > 1:
-        raise SceneError(f"pair {a}-{b}: {len(said)} entries say different things; name both bodies in one")
+        raise SceneError(
+            f"pair {a}-{b}: {len(said)} entries contradict each other; give an entry that names both bodies"
+        )
     return next(iter(said), (0.0, 0.0))

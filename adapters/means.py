@@ -1,4 +1,4 @@
-"""Numbers of single bodies whose arithmetic means are what a scene asks of its pairs, for engines that mix so."""
+"""Values per body whose arithmetic means are those of the pairs, for engines that combine materials by the mean."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
-#: What a solution of linear equations in doubles may miss of a number of order 1.
+#: Error of a solution of linear equations in doubles, for numbers of order 1.
 ROUNDING = 1e-12
 
 
 def mean(a: float, b: float) -> float:
-    """What such an engine makes of two bodies' numbers, in their precision."""
+    """Mean of two bodies' values, in their precision."""
     return 0.5 * float(a + b)
 
 
 def means(scene: Scene, coefficient: str) -> list[float] | None:
-    """Numbers of bodies of which each pair's ``coefficient`` is the mean; None if there are none that are allowed.
+    """Values per body of which each pair's ``coefficient`` is the mean; None if there are no valid ones.
 
-    A restitution lies in [0, 1], a friction is not negative: a number outside would be another material to the engine.
+    Restitution must lie in [0, 1], and friction must not be negative.
     """
     return representable(scene, lambda pairs: _means(scene, pairs, coefficient))
 
 
 def no_means(scene: Scene) -> str | None:
-    """Why an engine that mixes so refuses a scene: a table of pairs that no numbers of bodies give; None if some do."""
+    """Why such an engine refuses a scene: no values per body give the table of pairs; None if some do."""
     for coefficient in ("restitution", "friction"):
         if means(scene, coefficient) is None:
-            return f"pairs: {coefficient} of a pair is the mean of two numbers here, this table has none"
+            return f"pairs: {coefficient} of a pair is the mean of two values here; no values per body give this table"
     return None
 
 

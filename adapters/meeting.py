@@ -1,14 +1,13 @@
-"""Which bodies can meet while a scene lasts: an engine has to hold the materials of these pairs, and of no others.
+"""Pairs of bodies that can touch during a scene: only their materials must be represented by an engine.
 
-What touches nothing else keeps to itself. Of bodies that may touch each other nobody knows who moves how, but what all
-of them can have is bounded. With the kinetic energy T of a group and ``V = sqrt(2 T)``, contacts that do no work (fixed
-partners, e <= 1, friction) leave
+For a group of bodies that may touch each other, the motion is bounded by energy. With the kinetic energy T of the group
+and ``V = sqrt(2 T)``, contacts that add no energy (fixed partners, e <= 1, friction) give
 
     V(t) <= V(0) + t sqrt(sum m a^2 + torque^2 / I)      (Cauchy and Schwarz, of the loads' power),
 
-so that a body of mass m is never faster than ``V(t)/sqrt(m)`` and never farther from its start than t times that. A
-prescribed body or a surface that runs does work: what can reach one may be anywhere afterwards. So does a contact that
-gains energy.
+so a body of mass m is never faster than ``V(t)/sqrt(m)`` and never farther from its start than t times that. A
+prescribed body or a surface velocity adds energy, and so does restitution above 1: bodies that can reach one may be
+anywhere afterwards.
 """
 
 from __future__ import annotations
@@ -27,17 +26,17 @@ from adapters.shapes import reach
 
 #: Pair of bodies, by index, with its material.
 Meeting = tuple[int, int, Pair]
-#: Engines leave the exact motion, by drag, overlap or what they add to a rebound: so many times as far is looked.
+#: Factor on the distances, as engines deviate from the exact motion by drag, overlap or faster rebounds.
 ROOM = 2.0
-#: Of more bodies not every pair is looked at, and all are taken to meet.
+#: Most bodies for a test of every pair; with more, all are assumed to touch.
 MOST_BODIES = 200
 
 
 def representable(scene: Scene, solve: Callable[[Sequence[Meeting]], list[float] | None]) -> list[float] | None:
-    """Numbers of bodies that give the materials of all pairs, or else of those that can meet; None if there are none.
+    """Values per body that give the materials of all pairs, or else of those that can touch; None if there are none.
 
-    ``solve`` finds them for a list of pairs. All pairs come first: what an engine could hold, it holds as it did. Of
-    many bodies of one material two that are free and two that are not stand for all.
+    ``solve`` finds them for a list of pairs. All pairs are tried first. Many bodies of one material are represented by
+    two free ones and two others.
     """
     if len(scene.bodies) > MOST_BODIES and len(scene.materials()) == 1:
         free = [body.motion == "free" for body in scene.bodies]
@@ -61,13 +60,13 @@ def pairs_among(scene: Scene, chosen: Sequence[int]) -> list[Meeting]:
 
 
 def common_material(scene: Scene) -> tuple[float, float] | None:
-    """Restitution and friction, if all pairs have the same: engines that mix two bodies' numbers keep equal ones."""
+    """Restitution and friction, if all pairs have the same: every rule of combination keeps equal values."""
     found = scene.materials()
     return found.pop() if len(found) == 1 else None
 
 
 def told_pairs(scene: Scene) -> list[tuple[int, int]]:
-    """Pairs of which a readback tells the material: all, of many bodies those that can touch at the start."""
+    """Pairs in a readback: all, or with many bodies those that can touch at the start."""
     if len(scene.bodies) > MOST_BODIES:
         return list(near_pairs(scene, np.array([[body.pose for body in scene.bodies]])))
     return [(i, j) for i, j, _ in scene.contact_pairs()]
@@ -84,7 +83,7 @@ def meeting_pairs(scene: Scene) -> list[Meeting]:
         met = [pair for pair in pairs if _gap(scene, pair[0], pair[1]) <= around[pair[0]] + around[pair[1]]]
         joined = list(group)
         for i, j, _ in met:
-            # What is fixed passes nothing on between those that touch it; what is driven does work on them.
+            # A fixed body transfers no energy between bodies that touch it; a driven one does work on them.
             if _moves(scene.bodies[i]) and _moves(scene.bodies[j]):
                 old, new = joined[j], joined[i]
                 joined = [new if name == old else name for name in joined]
@@ -98,7 +97,7 @@ def _moves(body: Body) -> bool:
 
 
 def _around(scene: Scene, group: Sequence[int]) -> list[float]:
-    """How far from its start a body's outermost point can get [m]."""
+    """Largest distance of a body's outermost point from its start [m]."""
     found = [0.0] * len(scene.bodies)
     for name in set(group):
         members = [k for k, other in enumerate(group) if other == name]
@@ -118,7 +117,7 @@ def _around(scene: Scene, group: Sequence[int]) -> list[float]:
 
 
 def _norms(scene: Scene, free: Sequence[Body]) -> tuple[float, float]:
-    """``V(0)`` [sqrt(kg) m/s] of a group, and how fast its loads can make it grow."""
+    """``V(0)`` [sqrt(kg) m/s] of a group, and its growth rate by loads."""
     d, start, growth = scene.dimension, 0.0, 0.0
     for body in free:
         inertia = np.atleast_1d(np.asarray(body.inertia, dtype=float))

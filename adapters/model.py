@@ -1,8 +1,8 @@
-"""Models that people have for one engine, read as scenes that every engine can run.
+"""Model files of one engine, read as scenes for every engine.
 
-An engine that has a language of models names a reader for it (`adapters.engine.Engine.reads`), which stands in its
-folder and may use the engine's own compiler. Text from outside is handed to it in a process of its own
-(`read`), so that a compiler that aborts, hangs or takes all memory costs one line.
+An engine with a model language has a reader for it (`adapters.engine.Engine.reads`) in its folder, which may use the
+engine's compiler. It runs in a separate process (`read`), so that a compiler that aborts, hangs or takes all memory
+gives a one-line error.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from adapters.isolation import Child, Lost
 from adapters.plain import one_line, plain
 from adapters.scene import Body, Pair, Scene, SceneError, scene_from_dict
 
-#: Seconds that a reader may take, and address space that it may use [bytes]: a model of a thousand geoms takes a
-#: second, and an engine's library alone may map most of a gigabyte.
+#: Time limit [s] and address space [bytes] of a reader: a model of a thousand geoms takes a second, and an engine's
+#: library alone may map most of a gigabyte.
 PATIENCE, MEMORY = 60.0, 2 * 2**30
 #: Name of the profile that runs a model as its own engine would.
 PROFILE = "model"
-#: Simulated time of a model, which states none [s].
+#: Simulated time of a model [s], which has none itself.
 DURATION = 2.0
-#: Components of directions below this are the round-off of angles that a compiler turned into them.
+#: Components of directions below this count as round-off of a compiler's angles.
 ROUNDING = 1e-14
-#: A centre of mass or an axis this far from its shape's, relative to its size, is its shape's.
+#: Relative tolerance within which a centre of mass or an axis equals that of its shape.
 ALIGNED = 1e-9
-#: Rods lie along z in models and along x here: turned by -90 degrees about y, which keeps their plane.
+#: Rods lie along z in models and along x here: rotated by -90 degrees about y, which keeps their plane.
 ALONG = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
@@ -48,13 +48,13 @@ class Model:
     Parameters
     ----------
     scene
-        Rigid bodies and their materials; its duration is the reader's choice.
+        Rigid bodies and their materials; the reader chooses the duration.
     notes
-        What a reader of results must know: what was taken for what.
+        Assumptions in the conversion, for readers of results.
     dropped
-        What was left out because a scene has no place for it, one line each, with the element.
+        Elements that were left out because a scene does not support them, one line each.
     settings
-        What the model's own engine is told beside the scene: contact softness, solver options.
+        Further settings for the model's own engine: contact softness, solver options.
     dt
         The model's own step [s].
     """
@@ -72,7 +72,7 @@ class Model:
         return {"scene": self.scene.as_dict(), **rest}
 
 
-#: ``read(text, drop)``; with ``drop`` what has no place in a scene is left out instead of refused.
+#: ``read(text, drop)``; with ``drop`` unsupported elements are left out instead of refused.
 Reader = Callable[[str, bool], Model]
 
 
@@ -84,12 +84,12 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
 
 
 def _tuples(value: Any) -> Any:
-    """A setting's value as it was before JSON made lists of tuples."""
+    """A setting's value with tuples again, which JSON turned into lists."""
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def reader_of(suffix: str) -> str | None:
-    """Name of the engine of ours that reads files ending in ``suffix``; None if there is none."""
+    """Our engine that reads files ending in ``suffix``; None if there is none."""
     for name in registry.names():
         adapter = registry.adapter(name)
         if adapter is not None and suffix.lower() in adapter.reads:
@@ -98,12 +98,12 @@ def reader_of(suffix: str) -> str | None:
 
 
 def read(engine: str, suffix: str, text: str, drop: bool) -> Model:
-    """Read a model in a process of its own.
+    """Read a model in a separate process.
 
     Raises
     ------
     SceneError
-        Naming the element that has no place in a scene, or saying that the text is no model.
+        Naming the unsupported element, or if the text is not a model.
     ReaderMissing
         If the engine is not installed.
     EngineError
@@ -135,31 +135,31 @@ def _serve(connection: Connection) -> None:
         answer: dict[str, Any] = {"model": {**found, "settings": [plain(s) for s in found["settings"]]}}
     except SceneError as error:
         answer = {"refused": str(error) + ("" if drop else _helped_by_drop(engine, suffix, text))}
-    except Exception as error:  # a compiler's own complaints are the reader's to catch; this is something else
+    except Exception as error:  # the reader catches a compiler's errors; this is another one
         answer = {"failed": f"model: {type(error).__name__}: {error}"}
     connection.send_bytes(json.dumps(answer).encode())
 
 
 def _helped_by_drop(engine: str, suffix: str, text: str) -> str:
-    """That the model can be read without what is refused, where it can: it is tried."""
+    """A hint that the model can be read without the refused elements, if that works."""
     try:
         left_out = len(registry.load(engine).reads[suffix.lower()](text, True).dropped)
-    except Exception:  # it is refused for another reason as well, which the next call says
+    except Exception:  # it is refused for another reason too, which the next call reports
         return ""
     return f"; --drop leaves it out ({left_out} in all)" if left_out > 1 else "; --drop leaves it out"
 
 
-# ---- what readers have in common -------------------------------------------------------------------------------------
+# ---- shared by readers -----------------------------------------------------------------------------------------------
 
 
 def unit(vector: Any) -> tuple[float, ...]:
-    """A direction or a quaternion with the round-off of its components taken off, of length 1."""
+    """A direction or a quaternion of length 1, with round-off components set to 0."""
     clean = np.where(np.abs(vector) < ROUNDING, 0.0, vector)
     return tuple(float(x) + 0.0 for x in clean / np.linalg.norm(clean))
 
 
 def unique(names: Iterable[str]) -> list[str]:
-    """Names that bodies of a scene can have: of what several are called, the later ones are numbered."""
+    """Valid unique names of bodies: repeated ones are numbered."""
     seen: Counter[str] = Counter()
     found = []
     for name in (one_line(name, 60) for name in names):
@@ -169,7 +169,7 @@ def unique(names: Iterable[str]) -> list[str]:
 
 
 def pairs_of(frictions: Mapping[tuple[int, int], float], bodies: Sequence[Body]) -> tuple[Pair, ...]:
-    """Friction of pairs of bodies, by their numbers: the most common as the default, the others by name."""
+    """Friction of pairs of bodies, by index: the most common as the default, others by name."""
     usual = Counter(frictions.values()).most_common(1)[0][0] if frictions else 0.0
     others = [
         Pair(bodies[i].name, bodies[j].name, friction=friction)

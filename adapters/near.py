@@ -1,9 +1,9 @@
-"""Pairs of bodies that can touch at all, found without a look at every pair, and how deep they start in each other.
+"""Pairs of bodies that can touch, found without a loop over all pairs, and their overlap at the start.
 
-Each body is held by a box along the axes, over a block of samples. Boxes of about one size (within a factor of two) are
-sorted into cells of a grid that none of them exceeds, so that each lies in two cells an axis at most; what shares a
-cell is compared. Larger boxes meet smaller ones on the grid of the larger. For bodies that do not crowd one place the
-work grows as their number.
+Each body has a bounding box along the axes, over a block of samples. Boxes of similar size (within a factor of two) are
+sorted into cells of a grid at least as large, so each lies in at most two cells an axis; boxes that share a cell are
+compared. Larger boxes are compared with smaller ones on the grid of the larger. The work grows with the number of
+bodies, unless they crowd one place.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from adapters.engine import Array
 from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Scene, Sphere
 from adapters.shapes import Shape, reach
 
-#: Samples that a box holds a body for: what moves little in them keeps its box small, and a short run is one block.
+#: Samples of a block: slow bodies keep small boxes, and a short run is one block.
 BLOCK = 32
-#: Cells are counted to this far from the origin; beyond it they are one, which costs time and no pair.
+#: Cells end at this distance from the origin; beyond it there is one, which costs time but loses no pair.
 FARTHEST_CELL = 1e15
-#: What makes one number of a cell's place on each axis; cells that share it are compared, and no harm is done.
+#: Multipliers that hash a cell's indices to one number; a collision only adds comparisons.
 MIXERS = np.array([73856093, 19349663, 83492791], np.int64)
 
 Pairs = NDArray[np.int64]
 
 
 def near_pairs(scene: Scene, pose: Array) -> Iterator[tuple[int, int]]:
-    """Yield ``i < j`` of every pair, one of them free, that may touch in a sample of ``pose`` (s, n, 3 | 7).
+    """Yield ``i < j`` of every pair with a free body that may touch in a sample of ``pose`` (s, n, 3 | 7).
 
-    A half-space, and a body whose place is no number, may touch whatever is free.
+    A half-space, and a body with a NaN position, may touch every free body.
     """
     d, count = scene.dimension, len(scene.bodies)
     free = np.array([body.motion == "free" for body in scene.bodies])
@@ -67,13 +67,13 @@ def _meeting(low: Array, high: Array) -> Pairs:
 
 
 def _sharing(low: Array, high: Array, cell: float) -> Pairs:
-    """Pairs of boxes no larger than a cell that lie in one cell, (m, 2); a pair that shares several may come again."""
+    """Pairs of boxes in a common cell, none larger than a cell, (m, 2); a pair with several common cells may repeat."""
     d = low.shape[1]
     ends = [np.clip(np.floor(end / cell), -FARTHEST_CELL, FARTHEST_CELL).astype(np.int64) for end in (low, high)]
     keys, owners = [], []
     for corner in product((0, 1), repeat=d):
         place = np.stack([ends[side][:, axis] for axis, side in enumerate(corner)], 1)
-        # A box that lies in one cell along an axis is entered there once.
+        # A box in one cell along an axis is entered once.
         new = np.array([side == 0 for side in corner]) | (ends[0] != ends[1])
         chosen = np.flatnonzero(new.all(axis=1))
         keys.append((place[chosen] * MIXERS[:d]).sum(axis=1))
@@ -92,11 +92,11 @@ def _sharing(low: Array, high: Array, cell: float) -> Pairs:
 
 
 def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:
-    """How deep pairs start in each other at most, by body indices [m]; pairs that some direction parts are left out.
+    """Upper bound of the overlap of pairs at the start, by body indices [m]; separated pairs are left out.
 
-    Moved by their overlap along any direction two bodies are apart, so that the least of several directions is a bound
-    from above: the face of a half-space; otherwise the line of centres and the axes of both. It is exact for balls, and
-    for boxes that meet with a face.
+    Moving two bodies apart by their overlap along any direction separates them, so the least of several directions is
+    an upper bound: the face of a half-space; otherwise the line of centres and the axes of both. It is exact for balls,
+    and for boxes with a face in contact.
     """
     poses = np.array([body.pose for body in scene.bodies])
     found = {}
@@ -108,7 +108,7 @@ def start_overlap(scene: Scene) -> dict[tuple[int, int], float]:
 
 
 def _depths(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Iterator[float]:
-    """Yield how far A and B reach over each other along some directions [m]; below 0 they are apart."""
+    """Yield the overlap of A and B along some directions [m]; below 0 they are apart."""
     if isinstance(b, HalfSpace):
         a, pose_a, b, pose_b = b, pose_b, a, pose_a
     d = 2 if len(pose_b) == 3 else 3
@@ -124,7 +124,7 @@ def _depths(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Iterator[float]
 
 
 def _reach_along(shape: Shape, pose: Array, direction: Array) -> float:
-    """How far a shape reaches from its centre along a unit vector [m]."""
+    """Extent of a shape from its centre along a unit vector [m]."""
     if isinstance(shape, Disc | Sphere):
         return shape.radius
     along = rotation(pose[len(direction) :]).T @ direction

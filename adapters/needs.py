@@ -1,6 +1,6 @@
-"""What a scene needs from a solver; derived from the scene, never stored.
+"""Facts of a scene for the choice of settings; derived from the scene, never stored.
 
-Profiles choose an engine's settings from these facts alone. They see neither the scene's name nor its truth.
+Profiles choose an engine's settings from these facts only, without the scene's name or truth.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ class Needs:
     Parameters
     ----------
     dimension
-        2 or 3, of the scene as posed (before any lift).
+        2 or 3, of the original scene (before embedding in 3-D).
     rotation
         True if anything can turn a body: a box, friction, spin or torque.
     friction
-        Largest friction coefficient of a pair that can meet.
+        Largest friction coefficient of a pair that can touch.
     restitution
-        Largest restitution of a pair that can meet.
+        Largest restitution of a pair that can touch.
     regime
-        ``impact``: a pair that can meet has e > 0, or nothing but motion brings bodies together;
-        ``rest``: gravity or a force acts and no e > 0; ``free``: no pair can meet.
+        ``impact``: a pair that can touch has e > 0, or only motion brings bodies together;
+        ``rest``: gravity or a force acts and no e > 0; ``free``: no pair can touch.
     slide
-        Friction acts and a body starts with tangential motion or spin, or a surface runs, or load acts along a
-        half-space; over a fixed box what moves across gravity slides.
+        Friction acts and a body starts with tangential motion or spin, or a surface has a velocity, or a load acts
+        along a half-space; over a fixed box motion across gravity counts.
     smallest_size
         Smallest full extent of a free body [m].
     top_speed
-        Largest initial, prescribed or surface speed plus what gravity can add over the duration [m/s].
+        Largest initial, prescribed or surface speed plus the speed by gravity over the duration [m/s].
     mass_ratio
         Largest over smallest mass of the free bodies.
     gravity
         Magnitude [m/s^2].
     pull
-        What presses bodies together [m/s^2]: gravity; without it the largest force over the mass it acts on.
+        Acceleration that presses bodies together [m/s^2]: gravity, or without it the largest force over its mass.
     hulls
-        A body is a convex polygon or hull: engines know balls, capsules and boxes by name, and find contacts of other
-        convex bodies by another way.
+        A body is a convex polygon or hull: engines have separate contact routines for balls, capsules and boxes, and a
+        general one for convex bodies.
     """
 
     dimension: int
@@ -66,7 +66,7 @@ class Needs:
 
 
 def needs(scene: Scene) -> Needs:
-    """Derive what ``scene`` needs."""
+    """Derive the needs of ``scene``."""
     d = scene.dimension
     free = [body for body in scene.bodies if body.motion == "free"]
     materials = scene.materials()
@@ -99,9 +99,9 @@ def _regime(can_meet: bool, restitution: float, loaded: bool) -> Regime:
 
 
 def _tangential(scene: Scene) -> bool:
-    """True if a body moves along, or load acts along, the face of a half-space, or moves level over a fixed box.
+    """True if a body moves or a load acts along the face of a half-space, or a body moves level over a fixed box.
 
-    So it is where a surface runs, or a course moves what others lie on.
+    Also if a surface has a velocity, or a course moves a support.
     """
     d = scene.dimension
     if any(any(body.surface_velocity) or body.course or turns(body) for body in scene.bodies):
@@ -121,6 +121,6 @@ def _tangential(scene: Scene) -> bool:
 def _is_across(vector: tuple[float, ...], normal: tuple[float, ...]) -> bool:
     """Whether ``vector`` has a part across the unit ``normal`` (1e-12: round-off)."""
     along = sum(v * n for v, n in zip(vector, normal, strict=True))
-    # Component by component: the difference of two squares would lose half the digits, and with them the tilt.
+    # By components: a difference of squares would lose half the digits, and the tilt.
     across = math.hypot(*(v - along * n for v, n in zip(vector, normal, strict=True)))
     return across > 1e-12 * max(1.0, math.hypot(*vector))

@@ -1,7 +1,7 @@
-"""Settings of a user's own: read from a command line, checked by name and kind.
+"""Settings of a user, from the command line, checked by name and kind.
 
-A profile is named after them: ``--set cone=elliptic --set impratio=10`` makes ``default+cone=elliptic+impratio=10`` of
-``default``.
+They become part of the profile's name: ``--set cone=elliptic --set impratio=10`` makes
+``default+cone=elliptic+impratio=10`` of ``default``.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from adapters.engine import Engine, EngineError, Setting
 from adapters.plain import NAME, one_line
 from adapters.settings import Check, like, text_of
 
-#: Near names that a line about an unknown one lists.
+#: Number of similar names in the message about an unknown one.
 NEAR = 4
 #: Words that are values.
 NAMED = {"true": True, "false": False, "none": None}
-#: What stands for a value that an engine cannot take.
+#: Placeholder for a value that an engine cannot take.
 MISFIT = object()
 
 
 def read(text: str) -> Any:
-    """Value of a setting as a user writes it: a number, ``true``, ``none``, a word, or several with commas between."""
+    """Value of a setting from text: a number, ``true``, ``none``, a word, or several with commas between."""
     if "," in text:
         values = tuple(map(read, text.split(",")))
         return tuple(float(v) if isinstance(v, int) and not isinstance(v, bool) else v for v in values)
@@ -39,7 +39,7 @@ def read(text: str) -> Any:
 
 
 def suffix_of(settings: Iterable[tuple[str, Any]]) -> str:
-    """What the name of a profile gets whose settings these replace: ``+cone=elliptic+impratio=10``."""
+    """Suffix of a profile's name for these settings: ``+cone=elliptic+impratio=10``."""
     return "".join(f"+{name}={text_of(value)}" for name, value in settings)
 
 
@@ -63,7 +63,7 @@ def given(texts: Iterable[str]) -> tuple[tuple[str, Any], ...]:
     Raises
     ------
     EngineError
-        If one is not of that form, or named twice.
+        If one is not of that form, or given twice.
     """
     found: dict[str, Any] = {}
     for name, value in map(pair, texts):
@@ -74,24 +74,24 @@ def given(texts: Iterable[str]) -> tuple[tuple[str, Any], ...]:
 
 
 def kinds_of(engine: Engine, profile: Iterable[Setting]) -> dict[str, Check]:
-    """What each setting may be: of a profile of ``engine``, and of the engine itself."""
+    """Checks of each setting, of a profile of ``engine`` and of the engine."""
     return {setting.name: like(setting.value) for setting in profile} | dict(engine.settable())
 
 
 def own(engine: Engine, asked: Sequence[tuple[str, Any]], profile: Sequence[Setting]) -> tuple[tuple[str, Any], ...]:
-    """Settings of a user's own, sorted by name, of the kinds that ``engine`` takes.
+    """Settings of a user, sorted by name, in the kinds of ``engine``.
 
     Parameters
     ----------
     asked
-        Names with values as `read` gives them.
+        Names with values from `read`.
     profile
-        Settings of the profile that they replace, or are added to.
+        Settings of the profile, which they replace or extend.
 
     Raises
     ------
     EngineError
-        Naming the first setting that the engine does not have, or whose value it cannot take.
+        Naming the first unknown setting, or the first invalid value.
     """
     stock, kinds = {setting.name: setting.value for setting in profile}, kinds_of(engine, profile)
     found: dict[str, Any] = {}
@@ -100,8 +100,8 @@ def own(engine: Engine, asked: Sequence[tuple[str, Any]], profile: Sequence[Sett
             where = f"; crosscheck describe {engine.name} lists all"
             raise EngineError(f"set: {engine.name} has no setting {one_line(name, NAME)!r}{near(name, kinds)}{where}")
         if isinstance(value, int) and not isinstance(value, bool) and isinstance(stock.get(name), float):
-            value = float(value)  # 10 and 10.0 are one setting
-        # One of several words needs no comma, a word may read as a number or as none, and its letters may be small.
+            value = float(value)  # 10 and 10.0 are the same setting
+        # A single word of a list has no comma, a word may look like a number or none, and may be in lower case.
         said = text_of(value)
         tried = (value, (value,), said, said.lower(), said.upper(), said.capitalize())
         fits = next((each for each in tried if not kinds[name](each)), MISFIT)
@@ -116,7 +116,7 @@ def own(engine: Engine, asked: Sequence[tuple[str, Any]], profile: Sequence[Sett
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """Names that may have been meant; nothing where none is near."""
+    """Similar names; empty if there are none."""
     low = {each.lower(): each for each in known}
     parts = [each for each in low if name.lower() in each]
     close = list(dict.fromkeys([*parts, *difflib.get_close_matches(name.lower(), low, n=NEAR)]))[:NEAR]

@@ -1,7 +1,7 @@
-"""What comes from outside becomes plain data, once: short text without control characters, numbers, lists, tables.
+"""Converts data from outside to plain data: short text without control characters, numbers, lists, tables.
 
-Engines, their plugins and scene files choose names, reasons, versions and what they read back. All of it ends in a
-terminal, in XML, in a table or on a page; so it is cleaned where it enters, and whoever shows it need not think of it.
+Engines, plugins and scene files provide names, reasons, versions and readbacks, which end in a terminal, in XML, in a
+table or on a page. They are cleaned where they enter, so output need not do it.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from typing import Any
 
 #: Longest reason [characters]: three lines of a wide terminal.
 REASON = 500
-#: Longest name or version [characters]; more does not fit a column.
+#: Longest name or version [characters] for a column.
 NAME = 80
 #: Most characters and levels of a table that an engine reads back; real ones have some thousand, three deep.
 SIZE, LEVELS = 2**18, 8
-#: Characters that a number counts for.
+#: Characters counted for a number.
 NUMBER = 20
-#: Categories of Unicode that no reader sees or that steer what shows them: control, format (which turns the direction
-#: of writing), lone surrogates, private use, unassigned (XML allows some of these, no terminal shows them), and line
-#: and paragraph separators.
+#: Categories of Unicode that are invisible or control the display: control, format (which changes the writing
+#: direction), lone surrogates, private use, unassigned (XML allows some of these, no terminal shows them), and line and
+#: paragraph separators.
 _STEERING = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
 
 
-#: Types that are plain already, once a number is finite and a text is a line.
+#: Types that are already plain, if a number is finite and a text is one line.
 SCALARS = frozenset((str, float, int, bool, type(None)))
 
 
 def one_line(text: Any, most: int = REASON) -> str:
-    """First line of ``text`` that says something, control characters shown as escapes, at most ``most`` characters."""
+    """First nonempty line of ``text``, with control characters as escapes, at most ``most`` characters."""
     if type(text) is str and len(text) <= most and text.isascii() and text.isprintable():
-        return text.strip()  # a line as it should be, as most are
+        return text.strip()  # already a clean line, as most are
     whole = _as_text(text, 8 * most)
     return _cut(_visible(next((line for line in whole.splitlines() if line.strip()), "").strip()), most)
 
@@ -43,21 +43,21 @@ def lines(text: str, count: int, most: int = REASON) -> str:
 
 
 def is_visible(text: str) -> bool:
-    """Whether ``text`` holds nothing that `one_line` would escape."""
+    """Whether ``text`` has no characters that `one_line` would escape."""
     return not any(unicodedata.category(c) in _STEERING for c in text)
 
 
 def plain(value: Any) -> Any:
-    """``value`` as JSON-ready data: what is no number, word, list or table becomes its text; NaN and inf as words.
+    """``value`` as JSON-ready data: other types become text; NaN and inf become words.
 
-    Of what is too large the beginning is kept.
+    Of too large data the beginning is kept.
     """
     return _plain(value, 0, [SIZE])
 
 
 def _plain(value: Any, level: int, left: list[int]) -> Any:
-    """Plain data of at most ``left[0]`` characters, which are taken off."""
-    if type(value) in SCALARS:  # most values of most runs; asking for their abstract base takes ten times as long
+    """Plain data of at most ``left[0]`` characters, which is reduced by them."""
+    if type(value) in SCALARS:  # most values; a test by abstract base classes takes ten times as long
         return _counted(_scalar(value), left)
     if isinstance(value, Mapping) and level < LEVELS:
         table = {}
@@ -95,7 +95,7 @@ def _scalar(value: Any) -> Any:
 
 
 def _as_text(value: Any, most: int) -> str:
-    """Text of anything; an object that cannot even say what it is gets the name of its type."""
+    """Text of any object; the name of its type if it has none."""
     try:
         return (value if isinstance(value, str) else str(value))[:most]
     except BaseException:

@@ -1,7 +1,7 @@
-"""Faults of a given size that any engine can be given from outside.
+"""Faults of a given size for any engine.
 
-`validation.questions.detection` computes from them what every check and every receipt can see. Those of a toy engine,
-with what must catch each, stand in `adapters.conformance.faults`.
+`validation.questions.detection` computes from them which faults each check and property check notices. Faults of a toy
+engine, each with the check that must notice it, are in `adapters.conformance.faults`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from adapters.engine import Array, Contacts, Declared, Engine, EngineError, Simu
 from adapters.needs import Needs
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, Hull, Polygon, Scene, Sphere
 
-#: Faults of a given size that any engine can be given from outside, in what it is told...
+#: Faults of a given size for any engine, in its input...
 TOLD = ("mass", "inertia", "gravity", "friction", "restitution", "extent", "step")
-#: ... or in what it reports.
+#: ... or in its output.
 REPORTED = (
     "velocity", "impulse", "damping", "drift", "climb", "twirl", "tremble", "flicker", "lasting", "uneven", "late",
     "pull", "order",
@@ -29,20 +29,20 @@ SIZED = TOLD + REPORTED
 
 
 class Planted(Engine):
-    """An engine with one parameter off by a share: it is told, or it reports, ``(1 - size)`` times what it should.
+    """An engine with one wrong parameter: its input or output is ``(1 - size)`` times the right value.
 
     Parameters
     ----------
     fault
-        One of `SIZED`: of what is built (`TOLD`), or of what is read (`REPORTED`). Motion that a solver leaves behind
-        or adds is no share of a parameter: ``drift`` moves every body along x by ``size`` times 1 m/s and ``climb``
-        upwards, as a correction of places that never ends does, and ``twirl`` turns it by ``size`` times 1 rad/s in
-        the plane of x and the vertical; ``tremble`` adds ``size`` times 1 m/s along x with a
-        sign that changes every step; ``flicker`` does so to the impulses, as a share of them; ``lasting`` tells a share
-        of the last impulses on where nothing touches any more; ``uneven`` takes a share of the impulses that grows with
-        the place of the body that is pushed; ``damping`` takes the share of all speeds away in a second.
+        One of `SIZED`: of the input (`TOLD`) or of the output (`REPORTED`). Added motion is no share of a parameter:
+        ``drift`` moves every body along x by ``size`` times 1 m/s and ``climb`` upwards, like a position correction
+        that never ends, and ``twirl`` turns it by ``size`` times 1 rad/s in the plane of x and the vertical;
+        ``tremble`` adds ``size`` times 1 m/s along x with alternating sign; ``flicker`` changes the impulses
+        alternately by that share; ``lasting`` still reports a share of the last impulses after contact; ``uneven``
+        reduces impulses by a share that grows with the index of the body; ``damping`` reduces all speeds by the share
+        in a second.
     size
-        Share by which it is off, 0.02 for two per cent.
+        Relative error, 0.02 for two per cent.
     """
 
     def __init__(self, inner: Engine, fault: str, size: float) -> None:
@@ -52,23 +52,23 @@ class Planted(Engine):
         self.facts, self.profiles = inner.facts, inner.profiles
 
     def version(self) -> str:
-        """Version of the engine that got the fault."""
+        """Version of the engine."""
         return self.inner.version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """What the engine refuses."""
+        """The engine's refusal."""
         return self.inner.refuses(scene, profile)
 
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
-        """What the engine's steps are too long for."""
+        """The engine's refusal of too long steps."""
         return self.inner.too_coarse(scene, dt)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What the healthy engine declares: a fault is not declared."""
+        """Declarations of the correct engine: a fault is not declared."""
         return self.inner.declares(profile, needs, dt)
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """Build what the faulty engine was told."""
+        """Build the world from the faulty input."""
         told = dt * self.factor if self.fault == "step" else dt
         return _Misread(self.inner.build(self._told(scene), told, settings), self.fault, self.factor, dt)
 
@@ -103,17 +103,17 @@ class Planted(Engine):
 
 
 class _Misread(Simulation):
-    """A simulation that is read wrongly, in one of the ways of `REPORTED`."""
+    """A simulation with a fault of `REPORTED` in its output."""
 
     def __init__(self, inner: Simulation, fault: str, factor: float, dt: float) -> None:
         self.inner, self.fault, self.factor, self.dt = inner, fault, factor, dt
         self.size = 1.0 - factor
         self.steps = 0
         self.initial_change = inner.initial_change
-        #: Places and velocities of the last steps, newest last, as far back as what comes late may have been due.
+        #: Positions and velocities of the last steps, newest last, as far back as the delay.
         self.past: deque[tuple[Array, Array]] = deque(maxlen=math.ceil(self.size / dt) + 1)
         self._keep()
-        #: The last contacts that were read; none before the first.
+        #: The last contacts; none before the first.
         self.told: Contacts | None = None
 
     def advance(self, steps: int) -> None:
@@ -143,7 +143,7 @@ class _Misread(Simulation):
         return _turned(pose, self.size * self.dt * self.steps) if self.fault == "twirl" else pose
 
     def _late(self, pose: Array) -> Array:
-        """Places to which the velocities of ``size`` seconds ago lead; between two steps it is the mean of both."""
+        """Positions from the velocities of ``size`` seconds ago, interpolated between steps."""
         d, lag = _axes(pose), min(self.size / self.dt, float(self.steps))
         whole = math.floor(lag)
         led = [
@@ -190,7 +190,7 @@ class _Misread(Simulation):
         if self.fault == "lasting":
             if len(found.a) == 0 and self.told is not None:
                 return replace(self.told, impulse=self.size * self.told.impulse)
-            self.told = replace(found, impulse=found.impulse.copy())  # what a simulation gives may be its own
+            self.told = replace(found, impulse=found.impulse.copy())  # a simulation may return its own arrays
         return found
 
     def _turn(self) -> float:
@@ -205,12 +205,12 @@ class _Misread(Simulation):
 
 
 def _axes(pose: Array) -> int:
-    """How many of a pose's columns are a place: two in the plane, three in space."""
+    """Number of position columns of a pose: two in 2-D, three in 3-D."""
     return 2 if pose.shape[1] == 3 else 3
 
 
 def _inwards(pose: Array) -> Array:
-    """Unit vectors (n, axes) from each body to the middle between all of them; zero of a body that is there."""
+    """Unit vectors (n, axes) from each body to the centre of all; zero for a body there."""
     way = pose[:, : _axes(pose)].mean(axis=0) - pose[:, : _axes(pose)]
     far = np.linalg.norm(way, axis=1, keepdims=True)
     return np.divide(way, far, out=np.zeros_like(way), where=far > 0.0)
@@ -224,6 +224,6 @@ def _turned(pose: Array, angle: float) -> Array:
         return pose
     c, s = math.cos(0.5 * angle), -math.sin(0.5 * angle)
     w, x, y, z = pose[:, 3:].T
-    # The product (c, 0, s, 0) (w, x, y, z): a turn in world axes stands on the left.
+    # The product (c, 0, s, 0) (w, x, y, z): a rotation in world axes is the left factor.
     pose[:, 3:] = np.column_stack([c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x])
     return pose

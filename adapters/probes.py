@@ -1,16 +1,16 @@
-"""Probe scenes: what an engine realises, measured on the smallest scenes that show it.
+"""Probe scenes: the smallest scenes that measure the properties of an engine.
 
     fall      gravity, step, sampling       a ball released from rest
     load      mass, inertia, turn           bodies under a constant force and torque
-    flight    dampings                      bodies that nothing acts on, for a second
+    flight    dampings                      free bodies without load, for a second
     landing   size, impulse                 a ball and a box on each of its faces touch a floor
     rebound   restitution                   balls hit a floor at several phases of a step
     slide     friction, friction_impulse    a box slides on a floor; its weight is an impulse as well
     corner    turn                          boxes land on a corner
 
-A probe has the pair values of the scene that is judged, its friction where friction is read (`Probe.rubs`), and is
-stepped by the same loop. A reader gives samples of a
-quantity (one per component, body or phase); `adapters.receipts` looks at the one farthest from what is declared.
+A probe has the pair values of the judged scene, its friction where friction is measured (`Probe.rubs`), and runs in the
+same step loop. A reader gives samples of a quantity (one per component, body or phase); `adapters.receipts` uses the
+one farthest from the declared value.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from adapters.trajectory import Sampling, Trajectory
 
 Samples = dict[str, tuple[float, ...]]
 
-#: Steps of the short probes: enough to see one step more or less, too few for anything to build up.
+#: Steps of the short probes: enough to notice one step more or less, too few for errors to accumulate.
 STEPS = 8
 GRAVITY = 9.81
 #: Rebound: speed [m/s], radius [m] and mass [kg] of the balls, and the part of a step after which they touch. They
@@ -36,17 +36,17 @@ GRAVITY = 9.81
 REBOUND_SPEED, REBOUND_RADIUS, REBOUND_MASS = 2.0, 0.5, 1.0
 REBOUND_PHASES = (0.1, 0.37, 0.6, 0.87)
 REBOUND_LEAD = 3
-#: Time that a rebound may take [s]: twice what the softest contact known here takes (0.1 s).
+#: Time of a rebound [s]: twice that of the softest known contact (0.1 s).
 REBOUND_TIME = 0.2
 #: Sliding: least speed at the start [m/s] and time [s].
 SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5
-#: Friction up to which it brakes by no more than a weight. A larger one is left to the probes that read friction: what
-#: an engine does with it (a box sinks, or is thrown up) must not pass for a wrong size or sign.
+#: Friction up to which it brakes by at most a weight. Larger friction is used only in probes that measure friction: its
+#: effects in an engine (a box sinks, or is thrown up) must not count as a wrong size or sign.
 MOST_FRICTION = 1.0
-#: Speed of the landing bodies [m/s]: low, since the step of motion limits what their size can be told to.
+#: Speed of the landing bodies [m/s]: low, since the motion of a step limits the accuracy of their size.
 LANDING_SPEED = 0.25
 LANDING_LEAD = 5.5
-#: Half extents of probe boxes [m], all different so that no two can be swapped unseen.
+#: Half extents of probe boxes [m], all different so that a swap is noticed.
 HALF_EXTENTS = (0.3, 0.4, 0.5)
 #: Acceleration under load [m/s^2] and [rad/s^2].
 LOAD_ACCELERATION, LOAD_SPIN_UP = 2.0, 1.5
@@ -54,7 +54,7 @@ LOAD_ACCELERATION, LOAD_SPIN_UP = 2.0, 1.5
 
 @dataclass(frozen=True)
 class Case:
-    """What probes are made for: pair values, step, and step order and precision that the engine states."""
+    """Conditions of probes: pair values, step, and the engine's scheme and precision."""
 
     dimension: int
     restitution: float
@@ -66,11 +66,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Probe:
-    """A scene, the quantities it shows, and how they are read from its trajectory.
+    """A scene, its quantities, and their readers.
 
-    ``only_ends``: nothing between the first and the last state is read. ``touches``: bodies meet. ``rubs``: they have
-    the friction of the judged scene however large it is; others have `MOST_FRICTION` at most.
-    ``contacts``: contact impulses are read, of every step.
+    ``only_ends``: only the first and last state are used. ``touches``: with contact. ``rubs``: with the friction of the
+    judged scene, however large; others have at most `MOST_FRICTION`. ``contacts``: contact impulses of every step are
+    used.
     """
 
     quantities: tuple[str, ...]
@@ -82,7 +82,7 @@ class Probe:
     contacts: bool = False
 
     def sampling(self, case: Case, scene: Scene) -> Sampling:
-        """Every step, with contacts or without, or the ends alone."""
+        """Every step, with or without contacts, or only the ends."""
         if self.contacts:
             return Sampling(contacts_from=0.0)
         return Sampling(max(1, round(scene.duration / case.dt))) if self.only_ends else Sampling()
@@ -95,7 +95,7 @@ def _vector(case: Case, x: float, up: float) -> tuple[float, ...]:
 def _scene(case: Case, name: str, bodies: list[Body], duration: float, gravity: tuple[float, ...] = ()) -> Scene:
     pair = Pair(restitution=case.restitution, friction=case.friction)
     falling = gravity or _vector(case, 0.0, 0.0)
-    gaining = case.restitution > 1.0  # as the scene that is asked about
+    gaining = case.restitution > 1.0  # as in the judged scene
     return Scene(f"probe_{name}", 1, case.dimension, tuple(bodies), (pair,), falling, duration, gaining=gaining)
 
 
@@ -128,7 +128,7 @@ def _floor(case: Case, offset: float = 0.0) -> Body:
 
 
 def _fall_gravity(case: Case) -> tuple[float, ...]:
-    """Oblique, every component different: a swapped axis or a lost sign shows."""
+    """Oblique, with different components, so that a swapped axis or a wrong sign is noticed."""
     direction = (0.6, -0.8) if case.dimension == 2 else (0.48, 0.36, -0.8)
     return tuple(GRAVITY * c for c in direction)
 
@@ -139,10 +139,10 @@ def fall(case: Case) -> Scene:
 
 
 def read_fall(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """Gravity from growing speed, step from path against speed, and how many steps late states are.
+    """Gravity from the growth of speed, step from path and speed, and the delay of states in steps.
 
     Position follows ``x = g t^2/2 + position_offset g t dt/2`` and velocity ``v = g t`` [discrete laws of free fall];
-    what is missing, over the path (the gain) of one step, is the delay in steps.
+    the difference over the path of one step is the delay in steps.
     """
     d, dt, half = case.dimension, case.dt, STEPS // 2
     g, t = np.array(scene.gravity), STEPS * dt
@@ -159,7 +159,7 @@ def read_fall(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 def load(case: Case) -> Scene:
-    """Bodies with a stated inertia that is not their shape's, one for each axis, pushed and turned."""
+    """Bodies with an inertia other than their shape's, one for each axis, under force and torque."""
     return _scene(case, "load", _planar_load(case) if case.dimension == 2 else _spatial_load(case), STEPS * case.dt)
 
 
@@ -174,7 +174,7 @@ def _planar_load(case: Case) -> list[Body]:
 
 
 def _spatial_load(case: Case) -> list[Body]:
-    """Boxes in a turned pose, each with a torque about one of its principal axes, so that none precesses."""
+    """Rotated boxes, each with a torque about one of its principal axes, so that none precesses."""
     turn = (0.5, 0.1, 0.7, 0.5)  # a unit quaternion with four different components
     axes, moments = rotation(np.array(turn)), (1.0, 1.2, 1.5)
     ball = replace(_ball(case, "ball", 2.0, 0.5), torque=tuple(0.2 * LOAD_SPIN_UP * c for c in (0.6, 0.0, 0.8)))
@@ -188,9 +188,9 @@ def _spatial_load(case: Case) -> list[Body]:
 
 
 def read_load(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """``m = F t / dv`` and ``I = T t / d omega`` over what was stated; +1 where pose and spin follow the torque.
+    """``m = F t / dv`` and ``I = T t / d omega`` over the stated values; +1 where pose and spin follow the torque.
 
-    Gains are those of the second half, so that a state that is read late is not taken for a heavy body.
+    From the second half, so that a delayed state does not look like a heavy body.
     """
     d, half = case.dimension, STEPS // 2
     t = (STEPS - half) * case.dt
@@ -228,7 +228,7 @@ def flight(case: Case) -> Scene:
 
 
 def read_flight(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """Share of the speed lost in one second, continued from what was flown if that was less."""
+    """Share of the speed lost in one second, extrapolated from a shorter flight."""
     d, t = case.dimension, trajectory.t[-1]
     linear = np.linalg.norm(trajectory.twist[:, :, :d], axis=2)
     angular = np.linalg.norm(trajectory.twist[:, :, d:], axis=2)
@@ -265,10 +265,10 @@ def landing(case: Case) -> Scene:
 
 
 def read_landing(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
-    """Height of the centre above the floor when the body is first slowed; impulses over the momentum they changed.
+    """Height of the centre above the floor when the body is first slowed; impulses over the momentum change.
 
-    Slowed means: by more than its whole speed in a second, ten times the largest drag known and a hundredth of the
-    softest contact. A body that is never slowed is given the height that it reached: it is at most that large.
+    Slowed: by more than its whole speed in a second, ten times the largest known drag and a hundredth of the softest
+    contact. A body that is never slowed gets its final height, an upper bound of its size.
     """
     up, heights = case.dimension - 1, [0.4] + [height for _, height, _ in _upright(case)]
     ratios = []
@@ -280,7 +280,7 @@ def read_landing(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 def _landing_impulses(case: Case, scene: Scene, trajectory: Trajectory) -> list[float]:
-    """Reported contact impulse over m dv, for every body; a body that kept its speed has no such ratio."""
+    """Reported contact impulse over m dv, for every body; none for a body with constant speed."""
     up, ratios = case.dimension - 1, []
     for i, body in enumerate(scene.bodies[1:], start=1):
         change = body.mass * float(trajectory.twist[-1, i, up] - trajectory.twist[0, i, up])
@@ -290,13 +290,13 @@ def _landing_impulses(case: Case, scene: Scene, trajectory: Trajectory) -> list[
 
 
 def _impulse_on(trajectory: Trajectory, i: int) -> np.ndarray:
-    """Sum of all impulses that the floor (body 0) is reported to give to body ``i`` (d,) [N s]; NaN if unavailable."""
+    """Sum of the reported impulses of the floor (body 0) on body ``i`` (d,) [N s]; NaN if unavailable."""
     assert trajectory.contacts is not None
     return np.asarray(trajectory.contacts.impulse_between(0, i).sum(axis=0))
 
 
 def _reported(ratios: list[float], quantity: str = "impulse") -> Samples:
-    """Samples of what contacts report; none where the engine reports no impulses."""
+    """Samples of reported impulses; none where the engine reports none."""
     return {} if not ratios or any(math.isnan(ratio) for ratio in ratios) else {quantity: tuple(ratios)}
 
 
@@ -325,20 +325,20 @@ def read_rebound(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 def slide_load(friction: float) -> float:
-    """Gravity of the slide [m/s^2]: less above `MOST_FRICTION`, so that it brakes by one weight at most.
+    """Gravity of the slide [m/s^2]: less above `MOST_FRICTION`, so that braking is at most one weight.
 
-    Under a whole weight a friction of 10 would need a box of 115 m/s, where drag and caps of speed are measured.
+    With full gravity a friction of 10 would need a box of 115 m/s, where drag and speed limits act.
     """
     return GRAVITY / max(MOST_FRICTION, friction)
 
 
 def slide_speed(friction: float) -> float:
-    """Speed at which even twice the friction does not stop the box within the window [m/s]; 0.85 is a margin."""
+    """Speed at which twice the friction does not stop the box within the window [m/s]; 0.85 is a margin."""
     return max(SLIDE_SPEED, 2.0 * friction * slide_load(friction) * SLIDE_TIME / 0.85)
 
 
 def slide(case: Case) -> Scene:
-    """A unit box slides along x; flatter above mu = 0.5, so that it neither tips nor nearly does."""
+    """A unit box slides along x; flatter above mu = 0.5, so that it is far from tipping."""
     speed = slide_speed(case.friction)
     height = 0.5 * min(1.0, 0.5 / case.friction) if case.friction > 0.0 else 0.5
     box = _box(case, "box", 1.0, (0.5, 0.5, height), 0.0, height)
@@ -350,7 +350,7 @@ def slide(case: Case) -> Scene:
 def read_slide(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
     """Friction impulse over normal impulse, from the change of momentum (a hop does not count) and as reported.
 
-    What is reported does not contain what slows the box besides contact; the reported weight is an impulse as well.
+    Reported impulses do not contain other braking; the reported weight is an impulse as well.
     """
     up, mass = case.dimension - 1, scene.bodies[1].mass
     change = mass * (trajectory.twist[-1, 1] - trajectory.twist[0, 1])
@@ -369,7 +369,7 @@ def read_slide(case: Case, scene: Scene, trajectory: Trajectory) -> Samples:
 
 
 def corner(case: Case) -> Scene:
-    """Squares tilted either way land on their lower corner, without gravity; lifted for a spatial case."""
+    """Squares tilted either way land on their lower corner, without gravity; embedded in 3-D for a spatial case."""
     planar, half, speed = replace(case, dimension=2), 0.5, 0.5
     bodies = [_floor(planar)]
     for k, tilt in enumerate((0.3, -0.3)):

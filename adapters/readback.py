@@ -1,4 +1,4 @@
-"""What the readbacks of engines have in common: parts of free bodies by name, and materials by pair."""
+"""Shared parts of readbacks: parts of free bodies by name, and materials by pair."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 from adapters.meeting import told_pairs
 from adapters.scene import Scene
 
-#: A number of each body in the engine, and what the engine makes of two.
+#: A value of each body in the engine, and the rule that combines two.
 Mixed = tuple[Sequence[Any], Callable[[Any, Any], float]]
 
 
 def free_parts(scene: Scene, parts: Iterable[Any]) -> Iterator[tuple[str, Any]]:
-    """Name of each free body and what stands for it in the engine; ``parts`` has one for each body of the scene."""
+    """Name of each free body and its part in the engine; ``parts`` has one for each body of the scene."""
     for body, part in zip(scene.bodies, parts, strict=True):
         if body.motion == "free":
             yield body.name, part
 
 
 def pair_materials(scene: Scene, restitution: Mixed, friction: Mixed) -> dict[str, dict[str, float]]:
-    """Materials that pairs get of two bodies' numbers, by the names of the pairs."""
+    """Materials of pairs from two bodies' values, by the names of the pairs."""
     (own_restitution, mix_restitution), (own_friction, mix_friction) = restitution, friction
     return {
         f"{scene.bodies[i].name}-{scene.bodies[j].name}": {

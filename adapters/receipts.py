@@ -1,11 +1,11 @@
-"""Parameter receipts: what a profile realises, measured through its own adapter, against what it declares.
+"""Property checks: what a profile realises, measured through its adapter, against its declaration.
 
-    asked        by the scene: the pair's e and mu; 1 for ratios; 0 for losses and delays
-    declared     by `Engine.declares`; where that is silent, as asked
+    asked        value of the scene: the pair's e and mu; 1 for ratios; 0 for losses and delays
+    declared     by `Engine.declares`; otherwise as asked
     measured     on the probes, at the sample farthest from what is declared
     holds        |measured - declared| <= band
 
-Probes run with exactly the settings that the judged scene gets, so that the judged configuration is measured.
+Probes run with exactly the settings of the judged scene, so the judged configuration is measured.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from adapters.probes import (
 from adapters.stepping import posed_for, run
 
 #: What the probes measure. ``restitution`` and ``friction`` are the pair's effective coefficients, the latter from
-#: momentum; ``friction_impulse`` is the coefficient that reported contact impulses have, ``impulse`` their sum over the
+#: momentum; ``friction_impulse`` is the coefficient of the reported contact impulses, ``impulse`` their sum over the
 #: momentum that changed; ``mass``, ``inertia``, ``gravity``, ``step`` and ``size`` are ratios measured / asked;
 #: ``sampling`` is how many steps late a state is read; the dampings are the fraction of speed lost in one second;
 #: ``turn`` is +1 if positive torques and contact forces turn bodies counter-clockwise where they should, -1 if not.
@@ -55,17 +55,18 @@ QUANTITIES = (
     "turn",
 )
 
-#: What hangs on how a solver copes with friction. Above `MOST_FRICTION` some stop early, and soft pyramids let bodies
-#: sink: unless a profile declares it, what comes of that is measured, and a failure where a check sees it.
+#: Quantities that depend on how a solver treats friction. Above `MOST_FRICTION` some solvers stop early, and bodies
+#: sink into soft pyramids: unless a profile declares them, they are measured but not judged here; checks judge the
+#: effect.
 RUBBED = ("restitution", "friction", "friction_impulse")
-#: Band of everything an engine gets exactly, in roundings: 1e-12 of a double number.
+#: Band of exact quantities, in roundings: 1e-12 in double precision.
 ROUNDINGS = 1e-12 / 2.0**-52
-#: What a profile's own solve may leave of friction, as a share of the coefficient, unless it declares more: what a
-#: sliding box is judged to at 1/240 s (`validation.bounds.driven`, dt/100 s = 4e-5), rounded up.
+#: Residual of friction in a profile's solver, as a share of the coefficient, unless it declares more: the tolerance of
+#: a sliding box at 1/240 s (`validation.bounds.driven`, dt/100 s = 4e-5), rounded up.
 FRICTION_SHARE = 1e-4
-#: What a solver's tolerance may leave of the sum of contact impulses, as a share of the momentum they change.
+#: Residual of the sum of contact impulses by a solver's tolerance, as a share of the momentum change.
 IMPULSE_SHARE = 1e-6
-#: Band of a quantity that a receipt cannot tell: wider than any measured value, and still a number.
+#: Band of a quantity that cannot be predicted: wider than any measured value, but finite.
 UNTOLD = 1e9
 
 
@@ -92,8 +93,9 @@ def receipts(
 ) -> tuple[Receipt, ...]:
     """Measure what ``profile`` realises for a scene with ``needs``.
 
-    With ``own`` settings in the place of the profile's nothing is declared: what is measured stands beside what is
-    asked. Each probe is kept per engine, profile, settings, step and dimension, and if it touches, per pair values.
+    With ``own`` settings instead of the profile's, nothing is declared, and measured values are compared with the
+    scene's. Results of a probe are cached by engine, profile, settings, step and dimension, and with contact also by
+    the pair's values.
 
     Raises
     ------
@@ -129,7 +131,7 @@ def receipts(
 
 
 def _applies(probe: str, needs: Needs) -> bool:
-    """Rebounds are measured where something rebounds, friction where there is any."""
+    """Restitution is measured where e > 0, friction where mu > 0."""
     if probe == "rebound":
         return needs.regime == "impact"
     return needs.friction > 0.0 if probe == "slide" else True
@@ -147,11 +149,11 @@ def _frozen(value: Any) -> Any:
 def _measured(
     engine: Engine, profile: str, values: tuple[tuple[str, Any], ...], case: Case, names: tuple[str, ...]
 ) -> tuple[Samples, dict[str, tuple[str, bool]]]:
-    """Samples by quantity, and for quantities without: the reason and whether the engine refused."""
+    """Samples by quantity; for quantities without samples the reason, and whether the engine refused."""
     samples: Samples = {}
     silent: dict[str, tuple[str, bool]] = {}
     for name in names:
-        # Bodies that meet nothing do not depend on what a pair does: measured once for all pairs.
+        # Probes without contact do not depend on the pair: measured once for all pairs.
         probe, own = PROBES[name], case
         if not probe.touches:
             own = replace(own, restitution=0.0, friction=0.0)
@@ -185,7 +187,7 @@ def _probe(
 def _receipt(
     quantity: str, asked: float, declared: Declared, samples: tuple[float, ...], silent: tuple[str, bool] | None
 ) -> Receipt:
-    """Compare the sample farthest from what is declared with it; a quantity without samples tells why."""
+    """Compare the sample farthest from the declared value with it; a quantity without samples has the reason."""
     if silent and not (silent[1] and samples):
         return Receipt(quantity, asked, declared.value, declared.band, math.nan, silent[1], silent[0])
     if not samples:
@@ -203,21 +205,21 @@ def _asked(quantity: str, needs: Needs) -> float:
 
 
 def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -> tuple[float, str]:
-    """Band of what is as asked, and why: round-off, what the probe can resolve, and drag that is declared."""
+    """Default band and its reason: round-off, the resolution of the probe, and declared drag."""
     if quantity == "turn":
         return 0.0, "a sign"
     if quantity in RUBBED and case.friction > MOST_FRICTION:
-        return UNTOLD, "what a solver makes of a friction above 1 is left to the checks"
+        return UNTOLD, "friction above 1 is not measured here, but by the checks"
     round_off = ROUNDINGS * case.epsilon
     if quantity == "size":
-        # A predicted contact acts up to a step of approach and one of rebound early, another one up to a step late.
+        # A speculative contact acts up to a step of approach and one of rebound early, others up to a step late.
         path = (1.0 + case.restitution) * LANDING_SPEED * case.dt
         return path / HALF_EXTENTS[0] + round_off, "one step of motion, and a predicted rebound"
-    band, because = round_off, "exact but for round-off"
+    band, because = round_off, "exact up to round-off"
     if quantity == "impulse":
         band, because = (
             max(IMPULSE_SHARE, round_off),
-            "impulses are bookkeeping: they add up to m dv but for a solver's tolerance",
+            "reported impulses must sum to m dv, up to the solver's tolerance",
         )
     if quantity in ("friction", "friction_impulse"):
         band = FRICTION_SHARE * case.friction + round_off
@@ -227,34 +229,33 @@ def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -
 
 
 def _starved(quantity: str, told: Declared, case: Case, iterations: int, is_declared: bool) -> Declared:
-    """What is told at a number of sweeps that was asked for: a receipt is about a parameter, not about a starved solve.
+    """Bands at an iteration count set by the user: a parameter is checked, not convergence.
 
-    A sweep clips friction at the load known so far; what is left falls faster than 1/N with N sweeps. The first one
-    knows no load: anything from no friction to a stop within the window. The first and the last step of the window may
-    hold a friction without its load. Impulses add up at any count where they are what moves the bodies; where a profile
-    declares that they do so to its solver's tolerance only, a solve that is cut off tells nothing about them. One sweep
-    may stop what lands a step of motion above what it touches, beside the step that any landing is allowed.
+    An iteration limits friction by the load found so far; the residual falls faster than 1/N with N iterations. In the
+    first one there is no load yet: anything from no friction to a stop within the window is possible. The first and
+    last step of the window may have friction without its load. Impulses sum to the momentum change at any count where
+    they move the bodies; where a profile declares that only to its solver's tolerance, a solve that is cut off predicts
+    nothing. With one iteration a body may stop a step of motion above the face, in addition to the step that any
+    landing is allowed.
     """
     if quantity == "size" and iterations == 1:
         early = LANDING_SPEED * case.dt / HALF_EXTENTS[0]
-        return Declared(
-            told.value, told.band + early, f"{told.because}; 1 iteration was asked for: a step of motion more"
-        )
+        return Declared(told.value, told.band + early, f"{told.because}; with 1 iteration: a step of motion more")
     if quantity == "impulse" and is_declared:
-        return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations were asked for: not told")
+        return Declared(told.value, UNTOLD, f"{told.because}; {iterations} iterations are set: no prediction")
     if quantity not in ("friction", "friction_impulse"):
         return told
     stop = slide_speed(case.friction) / (slide_load(case.friction) * SLIDE_TIME)
     band = case.friction / iterations if iterations > 1 else stop
     band += 2.0 * case.dt / SLIDE_TIME * case.friction
-    because = f"{told.because}; {iterations} iterations were asked for, and a load may be off by 1/{iterations}"
+    because = f"{told.because}; {iterations} iterations are set, and a load may be off by 1/{iterations}"
     return Declared(told.value, told.band + band, because)
 
 
 def _drag(quantity: str, case: Case, declared: Mapping[str, Declared]) -> float:
     """Largest effect of declared damping on a probe; drag may grow with the square of a speed above 1 m/s.
 
-    What drag does to a slide is large and has a law: a profile that has drag declares its friction itself.
+    Its effect on a slide is large and follows a law, so a profile with drag declares its friction itself.
     """
     which = "angular_damping" if quantity == "inertia" else "linear_damping"
     untouched = ("step", "linear_damping", "angular_damping", "restitution", "friction", "friction_impulse")

@@ -1,4 +1,4 @@
-"""A run as lines of a script: an adapter makes its world, and what it calls is written as it is called."""
+"""A run as a script: an adapter builds its world, and its calls are written as lines."""
 
 from __future__ import annotations
 
@@ -12,40 +12,39 @@ import numpy as np
 from adapters.scene import Body, Scene
 from adapters.script import literal
 
-#: Types of values that are read from an engine as they are.
+#: Types of values from an engine that are used unchanged.
 PLAIN = (int, float, str, type(None), np.number, np.ndarray)
 #: A longer line is written argument by argument.
 LONG = 120
 
 
 class Recording:
-    """Lines of a script, as far as they are written, and how calls and values are written in them.
+    """Lines of a script so far, and the rules for writing calls and values.
 
     Parameters
     ----------
     names
-        Variables, and the last words of the calls and attributes whose values they hold: several with commas for
-        values that are taken apart, "" for calls that are lines of their own. What is not named is written where it is
-        used, a call only once.
+        Variables, by the last words of the calls and attributes that they hold: several with commas for unpacked
+        values, "" for calls that are separate lines. Unnamed values are written where they are used, a call only once.
     dt
         The step; it is written as ``DT``.
     others
-        What is written for objects of our own, by their classes.
+        Text for objects of our own classes.
     """
 
     def __init__(self, names: Mapping[str, str], dt: float, others: Mapping[type, str]) -> None:
         self.names = {word: name for name, words in names.items() for word in words.split()}
         self.dt, self.others = dt, others
         self.lines: list[str] = []
-        #: Results of calls that are written where they are used.
+        #: Results of calls, written where they are used.
         self.unnamed: list[Recorded] = []
-        #: Whether calls are made, or written alone.
+        #: Whether calls are made, or only written.
         self.calls = True
-        #: How often each name was given; but for ``name = name.call()`` a second time is another variable.
+        #: Number of uses of each name; a repeated name is another variable, except for ``name = name.call()``.
         self.given: Counter[str] = Counter()
 
     def text(self, value: Any) -> str:
-        """What is written for a value."""
+        """Text of a value."""
         if isinstance(value, Recorded):
             return _inside(value)[2]
         if value is self.dt:
@@ -61,7 +60,7 @@ class Recording:
         return self.others.get(type(value)) or literal(value)
 
     def found(self, word: str, text: str, value: Any, once: bool) -> Any:
-        """What ``text`` gives, to go on with; ``word`` is its last call or attribute, ``once`` is said of calls."""
+        """The value of ``text``, for further use; ``word`` is its last call or attribute, ``once`` marks calls."""
         name = self.names.get(word)
         if name and not text.startswith(f"{name}."):
             self.given[name] += 1
@@ -79,7 +78,7 @@ class Recording:
 
 
 class Recorded:
-    """An object of an engine and what stands for it in a script: what is done to it is done, and written."""
+    """An object of an engine and its text in a script: operations on it are done and written."""
 
     def __init__(self, recording: Recording, value: Any, text: str, once: bool = False) -> None:
         self.__dict__.update(_recording=recording, _value=value, _text=text, _once=once, _used=False)
@@ -115,13 +114,13 @@ def _is_plain(value: Any) -> bool:
 
 def _inside(recorded: Recorded) -> tuple[Recording, Any, str]:
     held = recorded.__dict__
-    assert not (held["_once"] and held["_used"]), f"{held['_text']} is used twice: it needs a name"
+    assert not (held["_once"] and held["_used"]), f"{held['_text']} is used twice and needs a name"
     held["_used"] = True
     return held["_recording"], held["_value"], held["_text"]
 
 
 def _real(value: Any) -> Any:
-    """An argument as the engine gets it."""
+    """An argument for the engine."""
     if isinstance(value, Recorded):
         return value.__dict__["_value"]
     return type(value)(map(_real, value)) if type(value) in (list, tuple) else value
@@ -135,12 +134,13 @@ def written(
     world: tuple[Scene, float, Mapping[str, Any]],
     others: Mapping[type, str] = MappingProxyType({}),
 ) -> tuple[list[str], list[str]]:
-    """Lines that make a world with its ``bodies`` by name, and lines of a step, which is not made.
+    """Lines that build a world with its ``bodies`` by name, and lines of a step, which is not made.
 
     Parameters
     ----------
     simulation
-        Class of an adapter's worlds, of ``(scene, dt, settings, module)``, whose ``_made(index, body)`` makes a body.
+        Class of an adapter's worlds, called with ``(scene, dt, settings, module)``, whose ``_made(index, body)`` makes
+        a body.
     module, name
         The engine, and how it is imported.
     names, others
@@ -149,7 +149,7 @@ def written(
         Scene, step [s] and settings.
     """
     recording = Recording(names, world[1], others)
-    lasting = recording.given  # what a body is made of is not needed for the next one
+    lasting = recording.given  # parts of a body are not needed for the next one
 
     class Written(simulation):
         def _made(self, index: int, asked: Body) -> Any:
@@ -163,7 +163,7 @@ def written(
 
     made = Written(*world, Recorded(recording, module, name))
     lost = [_inside(each)[2] for each in recording.unnamed if not each.__dict__["_used"]]
-    assert not lost, f"{lost} are used nowhere: each needs a name"
+    assert not lost, f"{lost} are not used, and each needs a name"
     lines, recording.lines, recording.calls = recording.lines, [], False
     made.advance(1)
     step, recording.lines, recording.calls = recording.lines, [], True

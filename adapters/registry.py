@@ -1,4 +1,4 @@
-"""Finds engines by entry points and loads them late; a broken one costs its own rows only."""
+"""Finds engines by entry points and loads them when needed; a broken one loses its own rows only."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
+from adapters.extras import install, packages
 from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
 from adapters.plain import NAME, is_visible, one_line
 
 GROUP = "contact_crosscheck.engines"
-#: Environment variable with the engines that must be installed, separated by commas: where an engine that is not
-#: there must be a failure rather than rows that say so, as in a check of every change.
+#: Environment variable with the engines that must be installed, separated by commas: in continuous integration a
+#: missing engine is a failure instead of rows with a reason.
 REQUIRED = "CROSSCHECK_REQUIRE_ENGINES"
 
 
@@ -22,14 +23,14 @@ _here = False
 
 
 class _Introduced(EntryPoint):
-    """Registration of an engine that this process alone knows: no package has it, so nothing is imported."""
+    """Registration of an engine of this process only: no package has it, so nothing is imported."""
 
     def __init__(self, engine: Engine) -> None:
         super().__init__(engine.name, f"here:{type(engine).__qualname__}", GROUP)
         vars(self)["made"] = engine  # an entry point refuses to set attributes
 
     def load(self) -> Any:
-        """What makes the engine."""
+        """The factory of the engine."""
         return lambda: vars(self)["made"]
 
 
@@ -39,7 +40,7 @@ _introduced: dict[str, Found] = {}
 def introduce(engine: Engine | type[Engine]) -> str:
     """Make an engine known in this process under its own name, until another of that name is introduced.
 
-    It is loaded here alone: processes that run cells do not know it. It has no folder, hence no laws and no findings.
+    Worker processes cannot load it. It has no folder, hence no contact laws and no findings.
 
     Returns
     -------
@@ -48,17 +49,17 @@ def introduce(engine: Engine | type[Engine]) -> str:
     Raises
     ------
     EngineError
-        If it is no engine, if it is broken, or if an installed engine has its name.
+        If it is not an engine, is broken, or has the name of an installed engine.
     """
     try:
         made = engine() if isinstance(engine, type) else engine
         if not isinstance(made, Engine):
             raise TypeError(f"{type(made).__name__} is not an adapters.engine.Engine")
         entry = _Introduced(made)
-    except Exception as error:  # whatever its own code raises
+    except Exception as error:  # its code may raise anything
         raise EngineError(f"engine: cannot be made: {said_by(error)}") from None
     if entry.name in _entries():
-        raise EngineError(f"engine: an installed engine is called {one_line(entry.name, NAME)!r}; name yours otherwise")
+        raise EngineError(f"engine: {one_line(entry.name, NAME)!r} is the name of an installed engine; choose another")
     found = loaded(entry)
     if found.engine is None:
         raise EngineError(f"engine: {one_line(entry.name, NAME)}: {found.reason}")
@@ -68,12 +69,12 @@ def introduce(engine: Engine | type[Engine]) -> str:
 
 
 def is_introduced(name: str) -> bool:
-    """Whether an engine is known in this process alone."""
+    """Whether an engine exists in this process only."""
     return name in _introduced
 
 
 def load_engines_here() -> None:
-    """Load the engines of others in this process as well, from now on: it is one that may die."""
+    """From now on load engines of other packages in this process too: a crash may end it."""
     global _here
     _here = True
     find.cache_clear()
@@ -85,7 +86,7 @@ def is_ours(entry: EntryPoint) -> bool:
 
 
 def _entries() -> dict[str, EntryPoint]:
-    # Ours come last: nobody else's engine takes their place by taking their name.
+    # Ours come last, so that another package cannot replace one by its name.
     return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=is_ours)}
 
 
@@ -95,15 +96,15 @@ def entry(name: str) -> EntryPoint | None:
 
 
 def names() -> list[str]:
-    """Names of all registered engines: ours first, of these who promises a solution, then who lives in the plane."""
+    """Names of all registered engines: ours first, of these the exact solver, then 2-D engines."""
     registered = _entries()
     return sorted(registered, key=lambda name: (not is_ours(registered[name]), *_place(registered[name]), name))
 
 
 def usual() -> list[str]:
-    """Names of the engines of a run that names none: all, but those set apart that are neither here nor required.
+    """Engines of a run that names none: all except optional ones that are neither installed nor required.
 
-    An engine of `all` that is missing keeps its rows, which say so.
+    A missing engine of the extra `all` keeps its rows, with that reason.
     """
     wanted = _wanted()
     return [name for name in names() if name in wanted or not _set_apart(name) or find(name).engine is not None]
@@ -120,7 +121,7 @@ def _wanted() -> list[str]:
 
 
 def _place(entry: EntryPoint) -> tuple[bool, int]:
-    """Where an engine is shown among ours, or among those of others, which nobody asks for it."""
+    """Sort key of an engine among ours, or among those of other packages, without loading these."""
     told = _facts(entry) if is_ours(entry) else None
     return (told.profile("solution") is None, min(told.dimensions)) if told else (True, 0)
 
@@ -129,8 +130,7 @@ def _place(entry: EntryPoint) -> tuple[bool, int]:
 def find(name: str) -> Found:
     """Look for the engine called ``name``; never raises for an engine that is missing or broken.
 
-    An engine of somebody else's plugin is asked in a process of its own (`adapters.foreign`), except where
-    `load_engines_here` was called.
+    An engine of another package is loaded in its own process (`adapters.foreign`), except after `load_engines_here`.
 
     Raises
     ------
@@ -149,24 +149,24 @@ def find(name: str) -> Found:
 
 
 def brought_by(entry: EntryPoint) -> str:
-    """Name of the distribution that registers an engine; empty where nobody knows."""
+    """Name of the distribution that registers an engine; empty if unknown."""
     return one_line(entry.dist.name, NAME) if entry.dist is not None else ""
 
 
 def loaded(entry: EntryPoint, distribution: str = "") -> Found:
-    """Load an engine in this process; a broken one is a reason.
+    """Load an engine in this process; for a broken one the result has the reason.
 
     Parameters
     ----------
     distribution
-        What registers it, for the reason why it cannot be loaded.
+        The package that registers it, for the reason why it cannot be loaded.
     """
     engine: Engine | None = None
     facts: EngineFacts | None = None
     name = entry.name
     try:
         made = entry.load()
-        told = getattr(made, "facts", None)  # known even if the engine itself is not installed
+        told = getattr(made, "facts", None)  # available even if the engine itself is not installed
         facts = told if is_ours(entry) else checked_facts(told) if isinstance(told, EngineFacts) else None
         engine = made()
         if not isinstance(engine, Engine):
@@ -180,21 +180,21 @@ def loaded(entry: EntryPoint, distribution: str = "") -> Found:
         reason = f"{one_line(error)}; {_remedy(entry, facts, distribution)}"
         trace = "" if is_ours(entry) else trace_of(error)
         return Found(name, None, "", reason, facts, trace=trace)
-    except BaseException as error:  # a third-party plugin may raise anything; only its rows may suffer
+    except BaseException as error:  # another package may raise anything; only its rows are lost
         return Found(name, None, "", said_by(error), facts, trace=trace_of(error))
 
 
 def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:
-    """What to install where an import fails: ours has extras, an engine of others its own package."""
-    if is_ours(entry):
-        return f"pip install 'contact-crosscheck[{entry.name}]' ({facts.package if facts else entry.name})"
+    """What to install where an import fails: the packages of the extra of one of ours, else the engine's own."""
+    if is_ours(entry) and packages(entry.name):
+        return install(entry.name)
     if facts is not None:
         return f"pip install {one_line(facts.package, NAME)}"
     return f"it is an engine of {distribution or 'another distribution'}, which must be installed with all it needs"
 
 
 def adapter(name: str) -> Engine | None:
-    """Our own adapter called ``name``, whose engine is not imported; None for one of somebody else's, or unknown."""
+    """Our adapter called ``name``, without importing its engine; None for another package's or an unknown one."""
     entry = _entries().get(name)
     return entry.load()() if entry is not None and is_ours(entry) else None
 
@@ -217,22 +217,22 @@ def _facts(entry: EntryPoint) -> EngineFacts | None:
 
 
 def profile_of(name: str, role: Role) -> str | None:
-    """Profile of an engine that has this role; None if it has none, or cannot be asked."""
+    """Profile of an engine with this role; None if it has none or is not available."""
     told = facts(name)
     return told.profile(role) if told else None
 
 
 def is_ranked(name: str, profile: str) -> bool:
-    """Whether a profile of an engine stands in rankings and counts as a cure (`adapters.engine.UNRANKED`).
+    """Whether a profile of an engine is ranked and counts as a fix (`adapters.engine.UNRANKED`).
 
-    One that a user has named after settings (``matched+cone=elliptic``) does as the one that they are settings of.
+    A profile with settings of a user (``matched+cone=elliptic``) counts as its base profile.
     """
     told = facts(name)
     return told is None or told.roles.get(profile, told.roles.get(profile.partition("+")[0])) not in UNRANKED
 
 
 def solver() -> str:
-    """Name of our own solver: the engine of ours that promises a solution.
+    """Name of our own solver: our engine with an exact profile.
 
     Raises
     ------

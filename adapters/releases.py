@@ -1,9 +1,8 @@
-"""Releases of an engine: which distributions carry them, what each needs, and what its interface does differently.
+"""Releases of an engine: their distributions, requirements, and differences of their interfaces.
 
-An adapter is written for the newest release. What older ones do differently stands in one table per engine
-(`adapters/<engine>/releases.py`) as rows of `Difference`, with the code that handles them beside it: whoever reads an
-adapter sees one interface, whoever asks "since when?" sees one table. Nothing here needs more than Python: it is read
-where an old release is driven as well.
+An adapter is written for the newest release. Differences of older ones are in one table per engine
+(`adapters/<engine>/releases.py`) as rows of `Difference`, beside the code that handles them, so the adapter itself has
+one interface. Nothing here needs more than Python: it is read where an old release is driven as well.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Requirement:
-    """What releases ``versions`` need that their own metadata does not say, as pip reads it (``numpy<2``)."""
+    """What releases ``versions`` need beyond their metadata, in pip's syntax (``numpy<2``)."""
 
     versions: str
     needs: str
@@ -31,7 +30,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Difference:
-    """What differs in releases ``versions`` (in words) from what the adapter is written for, and how it is handled."""
+    """A difference of releases ``versions`` (in words) from the adapter's release, and how it is handled."""
 
     versions: str
     what: str
@@ -41,16 +40,16 @@ class Difference:
 
 @dataclass(frozen=True)
 class Releases:
-    """All that an adapter knows of its engine over time.
+    """Everything about an engine's releases.
 
     Parameters
     ----------
     distributions
-        One engine may have had several names; each version is looked for in those whose specifier holds it.
+        An engine may have had several package names; a version is searched in those whose specifier contains it.
     known
-        Releases that the adapter has driven; outside of it a release is UNSUPPORTED unless it is asked for with --try.
+        Releases that the adapter has run; others are UNSUPPORTED unless --try is given.
     withheld
-        Releases that cannot be driven although they lie in the range: version -> why.
+        Releases in the range that cannot run: version -> why.
     """
 
     distributions: tuple[Distribution, ...]

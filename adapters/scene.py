@@ -1,6 +1,6 @@
-"""Scenes: what every engine is asked to simulate.
+"""Scenes: the input of every engine.
 
-Conventions, said once and valid everywhere in the project
+Conventions of the whole project
     * SI units: m, kg, s, rad, N, N s.
     * Planar scenes (``dimension = 2``): y points up, a pose is ``(x, y, theta)``, a twist ``(vx, vy, omega)``.
     * Spatial scenes (``dimension = 3``): z points up, a pose is ``(x, y, z, qw, qx, qy, qz)``, a twist
@@ -73,7 +73,7 @@ __all__ = [
 Motion = Literal["free", "fixed", "prescribed"]
 ImpactLaw = Literal["N-SIM", "N-SEQ"]
 
-#: Largest restitution of a scene that means to gain energy: a blow doubles the speed.
+#: Largest restitution of a scene that gains energy on purpose: a blow doubles the speed.
 MOST_RESTITUTION = 2.0
 
 
@@ -92,15 +92,15 @@ class Body:
     inertia
         About the centre of mass [kg m^2]: one number (planar), three principal moments in body axes (spatial).
     pose, twist
-        As in the module's conventions. An empty pose or twist stands for the origin and for rest.
+        As in the module's conventions. An empty pose is the origin, an empty twist is rest.
     motion
-        ``free``; ``fixed``; or ``prescribed`` (moves with its constant twist whatever hits it). A half-space is not
+        ``free``; ``fixed``; or ``prescribed`` (moves with its constant twist in any collision). A half-space is not
         free; it turns about the origin, which moves with it.
     force, torque
         Constant external load in world axes [N], [N m]; torque is a 1-tuple in the plane.
     surface_velocity
-        Of a body that is not free: velocity of its surface against the body [m/s], world axes; what of it lies along
-        the face that is touched drags by friction (a conveyor).
+        Of a body that is not free: velocity of its surface relative to the body [m/s], world axes; the component along
+        the touched face drags by friction (a conveyor).
     course
         Of a prescribed body: oscillation that is added to its twist (`adapters.drives`).
     """
@@ -119,7 +119,7 @@ class Body:
 
     @property
     def is_loaded(self) -> bool:
-        """Whether it moves freely under a load of its own."""
+        """Whether it is free and has an external load."""
         return self.motion == "free" and (any(self.force) or any(self.torque))
 
 
@@ -140,11 +140,11 @@ class Scene:
     duration
         Simulated time [s].
     params
-        What `validation` made it from; kept for identity and display.
+        Parameters from which `validation` made it; for identity and display.
     impact_law
         Law for several simultaneous contacts: ``N-SIM`` or ``N-SEQ``.
     gaining
-        Whether restitution above 1 is meant: contacts that gain energy are no passive process, and ask who takes them.
+        Whether restitution above 1 is intended: such contacts gain energy, and not every engine supports them.
 
     Raises
     ------
@@ -184,17 +184,17 @@ class Scene:
         Raises
         ------
         SceneError
-            If two entries are equally specific and say different things.
+            If two equally specific entries differ.
         """
         return Pair(a, b, *single(a, b, self._table.said(a, b)))
 
     def materials(self) -> set[tuple[float, float]]:
-        """Restitution and friction of all pairs that can meet, without looking at every pair.
+        """Restitution and friction of all pairs that can touch, without a loop over all pairs.
 
         Raises
         ------
         SceneError
-            As `material`, for the first pair of which two entries say different things.
+            As `material`, for the first pair with two different entries.
         """
         return self._table.materials({body.name: body.motion == "free" for body in self.bodies})
 
@@ -209,7 +209,7 @@ class Scene:
                 yield i, j, self.material(self.bodies[i].name, self.bodies[j].name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data (JSON-ready) that `scene_from_dict` reads back; drives, and gains, only where there are any."""
+        """Plain data (JSON-ready) that `scene_from_dict` reads back; drives and gains only where they exist."""
         data = asdict(self)
         for body, raw in zip(self.bodies, data["bodies"], strict=True):
             raw["shape"] = {"type": SHAPE_NAMES[type(body.shape)], **raw["shape"]}
@@ -247,7 +247,7 @@ def body_from_dict(raw: Mapping[str, Any]) -> Body:
 
 
 def check_body(body: Body, dimension: int) -> None:
-    """Raise `SceneError`, naming the field, unless ``body`` is one that a scene of this dimension may hold."""
+    """Raise `SceneError`, naming the field, unless ``body`` is valid in a scene of this dimension."""
     _validate_body(_complete(body, dimension), dimension)
 
 
@@ -265,7 +265,7 @@ def _as_tuple(value: Any) -> Any:
 
 
 def _identity(dimension: int) -> tuple[float, ...]:
-    """Pose at the origin, not turned."""
+    """Pose at the origin, not rotated."""
     return (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
@@ -308,7 +308,7 @@ def _validate_scene(scene: Scene) -> None:
 def _validate_body(body: Body, dimension: int) -> None:
     planar = dimension == 2
     if not isinstance(body.shape, SHAPES_OF[dimension]):
-        raise SceneError(f"{body.name}.shape: a {type(body.shape).__name__} has no place in {dimension}-D")
+        raise SceneError(f"{body.name}.shape: a {type(body.shape).__name__} cannot be used in {dimension}-D")
     body.shape.validate(body.name)
     if isinstance(body.shape, Box):
         check_length(f"{body.name}.shape.half_extents", body.shape.half_extents, dimension)
@@ -317,7 +317,7 @@ def _validate_body(body: Body, dimension: int) -> None:
         if body.motion == "free":
             raise SceneError(f"{body.name}.motion: a half-space is fixed or prescribed")
         if body.pose != _identity(dimension):
-            raise SceneError(f"{body.name}.pose: a half-space lies where its normal and offset say, leave it empty")
+            raise SceneError(f"{body.name}.pose: normal and offset define the place of a half-space; leave pose empty")
     if body.motion not in ("free", "fixed", "prescribed"):
         raise SceneError(f"{body.name}.motion: {body.motion!r} must be free, fixed or prescribed")
     if body.motion == "free":

@@ -1,10 +1,10 @@
-"""Stand-alone Python scripts of a run: what those of all engines have in common.
+"""Stand-alone Python scripts of a run: parts shared by all engines.
 
-A script is for whoever maintains the engine: it imports the engine alone and builds the same world by the same calls as
-the adapter, number by number. It prints the state at the start, at every tenth of the run and at the end, as lines of
-JSON in the conventions of `adapters.scene`, so that its last line has the bits of the cell that it was written from.
+A script is for maintainers of the engine: it imports only the engine and builds the same world by the same calls as the
+adapter, number by number. It prints the state at the start, at every tenth of the run and at the end, as lines of JSON
+in the conventions of `adapters.scene`, so its last line has the bits of the original cell.
 
-Each engine's folder writes its own (`adapters.engine.Engine.exports`); most record them (`adapters.recording`).
+Each engine has its own writer (`adapters.engine.Engine.exports`); most record calls (`adapters.recording`).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import numpy as np
 
 from adapters.scene import Body, Scene
 
-#: How often a script tells the state, beside the start.
+#: Number of printed states, besides the start.
 TOLD = 10
 
 
 def literal(value: Any) -> str:
-    """``value`` as Python reads it back, bit by bit: numbers of numpy as plain ones, arrays as tuples."""
+    """``value`` as a Python literal, exact to the bit: numpy numbers as Python ones, arrays as tuples."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -38,12 +38,12 @@ def keywords(values: Mapping[str, Any]) -> str:
 
 
 def constants(dt: float, steps: int) -> list[str]:
-    """Lines that name the step [s] and the number of steps."""
+    """Lines with the step [s] and the number of steps."""
     return [f"DT, STEPS = {dt!r}, {steps}"]
 
 
 def imports(scene: Scene, *others: str, angles: bool = False) -> list[str]:
-    """First lines of a script: what it imports, with what the courses of a scene or ``angles`` need."""
+    """First lines of a script: imports, with those for courses of a scene or ``angles``."""
     needed = angles or any(body.course for body in scene.bodies)
     return ["import json", *(["import math"] if needed else []), "", *others, ""]
 
@@ -71,9 +71,9 @@ def place(body: Body) -> str:
 
 
 def materials(scene: Scene) -> list[str]:
-    """Lines of ``material(i, j)``: restitution and friction of two bodies by their numbers, for what asks pair by pair.
+    """Lines of ``material(i, j)``: restitution and friction of two bodies by index, for engines that query each pair.
 
-    The commonest material stands once. No lines of a scene without such pairs.
+    The most common material is written once. No lines for a scene without pairs.
     """
     pairs = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
     if not pairs:

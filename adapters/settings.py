@@ -1,4 +1,4 @@
-"""What a setting may be, told once per engine and checked before a world is made.
+"""Kinds of settings, stated once per engine and checked before a world is built.
 
 An engine states its settings as a table, name by name: ``{"iterations": whole(1, 10**6), "skin": number(0.0)}``.
 """
@@ -13,7 +13,7 @@ from adapters.engine import EngineError
 
 #: Largest whole number that a setting of a C engine can hold.
 LARGEST_INT = 2**31 - 1
-#: ``check(value)`` says in words what the value must be, or nothing if it is that.
+#: ``check(value)`` returns what the value must be, in words, or nothing if it is valid.
 Check = Callable[[Any], str]
 
 
@@ -62,7 +62,7 @@ def word(*words: str) -> Check:
 
 
 def row(count: int, check: Check) -> Check:
-    """So many values, each of which ``check`` takes."""
+    """A row of ``count`` values that ``check`` accepts."""
 
     def whole_row(value: Any) -> str:
         fits = isinstance(value, tuple | list) and len(value) == count and not any(map(check, value))
@@ -72,7 +72,7 @@ def row(count: int, check: Check) -> Check:
 
 
 def words(*known: str) -> Check:
-    """Some of these words."""
+    """A selection of these words."""
 
     def check(value: Any) -> str:
         fits = isinstance(value, tuple | list) and len(value) > 0 and all(each in known for each in value)
@@ -92,7 +92,7 @@ def one_of(*known: int) -> Check:
 
 
 def either(check: Check, *others: Any) -> Check:
-    """What ``check`` takes, or one of these values."""
+    """Values that ``check`` accepts, or one of these."""
 
     def wider(value: Any) -> str:
         named = any(type(value) is type(other) and value == other for other in others)
@@ -103,7 +103,7 @@ def either(check: Check, *others: Any) -> Check:
 
 
 def checked(engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and values ``engine`` can take: all of ``kinds``, and no others.
+    """Valid settings of ``engine``: all of ``kinds``, and no others.
 
     Raises
     ------
@@ -123,12 +123,12 @@ def checked(engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any]
 
 
 def checked_step(dt: float) -> float:
-    """A step that can be made [s].
+    """A valid step [s].
 
     Raises
     ------
     EngineError
-        For one that is not positive and finite.
+        If it is not positive and finite.
     """
     if not (math.isfinite(dt) and dt > 0.0):
         raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
@@ -136,7 +136,7 @@ def checked_step(dt: float) -> float:
 
 
 def like(value: Any) -> Check:
-    """Whatever is of the kind of ``value``: of settings of which an adapter states no kind."""
+    """A check for the type of ``value``, for settings without a stated kind."""
     if isinstance(value, bool):
         return flag
     if isinstance(value, int):
@@ -147,11 +147,11 @@ def like(value: Any) -> Check:
         return row(len(value), like(value[0]) if value else flag)
     if isinstance(value, str):
         return lambda given: "" if isinstance(given, str) else "a word"
-    return lambda given: ""  # of none nobody knows what else it may be
+    return lambda given: ""  # the other type of None is unknown
 
 
 def text_of(value: Any) -> str:
-    """A value as `read` reads it; whole numbers without a fraction."""
+    """A value in the syntax of `read`; whole numbers without a fraction."""
     if isinstance(value, tuple | list):
         return ",".join(map(text_of, value))
     if isinstance(value, float):

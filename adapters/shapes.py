@@ -1,4 +1,4 @@
-"""Shapes of bodies, and the checks of numbers that whatever describes a scene is made with."""
+"""Shapes of bodies, and checks of the numbers of a scene."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class SceneError(ValueError):
-    """A scene is not a physical one; the message names the field in one line."""
+    """A scene is invalid; the message names the field in one line."""
 
 
 def check_finite(name: str, values: Any) -> None:
@@ -85,7 +85,7 @@ class Box:
 class HalfSpace:
     """Everything with ``normal . x <= offset`` [m] is solid, in world axes; ``normal`` is a unit vector.
 
-    Its body's pose stays empty: normal and offset say where it lies, at the start if its body is prescribed.
+    The pose of its body is empty: normal and offset define its place, for a prescribed body at the start.
     """
 
     normal: tuple[float, ...]
@@ -169,7 +169,7 @@ class Polygon:
                 raise SceneError(f"{label}: not convex and counter-clockwise at number {k}, {(bx, by)!r}")
             turns += turn
         if turns > 3.0 * math.pi:
-            raise SceneError(f"{label}: go round more than once")
+            raise SceneError(f"{label}: go round the centre more than once")
         centre = area_and_centroid(self.vertices)[1]
         if math.hypot(*centre) > CENTRED * self.reach:
             raise SceneError(f"{label}: their centroid is {centre!r}, it must be the origin")
@@ -196,15 +196,15 @@ class Hull:
     vertices: tuple[tuple[float, float, float], ...]
 
     def validate(self, owner: str) -> None:
-        """Raise `SceneError` unless the vertices are finite, no two the same, and some four in no plane."""
+        """Raise `SceneError` unless the vertices are finite, different, and not all in one plane."""
         label = f"{owner}.shape.vertices"
         check_points(label, self.vertices, 3, 4)
         if self.smallest_size <= 1e-6 * self.reach:
-            raise SceneError(f"{label}: lie in one plane, or nearly")
+            raise SceneError(f"{label}: lie in one plane, or almost")
 
     @property
     def smallest_size(self) -> float:
-        """Smallest extent along the axes in which the vertices spread most and least [m]; no less than the true one."""
+        """Smallest extent along the axes of largest and smallest spread [m]; at least the true one."""
         import numpy as np
 
         points = np.array(self.vertices)
@@ -218,29 +218,29 @@ class Hull:
         return max(math.hypot(*vertex) for vertex in self.vertices)
 
 
-#: The centroid of a polygon may miss the origin by this share of its size: round-off of whoever computed it.
+#: Allowed distance of a polygon's centroid from the origin, as a share of its size: round-off of its source.
 CENTRED = 1e-9
 #: Most vertices of a polygon or a hull.
 MOST_VERTICES = 64
 
 
 def check_points(label: str, points: Any, dimension: int, least: int) -> None:
-    """Raise `SceneError` unless so many points of so many coordinates are finite, and no two the same."""
+    """Raise `SceneError` unless the number of points and coordinates is right, and points are finite and different."""
     if not isinstance(points, tuple) or not least <= len(points) <= MOST_VERTICES:
         raise SceneError(f"{label}: {least} to {MOST_VERTICES} points are needed")
     for k, point in enumerate(points):
         if not isinstance(point, tuple):
-            raise SceneError(f"{label}.{k}: {point!r} is no point")
+            raise SceneError(f"{label}.{k}: {point!r} is not a point")
         check_finite(f"{label}.{k}", point)
         check_length(f"{label}.{k}", point, dimension)
     if len(set(points)) < len(points):
-        raise SceneError(f"{label}: a point stands there twice")
+        raise SceneError(f"{label}: a point is given twice")
 
 
 def area_and_centroid(points: tuple[tuple[float, float], ...]) -> tuple[float, tuple[float, float], float]:
     """Area [m^2], centroid [m] and second moment about it [m^4] of a counter-clockwise polygon (Green's theorem).
 
-    Summed about the first vertex, so that a place far from the origin costs no digits.
+    Summed about the first vertex, so that no digits are lost far from the origin.
     """
     (ox, oy), *rest = points
     area = first_x = first_y = second = 0.0
@@ -258,7 +258,7 @@ def area_and_centroid(points: tuple[tuple[float, float], ...]) -> tuple[float, t
 
 
 def reach(shape: Shape) -> float:
-    """Distance of a shape's outermost point from its centre [m], what turns spin into speed; 0 of a half-space."""
+    """Distance of a shape's outermost point from its centre [m]; 0 for a half-space."""
     if isinstance(shape, Box):
         return math.hypot(*shape.half_extents)
     if isinstance(shape, HalfSpace):
@@ -267,9 +267,9 @@ def reach(shape: Shape) -> float:
 
 
 Shape = Disc | Sphere | Box | HalfSpace | Capsule | Polygon | Cylinder | Hull
-#: Shapes that turn within their own outline.
+#: Shapes that rotate within their outline.
 ROUND = (Disc, Sphere)
-#: Shapes that have a place in each dimension.
+#: Shapes of each dimension.
 SHAPES_OF: dict[int, tuple[type, ...]] = {
     2: (Disc, Box, HalfSpace, Capsule, Polygon),
     3: (Sphere, Box, HalfSpace, Capsule, Cylinder, Hull),

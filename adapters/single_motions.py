@@ -1,4 +1,4 @@
-"""Laws that engines share: a place too far away for single numbers, and a box on its corner in the plane."""
+"""Shared contact laws: positions too far away for single precision, and a box on its corner in 2-D."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from adapters.single_precision import ROUNDINGS, UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
-#: ``(units_per_metre, skin [length])`` that a profile chooses for a scene and a step.
+#: ``(units_per_metre, skin [length])`` of a profile for a scene and a step.
 Chosen = Callable[[Scene, float], tuple[float, float]]
 
 
 def standstill_law(metric: str, chosen: Chosen) -> Law:
-    """A sliding box whose way in a step is below half the spacing of single numbers there: it stays where it is.
+    """A sliding box does not move if its motion of a step is below half the spacing of single-precision numbers.
 
-    Nothing is said where a step's way is kept, or where the box could become faster than it starts.
+    No prediction where the motion of a step is kept, or where the box could become faster.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -40,24 +40,24 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
         rest = np.zeros((2, 2, len(box.twist)))
         still = Trajectory(times, np.array([start, start]), rest, None, dt, "completed")
         value = measure(scene, still)[metric][0]
-        # What is lost is lost to the last bit.
+        # The motion is lost completely.
         return None if value is None else (value, 0.0)
 
     return law
 
 
 def corner_law(metric: str, chosen: Chosen, threshold: float) -> Law:
-    """A tilted box that comes down on one corner without friction, turn or load; numbers are rounded to singles.
+    """A tilted box that lands on one corner without friction, rotation or load, in single precision.
 
-    With the corner ``l`` beside the centre it is ``J = m (1 + e) v/(1 + m l^2/I)``. Where the box rebounds and has a
-    skin nothing is said: what is swept stops within its skin, and is turned a little before it is hit.
+    With the corner ``l`` beside the centre it is ``J = m (1 + e) v/(1 + m l^2/I)``. No prediction where the box
+    rebounds and has a skin: a swept body stops within its skin, and turns a little before the blow.
 
     Parameters
     ----------
     metric, chosen
-        What is predicted, and the settings.
+        The predicted metric, and the settings.
     threshold
-        Approach up to which nothing rebounds [length/s].
+        Approach speed up to which restitution is 0 [length/s].
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -81,7 +81,7 @@ def corner_law(metric: str, chosen: Chosen, threshold: float) -> Law:
             return None
         share = ROUNDINGS * UNIT
         other = measure(scene, _landed(scene, dt, landing, blow * (1.0 + share), lever))[metric][0]
-        # The arm of the blow is told by sine and cosine of a single angle: off by its roundings too.
+        # The lever arm of the blow is from sine and cosine of a single-precision angle, with its rounding.
         third = measure(scene, _landed(scene, dt, landing, blow, lever * (1.0 + share)))[metric][0]
         assert other is not None and third is not None
         return value, abs(other - value) + abs(third - value) + share * abs(value)
@@ -129,10 +129,10 @@ def _landed(scene: Scene, dt: float, landing: float, blow: float, lever: float) 
 
 
 def kept_law(metric: str) -> Law:
-    """What blows between balls keep, whatever they share it by: nothing is lost but the roundings of one blow a pair.
+    """Conservation in blows between balls, however the impulse is shared: the error is the rounding of one blow a pair.
 
-    For metrics that are shares and 0 in exact numbers, of an engine that solves each blow as far as its numbers tell;
-    balls alone, without gravity or load, friction or loss.
+    For relative metrics that are exactly 0, in an engine that solves each blow to its precision; balls only, without
+    gravity, load, friction or loss.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -142,23 +142,23 @@ def kept_law(metric: str) -> Law:
         loads = any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies)
         if not balls or not plain or loads:
             return None
-        # By energy no ball of these is faster than the first; one touches at most six others, half a pair each.
+        # By energy no ball is faster than the first; one touches at most six others, half a pair each.
         return 0.0, ROUNDINGS * UNIT * 3.0 * len(scene.bodies)
 
     return law
 
 
 def booked_law(metric: str) -> Law:
-    """What two free bodies keep between them where one of them spins: one loses what the other receives.
+    """Conservation between two free bodies, one of which spins: one loses what the other receives.
 
-    For metrics that are 0 in exact numbers and grow with what is lost: each coordinate of a velocity is off by the
-    roundings of a single number of the size of the fastest, as the scene's own measure tells it.
+    For metrics that are exactly 0 and grow with the loss: each component of a velocity has the rounding of a
+    single-precision number of the size of the fastest, by the scene's own measure.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         free = len(scene.bodies) == 2 and all(body.motion == "free" for body in scene.bodies)
         loads = any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies)
-        spins = any(any(body.twist[scene.dimension :]) for body in scene.bodies)  # else `rounded_law` knows more
+        spins = any(any(body.twist[scene.dimension :]) for body in scene.bodies)  # else `rounded_law` is more precise
         if not free or not spins or loads or any(friction > 0.0 for _, friction in scene.materials()):
             return None
         d, pose = scene.dimension, np.array([body.pose for body in scene.bodies])

@@ -1,14 +1,13 @@
-"""Laws that engines share: blows in free space, computed in single precision, and what roundings leave of a plane.
+"""Shared contact laws: blows in free space in single precision, and the distance from a plane by rounding.
 
-    o->   o      |        straight flight, blow, straight flight: nothing else changes a velocity, so that
-          o  o-> |        what an engine makes of it follows from the scene in a few roundings
+    o->   o      |        straight flight, blow, straight flight: nothing else changes a velocity, so
+          o  o-> |        the result of an engine follows from the scene up to a few roundings
 
-Most checks of impacts are stated to the round-off of doubles. An engine that computes in singles misses them by some
-units of 2^-24, which is no fault of its contact model. The motion is computed here in doubles, event by event; the band
-is what the metric makes of the roundings.
+Most checks of impacts have tolerances of double precision. A single-precision engine misses them by some units of
+2^-24, which is no fault of its contact model. The motion is computed here in doubles, event by event; the band is the
+effect of the roundings on the metric.
 
-Where blows follow each other within a few steps, or their solution is not reached in the engine's sweeps, nothing is
-said.
+There is no prediction where blows follow each other within a few steps, or the engine's iterations do not converge.
 """
 
 from __future__ import annotations
@@ -28,39 +27,39 @@ from adapters.scene import Box, HalfSpace, Pair, Scene, Shape, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
-#: Round-off of a single number, as a share of it.
+#: Relative round-off in single precision.
 UNIT = 2.0**-24
 #: Roundings of a velocity or an impulse in one blow: a relative speed of two bodies with their spins (8 operations), a
-#: mass (8), an impulse and what it does to both (8); as much again for sweeps that correct in their last digits.
+#: mass (8), an impulse and what it does to both (8); as much again for iterations that correct last digits.
 ROUNDINGS = 48
-#: Steps between two blows that share a body, at least: a step finds a contact late, and the next one may still see it.
+#: Least number of steps between two blows of a body: a step finds a contact late, and the next may still find it.
 APART = 4.0
-#: Roundings of a place across a plane: one in each of a thousand updates of a velocity, and five times that for the
-#: order of additions, as in what a scene allows doubles.
+#: Roundings of a position across a plane: one in each of a thousand velocity updates, and five times that for the order
+#: of additions, as in the tolerance for doubles.
 UPDATES = 5.0 * 1000.0
-#: Gap that counts as touching [m], for places of order 1 in doubles.
+#: Gap that counts as touching [m], for positions of order 1 in doubles.
 TOUCHING = 1e-9
 
-#: Least and largest number that a mass or a moment may be: a square or an inverse of it still is a single number.
+#: Least and largest mass or moment whose square and inverse are single-precision numbers.
 SMALLEST, LARGEST = 1e-30, 1e30
 
-#: ``restitution(e, speed)``: what an engine uses at an approach of ``speed`` [m/s].
+#: ``restitution(e, speed)``: the engine's value at an approach of ``speed`` [m/s].
 Restitution = Callable[[float, float], float]
 
 
 def without_a_place(scene: Scene) -> str | None:
-    """The first mass or moment of a free body that single precision cannot hold, in one line; None if all have one."""
+    """The first mass or moment of a free body outside single precision, in one line; None if there is none."""
     for body in scene.bodies:
         moments = body.inertia if isinstance(body.inertia, tuple) else (body.inertia,)
         for name, value in (("mass", body.mass), *(("inertia", moment) for moment in moments)):
             if body.motion == "free" and not SMALLEST <= value <= LARGEST:
-                return f"{body.name}.{name}: {value:g} has no place in single precision"
+                return f"{body.name}.{name}: {value:g} cannot be represented in single precision"
     return None
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """Restitution above a speed of approach [m/s], none up to it; at that speed itself as ``rebounds_at`` says."""
+    """Restitution above an approach speed [m/s], 0 below; at that speed by ``rebounds_at``."""
 
     speed: float
     rebounds_at: bool = False
@@ -72,21 +71,21 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Method:
-    """What of an engine's method a blow depends on.
+    """Properties of an engine's method that affect a blow.
 
     Parameters
     ----------
     restitution
-        What it makes of a pair's coefficient.
+        Effective value of a pair's coefficient.
     sweeps
-        Over the contacts of a moment; 0: nothing is said of several at once.
+        Iterations over simultaneous contacts; 0: no prediction for several at once.
     unit
-        Round-off of its numbers, as a share.
+        Relative round-off of its numbers.
     rebound_after_friction
-        Friction knows the impulse of compression only: what rebounds is added when friction is done.
+        Friction is limited by the impulse of compression only: restitution is applied after friction.
     ahead
-        Distance from which a step sees a contact [m]: nothing is said of a blow of which a step sees nothing, and the
-        next one finds an overlap.
+        Distance from which a step finds a contact [m]: no prediction for a blow that a step misses, so that the next
+        finds an overlap.
     """
 
     restitution: Restitution
@@ -107,7 +106,7 @@ class _Contact:
 
 
 def rounded_law(metric: str, method: Method) -> Law:
-    """What blows make of ``metric``, in a motion without gravity or load; None where a blow is not that simple."""
+    """Prediction of ``metric`` for blows without gravity or load; None where a blow is not simple."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         found = _motion(Held(scene), dt, method)
@@ -122,13 +121,12 @@ def rounded_law(metric: str, method: Method) -> Law:
 
 
 def plane_law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-    """How far singles let a planar scene leave its plane in space [m]: by mirror symmetry 0, but for roundings.
+    """Distance of an embedded 2-D scene from its plane in single precision [m]: 0 by symmetry, except for rounding.
 
-    What mirrors each other across the plane is told by numbers as large as the scene, places of points and ways of
-    flight, of which each update of a velocity rounds one to `UNIT` of its size: what does not cancel between left and
-    right is a speed across the plane. A thousand updates, and a factor of five for the order of additions, leave
-    `UPDATES` such units. A motion that multiplies what it is given is not told: no growth is predicted, so that what
-    tips over or is thrown out of its plane has another cause.
+    Mirrored points have coordinates as large as the scene, and each velocity update rounds one to `UNIT` of its size:
+    the difference between left and right is a speed across the plane. A thousand updates, and a factor of five for the
+    order of additions, give `UPDATES` such units. Amplification by the motion is not included, so a body that tips over
+    or is thrown out of its plane needs another cause.
     """
     if scene.dimension != 2:
         return None
@@ -136,17 +134,17 @@ def plane_law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
 
 
 def _band(scene: Scene, motion: Trajectory, share: float, metric: str, value: float, measure: Measure) -> float:
-    """Sum of what the roundings of each body's velocities and of each pair's impulses do to the metric."""
+    """Sum of the effects of roundings of each body's velocities and each pair's impulses on the metric."""
     total = 0.0
     for rounded in _rounded(motion, share):
         other = measure(scene, rounded)[metric][0]
         total += math.inf if other is None else abs(other - value)
-    # Places and times are rounded too, which shifts a blow but changes no velocity; a number itself is rounded once.
+    # Positions and times are rounded too, which shifts a blow but changes no velocity; a value itself is rounded once.
     return total + share * (1.0 + abs(value))
 
 
 def _rounded(motion: Trajectory, share: float) -> Iterator[Trajectory]:
-    """The motion with one number off by its roundings: a component of a body's velocity, or the impulses of a pair."""
+    """The motion with the rounding error of one number: a component of a body's velocity, or the impulses of a pair."""
     size = motion.twist.shape[2]
     linear = motion.dimension
     for body in range(motion.twist.shape[1]):
@@ -170,7 +168,7 @@ def _rounded(motion: Trajectory, share: float) -> Iterator[Trajectory]:
 
 
 class Held:
-    """A scene as an argument of a cached function: scenes hold a dictionary and have no hash of their own."""
+    """A scene as an argument of a cached function, as scenes are not hashable."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.hash = scene, scene.hash()
@@ -184,7 +182,7 @@ class Held:
 
 @lru_cache(maxsize=64)
 def _motion(key: Held, dt: float, method: Method) -> tuple[Trajectory, int] | None:
-    """Trajectory of all steps, and the number of blows; None where nothing can be said."""
+    """Trajectory of all steps, and the number of blows; None without a prediction."""
     scene = key.scene if key.scene.dimension == 3 else lift(key.scene)
     if any(scene.gravity) or any(any(body.force) or any(body.torque) for body in scene.bodies):
         return None
@@ -214,7 +212,7 @@ def _motion(key: Held, dt: float, method: Method) -> tuple[Trajectory, int] | No
 def _sampled(
     scene: Scene, dt: float, states: list[tuple[float, Array, Array]], blows: list[tuple[float, list]]
 ) -> Trajectory:
-    """The motion at every step, with the blows of each step as its contacts; turns stay as they start."""
+    """The motion at every step, with the blows of each step as contacts; rotations stay as at the start."""
     steps = step_count(scene.duration, dt)
     t = np.arange(steps + 1, dtype=np.float64) * dt
     which = np.searchsorted([time for time, _, _ in states], t, side="right") - 1
@@ -243,7 +241,7 @@ def _sampled(
 
 
 class _Flight:
-    """Bodies that move straight until they meet: balls with anything, and boxes that come down flat."""
+    """Bodies in straight flight until they touch: balls with anything, and boxes that land flat."""
 
     def __init__(self, scene: Scene, method: Method) -> None:
         self.scene, self.method, self.time = scene, method, 0.0
@@ -251,14 +249,14 @@ class _Flight:
         self.v = np.array([body.twist for body in scene.bodies])
         free = np.array([body.motion == "free" for body in scene.bodies])
         self.lightness = free / np.array([body.mass for body in scene.bodies])
-        # Boxes are looked at only before they turn, along axes of the world.
+        # Boxes are treated only before they turn, along the world's axes.
         self.mobility = free[:, None] / np.array([np.broadcast_to(body.inertia, 3) for body in scene.bodies])
         self.straight = all(
             body.pose[3:] == (1.0, 0.0, 0.0, 0.0) for body in scene.bodies if isinstance(body.shape, Box)
         )
 
     def next_blow(self) -> tuple[float, list[_Contact]] | None:
-        """Time of the next blow and all contacts that touch then; None if there is none."""
+        """Time of the next blow and all contacts at that time; None if there is none."""
         times = {
             (i, j): found
             for i, j in combinations(range(len(self.scene.bodies)), 2)
@@ -267,12 +265,12 @@ class _Flight:
         if not times:
             return None
         meeting = [time for time, c in times.values() if -self._closing(c) > TOUCHING]
-        if not meeting:  # what touches and does not part is at rest together
+        if not meeting:  # touching bodies that do not separate are at relative rest
             return None
         return self.time + min(meeting), [c for time, c in times.values() if time <= min(meeting) + TOUCHING]
 
     def _meeting(self, i: int, j: int) -> tuple[float, _Contact] | None:
-        """When two bodies will touch [s from now] and how; also those that touch already and do not part."""
+        """Time until two bodies touch [s] and how; also those that touch now and do not separate."""
         a, b = self.scene.bodies[i], self.scene.bodies[j]
         if "free" not in (a.motion, b.motion):
             return None
@@ -327,7 +325,7 @@ class _Flight:
         return wait, _Contact(i, j, normal, (a.radius * normal, -b.radius * normal), *_numbers(material))
 
     def strike(self, time: float, contacts: list[_Contact]) -> list[tuple[_Contact, Array]] | None:
-        """Go to ``time`` and solve the contacts: impulses on their second bodies, or None if that is not simple."""
+        """Advance to ``time`` and solve the contacts: impulses on second bodies, or None if not simple."""
         if not self.straight and any(isinstance(self.scene.bodies[c.a].shape, Box) for c in contacts):
             return None
         self.x += (time - self.time) * self.v[:, :3]
@@ -343,16 +341,16 @@ class _Flight:
         backwards = self._swept(contacts[::-1], self.method.sweeps)
         other, self.v = self.v, before
         forwards = self._swept(contacts, self.method.sweeps)
-        # Not solved to round-off: what comes out depends on the order of the contacts, which nobody states.
+        # Not converged to round-off: the result depends on the unknown order of contacts.
         return forwards if np.abs(other - self.v).max() <= self.method.unit and backwards else None
 
     def _alone(self, c: _Contact, contacts: list[_Contact]) -> bool:
-        """Whether no other contact of this moment has a free body of this one."""
+        """Whether no other simultaneous contact has a free body of this one."""
         free = {k for k in (c.a, c.b) if self.lightness[k] > 0.0}
         return all(other is c or not free & {other.a, other.b} for other in contacts)
 
     def _swept(self, contacts: list[_Contact], sweeps: int) -> list[tuple[_Contact, Array]]:
-        """Sequential impulses: normals to their target, then friction, which a ball alone has."""
+        """Sequential impulses: normal, then friction, which only balls have."""
         approach = [-self._closing(c) for c in contacts]
         wanted = [
             self.method.restitution(c.e, s) * s if s > 0.0 else 0.0 for c, s in zip(contacts, approach, strict=True)
@@ -368,7 +366,7 @@ class _Flight:
             slip = self._slip(c)
             speed, rub = float(np.linalg.norm(slip)), np.zeros(3)
             if c.mu > 0.0 and speed > 0.0:
-                # A contact of a ball: what stops it is its approach over its response.
+                # A contact of a ball: the stopping impulse is the approach over the response.
                 stop = max(0.0, approach[k]) / self._response(c, c.normal)
                 pressed = stop if self.method.rebound_after_friction else jn
                 rub = -slip / speed * min(c.mu * pressed, speed / self._response(c, slip / speed))

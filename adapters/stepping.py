@@ -2,9 +2,9 @@
 
     build -> sample -> [ advance(stride) -> sample -> finite? ] ... -> readback -> close
 
-Every engine is driven, sampled and stopped by these lines, so that a difference between two trajectories is a
-difference between two engines. One that can tell many samples at once (`Simulation.record`) is asked for them at once,
-and in the way above where one of them ends the run.
+Every engine is stepped, sampled and stopped by this code, so a difference between two trajectories is a difference
+between two engines. Engines that can return many samples at once (`Simulation.record`) do so, except where a sample
+ends the run.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import reach
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
-#: A body faster than this many times the fastest speed the scene can explain counts as exploded. Ten times would
-#: still be a wrong answer worth measuring; a thousand times is none.
+#: A body faster than this many times the largest speed that the scene explains counts as exploded. Ten times would
+#: still be a wrong result worth measuring; a thousand times is not.
 EXPLOSION_FACTOR = 1e3
-#: A quaternion shorter than this is no turn: what is read from it (an angle of atan2(0, 0)) would be an angle of 0.
+#: A shorter quaternion is no orientation: atan2(0, 0) would give an angle of 0.
 SHORTEST_TURN = 0.5
 
 
-#: States that are read as the scene's own at once: enough that a read costs little, and little memory beside a run.
+#: Number of states converted at once: the overhead a state is small, and so is the memory.
 AT_ONCE = 1024
-#: Samples that an engine is asked for in one call: each enters it seldom, and a run that explodes ends soon.
+#: Samples of one call of the engine: few calls, but a run that explodes ends soon.
 IN_ONE_CALL = 256
 CONTACT_FIELDS = tuple(field.name for field in fields(Contacts))
 
 
 class _Seen:
-    """States of a run as the engine gives them, read as the scene's own once it is over: many at once cost little.
+    """States of a run as the engine returns them, converted to the scene's dimension at the end, many at once.
 
     Parameters
     ----------
     flat
-        A planar scene that ran lifted.
+        A 2-D scene that ran embedded in 3-D.
     standing
-        Bodies that move so that their surfaces run: they stay where the scene has them.
+        Bodies that move to give their surfaces a velocity; in the scene they do not move.
     dt
         Step of the run [s].
     """
@@ -55,7 +55,7 @@ class _Seen:
     def __init__(self, scene: Scene, flat: bool, standing: Sequence[int], dt: float) -> None:
         self.scene, self.dt = scene, dt
         self.dimension, self.flat, self.standing = scene.dimension, flat, list(standing)
-        #: Speed that needs a reason [m/s]: that of an overlap at the start is looked for where it is exceeded.
+        #: Speed that needs an explanation [m/s]; where it is exceeded, an overlap at the start is searched for.
         self.limit, self.parted = EXPLOSION_FACTOR * _fastest(scene), False
         self.places = np.array([scene.bodies[i].pose for i in standing])
         self.poses: list[Array] = []
@@ -65,14 +65,14 @@ class _Seen:
         self.outside, self.unturned = 0.0, False
 
     def look(self, simulation: Simulation) -> None:
-        """Keep the state of this instant: copies, for what a simulation gives may be its own."""
+        """Store copies of the current state, as a simulation may return its own arrays."""
         if len(self.poses) == AT_ONCE:
             self._read_all()
         self.poses.append(np.array(simulation.pose()))
         self.twists.append(np.array(simulation.twist()))
 
     def take(self, found: Recorded) -> bool:
-        """Keep states that were recorded at once; False, and none of them is kept, if one of them may be none.
+        """Store states that were recorded at once; False, and nothing is stored, if one of them may be invalid.
 
         The sums are those of `divergence`, over all states.
         """
@@ -84,15 +84,15 @@ class _Seen:
         return True
 
     def divergence(self) -> str:
-        """Why the last state is none; empty if it is one.
+        """Why the last state is invalid; empty if it is valid.
 
-        Sums of squares tell most states that are in order, in a tenth of the time: where they are finite, so is all
-        that they are made of, and none of it is larger than their root.
+        Sums of squares show most valid states in a tenth of the time: if a sum is finite, so are its terms, and none is
+        larger than its root.
         """
         pose, twist = self.poses[-1], self.twists[-1]
         if np.vdot(twist, twist) < 0.5 * self.limit * self.limit and math.isfinite(np.vdot(pose, pose)):
             return ""
-        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):  # across the plane of a lifted scene as well
+        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):  # across the plane of an embedded scene as well
             return "the state is not finite"
         _, (twist,) = self._lowered(pose[None], twist[None])
         fastest = float(np.abs(twist[:, : self.dimension]).max())
@@ -101,10 +101,10 @@ class _Seen:
             self.limit += EXPLOSION_FACTOR * max(start_overlap(self.scene).values(), default=0.0) / self.dt
         if fastest <= self.limit:
             return ""
-        return f"a body moves at {fastest:.3g} m/s, nothing in the scene explains it"
+        return f"a body moves at {fastest:.3g} m/s, which nothing in the scene explains"
 
     def states(self) -> tuple[Array, Array, float | None]:
-        """Poses and twists of all instants, and how far a lifted scene has left its plane [m]."""
+        """Poses and twists of all instants, and the distance of an embedded 2-D scene from its plane [m]."""
         self._read_all()
         pose, twist = (np.concatenate(parts) for parts in zip(*self.read, strict=True))
         return pose, twist, self.outside if self.flat else None
@@ -133,12 +133,12 @@ class _Seen:
 
 
 def posed_for(engine: Engine, scene: Scene) -> Scene:
-    """Return the scene as ``engine`` gets it: itself, or lifted, or with half-spaces that move where surfaces run.
+    """The scene for ``engine``: unchanged, embedded in 3-D, or with half-spaces that move for surface velocities.
 
     Raises
     ------
     EngineError
-        If the engine has no dimension for it (a spatial scene on a planar engine), or no ability for what it asks.
+        If the engine does not support its dimension (a 3-D scene on a 2-D engine) or another feature.
     """
     known = engine.facts.abilities
     if scene.dimension in engine.facts.dimensions:
@@ -156,14 +156,14 @@ def posed_for(engine: Engine, scene: Scene) -> Scene:
 
 
 def _lacking(engine: Engine, ability: str) -> str:
-    """Why an adapter cannot honour what a scene asks."""
+    """Why an adapter does not support a scene."""
     if ability == "surface velocity" and "moving half-space" in engine.facts.abilities:
-        return f"in {engine.name} only the surface of a fixed half-space runs"
+        return f"{engine.name} supports surface velocities of fixed half-spaces only"
     return f"the adapter of {engine.name} has no {ability}"
 
 
 def step_count(duration: float, dt: float) -> int:
-    """Whole steps that cover ``duration``; 1e-9 forgives the rounding of duration / dt."""
+    """Number of steps that cover ``duration``; 1e-9 allows for the rounding of duration / dt."""
     return max(1, math.ceil(duration / dt - 1e-9))
 
 
@@ -184,14 +184,14 @@ def run(
     Raises
     ------
     EngineError
-        If the engine refuses the scene, for a step that is not positive and finite, or for a pose that is none.
+        If the engine refuses the scene, for a step that is not positive and finite, or for an invalid pose.
     """
     if not (math.isfinite(dt) and dt > 0.0):
         raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
     sampling = sampling or Sampling()
     posed = posed_for(engine, scene)
     started = time.perf_counter()
-    # What an engine says of a run that diverged is of the instant at which it did: that run is made sample by sample.
+    # A diverged run is reported at the instant of divergence, so it is repeated sample by sample.
     for in_one_call in (IN_ONE_CALL, 0):
         simulation = engine.build(posed, dt, settings)
         try:
@@ -204,7 +204,7 @@ def run(
 
 
 def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[int]:
-    """Advance by ``steps`` steps, ``stride`` at a time; yields the number made so far after each."""
+    """Advance by ``steps`` steps, ``stride`` at a time; yields the number of steps after each."""
     done = 0
     while done < steps:
         advance = min(stride, steps - done)
@@ -216,7 +216,7 @@ def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[in
 def _record(
     simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float, in_one_call: int
 ) -> Trajectory | None:
-    """Step and sample; None where one of the samples that were asked for at once may be the last of the run."""
+    """Step and sample; None where one of the samples made at once may end the run."""
     flat = posed.dimension != scene.dimension
     pairs = enumerate(zip(scene.bodies, posed.bodies, strict=True))
     standing = [i for i, (asked, body) in pairs if asked.motion != body.motion]
@@ -250,7 +250,7 @@ def _record(
             break
     pose, twist, outside = seen.states()
     if seen.unturned and finish == "completed":
-        raise EngineError("pose: a quaternion has no length, it is no orientation")
+        raise EngineError("pose: a quaternion of length 0 is not an orientation")
     return Trajectory(
         t=np.array(steps_at) * dt,
         pose=pose,
@@ -273,7 +273,7 @@ def _has_contacts(sampling: Sampling, dt: float, done: int) -> bool:
 
 
 def _alike(sampling: Sampling, dt: float, done: int, most: int) -> tuple[int, bool]:
-    """How many of the samples that follow, ``most`` at most, all have their contacts recorded or not, and whether."""
+    """Number of next samples, at most ``most``, with the same contact recording, and whether contacts are recorded."""
     ends = range(done + sampling.stride, done + sampling.stride * (most + 1), sampling.stride)
     if not ends or _has_contacts(sampling, dt, ends[0]) or not _has_contacts(sampling, dt, ends[-1]):
         return most, bool(ends) and _has_contacts(sampling, dt, ends[0])
@@ -281,9 +281,9 @@ def _alike(sampling: Sampling, dt: float, done: int, most: int) -> tuple[int, bo
 
 
 def _fastest(scene: Scene) -> float:
-    """Largest speed of any point that the scene can explain [m/s]: initial motion plus what its loads can add."""
+    """Largest speed of a point that the scene explains [m/s]: initial motion plus the effect of loads."""
     d = scene.dimension
-    farthest = max(math.hypot(*b.pose[:d]) + reach(b.shape) for b in scene.bodies)  # where a face that turns is met
+    farthest = max(math.hypot(*b.pose[:d]) + reach(b.shape) for b in scene.bodies)  # where a rotating face is touched
     sizes = [farthest if isinstance(b.shape, HalfSpace) else reach(b.shape) for b in scene.bodies]
     initial = max(top_speed(b) + size * math.hypot(*b.twist[d:]) for b, size in zip(scene.bodies, sizes, strict=True))
     pull = max((_pull(body) for body in scene.bodies if body.motion == "free"), default=0.0)
@@ -297,12 +297,12 @@ def _pull(body: Body) -> float:
 
 
 def _kept(contacts: Contacts) -> Contacts:
-    """Copies, for what a simulation gives may be its own."""
+    """Copies, as a simulation may return its own arrays."""
     return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
 
 
 def _join(collected: list[tuple[range, Sequence[int], Contacts]], dimension: int, flat: bool) -> ContactRecord:
-    """Contacts of all samples: which samples they are, how many each has, and they themselves, part by part."""
+    """Contacts of all samples: sample indices, counts and contacts, part by part."""
     offset = np.cumsum([0] + [count for _, counts, _ in collected for count in counts])
     empty = Contacts.from_rows([], dimension)
     parts = [empty] + [contacts for _, _, contacts in collected]

@@ -1,4 +1,4 @@
-"""Trajectories: what the one step loop records, the same for every engine."""
+"""Trajectories: records of the step loop, the same for every engine."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from adapters.engine import Array, Contacts
 
 Finish = Literal["completed", "diverged"]
-#: A number read from a trajectory, or None and why there is none.
+#: A value from a trajectory, or None and the reason.
 Measured = tuple[float | None, str]
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """What the step loop records.
+    """Recording options of the step loop.
 
     Parameters
     ----------

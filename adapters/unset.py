@@ -1,4 +1,4 @@
-"""What an engine does when nothing is set: what its documentation says, beside what small experiments measure.
+"""An engine without any settings: documented behaviour, and that measured in small experiments.
 
 An engine's folder states its table in ``unset.py`` as `UNSET` and makes worlds of the bare engine, in which nothing is
 set but what an experiment names. The experiments stand here, once for all engines:
@@ -76,7 +76,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Told:
-    """Where the body is and how it moves: gap [m], velocities [m/s], spin [rad/s]."""
+    """State of the body: gap [m], velocities [m/s], spin [rad/s]."""
 
     gap: float
     along: float

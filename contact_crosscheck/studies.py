@@ -34,6 +34,7 @@ from reports.progress import run_plan
 from reports.terminal import terminal
 from validation.bench.lane import FULL, QUICK
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
+from validation.bench.work import certified_of
 from validation.canonical import CanonicalScene
 from validation.cells import Outcome, Slot, parse_dt
 from validation.identity import commit
@@ -258,7 +259,8 @@ def bench(
     Parameters
     ----------
     scene
-        A scene that declares an error; see `run`.
+        A scene that declares an error, or one from a file; see `run`. The error on a file is the distance from the
+        certified run of our own solver at the end.
     engines
         Names of engines; by default all that are installed and not optional.
     profiles
@@ -279,7 +281,8 @@ def bench(
     Raises
     ------
     SceneError
-        For a scene that declares no error, an unknown parameter, or if no case has a result.
+        For a scene that declares no error, one from a file without a certified run, an unknown parameter, or if no
+        case has a result.
     EngineError
         For an unknown engine or profile, one that is not installed, or one of your own, which has no package that the
         process that measures could load.
@@ -319,6 +322,9 @@ def bench(
             if not any(each.outcome is Outcome.OK for each in observations):
                 raise SceneError(f"bench: no case has a result: {observations[0].reason}")
             units = timed_units(wanted, observations)
+            lost = [each.reason for each in certified_of(observations).values() if each.reason]
+            if lost and not any(unit.purpose == "work" for unit in units):
+                raise SceneError(f"bench: {lost[0]}")
             time_units(store, run, [name], units, FULL if full else QUICK, seed, console)
             store.finish(run)
             tables = speed.tables_of(store, run)

@@ -1,7 +1,7 @@
-"""The short answers: which engine is best for a scene, what is wrong with each, and what fixes it.
+"""The short answers: the best engine for a scene, the error of each, and its fix.
 
 One line per engine and scene that fails, in words: "engine/profile bounce: rebounds at 0.105, whatever e is; profile
-tuned fixes it". Everything is read off the judged rows at the profiles' own iteration counts.
+tuned fixes it". Everything follows from the judged rows at the profiles' own iteration counts.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from validation.posed import is_file, resolve
 Plain = Mapping[str, Any]
 #: (scene, dimension, engine, profile) -> cost [s of CPU per simulated s] of the cheapest step that passes.
 Costs = Mapping[tuple[str, int, str, str], float]
-#: Of kinds of metric that fail nearly as often as the worst one, the first that its scene states is shown.
+#: Among kinds of metric with nearly as many failures as the worst, the scene's first one is shown.
 CLEAR = 0.8
-#: Values that differ by less than this share of what the truth spans are one value.
+#: Values count as equal below this share of the truth's range.
 SAME = 0.05
 
 
-#: Said of a scene of which no engine of the run gave anything that is judged, and where none could be asked.
+#: Texts of a scene without judged results, and without an engine that can run it.
 UNJUDGED_SCENE = "no verdict: no check of it has a tolerance"
 UNASKED = "no verdict: no engine of this run can run it"
-#: How it begins that other profiles pass where one fails.
+#: Begin of the text about other, passing profiles.
 FIXES = r"profiles? .+? fix(es)? it\b"
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What one engine and profile gets wrong in one scene."""
+    """Error of one engine and profile in one scene."""
 
     engine: str
     profile: str
@@ -60,9 +60,9 @@ class Answer:
 
 @dataclass(frozen=True)
 class Choice:
-    """Who passes every row of a scene, the cheapest first where costs were measured; else who is nearest, if any.
+    """Engines that pass every row of a scene, the cheapest first if costs were measured; else the nearest one, if any.
 
-    ``asked`` is whether any engine of the run could be asked the scene at all.
+    ``asked`` is whether any engine of the run can run the scene.
     """
 
     scene: str
@@ -114,13 +114,13 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
 
 
 def _price(costs: Costs, scene: str, key: tuple[str, str]) -> float:
-    """Cost in the plane, else in space; what was not timed stands last."""
+    """Cost in 2-D, else in 3-D; profiles without timing come last."""
     known = [costs[scene, d, *key] for d in (2, 3) if (scene, d, *key) in costs]
     return known[0] if known else math.inf
 
 
 def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price: float, untold: int) -> str:
-    """``engine/profile (2-D only, 1.2 ms/s)``; of a file also how many checks have no value."""
+    """``engine/profile (2-D only, 1.2 ms/s)``; for a file also the number of checks without a value."""
     own = {row["dimension"] for row in rows}
     notes = [] if own >= wanted else [", ".join(f"{d}-D" for d in sorted(own)) + " only"]
     if untold and is_file(rows[0]["scene"]) and own >= wanted:
@@ -131,7 +131,7 @@ def _named(key: tuple[str, str], rows: Sequence[Plain], wanted: set[int], price:
 
 
 def answers(rows: Sequence[Plain]) -> list[Answer]:
-    """What each engine as shipped gets wrong, scene by scene; of other profiles, what they make worse than that."""
+    """Errors of each engine as shipped, scene by scene; of other profiles only worse ones."""
     groups, found = _by_profile(rows), []
     engines, scenes = (list(dict.fromkeys(row[name] for row in rows)) for name in ("engine", "scene"))
     ordered = sorted(groups, key=lambda key: (engines.index(key[1]), scenes.index(key[0])))
@@ -162,7 +162,7 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
 
 
 def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
-    """Which other profile passes every row, or is the nearest to it; that none is better, or that none was run."""
+    """The other profile that passes every row, or the nearest one; or that none is better, or none was run."""
     failed = _failing(own[profile])
     if all(mark_of(row) == "invalid" for row in failed):
         return "the measurement is broken, so it says nothing about the engine"
@@ -200,20 +200,22 @@ def _fix(profiles: Sequence[str]) -> str:
 
 
 def _case(row: Plain) -> tuple[Any, ...]:
-    """What was asked of a row, but for the profile: a row of another step says nothing of this one."""
+    """The case of a row, without the profile."""
     return row["dimension"], str(row["params"]), row["dt"], row["metric"]
 
 
 # ---- in words ----
 
-#: Kinds of metric of which people ask how fast: that it should be nothing at all is said of them.
+#: Kinds of metric that are speeds: the text says that they should be 0.
 RATES = ("creep",)
-#: What is smaller than this share of the truth is nothing, in words.
+#: Two numbers with this many digits are compared at a glance; if they need more, their difference is stated.
+GLANCE = 5
+#: Values below this share of the truth are described as none.
 NOTHING = 1e-6
 
 
 def _as_seen(row: Plain, metric: str) -> Plain | None:
-    """A row with the number by which people know its metric; None where they know it by its own."""
+    """A row with the usual quantity of its metric; None if that is the metric itself."""
     view = resolve(row["scene"]).seen_as.get(metric)
     if view is None or row["value"] is None or row["truth"] is None:
         return None
@@ -222,7 +224,7 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
-    """How wrong, by the kind of metric of which most rows fail (of near equals, the first that its scene states)."""
+    """The error in words, by the kind of metric with most failures (among near equals, the scene's first)."""
     lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
@@ -239,13 +241,13 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     if any(row["metric"] == known_as for row in kinds[kind]):
         seen = [_as_seen(row, known_as) for row in members if row["metric"] == known_as]
         members = [row for row in seen if row is not None] or members
-    # A scene file has no parameters that a truth could follow.
+    # The truth of a scene file depends on no parameters.
     constant = "" if is_file(rows[0]["scene"]) else _constant(kind, members)
     return constant or _worst(kind, [row for row in members if mark_of(row) != "pass"])
 
 
 def _instead(row: Plain, kind: str, told_as_size: bool) -> str:
-    """The truth beside a value; of a direction that is told in words, its size, or its own words if it is the other."""
+    """The truth beside a value; for a direction in words, its size, or its own words if it is the opposite."""
     truth = quantity(row["truth"], row["unit"], _digits(row))
     if not told_as_size:
         return f" instead of {truth}"
@@ -255,7 +257,7 @@ def _instead(row: Plain, kind: str, told_as_size: bool) -> str:
 
 
 def _constant(kind: str, rows: Sequence[Plain]) -> str:
-    """``rebounds at 0.105, whatever e is``: one value where the truth follows a parameter; empty if it is not."""
+    """``rebounds at 0.105, whatever e is``: a constant value while the truth depends on a parameter; else empty."""
     values, truths = [row["value"] for row in rows], [row["truth"] for row in rows]
     if None in truths or max(truths) == min(truths):
         return ""
@@ -271,7 +273,7 @@ def _constant(kind: str, rows: Sequence[Plain]) -> str:
 
 
 def spoken(scene: str, kind: str, value: str) -> str:
-    """What a value of a kind of metric means, in words: the scene's own, else those of `validation.metrics`."""
+    """Words for a value of a kind of metric: the scene's own, else those of `validation.metrics`."""
     own = resolve(scene).words
     words, signed = {**WORDS, **own}, own if kind in own else WORDS
     if value == "0" and f"{kind}=0" in words:
@@ -282,7 +284,7 @@ def spoken(scene: str, kind: str, value: str) -> str:
 
 
 def _digits(row: Plain) -> int:
-    """Fewest digits, at least three, that tell a wrong value from the truth."""
+    """Fewest digits, at least three, that distinguish a wrong value from the truth."""
     value, truth = row["value"], row["truth"]
     if value is None or truth is None:
         return 3
@@ -290,7 +292,7 @@ def _digits(row: Plain) -> int:
 
 
 def _follows(rows: Sequence[Plain], name: str) -> bool:
-    """Whether the truth of one metric changes with this parameter while all others stay."""
+    """Whether the truth of one metric changes with this parameter while all others are fixed."""
     seen: dict[str, set[float]] = defaultdict(set)
     for row in rows:
         rest = row["metric"] + repr(sorted((k, v) for k, v in row["params"].items() if k not in (name, "duration")))
@@ -299,17 +301,30 @@ def _follows(rows: Sequence[Plain], name: str) -> bool:
 
 
 def _worst(kind: str, rows: Sequence[Plain]) -> str:
-    """The worst row in words, with the truth beside it unless that is that nothing happens."""
+    """The worst row in words, with the truth unless that is 0."""
     row = max(rows, key=severity)
     nothing = bool(row["truth"]) and abs(row["value"]) < NOTHING * abs(row["truth"])
     value = "0" if nothing else measured(row, _digits(row))
-    # Of a file's own quantities the name of the body and what was read of it is all that is known.
+    # A file's own quantities have only the body's name and the read quantity.
     own = is_file(row["scene"]) and kind != row["metric"]
-    words = f"{row['metric']} is {value}" if own else spoken(row["scene"], kind, value)
-    text = "never settles" if value == NEVER else words
-    if row["truth"] == 0.0 and kind in RATES and row["value"] and "should" not in text:
+
+    def words(told: str) -> str:
+        return f"{row['metric']} is {told}" if own else spoken(row["scene"], kind, told)
+
+    text = "never settles" if value == NEVER else words(value)
+    as_size = value.startswith("-") and value not in text
+    if row["truth"] and value != NEVER and _digits(row) > GLANCE:
+        text = words(_apart(row, as_size))
+    elif row["truth"] == 0.0 and kind in RATES and row["value"] and "should" not in text:
         text += " instead of 0"
-    if row["truth"] and text != SILENT:
-        text += _instead(row, kind, told_as_size=value.startswith("-") and value not in text)
+    elif row["truth"] and text != SILENT:
+        text += _instead(row, kind, told_as_size=as_size)
     where = params_text(row["slot"]["params"])
     return text + (f" ({where})" if where else "")
+
+
+def _apart(row: Plain, as_size: bool) -> str:
+    """``2.0e-10 more than 1``, of numbers that are alike at a glance; of sizes where the direction is told in words."""
+    value, truth = (abs(row[name]) if as_size else row[name] for name in ("value", "truth"))
+    than = f"{'more' if value > truth else 'less'} than {quantity(truth, row['unit'], 3)}"
+    return f"{'-' if as_size else ''}{quantity(abs(value - truth), row['unit'], 2)} {than}"

@@ -1,8 +1,8 @@
-"""A run in brief: of each cell its primary error and how many of its checks fail. Kept beside the store.
+"""Summary of a run: primary error and number of failed checks of each cell. Stored beside the results.
 
-Judging a run of the quick suite takes seconds and a dashboard shows hundreds, so each is judged once: a summary is kept
-in ``OUT/dashboard.sqlite`` under the run and the hash of the code that judged it, by the run itself when it ends. The
-file may be deleted at any time.
+Judging a run of the quick suite takes seconds and a dashboard shows hundreds, so each is judged once: a run at its end
+stores a summary in ``OUT/dashboard.sqlite`` under its name and the hash of the judging code. The file may be deleted at
+any time.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
 
 FILE = "dashboard.sqlite"
-#: Outcomes that say something of an engine's physics.
+#: Outcomes about an engine's physics.
 ANSWERED = ("ok", "diverged")
 #: Brief of one cell: error or None, checks that fail, checks that are judged, checks that fail for sure: a start moved
 #: by the last place mends the others.
 Brief = tuple[float | None, int, int, int]
-#: What a panel is about.
+#: Key of a panel.
 Key = tuple[str, str, str, int]
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Cells of a run by panel, each under a key that is equal in every run that asked the same.
+    """Cells of a run by panel, each under a key that is equal in all runs with the same case.
 
     Parameters
     ----------
     versions
         Of the engines.
     times
-        Ratio to an opponent's time, and the opponent, where it was timed.
+        Ratio to an opponent's time, and the opponent, if timed.
     """
 
     cells: Mapping[Key, Mapping[str, Brief]]
@@ -52,14 +52,14 @@ class Summary:
     times: Mapping[Key, tuple[float, str]] = field(default_factory=dict)
 
     def as_text(self) -> str:
-        """JSON that `from_text` reads back; each panel a text of its own, mostly the same as in another run."""
+        """JSON for `from_text`; each panel is a separate text, mostly equal to that of another run."""
         panels = [json.dumps([*key, dict(briefs)], separators=(",", ":")) for key, briefs in self.cells.items()]
         times = [[*key, *taken] for key, taken in self.times.items()]
         return json.dumps({"panels": panels, "versions": dict(self.versions), "times": times}, separators=(",", ":"))
 
 
 def from_text(text: str) -> Summary:
-    """Inverse of `Summary.as_text`; a panel that is equal in two runs is one object."""
+    """Inverse of `Summary.as_text`; equal panels of two runs are one object."""
     data = json.loads(text)
     times = {_key(*asked): (float(ratio), str(opponent)) for *asked, ratio, opponent in data["times"]}
     return Summary(dict(map(_panel, data["panels"])), data["versions"], times)
@@ -67,7 +67,7 @@ def from_text(text: str) -> Summary:
 
 @lru_cache(maxsize=100_000)
 def _panel(text: str) -> tuple[Key, Mapping[str, Brief]]:
-    """Cells of a panel; engines repeat themselves, so that of hundreds of runs few texts differ."""
+    """Cells of a panel; engines are repeatable, so hundreds of runs have few different texts."""
     *asked, briefs = json.loads(text)
     return _key(*asked), {slot: (error, fails, judged, sure) for slot, (error, fails, judged, sure) in briefs.items()}
 
@@ -77,9 +77,9 @@ def _key(engine: object, profile: object, scene: object, dimension: int) -> Key:
 
 
 def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = None) -> Summary:
-    """Judge observations and keep what a dashboard shows: cells at the quick step with a profile's own settings.
+    """Judge observations and return the data of a dashboard: cells at the quick step with a profile's own settings.
 
-    ``rows`` are theirs, where they were judged already.
+    ``rows`` are theirs, if already judged.
     """
     everything = list(observations)
     moved: dict[str, list[Observation]] = defaultdict(list)
@@ -121,7 +121,7 @@ def _shown(slot: Slot) -> bool:
 
 
 def _error(observation: Observation) -> float | None:
-    """Primary error of one cell [unit of the primary], where its scene declares one and it can be taken there."""
+    """Primary error of one cell [unit of the primary], if its scene declares one and it can be computed there."""
     if observation.outcome.value not in ANSWERED or not observation.metrics:
         return None
     canonical = resolve(observation.slot.scene)
@@ -136,7 +136,7 @@ def _error(observation: Observation) -> float | None:
 
 @cache
 def judging_code() -> str:
-    """Hash of all code that judges: with other checks, summaries are made again."""
+    """Hash of all judging code: with other checks, summaries are made again."""
     digest = hashlib.sha256()
     root = Path(validation.__file__ or "").parent
     for path in sorted(p for p in root.rglob("*") if p.suffix in (".py", ".csv", ".toml")):
@@ -145,14 +145,14 @@ def judging_code() -> str:
 
 
 def keep(folder: Path, run: str, observations: Iterable[Observation], rows: Iterable[Row]) -> None:
-    """Keep the summary of a run that has just been judged, so that no dashboard has to judge it again."""
+    """Store the summary of a judged run for dashboards."""
     kept = Kept(folder)
     kept.put(run, summarise(observations, rows))
     kept.close()
 
 
 class Kept:
-    """Summaries that were made before; where nothing can be kept they are made each time."""
+    """Stored summaries; without a writable file they are made each time."""
 
     def __init__(self, folder: Path) -> None:
         self._db: sqlite3.Connection | None = None
@@ -171,7 +171,7 @@ class Kept:
         return None
 
     def put(self, name: str, summary: Summary) -> None:
-        """Keep a summary."""
+        """Store a summary."""
         if self._db is not None:
             with suppress(sqlite3.Error), self._db:
                 row: tuple[Any, ...] = (name, judging_code(), summary.as_text())

@@ -1,11 +1,11 @@
-"""A result as one archive: what ran, on what, with which outcome, how to cite it, and checksums of all of it.
+"""A result as one archive: plan, machine, results, citation, and checksums of all files.
 
-README.txt           what is inside
+README.txt           contents
 environment.json     machine, Python, packages, commit, plan
 observations.jsonl   raw measurements, one cell per line; verdicts are derived from them
 rows.jsonl, rows.csv every judged value
 timings.csv          raw timings of the benchmark, if there is one
-scenes/              scene files that ran, as they were when it began
+scenes/              scene files of the run, as at its start
 report.html          the report
 CITATION.cff         how to cite, with run and commit
 SHA256SUMS           checksums, as ``sha256sum -c`` reads them
@@ -36,7 +36,7 @@ README = """contact-crosscheck, run {run}
 Verdicts are derived from observations.jsonl: `crosscheck report` and `crosscheck compare` read the checks.
 Check the files with: sha256sum -c SHA256SUMS
 """
-#: File -> what it is, in the order of the archive.
+#: File -> description, in the order of the archive.
 CONTENTS = {
     "environment.json": "machine, Python, packages, commit and plan of the run (and of the benchmark)",
     "observations.jsonl": "raw measurements, one case per line",
@@ -88,7 +88,7 @@ def _texts(source: Source, folder: Path) -> dict[str, str]:
 
 
 def _scene_files(source: Source) -> dict[str, str]:
-    """Texts of scene files as ``scenes/<hash>-<name>``: names of two folders do not meet, and none leads out of it."""
+    """Texts of scene files as ``scenes/<hash>-<name>``: equal names do not collide, and no path leads outside."""
     found = {}
     for pinned, text in source.scenes_kept.items():
         path, _, digest = pinned.rpartition("@")
@@ -115,7 +115,7 @@ def _run(run: Run) -> Mapping[str, Any]:
 def citation(run: Run) -> str:
     """Citation file of the project with the run and its commit added."""
     here = files("reports")
-    beside = Path(str(here)).parent / "CITATION.cff"  # in a checkout; a wheel carries its copy inside the package
+    beside = Path(str(here)).parent / "CITATION.cff"  # in a checkout; a wheel has its copy inside the package
     inside = Path(str(here.joinpath("CITATION.cff")))
     text = (beside if beside.is_file() else inside).read_text(encoding="utf-8").rstrip("\n")
     commit = f'\ncommit: "{run.commit}"' if run.commit else ""

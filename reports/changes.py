@@ -1,4 +1,4 @@
-"""Shows what changed between two runs: text, JSON, and Markdown fit for a pull-request comment."""
+"""Changes between two runs: as text, JSON, and Markdown for a pull-request comment."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RELEASE = re.compile(r"[^=/]+==[^=/]+")
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a comparison: where it is from, judged rows, and ratios of times where a bench run has them."""
+    """One side of a comparison: its origin, judged rows, and ratios of times of a bench run."""
 
     rows: Sequence[Mapping[str, Any]]
     ratios: Sequence[Mapping[str, Any]]
@@ -35,7 +35,7 @@ class Side:
 
     @property
     def versions(self) -> dict[str, str]:
-        """Engine -> version that ran."""
+        """Engine -> version of the run."""
         return {row["engine"]: row["engine_version"] for row in self.rows if row["engine_version"]}
 
     @property
@@ -51,9 +51,9 @@ def load_side(argument: str, out: Path) -> Side:
     Raises
     ------
     MissingError
-        If there is nothing of that name, or a file is not JSON Lines of rows and ratios.
+        If nothing has that name, or a file is not JSON Lines of rows and ratios.
     """
-    if not argument:  # such as a variable that is not set
+    if not argument:  # such as an unset variable
         raise MissingError("run: a side is empty; `.` is the folder that you are in")
     if _RELEASE.fullmatch(argument):
         return _load_release(out, *argument.split("=="))
@@ -63,13 +63,13 @@ def load_side(argument: str, out: Path) -> Side:
     folder, _, run = argument.partition(":")
     if Path(folder).is_dir():
         return _load_run(Path(folder), run or "latest")
-    if path.name != argument or run:  # no id of a run
+    if path.name != argument or run:  # not a run id
         raise MissingError(f"run: there is no folder {folder}; crosscheck compare --help says what a side may be")
     return _load_run(out, argument)
 
 
 def _load_release(out: Path, engine: str, version: str) -> Side:
-    """All that a release was asked, whichever runs asked it."""
+    """All results of a release, from any run."""
     store = Store(out, create=False)
     try:
         runs = store.release_runs(engine, version)
@@ -83,7 +83,7 @@ def _load_release(out: Path, engine: str, version: str) -> Side:
 
 
 def _load_run(folder: Path, run_id: str) -> Side:
-    """Rows of the run; ratios of the run itself, or of the last bench run where no run was named."""
+    """Rows of the run; ratios of the run itself, or of the last bench run if no run is named."""
     store = Store(folder, create=False)
     try:
         timed = bench_runs(store)
@@ -100,7 +100,7 @@ def _load_run(folder: Path, run_id: str) -> Side:
 
 
 def _load_lines(path: Path) -> Side:
-    if path.exists() and not path.is_file():  # a pipe would be waited for
+    if path.exists() and not path.is_file():  # a pipe would block
         raise MissingError(f"run: cannot read {path}: it is not a regular file")
     try:
         lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
@@ -114,7 +114,7 @@ def _load_lines(path: Path) -> Side:
 
 
 def header(a: Side, b: Side) -> list[str]:
-    """Runs, commits, and the versions of engines that are not the same."""
+    """Runs, commits, and differing versions of engines."""
     lines = [f"A: {a.text}", f"B: {b.text}"]
     names = list(dict.fromkeys([*a.versions, *b.versions]))
     same = [f"{name} {a.versions[name]}" for name in names if a.versions.get(name) == b.versions.get(name)]
@@ -130,7 +130,7 @@ def header(a: Side, b: Side) -> list[str]:
 
 
 def headline(changes: Sequence[Change]) -> str:
-    """``1 newly failing, 2 fixed, 3 value changed (1 worse)``; or that nothing changed."""
+    """``1 newly failing, 2 fixed, 3 value changed (1 worse)``; or the text for no change."""
     counts = Counter((change.kind, change.regressed) for change in changes)
     parts = []
     for kind in Kind:
@@ -143,12 +143,12 @@ def headline(changes: Sequence[Change]) -> str:
     return "; ".join(parts) or "nothing changed"
 
 
-#: What a check is that fails on one side only, by whether it got worse.
+#: Word for a check that fails on one side only, by whether it got worse.
 WORDS = {True: "newly failing", False: "fixed"}
 
 
 def kind_of(kind: str, regressed: bool) -> str:
-    """``newly failing``, ``fixed``, or what else changed."""
+    """``newly failing``, ``fixed``, or another change."""
     return WORDS[regressed] if kind == Kind.FLIP.value else kind
 
 
@@ -163,7 +163,7 @@ def _size(change: Change) -> str:
 
 
 def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
-    """Who is compared, the headline, and one line per family of changes: its largest."""
+    """Both sides, the headline, and the largest change of each family, one line each."""
     lines = [*header(a, b), headline(changes)]
     for family in families(changes):
         change, more = family.first, len(family.changes) - 1
@@ -184,7 +184,7 @@ def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
 
 
 def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> str:
-    """Who is compared, the headline, and a table of at most ``most`` families of changes."""
+    """Both sides, the headline, and a table of at most ``most`` families of changes."""
     out = ["**contact-crosscheck compare**: " + headline(changes), ""]
     out += [f"* {line}" for line in header(a, b)]
     found = families(changes)

@@ -1,4 +1,4 @@
-"""What fixes an engine: the settings in which a profile that passes differs from the one that does not."""
+"""Fixes of an engine: settings in which a passing profile differs from a failing one."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from validation.settings.cures import Cure, asked_of, cures_of
 from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, changes_of, decisive
 from validation.settings.switching import switched
 
-#: Said where a search found nothing.
+#: Text of a search without a result.
 NONE_HELPS = "no setting helps"
-#: What a setting's part in a cure is called.
+#: Words for the role of a setting in a fix.
 ROLES = {
     ALONE: "enough alone",
     NEEDED: "needed",
@@ -34,7 +34,7 @@ ROLES = {
 
 @dataclass(frozen=True)
 class Change:
-    """A setting that differs between two profiles; ``role`` is whether it matters, where that was measured."""
+    """A setting that differs between two profiles; ``role`` is whether it matters, if measured."""
 
     name: str
     before: str
@@ -51,9 +51,9 @@ def shown_cell(
     profile: str,
     params: Mapping[str, float] | None = None,
 ) -> Observation | None:
-    """The cell that stands for a profile on a scene: the representative one, else the first that has settings.
+    """The representative cell of a profile on a scene, else the first one with settings.
 
-    ``params`` (what differs from the scene's defaults) asks for another one than the representative.
+    ``params`` (differences from the scene's defaults) selects another cell.
     """
     own = [
         o for o in observations
@@ -75,7 +75,7 @@ def changes(
     after: str,
     params: Mapping[str, float] | None = None,
 ) -> list[Change]:
-    """Settings that profile ``after`` sets otherwise than ``before``, in the engine's own words.
+    """Settings that differ between profiles ``after`` and ``before``, in the engine's own words.
 
     They are those of the cell of ``params``, see `shown_cell`.
     """
@@ -95,15 +95,15 @@ def changes(
 
 
 def _in_words(cell: Observation) -> dict[str, tuple[str, str]]:
-    """Settings of a cell, by name: what the engine itself calls them, and their values as text."""
+    """Settings of a cell, by name: the engine's own names, and their values as text."""
     settings = {s["name"]: s["value"] for s in cell.settings}
     return in_words(cell.slot, settings)
 
 
 def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """What the engine of a slot calls settings, by our name: its own name, and the value or formula as text.
+    """Settings in words of the engine of a slot, by our name: its own name, and the value or formula as text.
 
-    Without those that it tells with another one; see `adapters.engine.Engine.words`.
+    Without those included in another one; see `adapters.engine.Engine.words`.
     """
     loaded = registry.adapter(slot.engine)
     made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
@@ -113,9 +113,9 @@ def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, st
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
-    """What decides a cure, as `validation.settings.decisive` measured it; empty if nobody did with this release.
+    """Decisive settings of a fix by `validation.settings.decisive`; empty without a measurement for this release.
 
-    What was measured in one dimension is said with it where rows of another fail as well.
+    The dimension of a measurement is named if rows of another one fail as well.
     """
     measured = {d: decisive(engine, scene, d, before, after) for d in dimensions}
     texts = {d: _decided(m) for d, m in measured.items() if m is not None and m.version == version}
@@ -132,7 +132,7 @@ def _decided(measured: Decisive) -> str:
 
 
 def _settings(slot: Slot) -> dict[str, Any]:
-    """Settings of a slot by name; none of an engine that is not ours."""
+    """Settings of a slot by name; none for an engine of another package."""
     loaded = registry.adapter(slot.engine)
     if loaded is None:
         return {}
@@ -141,7 +141,7 @@ def _settings(slot: Slot) -> dict[str, Any]:
 
 
 def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]) -> list[str]:
-    """What was measured to mend a scene in each of ``dimensions``, with this release, from the committed table."""
+    """Measured fixes of a scene in each of ``dimensions``, with this release, from the committed table."""
     known = known_cures(engine, version, scene, shipped, dimensions)
     if len(known) == 2 and not any(cure.helps for cure, _ in known):
         return [f"{NONE_HELPS} ({', '.join(f'{cure.tried} tried in {where}' for cure, where in known)})"]
@@ -151,37 +151,37 @@ def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: 
 def known_cures(
     engine: str, version: str, scene: str, shipped: str, dimensions: Sequence[int]
 ) -> list[tuple[Cure, str]]:
-    """The committed fixes of a scene with this release, each with its dimensions; one that is the same in both once."""
+    """The committed fixes of a scene with this release, each with its dimensions; equal ones of both only once."""
     listed = [cures_of(engine).get((scene, d)) for d in dimensions]
     known = [c for c in listed if c is not None and (c.version, c.shipped) == (version, shipped)]
-    if len(known) == 2 and known[0].helps and known[0].changes == known[1].changes:  # one that is worse is told
+    if len(known) == 2 and known[0].helps and known[0].changes == known[1].changes:  # a worse one is named
         worse = max(known, key=lambda cure: (cure.left, cure.times or 0.0))
         return [(worse, "2-D and 3-D")]
     return [(cure, f"{cure.dimension}-D") for cure in known]
 
 
 def _recorded(cure: Cure, where: str) -> str:
-    """`cure_text`, begun by how much it fixes."""
+    """`cure_text` after the number of fixed checks."""
     what = "smallest fix, " if not cure.left else "best settings found, "
     return (what if cure.helps else "") + cure_text(cure, where)
 
 
 def told_cure(row: Mapping[str, Any]) -> str:
-    """What was measured to mend the check of one row, or that it is not among what was searched or is mended.
+    """Measured fix of the check of one row, or that there is none, or no search.
 
-    A cure is told of the cells, at the step, of which it was searched; of another case where it can be searched.
+    A fix belongs to the cells and the step of its search; for another case the text names the search command.
     """
     cure = _listed(row)
     if cure is None:
         return f"none was searched for in this case; to search: {search_command(row)}" if can_be_searched(row) else ""
-    kinds = cure.mends or (cure.metric.partition("[")[0],)  # where no kind is mended in all cells, what is told
+    kinds = cure.mends or (cure.metric.partition("[")[0],)  # its own metric if no kind is fixed in all cells
     if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
     return f"none is known for this check; for {', '.join(kinds)} in this scene, {cure_text(cure)}"
 
 
 def cure_of(row: Mapping[str, Any]) -> Cure | None:
-    """The listed cure that mends the check of a row in its own case, with its values there; None if none does."""
+    """The listed fix for the check of a row in its own case, with its values there; None if there is none."""
     cure = _listed(row)
     if cure is None or not cure.helps or not _is_mended(cure, row):
         return None
@@ -196,7 +196,7 @@ def cure_of(row: Mapping[str, Any]) -> Cure | None:
 
 
 def can_be_searched(row: Mapping[str, Any]) -> bool:
-    """Whether a row is of the profile that `search` starts from, in a cell that ran at its own iterations."""
+    """Whether a row belongs to the start profile of `search`, in a cell with its own iterations."""
     brought = resolve(row["scene"]).brings.get(row["engine"])
     start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")
     ran = row.get("outcome") not in ("unsupported", "not_installed") and row.get("iterations") is None
@@ -204,7 +204,7 @@ def can_be_searched(row: Mapping[str, Any]) -> bool:
 
 
 def _listed(row: Mapping[str, Any]) -> Cure | None:
-    """The listed cure that was searched in a row's own case, on its release."""
+    """The listed fix from a search in a row's own case, on its release."""
     cure = cures_of(row["engine"]).get((row["scene"], row["dimension"]))
     if cure is None or (cure.version, cure.shipped) != (row["engine_version"], row["profile"]):
         return None
@@ -219,20 +219,20 @@ def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
 
 
 def is_standard(row: Mapping[str, Any]) -> bool:
-    """Whether a row's case is among those that a search of its scene asks by itself."""
+    """Whether a row's case belongs to a default search of its scene."""
     if is_file(row["scene"]) or row.get("dt", QUICK_DT) != QUICK_DT or row.get("iterations") is not None:
         return False
     return dict(_minimal(row)) in asked_of(row["scene"], row["dimension"])
 
 
 def search_command(row: Mapping[str, Any]) -> str:
-    """Command that searches what mends a row's case."""
+    """Command that searches a fix for a row's case."""
     words = ["crosscheck", "cure", row["engine"], row["scene"]]
     return shlex.join(words if is_standard(row) else [*words, *_case(row)])
 
 
 def _case(row: Mapping[str, Any]) -> list[str]:
-    """Options that ask for a row's case."""
+    """Options that select a row's case."""
     words = [word for name, value in _minimal(row) for word in ("--param", f"{name}={value:.12g}")]
     brought = resolve(row["scene"]).brings.get(row["engine"])
     if row.get("dt", QUICK_DT) != (brought.dt if brought else QUICK_DT):
@@ -241,9 +241,9 @@ def _case(row: Mapping[str, Any]) -> list[str]:
 
 
 def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
-    """Parameters of a row, as what differs from its scene's defaults; as they are where the scene of today has not all.
+    """Parameters of a row that differ from its scene's defaults; all of them if the present scene lacks some.
 
-    A row may be of a run of before a parameter had another name or range.
+    A row may belong to an older run with another name or range of a parameter.
     """
     params = row["slot"]["params"] if "slot" in row else row.get("params", {})
     try:
@@ -252,51 +252,97 @@ def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
         return tuple(sorted(params.items()))
 
 
+@dataclass(frozen=True)
+class Told:
+    """What is said of a cure, piece by piece; what does not apply is empty.
+
+    Parameters
+    ----------
+    settings
+        Names and values in the engine's own words.
+    check, at
+        The check that tells it, and its parameters.
+    before, after, truth, unit
+        Its values; the truth only where it is neither 0 nor the value after.
+    left
+        How many checks still fail.
+    times
+        Cost in times of that before.
+    """
+
+    settings: list[tuple[str, str]]
+    check: str
+    at: str
+    before: str
+    after: str
+    truth: str
+    unit: str
+    left: str
+    times: str
+
+
+def told(cure: Cure) -> Told:
+    """The pieces of which terminal and page say a cure."""
+    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
+    return Told(
+        changes_in_words(cure, cure.changes),
+        cure.metric,
+        params_text(cure.params),
+        before,
+        after,
+        truth if truth not in ("0", after) else "",
+        "" if cure.unit == "1" else cure.unit,
+        f"{cure.left} of {cure.failing} checks still fail" if cure.left else "",
+        f"{cure.times:.2g}" if cure.times else "",
+    )
+
+
 def cure_text(cure: Cure, where: str = "") -> str:
     """``2-D: cone=elliptic, solimp=...: creep 0.016 -> 1e-6 m/s, at 1.7 times the cost``."""
     where = where or f"{cure.dimension}-D"
     if not cure.helps:
         return f"{where}: {NONE_HELPS} ({cure.tried} tried)"
-    settings = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.changes))
-    unit = "" if cure.unit == "1" else f" {cure.unit}"
-    at = params_text(cure.params)
-    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
-    aim = f" (true: {truth})" if truth not in ("0", after) else ""
-    numbers = f"{cure.metric}{f' at {at}:' if at else ''} {before} -> {after}{unit}{aim}"
-    left = f", {cure.left} of {cure.failing} checks still fail" if cure.left else ""
-    times = f"{cure.times:.2g}" if cure.times else ""
-    cost = "" if not times else ", at the same cost" if times == "1" else f", at {times} times the cost"
+    said = told(cure)
+    unit = f" {said.unit}" if said.unit else ""
+    aim = f" (true: {said.truth})" if said.truth else ""
+    numbers = f"{said.check}{f' at {said.at}:' if said.at else ''} {said.before} -> {said.after}{unit}{aim}"
+    left = f", {said.left}" if said.left else ""
+    cost = f", at {said.times} times the cost" if said.times else ""
+    cost = ", at the same cost" if said.times == "1" else cost
     alone = ""
     if cure.alone:
-        said = ", ".join(f"{name}={value}" for name, value in changes_in_words(cure, cure.alone))
-        alone = f"; {said} alone: {number(cure.alone_after, 3)}{unit}"
-    return f"{where}: {settings}; {numbers}{left}{cost}{alone}"
+        alone = f"; {_assigned(changes_in_words(cure, cure.alone))} alone: {number(cure.alone_after, 3)}{unit}"
+    return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}"
+
+
+def _assigned(settings: Iterable[tuple[str, str]]) -> str:
+    return ", ".join(f"{name}={value}" for name, value in settings)
 
 
 def told_apart(before: float | None, after: float | None, truth: float) -> tuple[str, str, str]:
-    """The three numbers in the fewest digits, at least three, that tell the first two apart."""
+    """The three numbers with the fewest digits, at least three, that distinguish the first two."""
     enough = (n for n in range(3, 18) if number(before, n) != number(after, n))
     digits = next(enough, 3)
-    missing = "no value"  # the engine gave no answer there
+    missing = "no value"  # no result of the engine there
     was, now = (missing if value is None else number(value, digits) for value in (before, after))
     return was, now, number(truth, digits)
 
 
 def changes_in_words(cure: Cure, changes: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Settings that a cure changes (or another of its scene) in the engine's own words, with values as text."""
+    """Settings that a fix changes (or another of its scene) in the engine's own words, with values as text."""
     slot = _slot(cure, changes)
     words = in_words(slot, {**changes, **_settings(slot)})
     return [words[name] for name in changes if name in words]
 
 
 def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
-    """The cell that a cure is told of, with settings replaced."""
+    """The cell of a fix, with settings replaced."""
     params = tuple(sorted(cure.params.items()))
     return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
 
 
 def recorded_fixes(scene: str, engines: Iterable[str]) -> list[Cure]:
-    """What is on record of engines as shipped on a scene: one each, in space where the engine has it there too."""
+    """Recorded fixes of engines as shipped on a scene: one each, in 3-D if the engine has it there too."""
     found = []
     for engine in engines:
         own = [cure for (name, _), cure in cures_of(engine).items() if name == scene]
@@ -305,7 +351,7 @@ def recorded_fixes(scene: str, engines: Iterable[str]) -> list[Cure]:
 
 
 def cure_paste(cure: Cure) -> str:
-    """The settings of a cure as lines of the engine's own language; empty if its adapter knows none."""
+    """The settings of a fix as lines in the engine's own language; empty if its adapter writes none."""
     loaded = registry.adapter(cure.engine)
     if loaded is None or not cure.changes:
         return ""
@@ -315,7 +361,7 @@ def cure_paste(cure: Cure) -> str:
 
 
 def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
-    """One sentence: what decides a cure, on which checks and cells, with which release; or that nobody measured."""
+    """One sentence: decisive settings of a fix, checks, cells and release; or that there is no measurement."""
     measured = decisive(engine, scene, dimension, before, after)
     if measured is None:
         return "Which of these settings matter was not measured; they are all that differs between the profiles."
@@ -333,9 +379,9 @@ def pasteable(
     after: str,
     params: Mapping[str, float] | None = None,
 ) -> str:
-    """The changes as lines of the engine's own language, ready to paste; empty if its adapter knows none.
+    """The changes as lines in the engine's own language, ready to paste; empty if its adapter writes none.
 
-    Values that depend on the material or the step are those of the cell of ``params``, see `shown_cell`.
+    Values that depend on material or step are those of the cell of ``params``, see `shown_cell`.
     """
     cell = shown_cell(observations, scene, dimension, engine, after, params)
     loaded = registry.adapter(engine)
@@ -351,10 +397,10 @@ def pasteable(
 
 
 def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str) -> tuple[str, str]:
-    """Lines to paste that mend the check of a row, and what they are; or that there are none to paste.
+    """Lines to paste that fix the check of a row, and their description; or that there are none.
 
-    The smallest that was searched in the row's own case, else all that the profile ``better`` changes, which passes it:
-    both were run in this very case. Empty for a row that nothing is known to mend.
+    The smallest fix from a search in the row's own case, else all changes of the passing profile ``better``: both were
+    run in this case. Empty for a row without a known fix.
     """
     cure = cure_of(row)
     if cure is None and not better:
@@ -370,7 +416,7 @@ def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str
 
 
 def nothing_to_paste(cure: Cure) -> str:
-    """What is said where a cure has no lines to paste, since its engine has none: the command that writes its calls."""
+    """Text for a fix without lines to paste: the command that writes the engine's calls."""
     sets = [word for name, value in sorted(cure.changes.items()) for word in ("--set", f"{name}={text_of(value)}")]
     row = {name: getattr(cure, name) for name in ("engine", "scene", "dimension", "params", "dt")}
     return _unpasted(row, ["--profile", cure.shipped, *sets])
@@ -383,7 +429,7 @@ def _unpasted(row: Mapping[str, Any], profile: Sequence[str]) -> str:
 
 
 def setting_text(value: Any) -> str:
-    """A setting's value as people write it."""
+    """A setting's value as text."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, list | tuple):

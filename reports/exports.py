@@ -25,7 +25,7 @@ Plain = Mapping[str, Any]
 def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:
     """Rows of a run as a DataFrame, judged with today's checks, laws and findings.
 
-    With ``nulls`` followed by those of the nulls, which answer without an engine (engine ``none``). Its ``attrs`` are
+    With ``nulls`` also rows of the null answers, which need no engine (engine ``none``). Its ``attrs`` are
     those of `described`.
 
     Raises
@@ -39,7 +39,7 @@ def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool
 
 
 def described(table: pd.DataFrame, run: str, commit: str, rows: Sequence[Row]) -> pd.DataFrame:
-    """The table, whose ``attrs`` say which run and commit it is of, and which version of each engine."""
+    """The table, with run, commit and engine versions in its ``attrs``."""
     table.attrs |= {"run": run, "commit": commit, "versions": versions_of([vars(row) for row in rows])}
     return table
 
@@ -79,17 +79,17 @@ def as_csv(rows: Sequence[Plain]) -> str:
     return stream.getvalue()
 
 
-#: What a row has in a flat table.
+#: Columns of a flat table.
 COLUMNS = tuple(name for name in Row.__dataclass_fields__ if name not in ("slot", "log"))
 
 
 def flattened(row: Plain) -> dict[str, Any]:
-    """A row without anything nested."""
-    return {name: _flat(row.get(name)) for name in COLUMNS}  # rows of an older file know fewer
+    """A row without nested values."""
+    return {name: _flat(row.get(name)) for name in COLUMNS}  # rows of an older file have fewer
 
 
 def _flat(value: Any) -> Any:
-    if value is None or isinstance(value, str | float):  # most of them; the question whether it is a table is dear
+    if value is None or isinstance(value, str | float):  # most of them; the check for a table is slow
         return value
     if isinstance(value, Mapping):
         return " ".join(f"{k}={v:.12g}" for k, v in value.items())
@@ -97,7 +97,7 @@ def _flat(value: Any) -> Any:
 
 
 def as_markdown(rows: Sequence[Plain]) -> str:
-    """Verdict matrix and findings that need attention, fit for a step summary."""
+    """Verdict matrix and findings that need attention, for a step summary."""
     matrix, versions = matrix_of(rows), versions_of(rows)
     heads = [
         markdown(f"{engine}/{profile}") + f"<br>{markdown(versions.get(engine, ''))}"
@@ -117,7 +117,7 @@ def as_markdown(rows: Sequence[Plain]) -> str:
 
 
 def as_junit(rows: Sequence[Plain]) -> str:
-    """JUnit XML: a suite per engine and profile; only what makes the command fail is a failure."""
+    """JUnit XML: a suite per engine and profile; failures are only those with exit status 1."""
     cases: dict[str, list[TestCase]] = {}
     for row in rows:
         name = f"{row['engine']}/{row['profile']}"
@@ -131,7 +131,7 @@ def as_junit(rows: Sequence[Plain]) -> str:
     document = JUnitXml("contact-crosscheck")
     for name, own in cases.items():
         suite = TestSuite(name)
-        suite.add_testcases(own)  # in one go: a suite counts all that it holds each time something is added
+        suite.add_testcases(own)  # at once: a suite counts all its cases after each addition
         document.add_testsuite(suite)
     document.update_statistics()
     return bytes(document.tostring()).decode()

@@ -1,7 +1,7 @@
 """Findings: rows that do not pass, by family or one line each, with the command that reproduces them.
 
-A starved stack fails twenty interfaces at once. A family is therefore one engine, profile, scene and kind of metric
-with one standing; it is shown by its worst row.
+A stack with too few iterations fails at twenty interfaces at once. A family is therefore one engine, profile, scene and
+kind of metric with one standing, represented by its worst row.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from validation.judging.rows import is_alarming
 from validation.posed import is_file
 
 Plain = Mapping[str, Any]
-#: Marks that make the command exit with 1.
+#: Marks with exit status 1 of the command.
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
-#: Outcomes of cells that were not run, and what they are called.
+#: Outcomes of cells that were not run, and their words.
 REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
-#: Marks of cells that gave no answer that counts: their rows have one reason, and no metric is worse than another.
+#: Marks of cells without a valid result: their rows have one reason, and no worst metric.
 WHOLE = ("crashed", "timed_out", "missing", "invalid")
-#: Marks in the order in which findings are shown.
+#: Marks in display order.
 ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
 
 
@@ -39,12 +39,12 @@ def finding_line(row: Plain) -> str:
 
 
 def has_answer(row: Plain) -> bool:
-    """Whether a row has a value that counts: that of an INVALID one says nothing of its engine, its reason does."""
+    """Whether a row has a valid value: an INVALID one has only a reason."""
     return row["value"] is not None and row["outcome"] != "invalid"
 
 
 def said(row: Plain, digits: int = 4) -> str:
-    """What was measured, the truth and the tolerance; or why there is no value that counts."""
+    """Measured value, truth and tolerance; or why there is no valid value."""
     if not has_answer(row):
         return str(row["reason"])
     truth, tolerance = quantity(row["truth"], row["unit"], digits), number(row["tolerance"], 3)
@@ -52,7 +52,7 @@ def said(row: Plain, digits: int = 4) -> str:
 
 
 def first_reason(row: Plain) -> str:
-    """The first of the reasons of a row that is INVALID, and how many more there are."""
+    """The first reason of an INVALID row, and the number of others."""
     first, *others = str(row["reason"]).split("; ")
     return f"{first} (and {len(others)} more)" if others else first
 
@@ -71,8 +71,8 @@ def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
 class Family:
     """Rows of one engine, profile, scene, kind of metric and standing, the worst first.
 
-    Cells that gave no answer make one family for each reason, of all metrics (``"*"``); INVALID ones for each receipt,
-    and for the certificate.
+    Cells without a result form one family for each reason, of all metrics (``"*"``); INVALID ones for each receipt, and
+    for the certificate.
     """
 
     mark: str
@@ -89,14 +89,14 @@ class Family:
 
     @property
     def where(self) -> str:
-        """Where its worst row stands: ``3-D n=20 at 4 iterations``."""
+        """Case of its worst row: ``3-D n=20 at 4 iterations``."""
         row = self.worst
         count = "" if row["iterations"] is None else f"at {row['iterations']} iterations"
         return " ".join(text for text in (f"{row['dimension']}-D", params_text(row["slot"]["params"]), count) if text)
 
     @property
     def line(self) -> str:
-        """One line: standing, who, what and how wrong its worst row is."""
+        """One line: standing, engine, metric and error of its worst row."""
         count = f"{len(self.rows)} checks"
         more = "" if len(self.rows) == 1 else f" ({count})" if self.mark in WHOLE else f", the worst of {count}"
         what = first_reason(self.worst) if self.mark == "invalid" else said(self.worst)
@@ -127,10 +127,10 @@ def families(rows: Iterable[Plain]) -> list[Family]:
 
 
 def refusals(rows: Sequence[Plain]) -> Iterator[str]:
-    """One line per engine and scene that it cannot run, with its reason: no fault of either.
+    """One line per engine and scene that it cannot run, with the reason.
 
-    An engine that is not installed has one line for all scenes. Of the catalogue's scenes the matrix says enough,
-    unless nothing else is there to be said.
+    An engine that is not installed has one line for all scenes. The matrix covers the catalogue's scenes, which are
+    listed only if there is nothing else.
     """
     found: dict[tuple[Any, ...], None] = {}
     nothing = all(row["outcome"] in REFUSED for row in rows)
@@ -142,12 +142,12 @@ def refusals(rows: Sequence[Plain]) -> Iterator[str]:
 
 
 def severity(row: Plain) -> float:
-    """|error| in units of the tolerance; 0 where there is no error or no tolerance to compare with."""
+    """|error| in units of the tolerance; 0 without an error or a tolerance."""
     if row["error"] is None or not row["tolerance"]:
         return 0.0
     return float(abs(row["error"]) / row["tolerance"])
 
 
 def alarms(rows: Sequence[Plain]) -> list[Family]:
-    """Families of what makes the command exit with 1."""
+    """Families with exit status 1 of the command."""
     return families([row for row in rows if is_alarming(row)])

@@ -1,4 +1,4 @@
-"""What moved over an engine's releases, in sentences with what its own notes say; ``make releases`` publishes them."""
+"""Changes over an engine's releases, in sentences with its own release notes; ``make releases`` publishes them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ build with that one change was made to prove it.
 
 
 def sentences(engine: str, steps: Sequence[Step]) -> list[str]:
-    """What moved in which release: a paragraph per release and explanation, a line in it per profile and scene."""
+    """Changes by release: a paragraph per release and explanation, with a line per profile and scene."""
     groups: dict[tuple[str, str], dict[str, dict[tuple[str, str], list[Step]]]] = {}
     for step in steps:
         change = step.family.first

@@ -1,4 +1,4 @@
-"""What there is: ``list``, ``describe`` and ``doctor``, as data; the command prints it as text or JSON."""
+"""Data of ``list``, ``describe`` and ``doctor``; the command prints it as text or JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def scenes() -> list[dict[str, Any]]:
 
 
 def suites() -> list[dict[str, Any]]:
-    """Cells of each scene that the suites ask of a profile with an iteration count at 1/240 s, and their parameters."""
+    """Cells of each scene in the suites, for a profile with an iteration count at 1/240 s, and their parameters."""
     out: list[dict[str, Any]] = []
     for canonical in CATALOGUE.values():
         asked = {suite: canonical.variations(suite) for suite in SUITES}
@@ -82,7 +82,7 @@ def checks() -> list[dict[str, Any]]:
 
 
 def _stated(canonical: CanonicalScene, scene: Scene) -> list[Check]:
-    """All checks of a scene, and that of its plane, which engines that live in space owe."""
+    """All checks of a scene, with that of planar motion for 3-D engines."""
     return [*canonical.checks(scene, QUICK_DT), *plane_of(canonical, scene, QUICK_DT)]
 
 
@@ -92,7 +92,7 @@ def describe(name: str) -> dict[str, Any]:
     Raises
     ------
     SceneError
-        If nothing is called that.
+        If nothing has that name.
     """
     if name in registry.names():
         return _describe_engine(name)
@@ -153,7 +153,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
 
 
 def _why_unmeasured(name: str) -> str:
-    """Why nothing is measured of an engine here and now; empty if it can be."""
+    """Why an engine cannot be measured here; empty if it can."""
     entry, engine = registry.entry(name), registry.find(name).engine
     if engine is None:
         return f"{name} is not installed here"
@@ -166,21 +166,21 @@ def _why_unmeasured(name: str) -> str:
 
 
 def _unset(row: Unset, why_not: str) -> dict[str, Any]:
-    """What is documented with nothing set, beside what the bare engine does now; why where nothing is measured."""
+    """Documented behaviour without any settings, and the measured one; or the reason without a measurement."""
     data: dict[str, Any] = {"what": row.what, "documented": row.documented, "value": row.value, "source": row.source}
     data |= {"measured": None, "agrees": None, "reason": why_not or "there is no experiment for it"}
     if why_not or row.measure is None:
         return data
     try:
         measured = float(row.measure())
-    except Exception as error:  # whatever a release makes of the calls
+    except Exception as error:  # a release may raise any error in the calls
         return data | {"reason": said_by(error)}
     agrees = None if row.value is None else measured == row.value or abs(measured - row.value) <= row.within
     return data | {"measured": measured, "agrees": agrees, "reason": ""}
 
 
 def doctor() -> dict[str, Any]:
-    """Health of the installation: engines, versions, caches, and whether our packages are really ours."""
+    """Health of the installation: engines, versions, caches, and the origin of our packages."""
     packages, problems = {}, []
     home = Path(__file__).resolve().parent.parent
     for name in ("reference_solver", "adapters", "validation", "reports"):

@@ -1,7 +1,7 @@
 """The verdict matrix: scenes x engines x profiles, one mark and a count per field.
 
-Rows at the profile's own iteration count are what a profile is judged by; a sweep over other counts shows what more
-or fewer would do and is counted apart from them.
+A profile is judged by the rows at its own iteration count; rows at other counts show the effect of more or fewer
+iterations and are counted separately.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from rich.text import Text
 from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
-from reports.wording import LABELS, MARKS, STATUS, mark_of
+from reports.wording import LABELS, MARKS, STATUS, mark_of, word_of
 from validation.metrics import OUT_OF_PLANE
 
-#: Colours support the words, they never replace them.
+#: Colours; they support the words and never replace them.
 STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
 ALARM = "bold white on red"
-#: Space before a scene [columns]: one of padding, and one that the box draws as its divider.
+#: Space before a scene [columns]: one of padding, and the box's divider.
 GAP = 2
-#: Marks of rows that have no verdict.
+#: Marks of rows without a verdict.
 UNJUDGED = ("unsupported", "none", "not_installed")
 
 
@@ -43,12 +43,12 @@ class Field:
 
     @property
     def judged(self) -> int:
-        """How many rows there is a verdict on."""
+        """Number of rows with a verdict."""
         return sum(n for mark, n in self.marks.items() if mark not in UNJUDGED)
 
     @property
     def missed(self) -> int:
-        """How many of them do not pass."""
+        """Number of those that do not pass."""
         return self.judged - self.marks["pass"]
 
     @property
@@ -62,7 +62,7 @@ class Field:
 
     @property
     def short(self) -> str:
-        """The same where there is little room: ``3/24 fail``."""
+        """Short form: ``3/24 fail``."""
         return self.text.replace(" of ", "/", 1)
 
 
@@ -75,7 +75,7 @@ class Matrix:
     fields
         Rows at the profile's own iteration count.
     swept
-        Rows at iteration counts that were asked for.
+        Rows at other iteration counts.
     counts
         Those iteration counts by scene.
     """
@@ -107,7 +107,7 @@ def matrix_of(rows: Iterable[Mapping[str, Any]]) -> Matrix:
 
 
 def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
-    """One line for each profile that is shown and in no ranking: what it is."""
+    """One line for each profile that is shown but not ranked: its meaning."""
     lines = []
     for engine, profile in columns:
         told = facts(engine)
@@ -117,9 +117,9 @@ def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Which profiles' planar scenes leave their plane, in how many cells, the worst; one line, or none.
+    """Profiles whose planar scenes leave the plane, number of cells, and the worst; one line, or none.
 
-    All other rows of such a cell are what is seen of it in the plane: one that passes is not the whole motion.
+    All other rows of such a cell measure the motion in the plane only, even if they pass.
     """
     cells: dict[tuple[str, str], list[tuple[bool, float, str]]] = defaultdict(list)
     for row in rows:
@@ -135,14 +135,15 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(told)}"] if told else []
 
 
-def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[Table]:
+def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:
     """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
 
     Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table. A profile
-    with settings of a user's own has a line for each of them where its name leaves no room for a scene.
+    with settings of a user's own has a line for each of them where its name leaves no room for a scene. With ``roles``
+    what a profile is stands beside its first line, where its name does not say so.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
-    body = list(_body(matrix, scenes, versions))
+    body = list(_body(matrix, scenes, versions, roles))
     texts, wide = _texts(scenes, body, short=False)
     if max((len(label) for label, _ in body), default=0) + sum(wide) + GAP * len(wide) > width:
         texts, wide = _texts(scenes, body, short=True)
@@ -153,13 +154,13 @@ def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int) -> list[T
 
 
 def _texts(scenes: Sequence[str], body: Sequence[Line], short: bool) -> tuple[list[list[Text]], list[int]]:
-    """What the fields of each line say, and the width of each scene's column."""
+    """Texts of the fields of each line, and the width of each scene's column."""
     texts = [[_styled(field, short) for field in fields] for _, fields in body]
     return texts, [max([len(scene), *(len(row[k]) for row in texts if row)]) for k, scene in enumerate(scenes)]
 
 
 def _chunks(widths: Sequence[int], room: int) -> Iterator[list[int]]:
-    """Indices of scenes that fit beside each other, each with its `GAP`: a count cut in half would be another count."""
+    """Indices of scenes that fit beside each other, each with its `GAP`, so that no count is cut."""
     chosen: list[int] = []
     for k, wide in enumerate(widths):
         if chosen and sum(widths[j] + GAP for j in chosen) + wide + GAP > room:
@@ -183,24 +184,27 @@ def _table(
     return table
 
 
-#: Label of a line and its fields, one per scene; none for the line that names an engine.
+#: Label of a line and its fields, one per scene; none for the line with an engine's name.
 Line = tuple[str, tuple[Field | None, ...]]
 
 
-def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str]) -> Iterator[Line]:
+def _body(matrix: Matrix, scenes: Sequence[str], versions: Mapping[str, str], roles: bool) -> Iterator[Line]:
     for engine in dict.fromkeys(engine for engine, _ in matrix.columns):
         yield f"{engine} {_version(versions.get(engine, ''))}".strip(), ()
         profiles = [profile for name, profile in matrix.columns if name == engine]
         refused = _never_asked(matrix, engine)
         for profile in profiles:
             dimensions = [d for d in sorted({d for _, d in matrix.lines}) if d not in refused]
-            yield from _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}")
+            role = f" ({word_of(engine, profile)})" if roles and word_of(engine, profile) else ""
+            for label, fields in _lines(matrix.fields, scenes, (engine, profile), dimensions, f"  {profile}"):
+                yield label + role, fields
+                role = ""
         for dimension in refused:
             yield from _lines(matrix.fields, scenes, (engine, profiles[0]), [dimension], "  every profile")
 
 
 def _never_asked(matrix: Matrix, engine: str) -> list[int]:
-    """Dimensions in which an engine cannot be asked for anything."""
+    """Dimensions in which an engine can run no scene."""
     found = []
     for dimension in sorted({d for _, d in matrix.lines}):
         own = [f for (line, column), f in matrix.fields.items() if line[1] == dimension and column[0] == engine]
@@ -212,7 +216,7 @@ def _never_asked(matrix: Matrix, engine: str) -> list[int]:
 def _lines(
     fields: Mapping[Any, Field], scenes: Sequence[str], column: tuple[str, str], dimensions: Sequence[int], label: str
 ) -> Iterator[Line]:
-    """One line per group of dimensions that say the same."""
+    """One line per group of dimensions with equal fields."""
     groups: dict[tuple[Any, ...], list[int]] = defaultdict(list)
     found: dict[tuple[Any, ...], tuple[Field | None, ...]] = {}
     for dimension in dimensions:
@@ -226,7 +230,7 @@ def _lines(
 
 
 def _version(version: str) -> str:
-    """Without the digits of a local build, which say nothing to a reader."""
+    """Version without the digits of a local build."""
     return version.partition("+")[0]
 
 
@@ -238,7 +242,7 @@ def _styled(field: Field | None, short: bool) -> Text:
 
 
 def sweeps_of(matrix: Matrix) -> list[str]:
-    """One line per scene whose iterations were swept: checks that fail, of those judged, by profile."""
+    """One line per scene with other iteration counts: failed of judged checks, by profile."""
     found = []
     for scene, counts in matrix.counts.items():
         said = []
@@ -257,7 +261,7 @@ def sweeps_of(matrix: Matrix) -> list[str]:
 
 
 def legend(matrix: Matrix) -> str:
-    """What the numbers count, and the words beside them that occur."""
+    """Explanation of the numbers and of the words that occur."""
     marks = {mark for field in matrix.fields.values() for mark in field.marks}
     said = ["A check is one measured quantity of one case; it fails outside its tolerance."]
     if "invalid" in marks:
@@ -267,7 +271,7 @@ def legend(matrix: Matrix) -> str:
     return " ".join(said)
 
 
-#: What the less obvious of the words of `reports.wording.STATUS` mean.
+#: Meaning of the less obvious words of `reports.wording.STATUS`.
 MEANT = {
     "known": "cause on record",
     "explained": "the engine's contact model predicts them",
@@ -277,7 +281,7 @@ MEANT = {
 
 
 def status_of(matrix: Matrix) -> str:
-    """Regression status: how many failed checks are expected and why, and how many are not; empty if none fails."""
+    """Regression status: numbers of expected failures by reason, and of unexpected ones; empty if none fails."""
     marks: Counter[str] = Counter()
     for own in (*matrix.fields.values(), *matrix.swept.values()):
         marks.update(own.marks)
@@ -289,5 +293,5 @@ def status_of(matrix: Matrix) -> str:
 
 
 def versions_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Engine -> version that ran."""
+    """Engine -> version of the run."""
     return {row["engine"]: row["engine_version"] for row in rows if row["engine_version"]}

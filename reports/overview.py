@@ -1,8 +1,8 @@
-"""The first look at a run of many scenes: one matrix of families that fits a screen, and an answer per family.
+"""Overview of a run of many scenes: one matrix of families that fits on a screen, and an answer per family.
 
-A matrix of forty scenes is two hundred lines on a terminal of eighty columns, and its answers five hundred. Where the
-scenes of a run do not fit a screen (`FIRST_LOOK`), families of scenes stand in their place; ``crosscheck show --all``
-prints every scene, and so does the report.
+A matrix of forty scenes has two hundred lines on a terminal of eighty columns, and its answers five hundred. If the
+scenes of a run do not fit on a screen (`FIRST_LOOK`), families of scenes replace them; ``crosscheck show --all`` and
+the report show every scene.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from adapters.registry import is_ranked
 from reports.answers import FIXES, Answer, answers, configured
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
-from reports.wording import MARKS, plural
+from reports.wording import MARKS, plural, word_of
 from validation.canonical import FAMILIES
 from validation.posed import resolve
 
 Plain = Mapping[str, Any]
-#: Lines of a terminal that are looked at without scrolling.
+#: Lines of a terminal without scrolling.
 FIRST_LOOK = 30
-#: Profiles that are named in a line of who is nearest.
+#: Largest number of profiles in a line of the nearest ones.
 NEAREST = 3
 
 
@@ -43,13 +43,13 @@ def families_of(rows: Sequence[Plain]) -> dict[str, list[str]]:
 
 
 def by_family(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Matrix:
-    """Matrix with a family in the place of its scenes; dimension 0 stands for all of them together."""
+    """Matrix of families instead of scenes; dimension 0 means all together."""
     family = {scene: name for name, scenes in families.items() for scene in scenes}
     return matrix_of({**row, "scene": family[row["scene"]], "dimension": 0} for row in rows)
 
 
-def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
-    """Terminal table: a line per engine and profile, a column per family, headings a word a line."""
+def table_of(matrix: Matrix, families: Sequence[str], roles: bool = False) -> Table:
+    """Terminal table: a line per engine and profile, with its role if asked; a column per family, a word a line."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
     table.add_column("engine,\nprofile", no_wrap=True)
     for name in families:
@@ -58,7 +58,8 @@ def table_of(matrix: Matrix, families: Sequence[str]) -> Table:
         table.add_row(Text(engine, style="bold"))
         for column in (column for column in matrix.columns if column[0] == engine):
             fields = [matrix.fields.get(((name, 0), column)) for name in families]
-            name = column[1].replace("+", "\n    +")  # a user's own settings, a line each
+            role = f" ({word_of(*column)})" if roles and word_of(*column) else ""
+            name = column[1].replace("+", "\n    +") + role  # a user's own settings, a line each
             table.add_row(Text(f"  {name}"), *(_cell(field) for field in fields))
     return table
 
@@ -76,7 +77,7 @@ def _cell(field: Field | None) -> Text:
 
 
 def share(part: float, whole: float) -> str:
-    """Per cent without digits; what is not all of it, or not nothing, never reads as if it were."""
+    """Per cent without digits; 0 % and 100 % only for exactly none and all."""
     per_cent = 100.0 * part / whole
     if 0.0 < per_cent < 1.0:
         return "<1 %"
@@ -84,7 +85,7 @@ def share(part: float, whole: float) -> str:
 
 
 def legend(matrix: Matrix) -> str:
-    """What the numbers and signs mean, of those that occur."""
+    """Explanation of the numbers and signs that occur."""
     marks = {field.mark for field in matrix.fields.values()}
     said = ["Percentage of checks that fail, over all scenes of a group, 2-D and 3-D."]
     if marks & set(ALARMING):
@@ -95,7 +96,7 @@ def legend(matrix: Matrix) -> str:
 
 
 def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
-    """Family, and who passes every row of all its scenes; then who else comes nearest."""
+    """Family, and the profiles that pass every row of all its scenes; else the nearest ones."""
     matrix = by_family(rows, families)
     asked: dict[tuple[str, tuple[str, str]], set[str]] = defaultdict(set)
     family = {scene: name for name, scenes in families.items() for scene in scenes}
@@ -111,20 +112,20 @@ def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Ite
 
 
 def _named(column: tuple[str, str], asked: int, scenes: int) -> str:
-    """``engine/profile``, with how many of the scenes it could be asked where that is not all of them."""
+    """``engine/profile``, with the number of scenes that it can run if not all."""
     return "/".join(column) + (f" ({asked} of {plural(scenes, 'scene')})" if asked < scenes else "")
 
 
 def shortened(answer: Answer) -> Answer:
-    """The answer without the settings that would do, where a whole profile does: ``explain`` has them."""
+    """The answer without single settings if a whole profile fixes it: ``explain`` shows them."""
     cure, _, _ = answer.cure.partition("; ")
     return replace(answer, cure=cure.partition(", by ")[0]) if re.match(FIXES, cure) else answer
 
 
 def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> tuple[list[Answer], int]:
-    """Of each engine and family the answer about the scene most rows of which fail, and how many there are in all.
+    """For each engine and family the answer about the scene with most failed rows, and the number of answers.
 
-    Only profiles as an engine is shipped: what `reports.answers` says of others is what they make worse.
+    Only for profiles as shipped: answers of `reports.answers` about others list only worse results.
     """
     found = answers(rows)
     family = {scene: name for name, scenes in families.items() for scene in scenes}

@@ -1,8 +1,8 @@
 """Colours and marks in pictures: one colour per engine, from its own folder, and one shape per role of a profile.
 
-Colours lie in the band of luminance that keeps a contrast of 3:1 on white and on the dark page alike, and stay apart
-under the three common kinds of colour blindness (`tests/reports/test_palette.py` computes both). Shape and dash carry
-the profile, so that no mark is told by colour alone.
+The luminance of colours has a contrast of 3:1 both on white and on the dark page, and they are distinct in the three
+common kinds of colour blindness (`tests/reports/test_palette.py` computes both). Shape and dash show the profile, so
+colour is never the only sign.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from functools import cache
 from adapters import registry
 from adapters.engine import Role
 
-#: Engines that bring no colour, in the order of their names.
+#: Colours of engines without their own, in the order of their names.
 OTHERS = ("#8a7a00", "#7a6cf0", "#d4504e", "#5d8a99")
-#: The truth is no engine and has no colour of its own.
+#: Colour of the truth, which is no engine.
 TRUTH = "currentColor"
 #: Paper and ink of the page, light and dark.
 PAPER = {"light": "#ffffff", "dark": "#15181d"}
 INK = {"light": "#1c2128", "dark": "#e3e6ea"}
-#: Where everything fails: as strong as a contrast of 4.5:1 with the ink on it allows.
+#: Colour for 100 % failed: as strong as a contrast of 4.5:1 with the ink allows.
 HOT = {"light": "#ec6a47", "dark": "#a5331c"}
 
 #: Role of a profile -> (point shape of Vega, dash pattern of its line).
@@ -32,13 +32,13 @@ MARKS: Mapping[Role, tuple[str, tuple[int, ...]]] = {
     "one": ("triangle-up", (2, 2)),
     "matched": ("cross", (8, 2, 2, 2)),
 }
-#: Roles whose marks are hollow: nobody has tuned them. All others are filled.
+#: Roles with hollow marks: they are not tuned. All others are filled.
 HOLLOW: frozenset[Role] = frozenset({"shipped", "textbook"})
 OTHER_MARK: tuple[str, tuple[int, ...]] = ("triangle-down", (1, 2))
 
 
 def colours_of(engines: list[str]) -> dict[str, str]:
-    """Colour of each engine; those that bring none share `OTHERS` in the order of their names."""
+    """Colour of each engine; engines without their own share `OTHERS` in the order of their names."""
     plain = sorted(name for name in engines if not _own_colour(name))
     given = {name: OTHERS[k % len(OTHERS)] for k, name in enumerate(plain)}
     return {name: _own_colour(name) or given[name] for name in engines}
@@ -67,13 +67,13 @@ def _mark_of(profile: str) -> tuple[str, tuple[int, ...]]:
 
 @cache
 def role_of(profile: str) -> Role | None:
-    """Role that the first engine gives a profile of this name: pictures tell profiles by name."""
+    """Role of a profile of this name in the first engine: pictures distinguish profiles by name."""
     told = (registry.facts(engine) for engine in registry.names())
     return next((facts.roles[profile] for facts in told if facts and profile in facts.roles), None)
 
 
 def heat(scheme: str, twentieths: int) -> str:
-    """Colour of a field in which so many twentieths fail: one hue from the paper on, never faint where any fails."""
+    """Colour of a field by twentieths of failed checks: one hue from the paper on, visible for any failure."""
     ends = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in (PAPER[scheme], HOT[scheme])]
     part = 0.15 + 0.85 * twentieths / 20 if twentieths else 0.0
     return "#" + "".join(f"{round(low + part * (high - low)):02x}" for low, high in zip(*ends, strict=True))

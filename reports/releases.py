@@ -1,4 +1,4 @@
-"""What releases of an engine answered, as text and Markdown: a line per release, then what moved in which."""
+"""Results of an engine's releases, as text and Markdown: a line per release, then the changes in each."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from validation.judging.verdicts import Physics
 from validation.releases.bisection import Found
 from validation.releases.history import Step, Told, cell_of, mended, sentence
 
-#: Most families of changes that the terminal shows of one release; --json and --markdown have all.
+#: Largest number of families of changes on the terminal for one release; --json and --markdown have all.
 SHOWN = 6
 
 
 def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Version and counts of rows: fail, without an answer, pass although listed for other releases, moved; the pace."""
+    """Version and counts of rows: failed, no result, passed although listed for others, changed; the pace."""
     if told.reason:
         return (told.version, "-", "-", "-", "-", "-", told.reason)
     moved = sum(len(step.family.changes) for step in steps if step.after == told.version)
@@ -34,18 +34,18 @@ def _line(told: Told, first: Told, steps: Sequence[Step]) -> tuple[str, ...]:
     return (told.version, *map(str, counts), "-" if pace is None else f"x{number(pace, 3)}", note)
 
 
-#: Headings of `_line`, and what is said of the pace where there is one.
+#: Headings of `_line`, and the text of a pace.
 HEADINGS = ("release", "failed", "no result", "fixed", "changed", "time", "")
 PACE = "time: relative to the first release; median over scenes, each relative to a Python loop on the same machine"
 
 
 def _first(releases: Sequence[Told]) -> Told:
-    """The first release that was timed, whose pace is one."""
+    """The first timed release, with a pace of 1."""
     return next((told for told in releases if told.times), releases[0])
 
 
 def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, out: Path | None = None) -> None:
-    """A line per release, then what moved in each: its families of changes, the most serious first.
+    """A line per release, then the changes in each: families of changes, the most serious first.
 
     ``out`` is the folder in which the commands below find the results; None for the usual one.
     """
@@ -80,7 +80,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
 
 
 def mark(change: Change) -> str:
-    """``flip``, ``moved`` or what else it is, in one word."""
+    """``flip``, ``moved`` or another kind of change, in one word."""
     return {Kind.FLIP: "flip", Kind.OUTCOME: "ended", Kind.ERROR: "moved"}.get(change.kind, "other")
 
 
@@ -92,7 +92,7 @@ def as_table(releases: Sequence[Told], steps: Sequence[Step]) -> str:
 
 
 def as_markdown(releases: Sequence[Told], steps: Sequence[Step]) -> str:
-    """Two tables: releases, and what moved."""
+    """Two tables: releases, and changes."""
     out = [as_table(releases, steps)]
     if steps:
         out += ["| in | after | checks | what changed | by |", "|---|---|---|---|---|"]
@@ -123,7 +123,7 @@ def as_json(releases: Sequence[Told], steps: Sequence[Step]) -> str:
 
 
 def found_as_plain(found: Found, engine: str, versions: Sequence[str], commands: Sequence[str]) -> dict[str, Any]:
-    """What a bisection found, as plain data."""
+    """Result of a bisection, as plain data."""
     return {
         "engine": engine,
         "before": versions[found.before],
@@ -139,7 +139,7 @@ def found_as_plain(found: Found, engine: str, versions: Sequence[str], commands:
 
 
 def found_as_text(plain: dict[str, Any]) -> str:
-    """What a bisection found, in sentences."""
+    """Result of a bisection, in sentences."""
     change = plain["change"]
     where = f"{change['profile']} {change['scene']} {plain['cell']}"
     lines = [

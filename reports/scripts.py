@@ -1,4 +1,4 @@
-"""A cell as a text that needs its engine alone, for a bug report: what is asked and true on top, then the run itself.
+"""A cell as a script that needs only its engine, for a bug report: the case and its truth, then the run itself.
 
 The run is written by the engine's own folder (`adapters.engine.Engine.exports`).
 """
@@ -17,7 +17,7 @@ from adapters.stepping import posed_for, step_count
 from reports.wording import profile_words, quantity
 from validation.cells import Slot, format_dt, prepare, settings_of
 
-#: Checks that a script names; a column of twenty has hundreds.
+#: Largest number of checks in a script; a column of twenty has hundreds.
 MOST_CHECKS = 12
 #: Longest line of the head [characters].
 WIDTH = 200
@@ -29,7 +29,7 @@ def written(slot: Slot, form: str) -> str:
     Raises
     ------
     EngineError, SceneError
-        If the engine is missing, refuses the scene, or does not write that format; or if the slot is wrong.
+        If the engine is missing, refuses the scene, or has no such format; or if the slot is wrong.
     """
     engine, prepared = load(slot.engine), prepare(slot)
     write = engine.exports.get(form)
@@ -53,12 +53,12 @@ def written(slot: Slot, form: str) -> str:
 
 
 def imported(text: str) -> set[str]:
-    """Names of the modules that a script imports: a file of that name would be imported in their place."""
+    """Names of the modules imported by a script: a file of that name would be imported instead."""
     return set(re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE))
 
 
 def _head(slot: Slot) -> Iterator[str]:
-    """What a reader who has never seen the project needs to know."""
+    """The information for a reader who does not know the project."""
     prepared = prepare(slot)
     canonical = prepared.canonical
     asked = " ".join([canonical.name, slot.params_text()]).strip()

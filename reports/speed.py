@@ -23,12 +23,12 @@ from validation.posed import primary_of
 from validation.records.store import Run, Store
 
 Tables = dict[str, pd.DataFrame]
-#: Levels that fit a terminal.
+#: Levels that fit into a terminal.
 SHOWN_LEVELS = (1e-1, 1e-2, 1e-3, 1e-5)
 
 
 def tables_of(store: Store, run: Run, observations: Sequence[Observation] | None = None) -> Tables:
-    """All tables of a bench run by name; ``observations`` are its own, where they were read already."""
+    """All tables of a bench run by name; ``observations`` are its own, if already read."""
     points, scaling = work.work_points(store, run, observations), reading.scaling(store, run)
     return {
         "work_points": points,
@@ -43,7 +43,7 @@ def tables_of(store: Store, run: Run, observations: Sequence[Observation] | None
 
 
 def plain(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows as JSON-ready data; what is not a number becomes null."""
+    """Rows as JSON-ready data; NaN becomes null."""
     return [{str(k): _plain(v) for k, v in row.items()} for row in table.to_dict("records")]
 
 
@@ -78,8 +78,8 @@ def raw_of(store: Store, run: Run) -> pd.DataFrame:
 def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], float]:
     """Cost [s/s] of the largest step from which on a profile passes every check of its bench cells.
 
-    Keys are (scene, dimension, engine, profile). A step counts only if every smaller one passes as well: what passes
-    once by luck is no recommendation.
+    Keys are (scene, dimension, engine, profile). A step counts only if every smaller one passes as well: a single pass
+    may be luck.
     """
     passes: dict[tuple[Any, ...], dict[float, bool]] = defaultdict(lambda: defaultdict(lambda: True))
     observations = store.observations(run)
@@ -103,7 +103,7 @@ def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], 
 
 
 def physics(observation: Observation) -> list[dict[str, Any]]:
-    """Rows of a bench's cell that say PASS or FAIL and nothing else: standings belong to the run, and cost time."""
+    """Rows of a bench's cell with PASS or FAIL only: standings belong to the run, and cost time."""
     slot = observation.slot
     same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
     rows: list[dict[str, Any]] = []
@@ -117,7 +117,7 @@ def physics(observation: Observation) -> list[dict[str, Any]]:
 
 
 def key(ranked: bool) -> str:
-    """What the marks in a table of costs mean; where no engine is ranked there are fewer of them."""
+    """Legend of the marks in a table of costs; a table without ranks has fewer."""
     ranks = "*: cheapest; =: no measurable difference from the cheapest; " if ranked else ""
     return f"{ranks}-: error not reached; 1/240 x30: time step, iterations"
 
@@ -125,7 +125,7 @@ def key(ranked: bool) -> str:
 def level_tables(points: pd.DataFrame, ranked: bool = True) -> list[Table]:
     """One table per scene and dimension: cost at equal error; of each level the cheapest and its ties are marked.
 
-    Who cannot be asked there (a planar engine in space) is in none: there is nothing to compare.
+    Engines that cannot run there (a planar engine in 3-D) are in none.
     """
     levels = work.time_at_equal_error(points, SHOWN_LEVELS)
     out = []
@@ -238,12 +238,13 @@ def scaling_table(scaling: pd.DataFrame, fits: pd.DataFrame) -> Table:
     return table
 
 
-#: Wall over CPU time of a unit above which something else had its core, and the share of such units that spoils ranks.
+#: Wall over CPU time of a unit above which another process used its core, and the share of such units that makes ranks
+#: invalid.
 TAKEN, SPOILT = 1.2, 0.1
 
 
 def busy(timings: pd.DataFrame) -> str:
-    """Warning if the machine was busy while it timed, else empty: a core of one's own has equal wall and CPU time."""
+    """Warning if the machine was busy during timings, else empty: on a free core wall and CPU time are equal."""
     used = timings[timings["void"] == ""] if len(timings) else timings
     if len(used) == 0:
         return ""
@@ -257,7 +258,7 @@ def busy(timings: pd.DataFrame) -> str:
 
 
 def quality_line(timings: pd.DataFrame) -> str:
-    """How far the timings can be trusted, in one line."""
+    """Quality of the timings, in one line."""
     used = timings[timings["void"] == ""]
     if len(used) == 0:
         return "nothing was timed"

@@ -1,4 +1,4 @@
-"""How far engines are apart on a scene from a file, in lines for the terminal (`validation.questions.spread`)."""
+"""Differences between engines on a scene from a file, in lines for the terminal (`validation.questions.spread`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from validation.questions.spread import Spread
 
 
 def spread_lines(found: Sequence[Spread]) -> Iterator[str]:
-    """A heading per scene and dimension, then a line per engine and profile, the farthest first."""
+    """A heading per scene and dimension, then a line per engine and profile, the largest difference first."""
 
     def posed(each: Spread) -> tuple[str, int]:
         return each.scene, each.dimension

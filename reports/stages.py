@@ -1,4 +1,4 @@
-"""Stages of a long command on stderr: what is being done, how long it will take, how long it took."""
+"""Stages of a long command on stderr: name, expected time, actual time."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ def clock(seconds: float) -> str:
 
 
 def say(console: Console, text: str) -> None:
-    """One line, never broken and never read as markup."""
+    """One line, without wrapping and markup."""
     console.print(Text(text), soft_wrap=True)
 
 
 def _busy() -> str:
-    """What a stage that takes so long on idle cores must add where they are not idle."""
+    """Addition to the expected time of a stage if cores are not idle."""
     load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0, os.cpu_count() or 1
     return f"; longer now, the machine is busy (load {load:.0f} on {cores} cores)" if load > 0.5 * cores else ""
 
 
 @contextmanager
 def stage(console: Console, name: str) -> Iterator[None]:
-    """Say how long the block took, unless it fails."""
+    """Print the time of the block, unless it fails."""
     started = time.monotonic()
     yield
     say(console, f"{name}: {clock(time.monotonic() - started)}")
 
 
 def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
-    """Compile what the engines of these cells compile at their first steps; no clock and no limit runs yet.
+    """Compile the code that the engines of these cells compile at their first steps, outside timings and time limits.
 
-    Returns what had to be compiled, an engine and a dimension each.
+    Returns engine and dimension of each compilation.
     """
     warming = Warming(slots)
     names: list[str] = []

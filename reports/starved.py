@@ -1,6 +1,6 @@
-"""Picture of what too few sweeps do to tall stacks: ``python -m reports.starved FOLDER``.
+"""Picture of tall stacks with too few sweeps: ``python -m reports.starved FOLDER``.
 
-A tile per height and number of sweeps, coloured by what the top box has sunk within 4 s at 60 Hz, in its own height.
+A tile per height and number of sweeps, coloured by the sinking of the top box within 4 s at 60 Hz, in box heights.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from reference_solver.simulation import Simulation
 from reports.palette import INK, PAPER
 from reports.pictures import labelled
 
-#: Sunk depths between which colours run [box heights]. Below, the slop of a tenth of a millimetre per contact counts.
+#: Range of sunk depths for the colours [box heights]. Below, the slop of a tenth of a millimetre per contact counts.
 RANGE = (1e-3, 0.2)
-#: Pale to dark, read as little to much also in grey.
+#: Pale to dark, also readable in grey.
 COLOURS = {"light": ("#eef3f8", "#8d2f1f"), "dark": ("#1d2733", "#ff9b7d")}
 TILE = 62
 #: Boxes in the stack, and sweeps per step.
@@ -43,7 +43,7 @@ class Starved:
     height, sweeps
         Boxes, and sweeps per step.
     sunk
-        What the top box has lost of its height [box heights].
+        Sinking of the top box [box heights].
     leaning
         Largest angle of a box [rad].
     load
@@ -61,7 +61,7 @@ class Starved:
 
 
 def starved_stack(height: int, sweeps: int, dt: float = 1.0 / 60.0, duration: float = 4.0) -> Starved:
-    """Let exactly placed boxes stand for ``duration`` [s] under `Settings.classical` with ``sweeps`` sweeps a step."""
+    """Simulate exactly placed boxes for ``duration`` [s] with `Settings.classical` and ``sweeps`` sweeps per step."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     boxes = [Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, 0.5 + i, 0.0)) for i in range(height)]
     simulation = Simulation(

@@ -1,8 +1,8 @@
-"""What the terminal says of a run: the matrix first, then the short answers, then where the details are.
+"""Summary of a run for the terminal: the matrix, then the short answers, then commands for details.
 
 matrix -> unexpected results (if any) -> best engine per scene -> what is wrong and what fixes it -> commands
 
-More scenes than fit a screen are shown by group (`reports.overview`), unless every one is asked for.
+If the scenes do not fit on a screen, groups are shown (`reports.overview`), unless all are requested.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import Matrix, leaving, legend, matrix_of, status_of, sweeps_of, tables_of, unranked, versions_of
-from reports.wording import at, plural
+from reports.wording import at, plural, roles_line
 
 Plain = Mapping[str, Any]
-#: Families of alarms that are named one by one; `crosscheck findings --new` names all.
+#: Largest number of alarm families in the list; `crosscheck findings --new` lists all.
 MOST_ALARMS = 6
-#: Lines of a table above its first row.
+#: Number of lines of a table above its first row.
 HEAD = 2
 
 
@@ -40,25 +40,36 @@ def show(
     out: Path | None = None,
     run: str = "",
 ) -> None:
-    """Print everything about a run that a first look wants, fit to the width of ``console``; of ``every`` scene.
+    """Print the summary of a run, fitted to the width of ``console``; with ``every``, of each scene.
 
-    ``out`` is where its results lie, and ``run`` its id if it is not the latest: the commands that are named get both.
+    ``out`` is the folder of its results, and ``run`` its id if it is not the latest: printed commands contain both.
     """
     place = at(out, run)
     matrix = matrix_of(rows)
-    tables = tables_of(matrix, versions_of(rows), console.width)
+    tables, wider = (tables_of(matrix, versions_of(rows), console.width, roles) for roles in (False, True))
     families = overview.families_of(rows)
-    short = overview.table_of(overview.by_family(rows, families), list(families))
+    grouped = overview.by_family(rows, families)
+    short = overview.table_of(grouped, list(families))
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
-    fits = console.measure(short, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
-    if long and fits and not every:
-        _show_families(rows, families, short, console, place)
+    if long and _fits(short, console) and not every:
+        told = overview.table_of(grouped, list(families), roles=True)
+        roles = [] if _fits(told, console) else [roles_line(matrix.columns)]
+        _show_families(rows, families, short if roles else told, roles, console, place)
         _where(rows, console, files, place, {"crosscheck show --all": "the same for every scene"})
         return
-    for table in tables:
+    # What profiles are stands beside them where that makes no further table, else in a line below.
+    roles = [roles_line(matrix.columns)] if len(wider) > len(tables) else []
+    for table in tables if roles else wider:
         console.print(table)
     explained = [legend(matrix)] if any(row["outcome"] not in REFUSED for row in rows) else []
-    for line in (*explained, *_beside(matrix), *sweeps_of(matrix), *unranked(matrix.columns), *leaving(rows)):
+    for line in (
+        *explained,
+        *filter(None, roles),
+        *_beside(matrix),
+        *sweeps_of(matrix),
+        *unranked(matrix.columns),
+        *leaving(rows),
+    ):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
         console.print(_folded(line, console, ""))
@@ -69,13 +80,18 @@ def show(
 
 
 def _show_families(
-    rows: Sequence[Plain], families: Mapping[str, Sequence[str]], table: Table, console: Console, place: str
+    rows: Sequence[Plain],
+    families: Mapping[str, Sequence[str]],
+    table: Table,
+    roles: Sequence[str],
+    console: Console,
+    place: str,
 ) -> None:
-    """The same by family of scenes."""
+    """The same by family of scenes; ``roles`` says what profiles are, where the table does not."""
     console.print(table)
     matrix = matrix_of(rows)
     explained = overview.legend(overview.by_family(rows, families))
-    for line in (explained, *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
+    for line in (explained, *filter(None, roles), *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
     console.print(_folded(ran, console, ""), style="dim")
@@ -93,6 +109,11 @@ def _show_families(
         console.print(_folded(answer.line, console))
 
 
+def _fits(table: Table, console: Console) -> bool:
+    """Whether a table is no wider than the terminal."""
+    return console.measure(table, options=console.options.update(max_width=sys.maxsize)).maximum <= console.width
+
+
 def _beside(matrix: Matrix) -> list[str]:
     """The regression status in one line; none where nothing fails."""
     return list(filter(None, [status_of(matrix)]))
@@ -104,7 +125,7 @@ def _heading(text: str, console: Console) -> None:
 
 
 def _folded(text: str, console: Console, indent: str = "  ") -> Text:
-    """Text in lines of the console's width; later lines stand in by four more."""
+    """Text in lines of the console's width; later lines are indented by four more."""
     later = indent + "    "
     folded = textwrap.fill(
         text, console.width, initial_indent=indent, subsequent_indent=later, break_on_hyphens=False,
@@ -143,7 +164,7 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
 
 
 def _nothing_wrong(rows: Sequence[Plain]) -> str:
-    """What is said of a run in which no profile fails at its own iteration count."""
+    """Text for a run in which no profile fails at its own iteration count."""
     if all(row["outcome"] in REFUSED for row in rows):
         return "Nothing was judged: no engine of this run can run any of it"
     judged = [row for row in rows if row["tolerance"] is not None and row["outcome"] not in REFUSED]
@@ -176,7 +197,7 @@ def _where(
     whole = [(command + place, what) for command, what in commands]
     wide = max(len(command) for command, _ in whole)
     for command, what in whole:
-        # A command stays whole, to be copied: where its explanation has no room beside it, it stands above.
+        # A command is not broken, so it can be copied; without room beside it, its explanation comes above.
         if wide + max(len(other) for _, other in whole) + 4 <= console.width:
             console.print(Text(f"  {command:<{wide}}  {what}"))
         else:

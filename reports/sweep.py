@@ -1,4 +1,4 @@
-"""What the terminal prints of a sweep: how many cases pass every check, by engine; the rest is in its table."""
+"""Summary of a sweep for the terminal: number of cases that pass every check, by engine; details are in its table."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from reports.tables import grid
 
 
 def counted(found: pd.DataFrame) -> Table:
-    """Cells of every scene, engine and profile, and how many of them pass all that is judged."""
+    """Cells of every scene, engine and profile, and the number of cells that pass all judged checks."""
     shown = grid("engine/profile", "scene", "cases", "pass", "fail", "no result")
     for (engine, profile, scene, dimension), cells in found.groupby(
         ["engine", "profile", "scene", "dimension"], sort=False

@@ -1,4 +1,4 @@
-"""``list``, ``describe`` and ``doctor`` as tables for the terminal, fit to its width."""
+"""``list``, ``describe`` and ``doctor`` as tables for the terminal, fitted to its width."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from validation.cells import format_dt
 from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
-#: Scenes of a run that its line names; a quick suite of forty would take a screen of its own.
+#: Largest number of scenes in a run's line; a quick suite has forty.
 FEW = 4
-#: Said below facts that were measured without an adapter.
+#: Note below facts measured without an adapter.
 AFTERWARDS = (
-    "Chosen afterwards: the source leaves a value open, and it was chosen so that the measurement agrees. This "
-    "agreement is therefore no test. The conditions that the reason of a contradiction names were found afterwards too."
+    "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
+    "agreement is no test. The conditions in the reason of a contradiction were found afterwards too."
 )
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
@@ -43,7 +43,7 @@ LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def grid(*headings: str) -> Table:
-    """A table without frames; the first column keeps its words whole."""
+    """A table without frames; the first column does not break words."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 2, 0, 0))
     for k, heading in enumerate(headings):
         table.add_column(heading, no_wrap=k == 0, overflow="fold")
@@ -56,13 +56,13 @@ def _heading(text: str, console: Console) -> None:
 
 
 def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool = False) -> None:
-    """Print a listing of scenes, engines, checks or runs; of checks with their reasons if they are asked for."""
+    """Print a listing of scenes, engines, checks or runs; of checks with their reasons on demand."""
     columns = [(heading, name) for heading, name in LISTINGS[what] if reasons or name != "because"]
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
         told = {name: _field(entry, name) for _, name in columns}
-        if "because" in told:  # one reason after the other in a narrow column: told once
+        if "because" in told:  # equal reasons are printed once
             told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
         table.add_row(*map(Text, told.values()))
     console.print(table)
@@ -89,7 +89,7 @@ def _field(entry: Plain, name: str) -> str:
 
 
 def title_of(title: str) -> str:
-    """A run's title, of many scenes with the first few."""
+    """A run's title, with the first few of many scenes."""
     asked, options, narrowing = title.partition(" --")
     if len(scenes := asked.partition(": ")[2].split()) > FEW:
         asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
@@ -107,7 +107,7 @@ def described(data: Plain, console: Console) -> None:
 def _scene(data: Plain, console: Console) -> None:
     console.print(Text(f"{data['name']}, version {data['version']}: {data['title']}", style="bold"))
     for k, block in enumerate(re.split(r"\n[ \t]*\n", data["figure"].strip("\n"))):
-        drawn = block.startswith(" ")  # what is indented is drawn, the rest is said and folds
+        drawn = block.startswith(" ")  # indented lines are figures; other lines are wrapped
         if k:
             console.print()
         console.print(Text(block.rstrip() if drawn else " ".join(block.split())), soft_wrap=drawn)
@@ -171,7 +171,7 @@ def _engine(data: Plain, console: Console) -> None:
 
 
 def _unset(data: Plain, console: Console) -> None:
-    """Print what is documented of an engine with nothing set, beside what was measured of it just now."""
+    """Print the documented behaviour of an engine without any settings, and the measured one."""
     rows = data["unset"]
     if not rows:
         return
@@ -186,7 +186,7 @@ def _unset(data: Plain, console: Console) -> None:
 
 
 def _measured(row: Plain) -> str:
-    """What was measured with nothing set; that it is not what is documented, where it is not."""
+    """The measured behaviour without any settings, with a note if it differs from the documented one."""
     value = row["measured"]
     if value is None:
         return "-"
@@ -195,7 +195,7 @@ def _measured(row: Plain) -> str:
 
 
 def _said_of(fact: Plain) -> str:
-    """The cell that shows a fact with its number, the test that asserts it, or why nothing does."""
+    """The cell that shows a fact with its number, the test that asserts it, or the reason for neither."""
     chosen = f"; chosen afterwards: {fact['chosen']}" if fact["chosen"] else ""
     if not fact["scene"]:
         return str(fact["test"] or fact["unasked"]) + chosen
@@ -209,9 +209,9 @@ def _said_of(fact: Plain) -> str:
 
 
 def _settings(scenes: Mapping[str, Sequence[Plain]], console: Console) -> None:
-    """Print one line per setting and value; scenes are named below, once for all settings that go with them.
+    """Print one line per setting and value; scenes are listed below, once for all settings with the same ones.
 
-    Half a hundred names in a column leave none of a line's 80 characters for the reason beside them.
+    Fifty names in a column would leave no room in 80 characters for the reason.
     """
     found: dict[tuple[str, str, str], list[str]] = {}
     for scene, settings in scenes.items():
@@ -226,7 +226,7 @@ def _settings(scenes: Mapping[str, Sequence[Plain]], console: Console) -> None:
     for names, mark in marks.items():
         if mark:
             others = tuple(scene for scene in scenes if scene not in names)
-            # The fewer are named, and only once.
+            # The smaller set of scenes is listed, and only once.
             but = f"all but {marks.get(others, ', '.join(others))}"
             named = but if len(others) < len(names) else ", ".join(names)
             console.print(Padding(Text(f"{mark} {named}"), (0, 0, 0, 2)))
@@ -241,7 +241,7 @@ def _pairs(data: Plain, console: Console) -> None:
 
 
 def health(data: Plain, console: Console) -> None:
-    """Print what ``doctor`` found."""
+    """Print the results of ``doctor``."""
     machine = data["machine"]
     _pairs({**machine, "commit": data["commit"] or "-", "executable": data["executable"]}, console)
     console.print()
@@ -272,7 +272,7 @@ def health(data: Plain, console: Console) -> None:
 def sensitivity(
     entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], blind: Sequence[BlindSpot], console: Console
 ) -> None:
-    """Print from which size on every check and receipt sees a planted fault, what no check of a scene sees, and why."""
+    """Print the size from which each check and receipt notices a planted fault, faults noticed by no check, and why."""
     table = grid("check or property check", "smallest fault that it notices")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]

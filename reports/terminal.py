@@ -6,7 +6,12 @@ Names of scenes, reasons and settings come from files and plugins. Rich would re
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rich.console import Console
+from rich.text import Text
+
+from reports.wording import roles_line
 
 
 class _Terminal(Console):
@@ -19,3 +24,9 @@ class _Terminal(Console):
 def terminal(stderr: bool = False, width: int | None = None) -> Console:
     """Return a console on stdout, or on stderr, that reads no markup and no emoji codes in any text."""
     return _Terminal(stderr=stderr, width=width, markup=False, emoji=False)
+
+
+def print_roles(columns: Iterable[tuple[str, str]], console: Console) -> None:
+    """Print what the profiles of ``(engine, profile)`` are, once below tables that name them."""
+    if line := roles_line(columns):
+        console.print(Text(line, style="dim"), highlight=False)

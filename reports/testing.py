@@ -1,11 +1,11 @@
 """Checks as pytest items: ``pytest --crosscheck ENGINE --scenes bounce,slide`` gates an engine in its own repository.
 
-    PASS                        passed; a finding of other releases that passes here is reported as mended
+    PASS                        passed; a finding of other releases that passes here is reported as fixed
     FAIL, known or explained    xfailed, with the reason
     FAIL, new or drifted        failed; so does a finding of this release that passes (strict)
     no answer                   failed; UNSUPPORTED is skipped
 
-Loaded by `contact_crosscheck.pytest_configure`, only where it is asked for.
+Loaded by `contact_crosscheck.pytest_configure`, only on demand.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import pytest
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.scene import SceneError
-from reports.wording import measured, plural, quantity, reproduce
+from reports.wording import measured, plural, profiles_called, quantity, reproduce
 from validation.catalogue import matching
 from validation.cells import Slot, plane_of, slot_from_dict
 from validation.judging.rows import Row, rows_of
@@ -34,7 +34,7 @@ class Failed(Exception):
 
 
 class Plugin:
-    """Adds the items, and says at the end what was mended."""
+    """Adds the items, and reports fixed findings at the end."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.engine = str(config.getoption("--crosscheck"))
@@ -51,17 +51,17 @@ class Plugin:
         self.mended: list[str] = []
 
     def pytest_report_header(self) -> str:
-        """What is checked."""
-        return f"crosscheck: {self.engine} {self.version}, {plural(len(self.slots), 'cell')}"
+        """Line with the engines and scenes."""
+        return f"crosscheck: {self.engine} {self.version}, {plural(len(self.slots), 'case')}"
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, session: pytest.Session, items: list[pytest.Item]) -> None:
-        """Add an item per check behind the tests that were collected, before any of them is deselected."""
+        """Add an item per check after the collected tests, before deselection."""
         cells = _Cells.from_parent(session, name="crosscheck", nodeid="crosscheck", plugin=self)
         items.extend(cells.collect())
 
     def row_of(self, slot: Slot, metric: str) -> Row | None:
-        """Row of a check; the cells of its scene run when the first of them is asked for."""
+        """Row of a check; the cells of its scene run with the first of them."""
         if slot.scene not in self.ran:
             self.ran.add(slot.scene)
             own = [each for each in self.slots if each.scene == slot.scene]
@@ -70,7 +70,7 @@ class Plugin:
         return self.rows.get((slot, metric))
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Name what passes here although it is listed for other releases."""
+        """List findings of other releases that pass here."""
         if self.mended:
             terminalreporter.section("crosscheck: fixed")
             for line in self.mended:
@@ -80,7 +80,7 @@ class Plugin:
 def _slots(engine: str, scenes: str, profiles: str) -> list[Slot]:
     names = [scene.name for word in (scenes or "*").split(",") for scene in matching(word.strip())]
     chosen = [word.strip() for word in profiles.split(",") if word.strip()]
-    return slots(Request(list(dict.fromkeys(names)), [engine], chosen))
+    return slots(Request(list(dict.fromkeys(names)), [engine], profiles_called(chosen, [engine])))
 
 
 class _Cells(pytest.Collector):
@@ -114,7 +114,7 @@ class _Check(pytest.Item):
         self.extra_keyword_matches |= {"crosscheck", slot.scene, slot.profile, metric}
 
     def runtest(self) -> None:
-        """Pass, fail, or fail as it is known to; see the module's docstring."""
+        """Pass, fail, or fail as known; see the module's docstring."""
         row = self.plugin.row_of(self.slot, self.metric)
         if row is None:
             raise Failed(f"there is no result of {self.metric}: the case did not finish")
@@ -135,13 +135,13 @@ class _Check(pytest.Item):
         raise Failed(_report(row))
 
     def repr_failure(self, excinfo: Any, style: Any = None) -> Any:
-        """The report alone: where it was raised says nothing."""
+        """Only the report, without the place of the exception."""
         if isinstance(excinfo.value, Failed):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Any, int | None, str]:
-        """Shown where a test's file and line are."""
+        """Shown in place of a test's file and line."""
         return "crosscheck", None, self.name
 
 

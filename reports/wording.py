@@ -1,22 +1,23 @@
-"""Words and numbers as they are shown everywhere: marks, digits, the command that reproduces a row."""
+"""Common format of words and numbers: marks, digits, the command that reproduces a row."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from adapters.registry import facts
 from adapters.settings import text_of
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
 from validation.metrics import NEVER as NEVER
 from validation.posed import resolve
 
-#: What a spreadsheet takes for the begin of a formula.
+#: Characters at which a spreadsheet starts a formula.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-#: Order in which a group of rows is summed up: the first that occurs is its mark.
+#: Priority of marks of a group of rows: the first that occurs is its mark.
 MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
     "crashed": "CRASHED",
@@ -34,7 +35,7 @@ LABELS = {
     "not_installed": "NOT INSTALLED",
     "none": "no value",
 }
-#: What a number of checks with a mark is called beside how many fail: their regression status.
+#: Words for the number of checks with a mark: their regression status.
 STATUS = {
     "crashed": "crashed", "timed_out": "timed out", "missing": "missing", "invalid": "INVALID", "new": "new",
     "drifted": "changed", "fail": "without a list of known failures", "known": "known", "explained": "explained",
@@ -48,13 +49,41 @@ ROLE_WORDS: dict[str, str] = {
 }  # fmt: skip
 
 
+def word_of(engine: str, profile: str) -> str:
+    """What a profile is called for people beside its name; empty where that is its name, or where it has no role."""
+    told = facts(engine)
+    word = ROLE_WORDS.get(told.roles.get(profile.partition("+")[0], "") if told else "", "")
+    return "" if word == profile else word
+
+
+def roles_line(columns: Iterable[tuple[str, str]]) -> str:
+    """What the profiles of ``(engine, profile)`` are, in one line, where their names do not say so; else empty."""
+    named = {profile.partition("+")[0]: word for engine, profile in columns if (word := word_of(engine, profile))}
+    return f"Profiles: {'; '.join(f'{name}: {word}' for name, word in named.items())}." if named else ""
+
+
+def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
+    """Profiles that words name on engines: by name, or by role (``shipped``, ``as shipped``); else the word itself."""
+    roles = [told.roles for engine in engines if (told := facts(engine))]
+    found: dict[str, None] = {}
+    for word in words:
+        own = [
+            name
+            for each in roles
+            for name, role in each.items()
+            if name == word or (word not in each and word in (role, ROLE_WORDS.get(role)))
+        ]
+        found.update(dict.fromkeys(own or [word]))
+    return list(found)
+
+
 def mark_of(row: Mapping[str, Any]) -> str:
     """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
     if row["outcome"] in ("crashed", "timed_out", "missing", "invalid", "not_installed"):
         return str(row["outcome"])
     if row["outcome"] == "unsupported":
         return "new" if row["standing"] == "new" else "unsupported"
-    if row["standing"] in ("drifted", "new"):  # also where there is no value, or a PASS left its band
+    if row["standing"] in ("drifted", "new"):  # also without a value, or if a PASS left its band
         return str(row["standing"])
     if row["physics"] == "pass":
         return "pass"
@@ -67,7 +96,7 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     """Command that runs exactly this slot."""
     words = ["crosscheck", "run", slot["scene"]]
     first = resolve(slot["scene"]).parameters[:1]
-    # Naming any parameter asks for one cell instead of the suite's variations, so one is always named.
+    # A parameter selects one cell instead of the suite's variations, so one is always given.
     for name, value in (slot["params"] or {p.name: p.default for p in first}).items():
         words += ["--param", f"{name}={value:.17g}" if float(f"{value:.12g}") != value else f"{name}={value:.12g}"]
     words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], *profile_words(slot_from_dict(slot))]
@@ -78,7 +107,7 @@ def reproduce(slot: Mapping[str, Any]) -> str:
 
 
 def at(out: Path | None, run: str = "") -> str:
-    """`` RUN --out DIR`` for a command that is to find the same results; empty for the latest in the usual folder."""
+    """`` RUN --out DIR`` for a command about the same results; empty for the latest in the usual folder."""
     named = f" {run}" if run else ""
     return named + ("" if out is None or out == Path("crosscheck-out") else f" --out {shlex.quote(str(out))}")
 
@@ -90,7 +119,7 @@ def profile_words(slot: Slot) -> list[str]:
 
 
 def row_id(row: Mapping[str, Any]) -> str:
-    """Eight hex digits by which ``crosscheck explain`` finds a row: the same in every run that asks the same."""
+    """Eight hex digits by which ``crosscheck explain`` finds a row: equal in all runs with the same case."""
     asked = json.dumps([row["slot"], row["metric"]], sort_keys=True)
     return hashlib.sha256(asked.encode()).hexdigest()[:8]
 
@@ -101,14 +130,14 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def measured(row: Mapping[str, Any], digits: int = 4) -> str:
-    """What was measured, with its unit; a time that the end of the run cut off is none."""
+    """Measured value with its unit; a time beyond the end of the run is "never"."""
     if row["reason"].startswith(NEVER):
         return NEVER
     return quantity(row["value"], row["unit"], digits)
 
 
 def missing_text(missing: int, planned: int) -> str:
-    """What is said of a run of which cells are missing."""
+    """Text for a run with missing cells."""
     return (
         f"{missing} of {planned} planned cases have no result and are left out here. The command that started the "
         "run resumes it."
@@ -128,7 +157,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def cell(value: Any) -> Any:
-    """Value for a table that a spreadsheet may open: text that would be taken for a formula is quoted."""
+    """Value for a table that a spreadsheet may open: text that looks like a formula is quoted."""
     return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA and not _is_number(value) else value
 
 
@@ -141,7 +170,7 @@ def _is_number(text: str) -> bool:
 
 
 def markdown(text: str) -> str:
-    """Text that is shown as it is in Markdown: no HTML, no cell of a table ends in it."""
+    """Text escaped for Markdown: without HTML and ends of table cells."""
     for raw, escaped in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|")):
         text = text.replace(raw, escaped)
     return text

@@ -15,6 +15,7 @@ import contact_crosscheck as cc
 from adapters import registry
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import EngineError, EngineFacts, Scheme
+from adapters.extras import install
 from adapters.scene import SceneError
 from reports.command import main
 from validation.records.store import MissingError
@@ -218,7 +219,7 @@ def test_without_the_libraries_a_chart_says_what_to_install(monkeypatch, engine)
     monkeypatch.setitem(sys.modules, "altair", None)
     with pytest.raises(EngineError) as caught:
         result.plot()
-    assert str(caught.value) == "plot: altair is missing; pip install 'contact-crosscheck[report]'"
+    assert str(caught.value) == f"plot: altair is missing; {install('report')}"
 
 
 def test_names_from_files_and_engines_are_text_in_html(tmp_path, monkeypatch, own, engine):
@@ -381,6 +382,24 @@ def test_a_model_is_a_scene(engine):
         cc.Scene.from_urdf(path)
     with pytest.raises(SceneError, match="does not end in"):
         cc.Scene.from_file("model.txt")
+
+
+@pytest.mark.parametrize(
+    ("read", "name", "reader"),
+    [(cc.Scene.from_urdf, "ball_alone.urdf", "mujoco"), (cc.Scene.from_sdf, "ball_dropped.sdf", "drake"),
+     (cc.Scene.from_sdf, "moon_slope.world", "drake")],
+)  # fmt: skip
+def test_a_model_in_urdf_and_sdf_is_a_scene(engine, read, name, reader):
+    """Its own engine runs it as its author made it, from where and as our solver does."""
+    if registry.find(engine(reader)).engine is None:
+        pytest.skip(f"{reader} is not installed")
+    scene = read(MODELS / name)
+    assert scene.title == f"Model {name}" and 3 in scene.dimensions and scene.notes
+    assert list(scene.parameters.name) == ["duration"]
+    own, solved = (cc.run(scene, engine=each, duration=0.05, dimension=3) for each in (reader, engine("reference")))
+    assert own.observation.slot.profile == "model" and own.observation.slot.dt != solved.observation.slot.dt
+    there, here = (each.trajectory.pose[-1, :, :3] for each in (own, solved))
+    assert np.abs(there - here).max() < 9.81 * 0.05 / 240.0  # g t dt: what a step can make of a start from rest [m]
 
 
 def test_engines_and_scenes_are_tables(engine):

@@ -1,1 +1,1 @@
-"""Canonical scenes, truths, metrics, tolerances, verdicts, the cells that run and the store that keeps them."""
+"""Canonical scenes, truths, metrics, tolerances, verdicts, cells and the store."""

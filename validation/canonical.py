@@ -1,13 +1,13 @@
-"""What a canonical scene is: everything that is about one scene, in one object, from one file.
+"""A canonical scene: everything about one scene, in one object, from one file.
 
-    figure and law        what is asked, drawn and said
+    figure and law        what the scene shows
     parameters, make      the scene itself
-    exact, measure, rule  its truth, what is measured of a run, and how far the two may be apart
+    exact, measure, rule  its truth, the measurements of a run, and the tolerance between them
     quick, standard, full the cells that a suite runs
-    primary, steps        the one error that a bench compares engines by, and the steps that it runs
-    the rest              what reports, tuning and detection want to know about a scene
+    primary, steps        the error by which a benchmark compares engines, and its time steps
+    the rest              facts for reports, tuning and fault detection
 
-A canonical scene knows nothing of engines. Bounds that several scenes owe stand in `validation.bounds`, metrics in
+A canonical scene does not depend on engines. Bounds that several scenes share are in `validation.bounds`, metrics in
 `validation.metrics`. `validation.catalogue` finds the scenes.
 """
 
@@ -29,12 +29,12 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a scene may be asked with.
+    """A parameter of a scene.
 
     Parameters
     ----------
     default, unit
-        Used where a call does not say; shown by ``crosscheck describe``.
+        Used where a call does not set it; shown by ``crosscheck describe``.
     because
         Meaning, and the reason for the default.
     low, high
@@ -60,7 +60,7 @@ class Parameter:
         Raises
         ------
         SceneError
-            Naming scene and parameter, if it is not finite, whole where it must be, or within the range.
+            Naming scene and parameter, if it is not finite, out of range, or not whole where it must be.
         """
         label = f"{scene}.{self.name}"
         if not math.isfinite(value):
@@ -87,7 +87,7 @@ class Check:
 
     @property
     def is_finite(self) -> bool:
-        """Whether truth and bound, where there are any, are numbers that can be compared with."""
+        """Whether truth and bound, where they exist, are finite."""
         return all(number is None or math.isfinite(number) for number in (self.truth, self.bound))
 
     def unjudged(self) -> Check:
@@ -119,7 +119,7 @@ Params = Mapping[str, float]
 class Variation:
     """Parameters of a cell, and the iteration counts to run it at (None: the profile's own).
 
-    ``dimensions`` are those of the scene in which the cell runs; all of them if it says none.
+    ``dimensions`` are those in which the cell runs; empty for all of the scene's.
     """
 
     params: Params
@@ -135,18 +135,18 @@ class Variation:
 class Primary:
     """The one declared error of a scene, and the state in which the scene is timed.
 
-    A work-precision plot shows one number per run of an engine, so it is declared with the scene, before anything is
-    measured. It is a supremum over variations that an engine cannot choose: the phase of an impact within a step, the
-    side of a threshold.
+    A work-precision plot shows one number per run of an engine. It is declared with the scene, before any measurement,
+    and is a supremum over variations that an engine cannot choose: the phase of an impact within a step, the side of a
+    threshold.
 
     Parameters
     ----------
     name, unit
         For axes.
     law
-        What exactly is measured, in one line.
+        What is measured, in one line.
     because
-        Why this and nothing else.
+        Why this quantity was chosen.
     variations
         ``variations(dt)``: parameters of the cells whose worst error counts; the first one is timed.
     error
@@ -178,9 +178,9 @@ def halves(first: float, last: float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Steps:
-    """What a bench runs of a scene: steps [s], and iteration counts beside each profile's own, by suite.
+    """Steps [s] of a benchmark of a scene, and iteration counts beside each profile's own, by suite.
 
-    Without quick steps a scene is benched in full, or where it is named.
+    A scene without quick steps runs in the full benchmark, or where it is named.
     """
 
     quick: tuple[float, ...] = ()
@@ -189,7 +189,7 @@ class Steps:
     full_iterations: tuple[int, ...] = ()
 
     def dts(self, suite: Suite) -> tuple[float, ...]:
-        """Steps of a suite [s]; of a scene without quick ones three of the full ones, a quarter of the last each."""
+        """Steps of a suite [s]; without quick ones three of the full ones, each a quarter of the one before."""
         return (self.quick or self.full[1:6:2]) if suite == "quick" else self.full
 
     def counts(self, suite: Suite) -> tuple[int, ...]:
@@ -199,7 +199,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Member:
-    """A cell that ran, as a study sees it: ``params`` are complete, ``metrics`` what was measured."""
+    """A cell that ran, as given to a study: complete ``params`` and measured ``metrics``."""
 
     dimension: int
     dt: float
@@ -207,20 +207,20 @@ class Member:
     metrics: Mapping[str, Measured]
 
 
-#: What a study says: value, reason, and the check that judges it.
+#: Result of a study: value, reason, and the check that judges it.
 Reduced = tuple[float | None, str, Check]
 
 
 @dataclass(frozen=True)
 class Study:
-    """What several cells of a scene say together: a threshold, a supremum.
+    """A result of several cells of a scene together: a threshold, a supremum.
 
     Parameters
     ----------
     name
         Of its metric.
     reduce
-        ``reduce(members)`` of cells that differ in parameters only; None if they do not allow it.
+        ``reduce(members)`` of cells that differ in parameters only; None if there is no result.
     """
 
     name: str
@@ -234,11 +234,11 @@ class Searched:
     Parameters
     ----------
     group
-        Scenes whose needs are alike are searched together: a profile has one set of settings for them.
+        Scenes with like needs are searched together: a profile has one set of settings for them.
     cells, held_out
-        Parameters to search on, and those on which nothing may get worse.
+        Parameters of the search, and those on which no check may get worse.
     starved
-        Iteration counts at which nothing may fail that passed, for profiles that have such a count.
+        Iteration counts at which no check that passed may fail, for profiles with such a count.
     """
 
     group: str
@@ -258,9 +258,9 @@ class Restitution:
     asked
         Parameter with the coefficient that is asked for.
     scale
-        Parameter that the metric is relative to, or that it may depend on: a height, a speed.
+        Parameter to which the metric is relative, or on which it may depend: a height, a speed.
     heights
-        How many heights after bounces the series has; 0 if the metric is the ratio of speeds itself.
+        Number of heights in the series; 0 if the metric is the ratio of speeds.
     """
 
     metric: str
@@ -271,21 +271,21 @@ class Restitution:
 
 @dataclass(frozen=True)
 class Frontier:
-    """How far a scene can be driven until an engine gives up on it (`validation.questions.frontier`).
+    """A parameter that is driven until an engine fails (`validation.questions.frontier`).
 
     Parameters
     ----------
     name, unit
-        What is driven, as people say it: ``impact speed`` in m/s.
+        Its name for people: ``impact speed`` in m/s.
     axis
         The scene's parameter, or ``dt``, or ``iterations``.
     easy, hard, hardest
-        Values between which the quick search looks, and how far the full one goes. Hard may be below easy.
+        Range of the quick search, and the end of the full one. Hard may be below easy.
     fate
-        ``fate(scene, metrics)`` of a cell that ran: how it ended, as one word, or empty if it survived. It asks whether
-        the engine still does what the scene is about, with room to be wrong, not whether it is exact.
+        ``fate(scene, metrics)`` of a cell that ran: how it failed, as one word, or empty if it survived. It tests
+        whether the engine still does what the scene is about, with a wide margin, not whether it is exact.
     survives
-        What surviving means, with its numbers.
+        The criterion of survival, with its numbers.
     params
         Other parameters, as what differs from the scene's defaults.
     whole
@@ -308,7 +308,7 @@ class Frontier:
 class Brought:
     """A profile that a scene brings for an engine: its settings are those of a model made for that engine.
 
-    It declares nothing, so nothing is measured of it beforehand; ``dt`` is the model's own step [s].
+    It declares nothing, so no property check runs before it; ``dt`` is the model's own step [s].
     """
 
     profile: str
@@ -325,7 +325,7 @@ class CanonicalScene:
     name, version, title
         Identity; a change of physics is a new version.
     symptoms
-        What people see and say where an engine fails on it, in their words: `validation.field.symptoms` finds it.
+        What users see where an engine fails, in their words; searched by `validation.field.symptoms`.
     figure
         ASCII drawing with the law.
     law
@@ -347,41 +347,41 @@ class CanonicalScene:
     track
         Exact motion for the replay's ghost, or None.
     family
-        What people would look for it under: one of `FAMILIES`, or a name of its own.
+        Its group: one of `FAMILIES`, or another name.
     quick, standard, full
-        Cells of the suites: a few, between them every kind of answer that engines give; those whose FAILs are listed
-        row by row; those that map the scene out, where defaults may be left out. Without cells of its own a suite has
-        those of the one before it.
+        Cells of the suites. Quick: a few, which cover every kind of result. Standard: those whose FAILs are listed one
+        by one. Full: a map of the parameters, possibly without the defaults. A suite without cells uses those of the
+        suite before.
     representative
-        The cell that stands for the scene: its noise floor is measured and its motion is kept for the replay.
+        The cell that represents the scene: its noise floor is measured, and its motion is kept for the replay.
     planted
-        Cells in which faults are planted (`validation.questions.detection`): at least one of them states each check.
+        Cells in which faults are planted (`validation.questions.detection`): together they have every check.
     primary, steps
-        The error by which a bench compares engines, and what it runs for it.
+        The error by which a benchmark compares engines, and its runs.
     size
-        Parameter that is the number of its bodies, where a bench may scale it up.
+        Parameter that sets the number of bodies, where a benchmark may increase it.
     growth
-        By how much the scene's own motion multiplies what is off its line or out of its plane, where it is unstable:
-        what round-off may grow to (`bounds.planar`).
+        Factor by which an unstable motion amplifies a deviation from its line or plane, and so round-off
+        (`bounds.planar`).
     smooth
-        Metrics that depend smoothly on the step, without an impact: a single cell per step has an order.
+        Metrics that depend smoothly on the step, without an impact: one cell a step is enough to fit an order.
     studies
-        What several of its cells say together.
+        Results of several of its cells together.
     searched
         What tuning runs of it.
     frontiers
         How far it can be driven.
     words
-        What a value of a metric means, in words with ``{value}`` for it, where `metrics.WORDS` does not say so; names
-        without their index. ``"rebound_ratio=0"`` is said of a value that is nothing.
+        Meaning of a metric's value, in words with ``{value}``, where `metrics.WORDS` has none; names without index.
+        ``"rebound_ratio=0"`` is for the value 0.
     seen_as
-        Of metrics that people know by another number: ``seen_as[metric](params, value)`` is that ratio.
+        For metrics that people know as another number: ``seen_as[metric](params, value)`` is that ratio.
     restitution
-        What it tells the report's explorer of restitution.
+        Its data for the report's explorer of restitution.
     notes
-        What was filled in or put right in a scene from a file, one line each; said wherever it is run or described.
+        What was filled in or corrected in a scene from a file, one line each; shown where it runs or is described.
     brings
-        Profiles of its own, by engine: a model made for one engine runs there as it was made.
+        Profiles of its own, by engine: a model made for an engine runs there with its own settings.
     """
 
     name: str
@@ -444,7 +444,7 @@ class CanonicalScene:
         Raises
         ------
         SceneError
-            If its numbers leave what can be computed with.
+            If its numbers overflow.
         """
         try:
             found = self.rule(scene, dt, self.exact(scene))

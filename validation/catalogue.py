@@ -1,10 +1,10 @@
-"""The catalogue of canonical scenes: ours, and those that other installed packages bring.
+"""The catalogue of canonical scenes: ours, and those of other installed packages.
 
     [project.entry-points."contact_crosscheck.scenes"]
     drop = "mypackage.drop:SCENE"
 
-A scene is loaded when it is first asked for. One of another package that cannot be loaded is left out, with the
-reason (`broken`, which ``crosscheck doctor`` says); it costs nothing else.
+A scene is loaded at its first use. A scene of another package that cannot be loaded is left out, and `broken` has the
+reason (shown by ``crosscheck doctor``).
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 @cache
 def _entries() -> dict[str, EntryPoint]:
-    """Entry points of other packages by scene; what takes the name of one of ours is not among them."""
+    """Entry points of other packages by scene, without those that use the name of one of ours."""
     return {entry.name: entry for entry in sorted(entry_points(group=GROUP)) if entry.name not in OURS}
 
 
 @cache
 def _loaded(name: str) -> CanonicalScene | SceneError:
-    """The scene called ``name``, or why it cannot be had."""
+    """The scene called ``name``, or why it cannot be loaded."""
     if name in OURS:
         ours: CanonicalScene = import_module(f"validation.scenes.{name}").SCENE
         return ours
@@ -45,7 +45,7 @@ def _loaded(name: str) -> CanonicalScene | SceneError:
         return SceneError(f"{where} is not a name of small letters, digits and underscores")
     try:
         found = entry.load()
-    except (Exception, SystemExit) as error:  # a package of others may raise anything; only its scene may suffer
+    except (Exception, SystemExit) as error:  # another package may raise anything; only its scene is lost
         return SceneError(f"{where} cannot be loaded: {type(error).__name__}: {one_line(error)}")
     if not isinstance(found, CanonicalScene) or found.name != name:
         return SceneError(f"{where} is not a CanonicalScene of that name")
@@ -58,12 +58,12 @@ def module_of(name: str) -> str:
 
 
 def broken() -> list[str]:
-    """One line for each scene of another package that cannot be had."""
+    """One line for each scene of another package that cannot be loaded."""
     return [str(found) for name in _entries() if isinstance(found := _loaded(name), SceneError)]
 
 
 def forget() -> None:
-    """Look again at what is installed."""
+    """Forget loaded scenes, so that installed packages are searched again."""
     _entries.cache_clear()
     _loaded.cache_clear()
 

@@ -1,4 +1,4 @@
-"""Slots, cells and observations: what was asked, what ran, what came out."""
+"""Slots, cells and observations: what was requested, what ran, and the result."""
 
 from __future__ import annotations
 
@@ -29,18 +29,17 @@ from validation.identity import adapter_hash, scene_code
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_known, resolve
 
-#: Most iterations and units in the last place that can be asked for: C integers hold the first, and the second are
-#: made one by one.
+#: Largest iteration count (a C integer) and largest move in units in the last place (made one by one).
 MOST_ITERATIONS, MOST_ULPS = 10**6, 10**4
 #: Most steps of a cell, and most samples (steps times bodies): a state of a body takes up to 104 bytes.
 MOST_STEPS, MOST_SAMPLES = 10**7, 5 * 10**7
-#: Longest step [s]: the probes that measure an adapter resolve nothing coarser. At 0.15 s they do not tell friction any
-#: more, at 0.25 s their boxes turn over between two samples; a receipt would speak of the step, not of the engine.
+#: Longest step [s]: the probes of an adapter resolve nothing coarser. At 0.15 s they cannot measure friction, at 0.25 s
+#: their boxes turn over between two samples; a property check would measure the step, not the engine.
 LONGEST_DT = 0.1
 
 
 class Outcome(Enum):
-    """What became of a cell."""
+    """Outcome of a cell."""
 
     OK = "ok"
     UNSUPPORTED = "unsupported"
@@ -86,7 +85,7 @@ def _is_whole(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Slot:
-    """What was asked; comparisons, findings and dashboards join on it.
+    """A requested cell; comparisons, findings and dashboards join on it.
 
     Parameters
     ----------
@@ -101,7 +100,7 @@ class Slot:
         engine computes with.
     switched
         Settings of the profile that are replaced, by name and sorted: an experiment (`validation.settings.switching`),
-        or a user's own, which the profile is named after (`with_own`).
+        or a user's, which then are part of the profile's name (`with_own`).
     """
 
     scene: str
@@ -116,7 +115,7 @@ class Slot:
 
     @property
     def base(self) -> str:
-        """Profile that the engine knows: the slot's own without the settings that it is named after."""
+        """The engine's profile: the slot's without the settings in its name."""
         return self.profile.removesuffix(suffix_of(self.switched))
 
     @property
@@ -130,7 +129,7 @@ class Slot:
         return replace(self, profile=self.base, switched=())
 
     def with_own(self, settings: tuple[tuple[str, Any], ...]) -> Slot:
-        """Return the slot with settings of a user's own, as a profile that is named after them."""
+        """Return the slot with settings of a user, which become part of the profile's name."""
         return replace(self, profile=self.profile + suffix_of(settings), switched=settings)
 
     def key(self) -> str:
@@ -152,7 +151,7 @@ class Slot:
 
 
 def _said(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A slot without experiment has no field of it: what was stored and hashed before there were any stays equal."""
+    """A slot without experiment omits that field, so older stored data and hashes stay equal."""
     return {name: value for name, value in data.items() if name != "switched" or value}
 
 
@@ -167,7 +166,7 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
     fields = set(Slot.__dataclass_fields__)
     for name in data:
         if name not in fields:
-            raise SceneError(f"slot.{name}: unknown field; a slot has {', '.join(sorted(fields))}")
+            raise SceneError(f"slot.{name}: unknown field; fields are {', '.join(sorted(fields))}")
     for name in ("scene", "engine", "profile", "dt"):
         if name not in data:
             raise SceneError(f"slot.{name}: is missing")
@@ -195,13 +194,13 @@ def slot_from_dict(data: Mapping[str, Any]) -> Slot:
 
 
 def _as_set(value: Any) -> Any:
-    """A setting's value as it was before JSON made lists of tuples."""
+    """A setting's value with tuples again, which JSON turned into lists."""
     return tuple(value) if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What ran: a slot and the identity of everything that decides its answer."""
+    """What ran: a slot and the identity of everything that determines its result."""
 
     slot: Slot
     scene_hash: str
@@ -219,7 +218,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Observation:
-    """What came out of a cell. Measurements only: verdicts are derived from it, never stored."""
+    """Result of a cell. Measurements only: verdicts are derived from it, never stored."""
 
     slot: Slot
     cell: str
@@ -247,9 +246,9 @@ class Observation:
 
 
 def observation_from_dict(data: Mapping[str, Any]) -> Observation:
-    """Inverse of `Observation.as_dict`; the one boundary that observations come through, from workers and stores.
+    """Inverse of `Observation.as_dict`; the only entry for observations from workers and stores.
 
-    Text is cleaned and capped here, whoever wrote it.
+    All text is cleaned and shortened here.
 
     Raises
     ------
@@ -266,19 +265,19 @@ def observation_from_dict(data: Mapping[str, Any]) -> Observation:
     for name, most in (("cell", NAME), ("engine_version", NAME), ("reason", REASON), ("state_hash", NAME)):
         values[name] = one_line(data[name], most)
     values["log"] = lines(str(data["log"]), LOG_LINES)
-    values.pop("out_of_plane", None)  # of runs before there was a metric of it: one number of mixed units
+    values.pop("out_of_plane", None)  # of runs before it was a metric: one number of mixed units
     return Observation(**values)
 
 
 def _measured(value: Any, reason: Any) -> Measured:
-    """A measured value as everything behind this boundary may rely on: a finite number, or None and a reason."""
+    """A measured value: a finite number, or None and a reason."""
     if value is None or math.isfinite(value):
         return (None if value is None else float(value)), one_line(reason)
     return None, one_line(f"{reason}; the value is {float(value)}, not a finite number".removeprefix("; "))
 
 
 def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
-    """Scene of an observation, and all checks that it owes: the scene's own, and its plane where it has been lifted.
+    """Scene of an observation and all its checks: the scene's own, and its plane where it is embedded in 3-D.
 
     Raises
     ------
@@ -293,13 +292,13 @@ def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
 
 
 def plane_of(canonical: CanonicalScene, scene: Scene, dt: float) -> list[Check]:
-    """Check of the plane that a planar scene owes where it is lifted; none in space."""
+    """Check that a 2-D scene embedded in 3-D stays in its plane; none for 3-D scenes."""
     return [planar(scene, dt, canonical.growth(scene))] if scene.dimension == 2 else []
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A slot made concrete: its scene and the cell it will be."""
+    """A slot with its scene and its cell."""
 
     canonical: CanonicalScene
     scene: Scene
@@ -332,32 +331,32 @@ def prepare(slot: Slot) -> Prepared:
 
 
 def settings_of(engine: Engine, slot: Slot, scene: Scene) -> list[Setting]:
-    """Settings that a slot runs with: its profile's for the scene, with those that are switched replaced or added.
+    """Settings of a slot: its profile's for the scene, with the switched ones replaced or added.
 
     Raises
     ------
     EngineError
         For an unknown profile, or an iteration count that the profile does not have.
     """
-    # The bench has scenes of its own, which no catalogue knows; they bring nothing.
+    # The benchmark has scenes outside the catalogue; they bring no profiles.
     brought = resolve(slot.scene).brought(slot.engine, slot.base) if is_known(slot.scene) else None
     if brought is not None:
         own = list(brought.settings)
     else:
         own = checked_settings(engine.settings(slot.base, needs(scene), slot.dt, slot.iterations))
-    because = "set by whoever asked" if slot.is_own else "switched for an experiment"
+    because = "set by the user" if slot.is_own else "switched for an experiment"
     switched = {name: Setting(name, value, because) for name, value in slot.switched}
     kept = [switched.pop(setting.name, setting) for setting in own]
     return [*kept, *switched.values()]
 
 
 def check_size(scene: Scene, dt: float) -> None:
-    """Refuse what no machine finishes or holds, before anything runs.
+    """Refuse a cell with too many steps or too much data, before anything runs.
 
     Raises
     ------
     SceneError
-        Naming the step, if it is longer than what probes resolve, or needs too many steps or samples.
+        Naming the step, if it is longer than probes resolve, or needs too many steps or samples.
     """
     if dt > LONGEST_DT:
         raise SceneError(f"dt: {format_dt(dt)} s is longer than {LONGEST_DT:g} s: nothing can be measured at it")
@@ -372,15 +371,16 @@ def check_size(scene: Scene, dt: float) -> None:
 
 
 def numbers_of(engine: str) -> type[np.floating[Any]]:
-    """Return the kind of numbers that an engine counts in: doubles where nothing else is known."""
+    """Return the precision of an engine: double where it is unknown."""
     facts = registry.facts(engine)
     return np.float32 if facts and facts.precision == "single" else np.float64
 
 
 def _nudged(scene: Scene, ulp: int, kind: type[np.floating[Any]]) -> Scene:
-    """Move every free body up by ``ulp`` units in the last place of its height, in the numbers of its engine.
+    """Move every free body up by ``ulp`` units in the last place of its height, in the engine's precision.
 
-    An engine of singles starts at the same place for all doubles next to each other: it would not see them moved.
+    A single-precision engine rounds neighbouring doubles to the same start, so a move by their last place has no
+    effect.
     """
     up, end = scene.dimension - 1, kind(math.copysign(math.inf, ulp))
 

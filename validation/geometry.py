@@ -1,9 +1,9 @@
 """Overlap of two bodies from their poses: the same exact routine for every engine.
 
-Engines report depths by their own rules (margins, speculative gaps, one point or four). Overlaps are therefore
-measured from poses by the certificate's geometry, which shares no code with any solver; cylinders and hulls by a
-library (`validation.solids`). It is asked only where bodies
-can overlap at all: along any axis the bodies' shadows are no farther apart than the bodies.
+Engines report depths by their own rules (margins, speculative gaps, one point or four). Overlaps are therefore measured
+from poses by the certificate's geometry, which shares no code with any solver; cylinders and hulls by a library
+(`validation.solids`). It runs only where bodies can overlap: projections on any axis are not farther apart than the
+bodies.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from adapters.shapes import reach
 from reference_solver.geometry import gap, rotation
 from validation import solids
 
-#: Samples whose exact gap is asked for at a time while the deepest of a run is looked for.
+#: Samples of one exact computation in the search for the deepest of a run.
 BATCH = 32
 
 
 def separation(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
-    """Signed distance of two bodies, (s,) [m]; < 0 is how far they must be moved to part.
+    """Signed distance of two bodies, (s,) [m]; < 0 is the distance that separates them.
 
     Raises
     ------
     ModuleNotFoundError
-        For a cylinder or a hull where the library `coal` is not installed, which measures them.
+        For a cylinder or a hull where the library `coal` is not installed.
     """
     kinds = {type(a), type(b)}
-    if Cylinder in kinds or (Hull in kinds and HalfSpace not in kinds):  # a hull over a face is its lowest corner
+    if Cylinder in kinds or (Hull in kinds and HalfSpace not in kinds):  # by its lowest corner
         return solids.separation(a, pose_a, b, pose_b)
     return np.atleast_1d(gap(a, pose_a, b, pose_b))
 
@@ -39,7 +39,7 @@ def separation(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 def overlap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
     """Depth of the overlap, (s,) [m]; 0 where the bodies are apart, NaN where their poses give no distance."""
     depth = np.zeros(len(pose_a))
-    near = np.flatnonzero(~(least_gap(a, pose_a, b, pose_b) >= 0.0))  # a bound that is no number excludes nothing
+    near = np.flatnonzero(~(least_gap(a, pose_a, b, pose_b) >= 0.0))  # a bound that is NaN excludes nothing
     if len(near):
         depth[near] = np.maximum(0.0, -separation(a, pose_a[near], b, pose_b[near]))
     return depth
@@ -48,8 +48,8 @@ def overlap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 def deepest(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> float:
     """Deepest overlap over all samples, >= 0 [m].
 
-    Samples are asked in the order of their lower bounds, until no bound is below what was found. NaN if the poses of
-    one sample give no distance: it may be the deepest.
+    Samples are computed in the order of their lower bounds, until no bound is below the result. NaN if the poses of a
+    sample give no distance: it may be the deepest.
     """
     bound, depth = least_gap(a, pose_a, b, pose_b), 0.0
     if np.isnan(bound).any():
@@ -66,7 +66,7 @@ def deepest(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> float:
 
 
 def least_gap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
-    """Lower bound of the signed distance, (s,) [m]: the largest gap of the shadows on face normals and centre line."""
+    """Lower bound of the signed distance, (s,) [m]: the largest gap of projections on face normals and centre line."""
     if isinstance(a, HalfSpace) or isinstance(b, HalfSpace):
         return separation(a, pose_a, b, pose_b)
     d = 2 if pose_a.shape[1] == 3 else 3
@@ -83,8 +83,8 @@ def least_gap(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 
 
 def _extent(shape: Shape, turn: Array, axis: Array) -> Array:
-    """Half width (s,) of ``shape``'s shadow on ``axis`` (s, d), seen from its centre."""
-    if not isinstance(shape, Box):  # no less than its shadow is
+    """Half width (s,) of the projection of ``shape`` on ``axis`` (s, d), from its centre."""
+    if not isinstance(shape, Box):  # an upper bound of its projection
         return np.full(len(axis), reach(shape))
     along = np.einsum("sij,si->sj", turn, axis)
     return np.abs(along) @ np.array(shape.half_extents)

@@ -1,8 +1,8 @@
-"""What code and what machine an answer came from.
+"""Identity of the code and the machine of a result.
 
-A cell's identity has two hashes of code: `adapter_hash`, of what stands between a scene and one engine's trajectory,
-and `scene_code`, of the scene's own file and what that measures with. Neither knows other engines or other scenes: who
-edits or adds one of those invalidates nothing else.
+A cell's identity has two hashes of code: `adapter_hash`, of the code between a scene and one engine's trajectory, and
+`scene_code`, of the scene's file and its metrics. Neither depends on other engines or scenes, so a change of one of
+those invalidates nothing else.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def _sources(package: str) -> list[Path]:
 
 @cache
 def adapter_hash(engine: str) -> str:
-    """Hash of everything of ours between a scene and this engine's trajectory.
+    """Hash of our code between a scene and this engine's trajectory.
 
-    The shared vocabulary and step loop, the engine's adapter with what that imports of its own package, and for an
-    adapter of our solver the solver. Laws, experiments and findings judge a trajectory and are no part of it.
+    The shared types and step loop, the engine's adapter with its imports from its package, and for our solver's adapter
+    the solver. Laws, experiments and findings judge a trajectory and are not part of it.
     """
     entry = registry.entry(engine)
     shared = [path for path in _sources("adapters") if path.parent.name == "adapters"]
-    if registry.is_introduced(engine):  # its source may be in no file; no store keeps its cells
+    if registry.is_introduced(engine):  # its source may not be a file; its cells are not stored
         return _hash_files(shared)
     if entry is None:
         raise KeyError(engine)
@@ -56,26 +56,26 @@ def adapter_hash(engine: str) -> str:
     return _hash_files(sorted({*shared, *own, *solver}))
 
 
-#: The solver of ours, which an adapter of it answers with.
+#: Our solver.
 SOLVER = "reference_solver"
-#: What runs and measures a cell of any scene.
+#: Code that runs and measures a cell of any scene.
 RUNNING = ("validation.running.execution", "validation.running.certification")
 
 
 @cache
 def scene_code(scene: str) -> str:
-    """Hash of the code that makes and measures a scene: its own module, and what that imports of its package and ours.
+    """Hash of the code that makes and measures a scene: its module, and its imports from its package and ours.
 
     All scene files share one: their text is part of their name.
     """
     module = module_of(scene) if scene in CATALOGUE else "validation.files.scene_files"
-    # Of the solver only what is imported itself: its geometry measures.
+    # Of the solver only directly imported files: its geometry is used in metrics.
     own = _closure(module, {"validation", module.partition(".")[0]}, {SOLVER})
     return _hash_files([*own, *(path for path in map(located, RUNNING) if path)])
 
 
 def _closure(module: str, inner: set[str], rim: set[str]) -> list[Path]:
-    """Files of a module and of what it imports of the packages ``inner``; of those in ``rim`` only the first file."""
+    """Files of a module and of its imports from the packages ``inner``; from those in ``rim`` only the first file."""
     found: dict[str, Path] = {}
     left = [module]
     while left:
@@ -89,7 +89,7 @@ def _closure(module: str, inner: set[str], rim: set[str]) -> list[Path]:
 
 
 def _imported(module: str, path: Path) -> tuple[str, ...]:
-    """Modules that a source file may import, by name; what turns out to be none is not located."""
+    """Names that a source file may import as modules; those that are not modules are not found."""
     return _named(path.read_bytes(), module if path.name == "__init__.py" else module.rpartition(".")[0])
 
 
@@ -121,7 +121,7 @@ def _statements(module: ast.Module) -> Iterator[ast.AST]:
 
 
 def code_hash(asked: Iterable[tuple[str, str]]) -> str:
-    """Hash of all our code that decides what is measured where these scenes run on these engines (scene, engine)."""
+    """Hash of all our code that affects the results of these scenes on these engines (scene, engine)."""
     asked = list(asked)
     registered = set(registry.names())
     scenes = sorted((scene, scene_code(scene)) for scene in {scene for scene, _ in asked})
@@ -150,7 +150,7 @@ def commit() -> str:
 
 
 def machine() -> dict[str, Any]:
-    """CPU, cores, memory, system and Python: what a time means, and what may move a last bit."""
+    """CPU, cores, memory, system and Python: facts that affect times and last bits."""
     return {
         "cpu": _cpu_name(),
         "cores": os.cpu_count() or 0,

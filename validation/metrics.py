@@ -19,30 +19,30 @@ from validation.canonical import Measured
 from validation.geometry import deepest, overlap
 
 UNAVAILABLE = "the engine does not tell the impulses of these contacts"
-#: Said of single contacts of bodies with edges, of a planar scene on an engine that lives in space.
+#: Reason for single contacts of bodies with edges, in a 2-D scene on a 3-D engine.
 SEVERAL = "a corner of the plane is an edge in space, with contacts at both its ends"
-#: Reasons for which a number is not told that are no fault of the motion.
+#: Reasons of a missing value that are no failure of the motion.
 UNTOLD = (UNAVAILABLE, SEVERAL)
-#: Said of a force where no step was recorded with its contacts.
+#: Reason of a missing force where no step was recorded with contacts.
 NOT_RECORDED = "contacts were not recorded"
-#: By what a quantity that is known step by step is told; its spread is the standard deviation.
+#: Statistics of a quantity that is known step by step; spread is the standard deviation.
 OVER_TIME: Mapping[str, Callable[[Array], float]] = {
     "mean": lambda steps: float(np.mean(steps)),
     "least": lambda steps: float(np.min(steps)),
     "greatest": lambda steps: float(np.max(steps)),
     "spread": lambda steps: float(np.std(steps)),
 }
-#: Said of a rebound that is none.
+#: Words for a missing rebound.
 SILENT = "does not rebound"
-#: Farthest that a planar scene has left its plane on an engine that lives in space [m]; measured as it is sampled.
+#: Largest distance of a 2-D scene from its plane on a 3-D engine [m]; measured at the samples.
 OUT_OF_PLANE = "out_of_plane"
-#: What a value of a metric means, in words, for whoever reads reports; ``name=0`` is said of a value that is nothing,
-#: ``name<0`` with the size of one that is negative: what creeps down at -0.003 m/s creeps up. A
-#: scene has words of its own for metrics that are not here (`CanonicalScene.words`).
+#: Meaning of a metric's value in words, for readers of reports. ``name=0`` is for the value 0, ``name<0`` takes the
+#: size of a negative value: creeping down at -0.003 m/s is creeping up. A scene has words for its other metrics
+#: (`CanonicalScene.words`).
 WORDS = {
     "rebound_ratio": "rebounds at {value}",
     "rebound_ratio=0": SILENT,
-    "rebound_ratio<0": "goes on at {value} of its speed",
+    "rebound_ratio<0": "moves on with {value} of its speed",
     "creep": "creeps at {value} where it should stick",
     "creep<0": "creeps uphill at {value} where it should stick",
     "acceleration": "slides with {value}",
@@ -58,9 +58,9 @@ WORDS = {
     "astray": "strays sideways by {value}",
     OUT_OF_PLANE: "leaves its plane by {value}",
 }
-#: Said of a time at which a value that was waited for did not come.
-NOT_PASSED = "it never gets there"
-#: Begins the reason of a time that is only the end of the run: what has not come to rest has no time of rest.
+#: Reason of a missing time: the value was never reached.
+NOT_PASSED = "it never arrives there"
+#: Start of the reason where a time is only the end of the run: the motion never came to rest.
 NEVER = "never settled"
 
 
@@ -87,15 +87,14 @@ def forces(
 ) -> Array:
     """Force on ``body`` of all its contacts with ``others``, step by step, (s, d) [N].
 
-    That of a step is the impulse of the step over its length: no engine knows more of a force. NaN where the engine
-    does not tell it.
+    The force of a step is its impulse over the step: engines report no more. NaN where the engine does not report it.
 
     Parameters
     ----------
     others
         Bodies by index; the body itself is left out.
     after, until
-        Steps that end within these times [s], the first of them left out; those without contacts recorded are not told.
+        Steps that end within (after, until] [s]; steps without recorded contacts are left out.
     """
     contacts = trajectory.contacts
     if contacts is None:
@@ -104,7 +103,7 @@ def forces(
     total = np.zeros((int(chosen.sum()), trajectory.dimension))
     for other in others:
         if other != body:
-            sign = 1.0 if body > other else -1.0  # impulses are kept as those on the body with the higher index
+            sign = 1.0 if body > other else -1.0  # impulses are stored as those on the body with the higher index
             total += sign * contacts.impulse_between(other, body)[chosen]
     return np.asarray(total / trajectory.dt)
 
@@ -117,7 +116,7 @@ def steps_between(trajectory: Trajectory, after: float, until: float) -> NDArray
 
 
 def over_time(name: str, steps: Array, by: Sequence[str] = ("mean", "least", "greatest")) -> dict[str, Measured]:
-    """``name[mean]`` and the like of what is known step by step (s,); without a value where one is not known."""
+    """``name[mean]`` and the other statistics of step values (s,); without a value where a step has none."""
     why = NOT_RECORDED if len(steps) == 0 else UNAVAILABLE if np.isnan(steps).any() else ""
     return {f"{name}[{each}]": (None, why) if why else (OVER_TIME[each](steps), "") for each in by}
 
@@ -125,18 +124,18 @@ def over_time(name: str, steps: Array, by: Sequence[str] = ("mean", "least", "gr
 def largest(values: Iterable[float]) -> float:
     """Largest of measured values; NaN if one of them is.
 
-    Not Python's max, which passes over a NaN that is not the first: a check would pass on what could not be measured.
+    Python's max skips a NaN that is not the first, and a check could pass without a measurement.
     """
     return float(np.max(np.fromiter(values, float)))
 
 
 def numbers(*series: Array) -> None:
-    """Refuse samples that are no numbers: what looks for a first or last event would look past them.
+    """Refuse samples that are not finite: a search for a first or last event would skip them.
 
     Raises
     ------
     ArithmeticError
-        If one is none.
+        If a sample is not finite.
     """
     if not all(np.isfinite(values).all() for values in series):
         raise ArithmeticError("a sample is not a finite number")
@@ -261,12 +260,12 @@ def tilt(trajectory: Trajectory, body: int = 1) -> Array:
 
 
 def tilt_rate(trajectory: Trajectory, body: int = 1) -> Array:
-    """Spin about the axis that `tilt` turns about, (s,) [rad/s]."""
+    """Spin about the axis of `tilt`, (s,) [rad/s]."""
     return np.asarray(trajectory.twist[:, body, 2] if trajectory.dimension == 2 else -trajectory.twist[:, body, 4])
 
 
 def point(trajectory: Trajectory, body: int, place: tuple[float, ...]) -> Array:
-    """Where a point of a body that is at ``place`` in its own axes is, (s, d) [m]."""
+    """World position of the body's point at ``place`` in body axes, (s, d) [m]."""
     d, pose = trajectory.dimension, trajectory.pose[:, body]
     if d == 3:
         return np.asarray(pose[:, :3] + rotation(pose) @ np.array(place))
@@ -330,7 +329,7 @@ def interface_load(
 
 
 def overlaps(scene: Scene, trajectory: Trajectory) -> dict[tuple[int, int], Array]:
-    """Depth of the overlap of every pair that can meet and does, by body indices; each (s,) [m]."""
+    """Depth of the overlap of every pair that overlaps, by body indices; each (s,) [m]."""
     found = {}
     for i, j in near_pairs(scene, trajectory.pose):
         a, b = scene.bodies[i].shape, scene.bodies[j].shape

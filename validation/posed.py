@@ -1,8 +1,8 @@
 """Turns a scene argument (a name of the catalogue, or a path) into a canonical scene.
 
 A scene file is *pinned* before anything runs: ``drop.toml`` becomes ``drop.toml@3f2a9c1d``, its name and the hash of
-its text. Slots carry the pinned name, and the store keeps the text, so that a run means the scene it was started with
-whatever happens to the file.
+its text. Slots carry the pinned name, and the store keeps the text, so that a run keeps its scene even if the file
+changes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FILE = re.compile(
 _OWN = (".toml", ".json")
 #: Texts of pinned scene files by pinned name.
 _texts: dict[str, str] = {}
-#: What pinned scene files state, read and checked elsewhere, by pinned name.
+#: Contents of pinned scene files, read and checked in another process, by pinned name.
 _stated: dict[str, dict[str, Any]] = {}
 
 
@@ -47,15 +47,15 @@ def is_known(argument: str) -> bool:
 
 
 def pinned(argument: str, drop: bool = False) -> str:
-    """Name of a scene that stays what it is: a file's name gets the hash of its text.
+    """Pinned name of a scene: a file's name gets the hash of its text.
 
-    A model's text is what `validation.files.model_files` makes of it; with ``drop`` what has no place is left out, and
-    a name that is pinned already means the text that it was pinned with.
+    A model's text is the JSON of `validation.files.model_files`; with ``drop`` unsupported parts are left out, and a
+    name that is already pinned keeps its text.
 
     Raises
     ------
     SceneError
-        If the file cannot be read, or is no longer the one that a pinned name means.
+        If the file cannot be read, or has changed since it was pinned.
     """
     found = _FILE.fullmatch(argument)
     if argument in CATALOGUE or argument in _texts or argument in _stated or found is None:
@@ -64,15 +64,15 @@ def pinned(argument: str, drop: bool = False) -> str:
 
     path, wanted = found["path"], found["digest"]
     if not is_visible(path):
-        raise SceneError(f"scene: the name of {one_line(path)} has characters that steer a terminal; rename the file")
+        raise SceneError(f"scene: the name of {one_line(path)} has control characters; rename the file")
     text = read_text(Path(path))
     if Path(path).suffix.lower() not in _OWN:
         from validation.files import model_files
 
         try:
-            # A hash is of a text that somebody has read before: it says whether something was left out.
+            # The hash belongs to a text that was read before, which shows whether something was left out.
             text = model_files.text_of(text, Path(path).suffix, drop or wanted is not None)
-        except SceneError as error:  # who reads a text does not know the name of its file
+        except SceneError as error:  # the reader of a text does not have the file's name
             raise SceneError(f"{path}: {str(error).removeprefix('model: ')}") from None
     digest = _digest(text)
     if wanted and wanted.lower() != digest:
@@ -87,23 +87,28 @@ def texts_of(scenes: Iterable[str]) -> dict[str, str]:
     return {scene: _texts[scene] for scene in dict.fromkeys(scenes) if scene in _texts}
 
 
+def known_texts() -> dict[str, str]:
+    """Texts of all pinned scene files that this process knows, by name."""
+    return dict(_texts)
+
+
 def remember(texts: Mapping[str, str]) -> None:
-    """Make pinned scenes known in this process, so that their files are not needed.
+    """Register pinned scenes in this process, so that their files are not needed.
 
     Raises
     ------
     SceneError
-        If a text is not the one that its name means.
+        If a text does not fit its name.
     """
     for name, text in texts.items():
         found = _FILE.fullmatch(name)
         if found is None or found["digest"] != _digest(text):
-            raise SceneError(f"scene: the text kept for {name} is not that file's")
+            raise SceneError(f"scene: the stored text of {name} is not that of the file")
         _texts[name] = text
 
 
 def stated_of(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """What those scenes that are files state, as plain data by pinned name: for a process that cannot read files."""
+    """Contents of scenes from files, as plain data by pinned name: for a process that cannot read files."""
     from validation.files.scene_files import stated_from_text
 
     paths = {name: Path(name.rpartition("@")[0]) for name in texts_of(scenes)}
@@ -111,12 +116,12 @@ def stated_of(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def handed(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """What `hand_over` was given here for those scenes, to hand it on."""
+    """Data that `hand_over` received for those scenes."""
     return {scene: _stated[scene] for scene in dict.fromkeys(scenes) if scene in _stated}
 
 
 def hand_over(stated: Mapping[str, dict[str, Any]]) -> None:
-    """Make scenes known in this process from what `stated_of` gave elsewhere."""
+    """Register scenes in this process from data of `stated_of` in another."""
     _stated.update(stated)
 
 
@@ -153,14 +158,18 @@ def resolve(argument: str) -> CanonicalScene:
 
 
 def primary_of(argument: str) -> Primary:
-    """Return the declared error of a scene.
+    """Return the declared error of a scene; of one from a file the distance from the certified run.
 
     Raises
     ------
     SceneError
-        If none is declared: a bench needs one number, and a scene from a file has no truth to take it from.
+        If none is declared: a bench needs one number.
     """
     found = resolve(argument).primary
+    if found is None and is_file(argument):
+        from validation.files.distance import DISTANCE
+
+        return DISTANCE
     if found is None:
         declared = [name for name, scene in CATALOGUE.items() if scene.primary]
         raise SceneError(f"scene: no primary error is declared for {argument!r}, only for {', '.join(declared)}")

@@ -1,4 +1,4 @@
-"""Cylinders and hulls: what is measured of them by libraries, distances by `coal` and mass properties by Qhull."""
+"""Cylinders and hulls by libraries: distances by `coal` and mass properties by Qhull."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from adapters.engine import Array
 from adapters.scene import Box, Capsule, Cylinder, HalfSpace, Hull, SceneError, Shape, Sphere
 
-#: Share of a body's size to which `coal` is asked to be right (its own default is 1e-6 m, whatever the size).
+#: Tolerance of `coal` as a share of a body's size (its default is 1e-6 m for every size).
 TOLERANCE = 1e-9
 
 
@@ -36,7 +36,7 @@ def separation(a: Shape, pose_a: Array, b: Shape, pose_b: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _solid(shape: Shape) -> Any:
-    """The shape as `coal` knows it; cylinders and capsules lie along its z axis."""
+    """The shape in `coal`; cylinders and capsules lie along its z axis."""
     import coal
 
     if isinstance(shape, Sphere):
@@ -57,7 +57,7 @@ def _solid(shape: Shape) -> Any:
 
 
 def _turn(shape: Shape, pose: Array) -> Array:
-    """Rotation of the solid that stands for a shape, (3, 3)."""
+    """Rotation of the solid of a shape, (3, 3)."""
     from reference_solver.geometry import rotation
 
     turn = np.asarray(rotation(pose[None]))[0]
@@ -68,8 +68,8 @@ def _turn(shape: Shape, pose: Array) -> Array:
 def hull_properties(vertices: Array) -> tuple[float, Array, Array]:
     """Volume [m^3], centroid (3,) [m] and tensor of second moments about it (3, 3) [m^5] of a convex hull.
 
-    Sums over the tetrahedra that the hull's triangles make with its middle; of each the second moment about its own
-    corner is V/20 (sum of x x^T over the corners + (sum of x)(sum of x)^T) [F. Tonon, J. Math. Stat. 1 (2005) 8].
+    Sums over the tetrahedra between the hull's triangles and its middle; the second moment of each about its corner is
+    V/20 (sum of x x^T over the corners + (sum of x)(sum of x)^T) [F. Tonon, J. Math. Stat. 1 (2005) 8].
 
     Raises
     ------
@@ -83,7 +83,7 @@ def hull_properties(vertices: Array) -> tuple[float, Array, Array]:
     try:
         hull = ConvexHull(vertices)
     except QhullError:
-        raise SceneError("vertices: lie in one plane, or nearly") from None
+        raise SceneError("vertices: lie in one plane, or almost") from None
     inside = sorted(set(range(len(vertices))) - {int(k) for k in hull.vertices})
     if inside:
         raise SceneError(f"vertices: number {inside[0]} lies within the hull of the others")

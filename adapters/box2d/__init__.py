@@ -1,9 +1,9 @@
-"""Box2D 2.3 through its Python bindings; what stands where is told in `adapters.engine_folder`.
+"""Box2D 2.3 through its Python bindings; `adapters.engine_folder` describes the modules.
 
-shipped        numbers of Box2D itself, most of them fixed when it was compiled
-profiles       settings with their reasons
+shipped        Box2D's own constants, most of them compiled in
+profiles       settings and their reasons
 simulation     one world
-listening      contacts, as they can be heard while a step is made
+listening      contacts, from a listener within a step
 engine         the adapter
 """
 

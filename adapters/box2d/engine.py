@@ -1,9 +1,9 @@
-"""Box2D 2.3 behind the plugin line: planar, sequential impulses, warm starting, and positions put right afterwards.
+"""The adapter of Box2D 2.3: planar, sequential impulses, warm starting, and position correction afterwards.
 
     step:  detect  ->  v += (g + f/m) dt  ->  restitution from v  ->  warm start  ->  N sweeps over velocities
            ->  x += v dt  ->  sweeps over positions (no velocities)  ->  sweep what moves against what does not
 
-It computes in single precision. Names in the sources are those of Box2D's own files.
+It computes in single precision. Names in sources are Box2D's own files.
 """
 
 from __future__ import annotations
@@ -39,42 +39,42 @@ class Box2DEngine(CheckedEngine):
         quirks=(
             Quirk(
                 "polygons have a skin of 1 cm: boxes rest 1.5 cm above the ground",
-                "left alone in `default`, 0 in `tuned`",
+                "unchanged in `default`, 0 in `tuned`",
                 "b2Settings.h, b2_polygonRadius",
             ),
             Quirk(
-                "nothing rebounds below 1 unit/s, and 5 mm of overlap are left alone; neither can be set",
-                "left alone in `default`; `tuned` chooses a finer unit of length",
+                "restitution is 0 below 1 unit/s, and 5 mm of overlap stay uncorrected; neither can be set",
+                "unchanged in `default`; `tuned` uses a smaller unit of length",
                 "b2Settings.h, b2_velocityThreshold, b2_linearSlop",
             ),
             Quirk(
-                "what moves farther than 2 units or turns farther than 90 degrees in a step is cut",
-                "`tuned` chooses its unit by the scene's speeds",
+                "motion beyond 2 units and rotation beyond 90 degrees in a step are cut off",
+                "`tuned` chooses its unit of length by the scene's speeds",
                 "b2Settings.h, b2_maxTranslation, b2_maxRotation",
             ),
             Quirk(
-                "restitution looks at the velocity after this step's gravity: e g dt too much",
-                "left alone",
+                "restitution uses the velocity after gravity of this step, so rebounds are e g dt too fast",
+                "unchanged",
                 "b2Island.cpp, Solve: velocities are integrated before constraints are initialised",
             ),
             Quirk(
                 "friction of a pair is the root of a product, restitution the larger of two",
-                "where pairs differ, each contact gets its own numbers when it begins",
+                "where pairs differ, each contact gets its values when it begins",
                 "b2Contact.h, b2MixFriction, b2MixRestitution",
             ),
             Quirk(
-                "impulses of bodies that were swept are kept in no manifold",
-                "a listener adds up what the solver reports",
+                "manifolds do not store impulses of swept bodies",
+                "a listener sums the impulses that the solver reports",
                 "b2Island.cpp, SolveTOI: impulses are not stored for warm starting",
             ),
             Quirk(
-                "bodies sleep, also where the world was made with doSleep=False",
+                "bodies sleep even in a world made with doSleep=False",
                 "every body is made with allowSleep=False",
                 "measured with 2.3.10",
             ),
             Quirk(
-                "an edge keeps boxes 2 cm away whatever their skin",
-                "the ground is a polygon, in a frame of its own",
+                "an edge shape keeps boxes at a distance of 2 cm, whatever their skin",
+                "the ground is a polygon with its own frame",
                 "b2CollideEdge.cpp, m_radius",
             ),
         ),
@@ -86,7 +86,7 @@ class Box2DEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """The skin around what is landed on and what lands."""
+        """The skin around both shapes of a landing."""
         settings = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}
         skin = settings["skin"] / settings["units_per_metre"]
         declared = {}
@@ -100,7 +100,7 @@ class Box2DEngine(CheckedEngine):
         return declared
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: arguments of a step, attributes of the world and of shapes, and the unit to choose."""
+        """Python: arguments of a step, attributes of the world and of shapes, and the unit of length."""
         lines = [
             f"# world: your b2World, stepped with world.Step({dt:.9g}, {settings['iterations']}, "
             f"{settings['position_iterations']})"

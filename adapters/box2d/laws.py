@@ -1,4 +1,4 @@
-"""What Box2D does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Box2D from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 
 
 def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, and none that rebounds at up to one unit a second."""
+    """Blows in single precision, without restitution at up to one unit per second."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
@@ -53,7 +53,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(profile, metric),
-        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to one unit a second",
+        "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
         "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_precision.py",
         CHECKED_ON,
     )
@@ -80,7 +80,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", _chosen(profile)),
-        "places are singles: a step's way below half their spacing (12 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (12 cm at 1e6 m) is lost",
         "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -94,7 +94,7 @@ DEVIATIONS += tuple(
         "edge_drop",
         metric,
         corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
-        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to one unit a second",
+        "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
         "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -109,11 +109,11 @@ DEVIATIONS += tuple(
         "rack",
         metric,
         kept_law(metric),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "b2Settings.h, float32; band in adapters/single_motions.py",
         CHECKED_ON,
     )
-    # What the threshold takes of the energy as shipped is no rounding: that is a finding.
+    # The threshold's loss of energy as shipped is no round-off, but a finding.
     for profile, metrics in (
         ("default", ("momentum_defect", "asymmetry")),
         ("tuned", ("momentum_defect", "energy_defect", "asymmetry")),
@@ -128,7 +128,7 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "b2Settings.h, float32; band in adapters/single_motions.py",
         CHECKED_ON,
     )

@@ -1,7 +1,7 @@
-"""What Box2D tells of contacts while it makes a step: geometry before it is solved, impulses after.
+"""Box2D's contacts within a step: geometry before the solve, impulses after it.
 
-A manifold keeps the impulses of the step itself only, not those of bodies that were swept and met something within it.
-Both are reported to a listener, and a step's impulses are the sum of what it hears.
+A manifold has the impulses of the step itself only, without those of continuous collisions within it. A listener gets
+both, and a step's impulses are their sum.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ Row = tuple[int, int, tuple[float, float], tuple[float, float], tuple[float, flo
 
 
 class Listener(Box2D.b2ContactListener):
-    """Sets the materials of pairs when they meet, and keeps the contacts of a step while it is told to.
+    """Sets the materials of new pairs, and records the contacts of a step while it is switched on.
 
     Parameters
     ----------
     radii
         Skin or radius of each body's shape [length].
     materials
-        Restitution and friction by pair of bodies; a pair that is missing keeps what Box2D mixes.
+        Restitution and friction by pair of bodies; a missing pair keeps Box2D's own mixed values.
     early
         Gravity of a step [length/s], if restitution is to be sampled before it.
     """
@@ -43,24 +43,24 @@ class Listener(Box2D.b2ContactListener):
         self.failure: Exception | None = None
 
     def BeginContact(self, contact: Any) -> None:
-        """Give the pair its own material: what Box2D mixes of two bodies' numbers is overwritten."""
+        """Give the pair its own material: overwrite Box2D's mixed values."""
         a, b = contact.fixtureA.body.userData, contact.fixtureB.body.userData
         material = self.materials.get((min(a, b), max(a, b)))
         if material is not None:
             contact.restitution, contact.friction = material
 
     def PreSolve(self, contact: Any, oldManifold: Any) -> None:
-        """Keep where the contact is: the solver works with these normals, and the bodies move afterwards."""
+        """Record the place of the contact: the solver works with these normals, and the bodies move afterwards."""
         try:
             if self.early is not None:
                 self._correct(contact, self.early)
             if self.hears:
                 self._keep(contact)
-        except Exception as error:  # the binding prints and swallows what a callback raises
+        except Exception as error:  # the binding prints and drops exceptions of a callback
             self.failure = error
 
     def PostSolve(self, contact: Any, impulse: Any) -> None:
-        """Add what the solver found."""
+        """Add the solver's impulses."""
         if self.hears:
             try:
                 self._add(contact, impulse)
@@ -75,7 +75,7 @@ class Listener(Box2D.b2ContactListener):
         self.geometry[a.userData, b.userData] = (tuple(normal), points, self._gaps(a, b, manifold, normal))
 
     def _correct(self, contact: Any, kick: tuple[float, float]) -> None:
-        """Lower the restitution so that the rebound is that of the velocity before this step's gravity."""
+        """Lower the restitution to rebound with the velocity before this step's gravity."""
         a, b = contact.fixtureA.body, contact.fixtureB.body
         world = contact.worldManifold
         n, p = world.normal, world.points[0]
@@ -87,7 +87,7 @@ class Listener(Box2D.b2ContactListener):
         contact.restitution = max(0.0, asked * before / after) if after < 0.0 else asked
 
     def _gaps(self, a: Any, b: Any, manifold: Any, normal: Any) -> list[float]:
-        """Gap of each point as the solver of positions sees it [b2PositionSolverManifold::Initialize]."""
+        """Gap of each point in the position solver [b2PositionSolverManifold::Initialize]."""
         skins = self.radii[a.userData] + self.radii[b.userData]
         kind, gaps = manifold.type_, []
         for point in manifold.points[: manifold.pointCount]:
@@ -104,7 +104,7 @@ class Listener(Box2D.b2ContactListener):
     def _add(self, contact: Any, impulse: Any) -> None:
         a, b = contact.fixtureA.body.userData, contact.fixtureB.body.userData
         (nx, ny), points, gaps = self.geometry[a, b]
-        # Of two points that are nearly one the solver drops the second, which then has no impulse.
+        # The solver drops the second of two almost equal points, which then has no impulse.
         solved = zip(points, gaps, impulse.normalImpulses, impulse.tangentImpulses, strict=False)
         for point, gap, jn, jt in solved:
             # The tangent is the normal turned by -90 degrees [b2Cross(normal, 1)].

@@ -1,10 +1,10 @@
-"""Profiles of Box2D 2.3: settings with their reasons.
+"""Profiles of Box2D 2.3: settings and their reasons.
 
 default   as shipped
-tuned     best stock settings for what a scene needs
+tuned     best stock settings for the needs of a scene
 
-Most numbers of Box2D are lengths that are compiled in. What a user can choose instead is the unit: its manual says to
-scale a world whose bodies are not between 0.1 and 10 units large. ``units_per_metre`` is that choice.
+Most parameters of Box2D are compiled-in lengths. A user can choose the unit instead: its manual recommends scaling a
+world whose bodies are not between 0.1 and 10 units large. ``units_per_metre`` is that choice.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
 )
 #: Largest unit that `tuned` chooses: slop and threshold are then 0.08 mm and 16 mm/s.
 FINEST = 64.0
-#: Skin of boxes that rest, in `tuned` [length].
+#: Skin of resting boxes in `tuned` [length].
 THIN = 1e-4
 
 
@@ -44,12 +44,17 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
     """As shipped, in metres."""
     said = "as shipped"
     return [
-        Setting("iterations", VELOCITY_ITERATIONS, f"{said}: sweeps over velocities", "manual, Simulating the World"),
+        Setting("iterations", VELOCITY_ITERATIONS, f"{said}: velocity iterations", "manual, Simulating the World"),
         Setting("position_iterations", POSITION_ITERATIONS, f"{said}", "manual, Simulating the World"),
-        Setting("continuous", True, f"{said}: bodies are swept against what does not move", "b2World.h"),
+        Setting("continuous", True, f"{said}: bodies are swept against static ones", "b2World.h"),
         Setting("skin", POLYGON_RADIUS, f"{said}: around each polygon", "b2Settings.h, b2_polygonRadius"),
         Setting("units_per_metre", 1.0, "the manual's MKS units", "manual, Units"),
-        Setting("early_restitution", False, f"{said}: sampled after this step's gravity", "b2Island.cpp, Solve"),
+        Setting(
+            "early_restitution",
+            False,
+            f"{said}: velocities are taken after gravity of this step",
+            "b2Island.cpp, Solve",
+        ),
     ]
 
 
@@ -59,10 +64,10 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             _sweeps(needs.mass_ratio),
-            "100 hold a column of twenty; a load needs as many as it is times heavier than what carries it",
+            "100 hold a column of twenty; a heavy load needs about as many as its mass ratio to the body below it",
             "measured: columns and unequal masses",
         ),
-        Setting("position_iterations", 10, "as many as its testbed allows by default", "measured"),
+        Setting("position_iterations", 10, "the default of its testbed", "measured"),
         Setting(
             "continuous",
             True,
@@ -72,9 +77,9 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "skin",
             THIN if needs.regime == "rest" else 0.0,
-            "a hundredth of the shipped one: faces that touch at the start stay in touch whatever their rounding"
+            "1 % of the shipped one; faces that touch at the start stay in contact, whatever their rounding"
             if needs.regime == "rest"
-            else "boxes are as large as they are",
+            else "boxes have their own size",
             "b2PolygonShape, m_radius",
         ),
         Setting("units_per_metre", units(needs, dt), _WHY_UNITS, "manual, Units; b2Settings.h"),
@@ -87,16 +92,16 @@ def _sweeps(ratio: float) -> int:
 
 
 _WHY_UNITS = (
-    "slop and threshold of restitution are lengths that are compiled in, and small in a finer unit; "
-    "what moves farther than 2 units in a step is cut, so that speed sets a limit"
+    "slop and restitution threshold are compiled-in lengths, and small in a smaller unit of length; motion beyond "
+    "2 units a step is cut off, which limits the choice by the speed"
 )
 
 
 def units(needs: Needs, dt: float) -> float:
-    """Largest power of two, at most `FINEST` and at least 1, in which the fastest body of a scene is not cut."""
-    # A rebound can double a speed, and blows can give the energy of a heavy body to a light one.
+    """Largest power of two, at most `FINEST` and at least 1, without clamping the fastest body of a scene."""
+    # A rebound can double a speed, and blows can transfer the energy of a heavy body to a light one.
     gain = max(2.0, math.sqrt(needs.mass_ratio)) if needs.regime == "impact" else 2.0
-    # Receipts are measured with these settings too, on a box that slides so fast.
+    # Property checks use these settings too, with a box that slides so fast.
     fastest = dt * max(gain * needs.top_speed, slide_speed(needs.friction))
     return min(FINEST, max(1.0, 2.0 ** math.floor(math.log2(MAX_TRANSLATION / fastest))))
 

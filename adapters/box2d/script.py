@@ -1,4 +1,4 @@
-"""A run on Box2D 2.3 as a stand-alone script: what `adapters.box2d.simulation` calls, as it is recorded."""
+"""A run on Box2D 2.3 as a stand-alone script: the recorded calls of `adapters.box2d.simulation`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.recording import written
 from adapters.scene import HalfSpace, Scene
 from adapters.script import constants, imports, literal, materials, stepped, text
 
-#: Variables of a script, and the calls whose values they hold.
+#: Variables of a script, and the calls that return their values.
 _NAMES = {
     "world": "b2World",
     "body": "CreateDynamicBody CreateStaticBody CreateKinematicBody",
@@ -37,20 +37,20 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
         lines += [f"    KICK = {literal(kick)}  # gravity of a step", *_EARLY] if early else []
         lines += ["", "", "listener = Listener()"]
     else:
-        made.remove("world.contactListener = listener")  # it only listens
+        made.remove("world.contactListener = listener")  # it only reads
     still = literal([body.name for body in scene.bodies if isinstance(body.shape, HalfSpace)])
     lines += ["", *made, "", f"HALF_SPACES = {still}  # their pose is the origin, wherever their polygons stand"]
     return text([*lines, *_STATE, *stepped(step)])
 
 
-#: Lines of what gives each pair its own material when it meets.
+#: Lines of the listener that gives each new pair its own material.
 _LISTENER = [
     "class Listener(Box2D.b2ContactListener):",
     "    def BeginContact(self, contact):",
     "        own = material(contact.fixtureA.body.userData, contact.fixtureB.body.userData)",
     "        contact.restitution, contact.friction = own",
 ]
-#: Lines of what lowers a restitution so that the rebound is that of the velocity before a step's gravity.
+#: Lines that lower a restitution to rebound with the velocity before a step's gravity.
 _EARLY = [
     "",
     "    def PreSolve(self, contact, oldManifold):",

@@ -1,7 +1,7 @@
-"""One ``b2World`` and what is read from it.
+"""One ``b2World`` and its readings.
 
-Velocities first, then positions: poses and impulses read after a step belong together, points and gaps to the places
-where bodies stood before it. Lengths are handed over in the units of the profile, and are metres again when read.
+Velocities first, then positions: poses and impulses after a step belong together; points and gaps belong to the poses
+before it. Lengths in the engine have the units of the profile; readings are in metres.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 class Box2DSimulation(Simulation):
     """One ``b2World``; bodies in the scene's order.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
@@ -87,8 +87,8 @@ class Box2DSimulation(Simulation):
             made = self.box2d.b2PolygonShape(box=self._vector(shape.half_extents))
         else:
             assert isinstance(shape, HalfSpace)
-            # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision;
-            # and without a turn along an axis of the world, of which a single angle would miss by 4e-8.
+            # In its own frame, with the surface through its origin, so single precision loses nothing; and without
+            # rotation if along an axis of the world, because a single-precision angle has an error of 4e-8.
             wide = self.reach * self.units
             nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
             made = self.box2d.b2PolygonShape(box=(wide, wide, (-nx * wide, -ny * wide), 0.0))
@@ -96,7 +96,7 @@ class Box2DSimulation(Simulation):
         return made
 
     def advance(self, steps: int) -> None:
-        """See `Simulation.advance`; only the last step is listened to, since only its contacts are ever read."""
+        """See `Simulation.advance`; the listener works in the last step only, whose contacts are read."""
         step, dt, listener = self.world.Step, self.dt, self.listener
         counts = self.settings["iterations"], self.settings["position_iterations"]
         listener.rows, listener.hears = [], False
@@ -110,7 +110,7 @@ class Box2DSimulation(Simulation):
             raise EngineError(f"contacts: {type(listener.failure).__name__}: {listener.failure}")
 
     def pose(self) -> Array:
-        """See `Simulation.pose`; a half-space's own pose is the origin, wherever its polygon stands."""
+        """See `Simulation.pose`; a half-space's own pose is the origin, wherever its polygon is."""
         per_metre = 1.0 / self.units
         rows = [(p[0] * per_metre, p[1] * per_metre, body.angle) for body in self.bodies for p in (body.position,)]
         for row, body in enumerate(self.scene.bodies):
@@ -131,7 +131,7 @@ class Box2DSimulation(Simulation):
         )
 
     def contacts(self) -> Contacts:
-        """Up to two points per pair; a pair that is swept into touch within the step has them twice."""
+        """Up to two points per pair; a pair with a continuous collision within the step has them twice."""
         per_metre = 1.0 / self.units
         rows = (
             (a, b, np.multiply(point, per_metre), normal, np.multiply(impulse, per_metre), gap * per_metre)
@@ -140,7 +140,7 @@ class Box2DSimulation(Simulation):
         return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
-        """What the world, its bodies and shapes hold."""
+        """Values of the world, its bodies and shapes."""
         world, units = self.world, self.units
         held: dict[str, Any] = {
             "dt": self.dt,

@@ -1,4 +1,4 @@
-"""What Box2D 2.3 does when nothing is set; see `adapters.unset`."""
+"""Box2D 2.3 without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTI
 class Bare:
     """A world with one body above a static box."""
 
-    #: What the manual steps with [s]: a world has no step of its own.
+    #: Step of the manual [s]: a world has no default.
     dt = 1.0 / 60.0
 
     def __init__(self, asked: Asked) -> None:

@@ -1,11 +1,11 @@
-"""Box2D 3.1 through pyb2d3; what stands where is told in `adapters.engine_folder`.
+"""Box2D 3.1 through pyb2d3; `adapters.engine_folder` describes the modules.
 
-shipped        numbers of Box2D itself
-profiles       settings with their reasons
-translation    materials of pairs as one number per body
-ball_on_plane  a motion that the small steps make, for laws
+shipped        Box2D's own defaults
+profiles       settings and their reasons
+translation    materials of pairs from one value per body
+ball_on_plane  a ball's motion in substeps, for laws
 simulation     one world
-drawing        contacts, as the engine draws them
+drawing        contacts, from the engine's debug drawing
 engine         the adapter
 """
 

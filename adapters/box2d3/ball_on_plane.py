@@ -1,4 +1,4 @@
-"""What the small steps make of a ball on a plane, as a law: its motion in the plane's axes, step by step.
+"""The motion of a ball on a plane in Box2D's substeps, as a law, in the plane's axes.
 
     start of a step:  a gap of up to 2 cm is a contact, in the middle of the gap, at a point that turns with the ball
     n small steps:    v += g h, and what the contact gave before once more
@@ -7,11 +7,11 @@
                       both once more, without the spring
     end:              v_n = -e v_n(start of the step), if that was an approach above the threshold, and it was stopped
 
-So a rebound is that of the velocity at the start of its step, friction knows nothing of it, and a ball that turns
-within a step lifts the point that it is held by. Everything is computed in doubles; the band is what roundings of
-singles make of it.
+So the rebound follows from the velocity at the start of its step, friction does not depend on it, and a ball that
+rotates within a step lifts its contact point. Everything is computed in double precision; the band is the round-off of
+single precision.
 
-Longer than a law is meant to be: it explains 48 rows of the standard suite (bounce and oblique) at any step.
+Longer than a usual law, but it explains 48 rows of the standard suite (bounce and oblique) at any step.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def ball_law(metric: str, chosen: Chosen, sampled: bool = False) -> Law:
     Parameters
     ----------
     metric, chosen
-        What is predicted, and the settings.
+        The predicted metric, and the settings.
     sampled
-        The metric is a time that is read from samples, known to one of them.
+        The metric is a time from samples, known to one sample.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -73,7 +73,7 @@ def _is_told(scene: Scene) -> bool:
 
 @dataclass
 class _Held:
-    """What a contact holds [N s], and whether it ever pushed in this step."""
+    """Impulses of a contact [N s], and whether it ever pushed in this step."""
 
     normal: float = 0.0
     friction: float = 0.0
@@ -103,7 +103,7 @@ class _Ball:
         turns = 2.0 * math.pi * 2.0 * min(settings["hertz"], STIFFEST / self.h)
         a = 2.0 * settings["damping_ratio"] + self.h * turns
         b = self.h * turns * a
-        #: Rate of the spring [1/s], its share of a mass, and of what was given before.
+        #: Rate of the spring [1/s], and its factors of mass and of accumulated impulse.
         self.spring = (turns / a, b / (1.0 + b), 1.0 / (1.0 + b))
 
     def moved(self) -> Trajectory:
@@ -131,7 +131,7 @@ class _Ball:
         held.pushed, start, turned, arm = False, self.y, self.turn, self.radius + 0.5 * gap
 
         def left() -> float:
-            # The point of the ball that is held turns with it.
+            # The contact point of the ball turns with it.
             return gap + self.y - start + arm * (1.0 - math.cos(self.turn - turned))
 
         for _ in range(self.settings["substeps"]):

@@ -1,9 +1,9 @@
-"""Contacts of Box2D 3.1 as far as its bindings show them: what the engine draws for debugging.
+"""Contacts of Box2D 3.1 from the engine's debug drawing, the only access in its bindings.
 
-No call of the bindings tells which contacts a body has. The engine draws each contact's points and normals, not the
-bodies; these are found by where the point lies. The impulses that it draws are sums over the solve and the relaxation
-of each small step, without a rebound: twice the weight of what rests, and of a blow what stops it. No momentum follows
-from them; they say that a contact pushed, and no more.
+The bindings have no call for a body's contacts. The engine draws each contact's points and normals without the bodies,
+which follow from the place of the point. The drawn impulses are sums over the solve and the relaxation of each substep,
+without restitution: twice the weight of a resting body, and in a blow the impulse of the stop. They do not give a
+momentum; they only show that a contact pushed.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import pyb2d3
 from adapters.engine import EngineError
 from adapters.scene import Body, Box, Disc, HalfSpace
 
-#: Point and unit normal of a contact that touches or pushed.
+#: Point and unit normal of a touching or pushing contact.
 Point = tuple[tuple[float, float], tuple[float, float]]
-#: Colour of the points of contacts that are seen ahead, and do not touch. [b2DrawContacts, b2_colorGray3]
+#: Colour of the points of speculative contacts, which do not touch. [b2DrawContacts, b2_colorGray3]
 AHEAD = 0x4D4D4D
-#: What single numbers may make of the product of two unit normals, and the arc of a small turn within a step.
+#: Round-off of the product of two unit normals in single precision, and the arc of a small rotation within a step.
 ALONG = 1e-3
 
 
 class Pen(pyb2d3.DebugDraw):
-    """Keeps points and segments of what the engine draws of its contacts."""
+    """Records points and segments that the engine draws of its contacts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -36,12 +36,12 @@ class Pen(pyb2d3.DebugDraw):
         self.segments: list[tuple[float, float]] = []
 
     def draw_point(self, p: Any, size: float, color: int) -> None:
-        """Keep the point, and whether it is seen ahead only."""
+        """Record the point, and whether it is only speculative."""
         x, y = p
         self.points.append(((float(x), float(y)), color == AHEAD))
 
     def draw_segment(self, p1: Any, p2: Any, color: int) -> None:
-        """Keep the vector: a normal, or an impulse along it."""
+        """Record the vector: a normal, or an impulse along it."""
         (x, y), (u, v) = p1, p2
         self.segments.append((float(u) - float(x), float(v) - float(y)))
 
@@ -61,7 +61,7 @@ def touching(pen: Pen, world: Any) -> list[Point]:
     Raises
     ------
     EngineError
-        If points and vectors are not drawn one for one.
+        If the numbers of points and vectors differ.
     """
     points, normals = pen.drawn(world, True)
     _, pushes = pen.drawn(world, False)
@@ -76,7 +76,7 @@ def touching(pen: Pen, world: Any) -> list[Point]:
 
 
 def named(point: Point, bodies: Sequence[Body], places: Sequence[tuple[float, float, float, float]]) -> tuple[int, int]:
-    """Bodies of a contact: a plane across its normal has the first one behind it, the second ahead, and both at it.
+    """Bodies of a contact: both touch the plane through the point across the normal, the first one from behind.
 
     ``places``: x, y, cosine and sine of each body when the contact was found.
     """
@@ -96,7 +96,7 @@ def named(point: Point, bodies: Sequence[Body], places: Sequence[tuple[float, fl
 
 
 def _farthest(body: Body, place: tuple[float, float, float, float], nx: float, ny: float) -> float:
-    """How far a body reaches along a direction of length 1 [m]; a half-space does so along its normal only."""
+    """Extent of a body along a unit direction [m]; a half-space has one along its normal only."""
     shape = body.shape
     if isinstance(shape, HalfSpace):
         along = nx * shape.normal[0] + ny * shape.normal[1] > 1.0 - ALONG
@@ -104,7 +104,7 @@ def _farthest(body: Body, place: tuple[float, float, float, float], nx: float, n
     x, y, c, s = place
     centre = nx * x + ny * y
     if not isinstance(shape, Box):
-        assert isinstance(shape, Disc)  # what else this engine is asked for
+        assert isinstance(shape, Disc)  # the only other shape of this engine
         return centre + shape.radius
     a, b = shape.half_extents
     return centre + a * abs(nx * c + ny * s) + b * abs(ny * c - nx * s)

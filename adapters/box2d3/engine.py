@@ -1,9 +1,9 @@
-"""Box2D 3.1 behind the plugin line: planar, soft contacts, small steps with warm starting, single precision.
+"""The adapter of Box2D 3.1: planar, soft contacts, substeps with warm starting, single precision.
 
     step:  detect  ->  n times: v += g dt/n, contacts as springs that are solved with the velocities, x += v dt/n,
            contacts once more without their springs  ->  restitution  ->  sweep what moves against what does not
 
-Names in the sources are those of Box2D's own files.
+Names in sources are Box2D's own files.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Box2D3Engine(CheckedEngine):
         title="Box2D 3.1",
         package="pyb2d3",
         dimensions=frozenset({2}),
-        scheme=Scheme("detect, then small steps of velocity and position, restitution last, sweep", 1.0 / SUBSTEPS),
+        scheme=Scheme("detect, then substeps of velocity and position, restitution last, sweep", 1.0 / SUBSTEPS),
         profile_schemes=MappingProxyType(
-            {"tuned": Scheme("as shipped, with twice the small steps", 1.0 / TUNED_SUBSTEPS)}
+            {"tuned": Scheme("as shipped, with twice the substeps", 1.0 / TUNED_SUBSTEPS)}
         ),
         customary_dt=1.0 / 60.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
@@ -43,38 +43,41 @@ class Box2D3Engine(CheckedEngine):
         apart=True,
         quirks=(
             Quirk(
-                "contacts are springs of 30 Hz, 60 Hz against what is fixed: columns sink by millimetres whatever "
-                "the step is",
-                "left alone in `default`, as stiff as the small steps resolve in `tuned`",
+                "contacts are springs of 30 Hz, 60 Hz against static bodies: columns sink by millimetres at every "
+                "step size",
+                "unchanged in `default`, as stiff as the substeps resolve in `tuned`",
                 "types.c, b2DefaultWorldDef: contactHertz; solver.c, staticSoftness",
             ),
             Quirk(
-                "nothing rebounds below 1 m/s",
-                "left alone in `default`, what gravity adds in a step in `tuned`",
+                "restitution is 0 below 1 m/s",
+                "unchanged in `default`; in `tuned` the speed that gravity adds in a step",
                 "types.c, b2DefaultWorldDef: restitutionThreshold",
             ),
             Quirk(
-                "a rebound comes after friction, which knows the impulse of compression only: mu / (1 + e)",
-                "left alone; laws predict it",
+                "restitution is applied after friction, which is limited by the impulse of compression only: mu / "
+                "(1 + e)",
+                "unchanged; the contact laws predict it",
                 "contact_solver.c, b2ApplyRestitutionTask; measured with 0.11.1",
             ),
             Quirk(
-                "the bindings tell of no body's contacts; what the engine draws has points and normals, and impulses "
-                "that add up the solve and the relaxation of each small step: twice a weight, no rebound",
-                "points and normals are those that are drawn, impulses are not stated (NaN)",
+                "the bindings give no contacts; the debug drawing has points and normals, and impulses that sum "
+                "solve and relaxation of each substep: twice a weight, no rebound",
+                "points and normals come from the drawing, impulses are not stated (NaN)",
                 "pyb2d3 0.11.1; contact_solver.c, totalNormalImpulse; measured",
             ),
             Quirk(
                 "friction of a pair is the root of a product, restitution the larger of two",
-                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "values per body are chosen that give the values of the pairs; a table without such values is refused",
                 "types.h, b2WorldDef: frictionCallback, restitutionCallback, which the bindings leave out",
             ),
             Quirk(
-                "the angle it tells is an approximation of an arc tangent, off by 1e-4",
+                "its angle approximates the arc tangent, with an error of 1e-4",
                 "angles are computed from its cosine and sine",
                 "math_functions.c, b2Atan2",
             ),
-            Quirk("bodies sleep", "worlds and bodies are made so that none may", "types.h, b2WorldDef, b2BodyDef"),
+            Quirk(
+                "bodies sleep", "worlds and bodies are made so that they cannot sleep", "types.h, b2WorldDef, b2BodyDef"
+            ),
             Quirk("there is room for 128 worlds", "a world is destroyed when its run ends", "core.h, B2_MAX_WORLDS"),
         ),
     )
@@ -86,15 +89,18 @@ class Box2D3Engine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         if restitutions(scene) is None:
-            return "pairs: restitution of a pair is the larger of two numbers here, this table has none"
+            return "pairs: restitution of a pair is the larger of two values here; no values per body give this table"
         if frictions(scene) is None:
-            return "pairs: friction of a pair is the root of a product of two numbers here, this table has none"
+            return (
+                "pairs: friction of a pair is the root of a product of two values here; no values per body give "
+                "this table"
+            )
         return super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing so far."""
+        """No deviations so far."""
         return {}
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:

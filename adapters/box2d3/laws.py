@@ -1,4 +1,4 @@
-"""What Box2D 3.1 does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Box2D 3.1 from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def _chosen(profile: str) -> Chosen:
 
 
 def _lengths(profile: str) -> Callable[[Scene, float], tuple[float, float]]:
-    """Units a metre of a profile, and its skin around polygons."""
+    """Units per metre of a profile, and its skin around polygons."""
     return lambda scene, dt: (_chosen(profile)(scene, dt)["units_per_metre"], 0.0)
 
 
 def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, that rebound above the threshold, after friction."""
+    """Blows in single precision, with restitution above the threshold, after friction."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         threshold = Threshold(_chosen(profile)(scene, dt)["restitution_threshold"], rebounds_at=True)
@@ -68,8 +68,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(profile, metric),
-        "numbers are singles, 2^-24 of their size; nothing rebounds at an approach below the threshold; and friction "
-        "knows the impulse of compression only, as the rebound comes last",
+        "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
+        "of compression only, as restitution is applied last",
         "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
         CHECKED_ON,
     )
@@ -84,8 +84,9 @@ DEVIATIONS += tuple(
         scene,
         metric,
         ball_law(metric, _chosen(profile), sampled=metric == "rest_time"),
-        "a rebound is that of the velocity at the start of its step, comes after friction, above the threshold only; "
-        "the rest of that step is lost; the point that a ball is held by turns with it within a step, and lifts it",
+        "restitution uses the velocity at the start of the step, is applied after friction and above the threshold "
+        "only, and the rest of the step is lost; the contact point is fixed to the ball within a step, turns with "
+        "it and lifts it",
         "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
         CHECKED_ON,
     )
@@ -100,7 +101,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", _lengths(profile)),
-        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -112,11 +113,11 @@ DEVIATIONS += tuple(
         (profile,),
         "edge_drop",
         metric,
-        # What approaches just as fast as the threshold rebounds here.
+        # An impact exactly at the threshold rebounds here.
         corner_law(
             metric, _lengths(profile), math.nextafter(RESTITUTION_THRESHOLD, 0.0) if profile == "default" else 0.0
         ),
-        "numbers are singles, 2^-24 of their size; and nothing rebounds at an approach of up to the threshold",
+        "single precision, 2^-24 relative; restitution is 0 up to the threshold",
         "types.h, restitutionThreshold; motion in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -131,7 +132,7 @@ DEVIATIONS += tuple(
         "rack",
         "momentum_defect",
         kept_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
         CHECKED_ON,
     )
@@ -145,7 +146,7 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
         CHECKED_ON,
     )

@@ -1,4 +1,4 @@
-"""A run on Box2D 3.1 as a stand-alone script: what `adapters.box2d3.simulation` calls, as it is recorded."""
+"""A run on Box2D 3.1 as a stand-alone script: the recorded calls of `adapters.box2d3.simulation`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from adapters.recording import written
 from adapters.scene import HalfSpace, Scene
 from adapters.script import constants, imports, literal, stepped, text
 
-#: Variables of a script, and the calls and attributes whose values they hold.
+#: Variables of a script, and the calls and attributes of their values.
 _NAMES = {
     "world": "World",
     "turn": "Rot",
@@ -34,7 +34,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     return text([*lines, *_STATE, *stepped(step)])
 
 
-#: Lines of the function that reads all bodies: the angle that the engine tells itself is off by 1e-4.
+#: Lines of the function that reads all bodies: the engine's own angle has an error of 1e-4.
 _STATE = [
     "",
     "",

@@ -1,7 +1,7 @@
-"""One Box2D 3.1 world and what is read from it.
+"""One Box2D 3.1 world and its readings.
 
-A step is made of small ones, each velocity first: poses and velocities belong together, contacts to the places where
-bodies stood before the step. Lengths are handed over in the units of the profile, and are metres again when read.
+A step consists of substeps, each velocity first: poses and velocities belong together; contacts belong to the poses
+before the step. Lengths in the engine have the units of the profile; readings are in metres.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _UNKNOWN = (math.nan, math.nan)
 class Box2D3Simulation(Simulation):
     """One world; bodies in the scene's order.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
@@ -66,7 +66,7 @@ class Box2D3Simulation(Simulation):
         if isinstance(asked.shape, HalfSpace):
             (nx, ny), offset = asked.shape.normal, asked.shape.offset
             x, y = offset * nx, offset * ny
-            # Without a turn along an axis of the world, of which a single number would miss.
+            # Without rotation if along an axis of the world, because single precision is not exact.
             c, s = (1.0, 0.0) if 0.0 in (nx, ny) else (ny, -nx)
         else:
             x, y, theta = asked.pose
@@ -94,7 +94,7 @@ class Box2D3Simulation(Simulation):
         if isinstance(shape, Box):
             return pyb2d3.box(*self._vector(shape.half_extents))
         assert isinstance(shape, HalfSpace)
-        # In a frame of its own, with the surface through its origin, so that single numbers cost it no precision.
+        # In its own frame, with the surface through its origin, so single precision loses nothing.
         nx, ny = shape.normal if 0.0 in shape.normal else (0.0, 1.0)
         wide = self.reach * self.units
         return pyb2d3.box(wide, wide, center=(-nx * wide, -ny * wide))
@@ -134,7 +134,7 @@ class Box2D3Simulation(Simulation):
         return np.array(rows, float)
 
     def contacts(self) -> Contacts:
-        """Points and normals of what touched in the last step; impulses and gaps are not told (NaN)."""
+        """Points and normals of contacts in the last step; impulses and gaps are not available (NaN)."""
         from adapters.box2d3.drawing import named, touching
 
         rows: list[Row] = []
@@ -145,7 +145,7 @@ class Box2D3Simulation(Simulation):
         return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
-        """What the world, its bodies and shapes hold; the bindings do not tell springs and speeds again."""
+        """Values of the world, its bodies and shapes; the bindings cannot read springs and speeds."""
         world, units = self.world, self.units
         held: dict[str, Any] = {
             "dt": self.dt,
@@ -168,6 +168,6 @@ class Box2D3Simulation(Simulation):
         return held
 
     def close(self) -> None:
-        """Give the world back: there is room for 128 of them."""
+        """Close the world: there is room for 128."""
         self.bodies, self.loads = [], []
         self.world.destroy()

@@ -1,6 +1,6 @@
-"""Materials of pairs as one number per body: Box2D takes the larger restitution and the root of a product of frictions.
+"""Materials of pairs from one value per body: Box2D takes the larger restitution and the root of the friction product.
 
-What it can hold is a single number, so that a pair's own comes out to a rounding of one.
+Values are in single precision, so a pair's value is exact to its round-off.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
-#: What a logarithm, an exponential, a root and a product in doubles may miss of a number, as a share.
+#: Relative round-off of a logarithm, an exponential, a root and a product in double precision.
 ROUNDING = 1e-14
 
 
 def restitutions(scene: Scene) -> list[float] | None:
-    """Numbers of which the larger one is each pair's restitution; None if there are none."""
+    """Values of which the larger one is each pair's restitution; None if there are none."""
     return representable(scene, lambda pairs: _restitutions(scene, pairs))
 
 
@@ -30,7 +30,7 @@ def _restitutions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | No
 
 
 def frictions(scene: Scene) -> list[float] | None:
-    """Numbers of which the root of the product is each pair's friction; None if there are none."""
+    """Values of which the root of the product is each pair's friction; None if there are none."""
     return representable(scene, lambda pairs: _frictions(scene, pairs))
 
 

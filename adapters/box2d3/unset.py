@@ -1,4 +1,4 @@
-"""What Box2D 3.1 does when nothing is set; see `adapters.unset`."""
+"""Box2D 3.1 without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTI
 class Bare:
     """A world with one body above a static box."""
 
-    #: What the manual steps with [s]: a world has no step of its own.
+    #: Step of the manual [s]: a world has no default.
     dt = 1.0 / 60.0
 
     def __init__(self, asked: Asked) -> None:
@@ -61,7 +61,7 @@ UNSET = (
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-5),
     Unset("at 1 mm/s asleep after [s]", "0.5: B2_TIME_TO_SLEEP, below sleepThreshold, 5 cm/s", f"core.h; {_BODY}", 0.5,
           partial(unset.sleep, Bare), 2.0 * Bare.dt),
-    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against what is fixed", _WORLD, None,
+    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against static bodies", _WORLD, None,
           partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "not documented", "constants.h, B2_LINEAR_SLOP: 5 mm", None,
           partial(unset.left, Bare)),

@@ -1,9 +1,9 @@
-"""Bullet through PyBullet; what stands where is told in `adapters.engine_folder`.
+"""Bullet through PyBullet; `adapters.engine_folder` describes the modules.
 
-shipped         numbers of Bullet itself, and the releases that were looked at
-profiles        settings with their reasons
+shipped         Bullet's own constants, and the reviewed releases
+profiles        settings and their reasons
 simulation      one world in a DIRECT client
-clipped         bodies whose faces Bullet knows
+clipped         bodies with faces for clipping
 engine          the adapter
 contact_law     one ball over a face, as a scalar recurrence of the settings
 """

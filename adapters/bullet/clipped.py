@@ -1,12 +1,12 @@
-"""Boxes and hulls whose faces are clipped against each other: setting ``enableSAT``.
+"""Boxes and hulls with clipping of faces: setting ``enableSAT``.
 
-Bullet finds all points of two convex bodies in one step where it knows their faces, and one point a step where it does
-not. PyBullet lets it know those of bodies that come in URDF files alone [bullet3, URDF_INITIALIZE_SAT_FEATURES].
+Bullet finds all points of two convex bodies in one step if their faces are initialized, else one point per step.
+PyBullet initializes the faces of bodies from URDF files only [bullet3, URDF_INITIALIZE_SAT_FEATURES].
 
-    0   bodies come in URDF files and their faces stay unknown: a control of what the files themselves change
-    1   they are known
+    0   bodies come from URDF files without faces: a control for the effect of the files themselves
+    1   with faces
 
-Without the setting, as shipped, bodies are made as everywhere here and no file is written.
+Without the setting, as shipped, bodies are made without files.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _BODY = """<robot name="body"><link name="body">
 
 
 def files(shape: Shape, half_extents: Iterable[float], mass: float) -> dict[str, str]:
-    """Files, by name, of a body of a hull, or of a box of ``half_extents`` [m] that stands for any other shape.
+    """Files, by name, of a body of a hull, or of a box of ``half_extents`` [m] for any other shape.
 
-    ``body.urdf`` is what is loaded; a hull's vertices stand beside it, and Bullet reads them in single precision.
+    ``body.urdf`` is loaded; a hull's vertices are in a file beside it, which Bullet reads in single precision.
     """
     if not isinstance(shape, Hull):
         stated = '<box size="{!r} {!r} {!r}"/>'.format(*(2.0 * float(half) for half in half_extents))
         return {"body.urdf": _BODY.format(mass=float(mass), shape=stated)}
     lines = ["v {!r} {!r} {!r}".format(*map(float, vertex)) for vertex in shape.vertices]
-    lines += [f"f 1 {k} {k + 1}" for k in range(2, len(lines))]  # any faces that name all vertices: it makes its own
+    lines += [f"f 1 {k} {k + 1}" for k in range(2, len(lines))]  # any faces with all vertices: Bullet makes its own
     text = "\n".join(lines) + "\n"
     return {"hull.obj": text, "body.urdf": _BODY.format(mass=float(mass), shape='<mesh filename="hull.obj"/>')}
 
@@ -49,16 +49,16 @@ def made(
     turn: Iterable[float],
     **how: int,
 ) -> int:
-    """Make the body of `files`. Moments are set afterwards, as for bodies that are made otherwise.
+    """Make the body of `files`. Moments are set afterwards, as for other bodies.
 
     Parameters
     ----------
     known
-        Whether Bullet knows its faces.
+        Whether its faces are initialized.
     place, turn
         Position [m] and quaternion (x, y, z, w).
     how
-        What else `loadURDF` is told.
+        Further arguments of `loadURDF`.
 
     Returns
     -------

@@ -5,12 +5,12 @@
       free velocity      u = v - g dt - k (1 + |v|) v dt         (k: drag of the multibody path)
       rebound            r = e max(0, -s) if |s| >= threshold    s = u (multibody) or v (rigid body)
       target             r - (d + slop)/dt          if d > -slop: closing the gap counts as a velocity
-                         r - erp (d + slop)/dt      else: Baumgarte, or a push velocity that is not kept
+                         r - erp (d + slop)/dt      else: Baumgarte, or a push velocity for this step only
       v <- max(u, target),   d <- d + (v + push) dt
 
-It needs neither Bullet nor a scene, and its numbers are those of a profile's settings (`ContactLaw.of`): the adapter
-declares its profiles' rebounds with it, and the laws beside it explain results by it. Sources: bullet3 at 6c888f4,
-btSequentialImpulseConstraintSolver.cpp:890-970 (rigid body), btMultiBodyConstraintSolver.cpp:770-815 and
+It needs neither Bullet nor a scene; its parameters come from a profile's settings (`ContactLaw.of`). The adapter
+declares the rebounds of its profiles with it, and the deviation laws explain results by it. Sources: bullet3 at
+6c888f4, btSequentialImpulseConstraintSolver.cpp:890-970 (rigid body), btMultiBodyConstraintSolver.cpp:770-815 and
 btMultiBody.cpp:843 (multibody).
 """
 
@@ -35,14 +35,14 @@ from adapters.bullet.shipped import (
     SPLIT_DEPTH,
 )
 
-#: Phases of a step that a range of rebounds is taken over.
+#: Number of phases of a step for a range of rebounds.
 PHASES = 64
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Parameters of the recurrence; `of` reads them off settings.
+    """Parameters of the recurrence; `of` takes them from settings.
 
     Parameters
     ----------
@@ -51,17 +51,17 @@ class ContactLaw:
     damping
         Drag [1/s] and [1/m]: a body loses ``damping (1 + |v|) v`` of speed per second.
     erp
-        Fraction of an overlap that is worked off per step.
+        Fraction of an overlap corrected per step.
     slop
-        Overlap that is left alone [m].
+        Overlap without correction [m].
     threshold
         Approach speed below which there is no rebound [m/s].
     solved_gap
         Contacts at larger gaps are seen but not solved [m].
     split_depth
-        Overlaps at least this deep are pushed out by a velocity that is not kept [m].
+        Overlaps at least this deep are corrected by a velocity for one step only [m].
     largest_speed
-        Velocities are cut to this after a step [m/s].
+        Velocities are clamped to this after a step [m/s].
     breaking
         A contact is seen below this share of the smaller shape's bounding radius.
     """
@@ -78,9 +78,9 @@ class ContactLaw:
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> ContactLaw:
-        """Law that a ball follows under ``settings``; what they do not name is as shipped.
+        """Law of a ball under ``settings``; other parameters are as shipped.
 
-        The multibody path splits no impulses, the rigid-body path cuts no velocities.
+        The multibody path splits no impulses, the rigid-body path clamps no velocities.
         """
         multibody = not settings.get("useMaximalCoordinates", 0)
         split_depth = settings.get("splitImpulsePenetrationThreshold", SPLIT_DEPTH)
@@ -101,7 +101,7 @@ class ContactLaw:
         return self.damping * (1.0 + abs(speed)) * speed * dt
 
     def contact(self, gap: float, before: float, free: float, e: float, dt: float) -> tuple[float, float]:
-        """Velocity after the contact and the velocity that only moves the body [m/s].
+        """Velocity after the contact, and the velocity that only moves the body in this step [m/s].
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ def fall(law: ContactLaw, radius: float, gap: float, velocity: float, e: float, 
 
 
 def loss_in_one_second(law: ContactLaw, dt: float) -> float:
-    """Share of 1 m/s (or 1 rad/s) that drag takes in a second of flight."""
+    """Share of 1 m/s (or 1 rad/s) lost by drag in a second of flight."""
     steps, speed = min(max(8, round(1.0 / dt)), 1000), 1.0
     for _ in range(steps):
         speed -= law.drag(speed, dt)
@@ -156,7 +156,7 @@ def loss_in_one_second(law: ContactLaw, dt: float) -> float:
 
 
 def drag_share(law: ContactLaw, speed: float, braking: float, dt: float, time: float) -> float:
-    """What drag takes from a slide, over what friction takes.
+    """Speed lost by drag in a slide, relative to that lost by friction.
 
     Parameters
     ----------
@@ -180,12 +180,10 @@ def rebound_range(law: ContactLaw, radius: float, v: float, e: float, dt: float,
     Parameters
     ----------
     time
-        How long after the start the speed is taken [s].
+        Time of the speed after the start [s].
 
-    Returns
-    -------
-    (least, greatest), widened by what may lie between two of the phases that were tried: within a phase interval
-    the gap changes by ``v dt / PHASES``, hence ``gap/dt`` by ``v / PHASES``, in the braking step and in the one before.
+    Returns ------- (least, greatest), widened for values between two phases: within a phase interval the gap changes by
+    ``v dt / PHASES``, hence ``gap/dt`` by ``v / PHASES``, in the braking step and in the one before.
     """
     steps = math.ceil(time / dt - 1e-9)
     gaps = [(lead + (k + 0.5) / PHASES) * v * dt for k in range(PHASES)]

@@ -1,6 +1,6 @@
-"""Bullet behind the plugin line: facts, refusals, and what its profiles declare.
+"""The adapter of Bullet: facts, refusals, and declarations of its profiles.
 
-Source references are to bulletphysics/bullet3 at 6c888f4, the commit that the 3.2.7 wheels were built from.
+Source references are to bulletphysics/bullet3 at 6c888f4, the commit of the 3.2.7 wheels.
 """
 
 from __future__ import annotations
@@ -38,59 +38,60 @@ from adapters.scene import Scene
 _QUIRKS = (
     Quirk(
         "coefficients of two bodies multiply",
-        "values per body are solved from the pairs; a table that no product gives is refused",
+        "values per body are computed from the pairs; a table that is no product is refused",
         "btManifoldResult.cpp:58,70",
     ),
     Quirk(
-        "a plane gives a box one contact point per step and spins it up",
+        "a plane gives a box one contact point a step, which makes it spin",
         "a half-space is a thick static box, in every profile",
         "btConvexPlaneCollisionAlgorithm.cpp:92; bullet3 #1514",
     ),
     Quirk(
-        "a new inertia or orientation acts a step late, and an inertia without a mass wipes a rigid body's mass",
+        "a new inertia or orientation acts a step late, and setting an inertia without a mass deletes the mass of a "
+        "rigid body",
         "bodies wait far away, already turned, for one step without gravity; mass and inertia are set together",
         "measured: a touching disc rolls at 5/7 instead of 2/3, a turned body answers a torque by its unturned inertia",
     ),
     Quirk(
-        "contactBreakingThreshold is a C global that survives disconnect",
+        "contactBreakingThreshold is a C global that outlives a connection",
         "every profile sets it",
         "PhysicsServerCommandProcessor.cpp:11525",
     ),
     Quirk(
-        "negative and NaN values are ignored without a word",
-        "all numbers are validated before, and read back after, they are set",
+        "negative and NaN values are ignored without an error",
+        "all numbers are checked before they are set, and read back",
         "pybullet.c:1825",
     ),
     Quirk(
-        "contacts beyond contactProcessingThreshold keep reporting their last impulse",
+        "contacts beyond contactProcessingThreshold still report their last impulse",
         "their impulse counts as zero",
         "measured: an impulse sum six times too large after one rebound",
     ),
     Quirk(
-        "getDynamicsInfo does not fill in restitution and dampings of rigid bodies: they are left from older answers",
-        "not read back on that path; receipts measure them",
+        "getDynamicsInfo does not fill in restitution and damping of rigid bodies, and returns those of earlier calls",
+        "not read back on that path; property checks measure them",
         "measured: 0.7 asked, 0.0 or an older body's value reported",
     ),
     Quirk(
         "contact distances are those before the step, forces those of the step",
-        "said in the contact record; states are read after the step",
+        "stated in the contact record; states are read after the step",
         "PhysicsServerCommandProcessor.cpp:8663",
     ),
     Quirk(
-        "hulls keep a margin of 1 mm; their manifold, as that of capsules and cylinders, gets one point a step",
-        "left so: a hull rests 1 mm high, a cylinder that lands on its end turns (0.3 rad/s at 1 m/s and e = 0.5), "
-        "what rolls lying ends 3 to 4 % too fast",
+        "hulls have a margin of 1 mm; their manifolds, and those of capsules and cylinders, get one point a step",
+        "unchanged: a hull rests 1 mm high, a cylinder that lands on its end turns (0.3 rad/s at 1 m/s and e = "
+        "0.5), a rolling one ends 3 to 4 % too fast",
         "measured with 3.2.7; btConvexConvexAlgorithm.cpp, btConvexHullShape's collision margin",
     ),
     Quirk(
-        "faces are clipped for bodies from URDF files alone, and vertices of hulls are cut down to 1/10216 of extents",
-        "with `enableSAT` boxes and hulls come from files, their vertices as stated: a hull may hover by such a cell",
+        "faces are clipped for bodies from URDF files only, and hull vertices are truncated to 1/10216 of the extents",
+        "with `enableSAT` boxes and hulls come from files, with vertices as stated; a hull may hover by such a cell",
         "btConvexHullComputer.cpp; measured: whole cells, in tests/adapters/test_bullet.py",
     ),
-    Quirk("external loads last for one step", "applied anew before every step", "PyBullet Quickstart Guide"),
+    Quirk("external loads last for one step", "applied again before every step", "PyBullet Quickstart Guide"),
     Quirk(
         "there is no kinematic body in Python and rigid static bodies ignore a velocity",
-        "a prescribed body is a free one of 1e15 times the heaviest mass, its velocity set anew before every step",
+        "a prescribed body is a free one of 1e15 times the heaviest mass, whose velocity is set before every step",
         "measured: recoil within round-off",
     ),
 )
@@ -119,11 +120,11 @@ class BulletEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def version(self) -> str:
-        """Version of the installed wheel; PyBullet itself does not know it, and prints a line where it is imported."""
+        """Version of the installed wheel; PyBullet itself has no version, and prints a line at import."""
         return version("pybullet")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse sizes and moments that Bullet cannot hold, too much friction, and unfactorable materials."""
+        """Refuse sizes and moments beyond Bullet's range, too much friction, and unfactorable materials."""
         for body in scene.bodies:
             if body.shape.smallest_size < SMALLEST_SIZE:
                 return f"{body.name}.shape: bullet needs sizes of at least {SMALLEST_SIZE:g} m"
@@ -135,7 +136,7 @@ class BulletEngine(CheckedEngine):
             return f"friction: bullet clamps coefficients to {LARGEST_FRICTION:g}"
         for coefficient in ("restitution", "friction"):
             if factors(scene, coefficient) is None:
-                return f"{coefficient}: bullet multiplies values of bodies, no product gives this table of pairs"
+                return f"{coefficient}: bullet multiplies values of bodies, and this table of pairs is no such product"
         return None
 
     def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -165,7 +166,7 @@ class BulletEngine(CheckedEngine):
         return {name: (word, settings[name]) for name, word in _WORDS.items() if name in settings}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Drag and the rebounds of the multibody path as shipped; the rebounds that `one` gains; friction of all."""
+        """Drag and rebounds of the multibody path as shipped; the too fast rebounds of `one`; friction of all."""
         law = law_of(profile, needs, dt)
         declared = _sliding(profile, law, needs, dt) if 0.0 < needs.friction <= MOST_FRICTION else {}
         if profile == "one":
@@ -177,52 +178,57 @@ class BulletEngine(CheckedEngine):
         time = (REBOUND_LEAD + 4) * dt + REBOUND_TIME
         ball = (REBOUND_RADIUS, REBOUND_SPEED, needs.restitution, dt, REBOUND_LEAD, time)
         least, greatest = rebound_range(law, *ball)
-        because = "speculative contact takes gap/dt off a rebound, by the phase of the step: recurrence over all phases"
+        because = (
+            "speculative contact subtracts gap/dt from a rebound, depending on the phase of the step: "
+            "recurrence over all phases"
+        )
         rebound = Declared(0.5 * (least + greatest), 0.5 * (greatest - least), because)
         return {**declared, "linear_damping": loss, "angular_damping": loss, "restitution": rebound}
 
 
-#: What pybullet calls a setting otherwise than we do.
+#: Settings with another name in pybullet.
 _WORDS = {"iterations": "numSolverIterations"}
 
 
 def _sliding(profile: str, law: ContactLaw, needs: Needs, dt: float) -> dict[str, Declared]:
     """Friction of the sliding probe: Coulomb's, and as shipped the drag of the multibody path on top.
 
-    A contact point under a fast box that comes or goes holds the friction of a step without its load; a slide has one
-    at each end at most, and more where the box hops (`_hopping`). On the rigid-body path that adds friction and never
-    takes any (measured at 1/60 .. 1/960 s).
+    A contact point that appears or disappears under a fast box has friction in a step without load; a slide has one at
+    each end at most, and more where the box hops (`_hopping`). On the rigid-body path that adds friction and never
+    reduces it (measured at 1/60 .. 1/960 s).
     """
     friction, share = needs.friction, dt / SLIDE_TIME
-    because = "contact points under a fast box come and go: a step at each end of the slide may be without its load"
+    because = "contact points under a fast box come and go: at each end of the slide a step may lack its load"
     if profile != "default":
         held = WARM_STARTING * _hopping(law, friction, needs.restitution, dt)
         if held:
-            because = "a box that hops within the slop loads its points in turns: one without a load holds its friction"
+            because = (
+                "a box that hops within the slop loads its points in turns: a point without load keeps its friction"
+            )
             share += 0.5 * held
         more = Declared(friction * (1.0 + share), friction * (share + FRICTION_SHARE), because)
         return {"friction": more, "friction_impulse": more}
     slowed = drag_share(law, slide_speed(friction), friction * slide_load(friction), dt, SLIDE_TIME)
     drag = f"{because}; and drag 0.04 (1 + v) v, by its recurrence"
     return {
-        # What is measured is all that slows the box over its load: a step without load counts for the drag as well.
+        # The probe measures the whole deceleration over the load: drag counts in a step without load as well.
         "friction": Declared(friction * (1.0 + slowed), 2.0 * share * friction * (1.0 + slowed), drag),
         "friction_impulse": Declared(friction, 2.0 * share * friction, because),
     }
 
 
-#: Slop from which a box that hops within it may unload a point, in falls of a step: half of that at which it must.
+#: Slop from which a hopping box may unload a point, in falls of a step: half of the slop at which it must.
 UNLOADS = 0.25
 
 
 def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
-    """Share of the sliding probe's steps in which the box may hop on its floor instead of resting on it.
+    """Share of the sliding probe's steps in which the box may hop instead of rest on its floor.
 
-    A box sinks by the slop in a step, ``q g dt^2``, and with restitution leaves by it in the next, for both ends of the
-    hop are contacts; the step down carries 1 - 2 q of the weight, the step up 1 + 2 q. From q = 1/2 on a step carries
-    nothing, and a point of a tilted load loses its own before (measured from 0.45 on, at 1/240 and 1/960 s): half of
-    that is asked for here. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Solved without
-    the last step's impulses, without slop or with a higher threshold the friction is exact.
+    A box sinks by the slop in a step, ``q g dt^2``, and with restitution rises by it in the next, because both ends of
+    the hop are contacts; the step down carries 1 - 2 q of the weight, the step up 1 + 2 q. From q = 1/2 on a step
+    carries nothing, and a point with less load loses it earlier (measured from 0.45 on, at 1/240 and 1/960 s): the
+    limit here is half of that. Each hop is slower by e, from g dt/2 down to the threshold of restitution. Without warm
+    starting, without slop or with a higher threshold the friction is exact.
     """
     load = slide_load(friction)
     hop = 0.5 * load * dt
@@ -233,7 +239,9 @@ def _hopping(law: ContactLaw, friction: float, e: float, dt: float) -> float:
 
 
 def _gain(law: ContactLaw, e: float, dt: float) -> Declared:
-    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and one met within the slop loses slop/dt."""
+    """An impact is found 0 .. v dt deep: Baumgarte adds up to erp v, and an impact within the slop loses slop/dt."""
     lost = law.slop / (REBOUND_SPEED * dt)
-    because = "found 0 .. v dt deep, of which contactERP per step becomes speed; within the slop, slop/dt is lost"
+    because = (
+        "found 0 .. v dt deep; a share contactERP of that per step becomes speed; within the slop, slop/dt is lost"
+    )
     return Declared(e + 0.5 * (law.erp - lost), 0.5 * (law.erp + lost), because)

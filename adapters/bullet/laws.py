@@ -1,12 +1,11 @@
 """Deviation laws of Bullet: its contact law as a scalar recurrence, measured like the engine itself.
 
-`adapters.bullet.contact_law` follows one ball over a fixed face from the scene and the step alone. The result is put
-into a trajectory and measured by the scene's own metrics, so that a prediction and a measurement differ by physics
-only.
+`adapters.bullet.contact_law` computes one ball over a fixed face from the scene and the step only. The result becomes a
+trajectory and is measured by the scene's own metrics, so a prediction and a measurement differ by physics only.
 
-How far a prediction holds is computed with it: a gap that is known to round-off only is fed through the same
-recurrence. Speculative contacts turn an error of the gap d into one of d/dt in speed, which the next flight turns
-into one of 2 v d/(g dt) in the gap; after some impacts nothing is left of sixteen digits, and the law falls silent.
+The validity of a prediction is computed as well: the same recurrence runs with a gap changed by round-off. Speculative
+contacts turn an error d of the gap into an error d/dt of speed, and the next flight turns that into an error 2 v d/(g
+dt) of the gap; after some impacts none of the sixteen digits is left, and the law makes no prediction.
 """
 
 from __future__ import annotations
@@ -27,20 +26,20 @@ from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from adapters.unswept import passing_law, shoved_law
 
-#: Gaps are differences of lengths of some ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
+#: Gaps are differences of lengths of about ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
 GAP_ROUND_OFF = 1e-14
 #: Perturbations of the first gap, in units of its round-off; two of each sign, since jumps are one-sided.
 PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
-#: A spread among five runs may miss the true error by this factor.
+#: The true error may exceed the spread of five runs by this factor.
 SPREAD_FACTOR = 10.0
-#: A metric that round-off blurs by more than this share of its scale is not predicted.
+#: A metric with more round-off than this share of its scale is not predicted.
 BLURRED = 1e-4
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
 
 
 def _is_one_ball_over_a_floor(scene: Scene) -> bool:
-    """A half-space facing up and one free ball that can only move up and down."""
+    """A half-space facing up and one free ball that moves only up and down."""
     if len(scene.bodies) != 2:
         return False
     d = scene.dimension
@@ -52,7 +51,7 @@ def _is_one_ball_over_a_floor(scene: Scene) -> bool:
 
 
 def _as_trajectory(scene: Scene, dt: float, path: Fall) -> Trajectory:
-    """What the step loop would have recorded of this fall."""
+    """The trajectory that the step loop would record of this fall."""
     d, steps = scene.dimension, len(path.gap)
     face, body = scene.bodies
     assert isinstance(face.shape, HalfSpace) and isinstance(body.shape, Disc | Sphere)
@@ -99,14 +98,14 @@ def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[
     for metric, (value, reason) in runs[0].items():
         others = [run[metric][0] for run in runs]
         if reason.startswith("there is no apex") and value == 0.0:
-            # The ball rests, with a velocity of round-off that the metric may take for an arc, at 0 .. -slop.
+            # The ball rests at 0 .. -slop, with a velocity of round-off that the metric may take for an arc.
             predictions[metric] = (-0.5 * law.slop, 0.5 * law.slop + GAP_ROUND_OFF / dt)
             continue
         if value is None or reason.startswith("there are only") or any(other is None for other in others):
             continue
         spread = max(abs(other - value) for other in others if other is not None)
         scale = _scale(scene, metric)
-        # A gap's round-off becomes a speed once: over dt, relative to 1 m/s, whatever the recurrence does later.
+        # Round-off of a gap becomes a speed once: over dt, relative to 1 m/s, independent of later steps.
         band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale + GAP_ROUND_OFF / dt
         if spread <= BLURRED * scale:
             predictions[metric] = (value, band)
@@ -133,11 +132,12 @@ _BALL_METRICS = {
     ),
 }
 _BECAUSE = {
-    "default": "speculative contact takes gap/dt off a rebound, Baumgarte adds 8 % of an overlap over dt, restitution "
-    "includes gravity's own g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v brakes the flight",
-    "tuned": "an impact is found up to v dt late and bounces from there; one met within the slop loses slop/dt of its "
-    "rebound; at rest settings 8 % of an overlap per step become speed",
-    "one": "Baumgarte adds 1 % of the overlap that an impact is found with, over dt, to the rebound",
+    "default": "speculative contact subtracts gap/dt from a rebound, Baumgarte correction adds 8 % of an overlap "
+    "over dt, restitution includes gravity's g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v "
+    "brakes the flight",
+    "tuned": "an impact is found up to v dt late and rebounds from there; one found within the slop loses slop/dt "
+    "of its rebound; with the settings for rest 8 % of an overlap per step become speed",
+    "one": "Baumgarte correction adds 1 % of the overlap at an impact, over dt, to the rebound",
 }
 _SOURCE = {
     "default": "btMultiBodyConstraintSolver.cpp:770-815, btMultiBody.cpp:843, btMultiBody.h:486 (bullet3 6c888f4)",
@@ -169,7 +169,7 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         passing_law(metric),
-        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
         "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
         CHECKED_ON,
     )
@@ -179,7 +179,7 @@ DEVIATIONS += tuple(
 
 
 def _split_push(scene: Scene, dt: float, overlap: float) -> float:
-    """Push-out of profile `one`, in the step after: beyond 4 cm by places alone, else less than the ball's speed."""
+    """Correction in `one`, in the next step: from 4 cm on by places only, else slower than the ball."""
     chosen: dict[str, float] = {s.name: s.value for s in PROFILES["one"](needs(scene), dt)}
     if overlap <= SPLIT_DEPTH:
         return 0.0
@@ -193,7 +193,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         shoved_law(metric, push),
-        "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is on",
+        "there is no swept collision detection: the step that finds the ball in the plate finds it beyond the "
+        "middle, and pushes it out on the far side",
         "contactProcessingThreshold 0, contactERP 0 or 0.01: btPersistentManifold.cpp (bullet3 6c888f4)",
         CHECKED_ON,
     )

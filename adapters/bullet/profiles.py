@@ -1,6 +1,6 @@
-"""Bullet's profiles: settings with their reasons.
+"""Bullet's profiles: settings and their reasons.
 
-default   Featherstone multibody path, as shipped: what `createMultiBody` gives whoever changes nothing
+default   Featherstone multibody path, as shipped: `createMultiBody` without further settings
 tuned     rigid-body path; settings for rebounds where the scene has impacts, else settings for rest; faces are clipped
           where there are hulls
 one       rigid-body path, one compromise for every scene
@@ -54,7 +54,7 @@ BODY = frozenset(
         "spinningFriction",
     }
 )
-#: Settings that PyBullet takes as an int.
+#: Integer settings of PyBullet.
 WHOLE = frozenset(
     {
         "constraintSolverType",
@@ -74,14 +74,14 @@ KINDS: Mapping[str, Check] = MappingProxyType(
 
 
 def _breaking_threshold() -> Setting:
-    because = "shipped value; set because it is a C global that every client of the process shares"
+    because = "shipped value; set because it is a C global that all clients of the process share"
     return Setting("contactBreakingThreshold", BREAKING_THRESHOLD, because, "PhysicsServerCommandProcessor.cpp:11525")
 
 
 def _wide_breaking_threshold() -> Setting:
     because = (
-        "contact points that drift farther in a step than this share of the body are dropped: the shipped 0.02 loses "
-        "some of a box that slides 1.7 cm a step, and friction with them. Nothing is solved at a distance: "
+        "contact points that drift farther in a step than this share of the body are dropped; with the shipped 0.02 a "
+        "box that slides 1.7 cm a step loses some of them, and their friction; no contact acts at a distance, since "
         "contactProcessingThreshold is 0"
     )
     return Setting("contactBreakingThreshold", 0.1, because, "crosscheck tune bullet --group slide; also --profile one")
@@ -97,71 +97,76 @@ def default(needs: Needs, dt: float) -> list[Setting]:
 
 
 def _rigid_body() -> list[Setting]:
-    """Settings that every tuned scene shares."""
+    """Common settings of all tuned scenes."""
     solver = "btSequentialImpulseConstraintSolver.cpp"
     return [
         Setting(
             "useMaximalCoordinates",
             1,
-            "the multibody path cannot warm start or split impulses, and restitutes gravity's own g dt",
+            "the multibody path has no warm start or split impulse, and applies restitution to gravity's g dt as well",
             "btMultiBodyConstraintSolver.cpp:779,812",
         ),
         Setting("iterations", ITERATIONS, "shipped; ten boxes carry their weight to 1e-8"),
-        Setting("solverResidualThreshold", 0.0, "shipped 1e-7 stops at 3e-4 m/s per row"),
-        Setting("warmStartingFactor", 0.85, "shipped 0.1 hardly warm starts, 1.0 adds energy", f"{solver}:988"),
-        Setting("restitutionVelocityThreshold", 1e-4, "shipped 0.2 m/s swallows slow rebounds", f"{solver}:494"),
-        Setting("deterministicOverlappingPairs", 1, "order of pairs is part of a Gauss-Seidel answer"),
-        Setting("numSubSteps", 0, "with substeps contact forces are reported wrong", "bullet3 #2797"),
+        Setting("solverResidualThreshold", 0.0, "the shipped 1e-7 stops at velocity changes of 3e-4 m/s"),
+        Setting("warmStartingFactor", 0.85, "the shipped 0.1 hardly warm starts; 1.0 adds energy", f"{solver}:988"),
+        Setting("restitutionVelocityThreshold", 1e-4, "below the shipped 0.2 m/s nothing rebounds", f"{solver}:494"),
+        Setting("deterministicOverlappingPairs", 1, "the result of Gauss-Seidel depends on the order of pairs"),
+        Setting("numSubSteps", 0, "with substeps the reported contact forces are wrong", "bullet3 #2797"),
         _wide_breaking_threshold(),
-        Setting("linearDamping", 0.0, "no drag in the scene"),
-        Setting("angularDamping", 0.0, "no drag in the scene"),
-        Setting("rollingFriction", 0.0, "no rolling resistance in the scene"),
-        Setting("spinningFriction", 0.0, "no torsional resistance in the scene"),
+        Setting("linearDamping", 0.0, "the scene has no drag"),
+        Setting("angularDamping", 0.0, "the scene has no drag"),
+        Setting("rollingFriction", 0.0, "the scene has no rolling resistance"),
+        Setting("spinningFriction", 0.0, "the scene has no torsional resistance"),
         Setting(
             "contactProcessingThreshold",
             0.0,
-            "speculative contacts take gap/dt off a rebound",
+            "speculative contacts subtract gap/dt from a rebound",
             f"{solver}:949-953; bullet3 #3094",
         ),
     ]
 
 
 def _faces(needs: Needs) -> list[Setting]:
-    """Clipping of faces, where there are hulls: boxes against boxes have a way of their own without it."""
+    """Clipping of faces where there are hulls: two boxes have their own algorithm without it."""
     if not needs.hulls:
         return []
     because = (
-        "else one point a step is found between hulls, on a margin of 1 mm: a block on a wedge stands on one point of "
-        "four. Where all bodies are boxes, balls or half-spaces it changes nothing"
+        "otherwise one contact point a step is found between hulls, on a margin of 1 mm, and a block on a wedge stands "
+        "on one point of four; boxes, balls and half-spaces do not need it"
     )
     return [Setting("enableSAT", 1, because, "btConvexConvexAlgorithm.cpp; of bodies from URDF files alone")]
 
 
 def tuned(needs: Needs, dt: float) -> list[Setting]:
-    """Choose between settings for impacts and for rest: one knob, the split impulse, helps one and harms the other."""
+    """Choose between settings for impacts and for rest: the split impulse improves one and harms the other."""
     if needs.regime == "rest":
         return [
             *_rigid_body(),
             *_faces(needs),
-            Setting("contactSlop", SLOP, "shipped; keeps resting contacts closed"),
+            Setting("contactSlop", SLOP, "shipped; resting contacts stay closed"),
         ]
     return [
         *_rigid_body(),
         *_faces(needs),
-        Setting("useSplitImpulse", 1, "overlap is pushed out without adding to a rebound"),
+        Setting("useSplitImpulse", 1, "overlaps are corrected without adding to a rebound"),
         Setting(
             "splitImpulsePenetrationThreshold",
             0.0,
-            "split every overlap, not only those beyond 4 cm, so that none adds to a rebound; not for rest",
+            "the split impulse acts on every overlap, not only beyond 4 cm, so that none adds to a rebound; "
+            "not for rest",
             "pybullet.c:1825",
         ),
         Setting(
             "contactERP",
             0.0,
-            "no push-out: it adds potential energy to every impact found late, so that e = 1 grows",
+            "correction would add energy to every impact that is found late; with e = 1 rebounds would grow",
             "crosscheck tune bullet --group impact",
         ),
-        Setting("contactSlop", 1e-6, "a rebound met within the slop loses slop/dt; 0 makes resting boxes chatter"),
+        Setting(
+            "contactSlop",
+            1e-6,
+            "an impact found within the slop loses slop/dt of its rebound; with 0 resting boxes chatter",
+        ),
     ]
 
 
@@ -169,8 +174,10 @@ def one(needs: Needs, dt: float) -> list[Setting]:
     """One setting for all scenes: rebounds within 1 %, stacks of ten stand."""
     return [
         *_rigid_body(),
-        Setting("contactSlop", SLOP, "shipped; keeps resting contacts closed"),
-        Setting("contactERP", 0.01, "a rebound gains at most this fraction of v; still pushes stacks apart"),
+        Setting("contactSlop", SLOP, "shipped; resting contacts stay closed"),
+        Setting(
+            "contactERP", 0.01, "a rebound gains at most this fraction of v, and overlaps in stacks are still corrected"
+        ),
     ]
 
 
@@ -183,7 +190,7 @@ def law_of(profile: str, needs: Needs, dt: float) -> ContactLaw:
 
 
 def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """World and body parameters of a profile, validated: PyBullet ignores a bad value without a word.
+    """World and body parameters of a profile, validated: PyBullet silently ignores a bad value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A run on Bullet as a stand-alone script: the calls of `adapters.bullet.simulation`, with their numbers."""
+"""A run on Bullet as a stand-alone script: the calls of `adapters.bullet.simulation`, with their values."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
 
 
 def _loader(known: bool, maximal: int) -> list[str]:
-    """Lines of a function that makes a body from files, the only ones whose faces Bullet knows."""
+    """Lines of a function that makes a body from files: only these have faces in Bullet."""
     flags = "p.URDF_USE_INERTIA_FROM_FILE" + (" | p.URDF_INITIALIZE_SAT_FEATURES" if known else "")
     return [
         "",
@@ -65,7 +65,7 @@ def _loader(known: bool, maximal: int) -> list[str]:
 def _made(
     index: int, body: Body, scene: Scene, mass: float, maximal: int, material: Mapping[str, Any], filed: bool
 ) -> list[str]:
-    """Lines that make a body in its place in the waiting room; boxes and hulls from files, where they have to be."""
+    """Lines that make a body at its waiting place; boxes and hulls from files, if needed."""
     sizes, _, quaternion = placement(body, scene)
     shape = f"p.GEOM_BOX, halfExtents={literal(sizes)}"
     if isinstance(body.shape, Sphere):
@@ -92,7 +92,7 @@ def _made(
 
 
 def _placed(body: Body, scene: Scene, dt: float) -> list[str]:
-    """Lines that move a body to where it starts; its pose first, since that zeroes its velocity."""
+    """Lines that move a body to its start; its pose first, since that zeroes its velocity."""
     _, position, quaternion = placement(body, scene)
     lines = [f"p.resetBasePositionAndOrientation(bodies[{body.name!r}], {literal(position)}, {literal(quaternion)})"]
     if body.motion != "fixed":
@@ -102,7 +102,7 @@ def _placed(body: Body, scene: Scene, dt: float) -> list[str]:
 
 
 def _state(scene: Scene) -> list[str]:
-    """Lines of the function that reads all bodies; a half-space, here a box, is told without the way to its centre."""
+    """Lines of the function that reads all bodies; a half-space, here a box, without the offset of its centre."""
     ways = {body.name: placement(body, scene)[1] for body in scene.bodies if isinstance(body.shape, HalfSpace)}
     return [
         "# Half-spaces, and the way to the centre of the box that stands for each.",
@@ -123,7 +123,7 @@ def _state(scene: Scene) -> list[str]:
 
 
 def _loads(scene: Scene, masses: list[float]) -> list[str]:
-    """Lines before a step: velocities that are prescribed, and external loads, which last for one step."""
+    """Lines before a step: prescribed velocities, and external loads, which last for one step."""
     lines, loads = [], []
     for body, mass in zip(scene.bodies, masses, strict=True):
         force, torque = body.force, body.torque

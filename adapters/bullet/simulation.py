@@ -1,4 +1,4 @@
-"""One world of Bullet, stepped by `stepSimulation` in a DIRECT client of its own."""
+"""One world of Bullet, stepped by `stepSimulation` in its own DIRECT client."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Simulation
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
-#: Where bodies wait while their inertia takes effect [m]: far from each other and from every scene.
+#: Waiting places of bodies while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5
-#: A prescribed body outweighs the heaviest free one by this factor; its recoil is then round-off of a velocity change.
+#: Mass of a prescribed body over the heaviest free one; its recoil is then round-off of a velocity change.
 HEAVY = 1e15
 
 
 @cache
 def pybullet_here() -> ModuleType:
-    """Import the engine; the line that it prints on file descriptor 2 while loading is dropped."""
+    """Import the engine without the line that it prints on file descriptor 2 while loading."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
@@ -39,7 +39,7 @@ def pybullet_here() -> ModuleType:
 
 
 class BulletSimulation(Simulation):
-    """One world in a DIRECT client of its own."""
+    """One world in its own DIRECT client."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         world, material = checked(settings)
@@ -47,11 +47,11 @@ class BulletSimulation(Simulation):
         self._scene, self._dt = scene, dt
         self._world, self._material = world, material
         self._maximal = int(settings.get("useMaximalCoordinates", 0))
-        #: Contacts farther apart than this are not solved, yet keep reporting the impulse of their last solution.
+        #: Contacts farther apart than this are not solved, but still report the impulse of their last solution.
         self._solved_gap = float(material.get("contactProcessingThreshold", math.inf))
         self._client = self._p.connect(self._p.DIRECT)
         if self._client < 0:
-            raise EngineError("client: bullet has no free client, 1024 are the limit of a process")
+            raise EngineError("client: bullet allows 1024 clients in a process, and none is free")
         try:
             self._build()
         except self._p.error as error:
@@ -64,10 +64,10 @@ class BulletSimulation(Simulation):
     # -- building --
 
     def _build(self) -> None:
-        """Make the world; bodies wait far away for one step, so that the stated inertia is in force on contact.
+        """Make the world; bodies wait far away for one step, so that the stated inertia holds at contact.
 
-        A body that changes its inertia or its orientation keeps the old inverse inertia in world axes through its
-        next step, and a reset of its pose does not refresh it: bodies wait in their final orientation.
+        After a change of inertia or orientation a body keeps the old inverse inertia in world axes for its next step,
+        and a reset of its pose does not update it: bodies wait in their final orientation.
         """
         p, scene, client = self._p, self._scene, self._client
         p.setPhysicsEngineParameter(fixedTimeStep=self._dt, **self._world, physicsClientId=client)
@@ -75,10 +75,10 @@ class BulletSimulation(Simulation):
         heaviest = max((body.mass for body in scene.bodies if body.motion == "free"), default=1.0)
         restitution, friction = factors(scene, "restitution"), factors(scene, "friction")
         if restitution is None or friction is None:
-            raise EngineError("pairs: no product of two bodies' values gives this table of materials")
+            raise EngineError("pairs: this table of materials is no product of two bodies' values")
         self._ids: list[int] = []
         self._mass: list[float] = []
-        self._offset: list[tuple[float, ...]] = []  # of the centre of what stands for a body from the scene's pose
+        self._offset: list[tuple[float, ...]] = []  # offset of the centre of Bullet's body from the scene's pose
         faces = [(i, body.pose[3:]) for i, body in enumerate(scene.bodies) if isinstance(body.shape, HalfSpace)]
         self._faces = [i for i, _ in faces]
         self._normals = np.array([turn for _, turn in faces]).reshape(-1, 4)
@@ -114,7 +114,7 @@ class BulletSimulation(Simulation):
             identifier = p.createMultiBody(mass, shape, -1, waiting, quaternion, **common)
         self._ids.append(identifier)
         self._mass.append(mass)
-        # A half-space is drawn as a box whose centre lies below the face: the scene's pose is its own.
+        # A half-space is a box whose centre lies below the face; the scene's pose is that of the face.
         shift = np.subtract(position, body.pose[:3]) if isinstance(body.shape, HalfSpace) else np.zeros(3)
         self._offset.append(tuple(float(s) for s in shift))
         p.changeDynamics(
@@ -126,7 +126,7 @@ class BulletSimulation(Simulation):
             physicsClientId=client,
         )
         if body.motion != "fixed":
-            # The rigid-body path overwrites the mass with -1 unless it comes with the inertia.
+            # The rigid-body path overwrites the mass with -1 unless mass and inertia are set together.
             inertia = moments(body, mass)
             p.changeDynamics(identifier, -1, mass=mass, localInertiaDiagonal=inertia, physicsClientId=client)
         if body.motion == "prescribed":
@@ -165,7 +165,7 @@ class BulletSimulation(Simulation):
             self._p.resetBaseVelocity(identifier, velocity, body.twist[3:], physicsClientId=client)
 
     def _constant_loads(self) -> list[tuple[int, tuple[float, ...], tuple[float, ...]]]:
-        """External force and torque of every body that has any; a prescribed body is held against gravity."""
+        """External force and torque of each loaded body; gravity on a prescribed body is cancelled."""
         loads = []
         for i, body in enumerate(self._scene.bodies):
             force, torque = body.force, body.torque
@@ -176,7 +176,7 @@ class BulletSimulation(Simulation):
         return loads
 
     def _check_readback(self, restitution: list[float], friction: list[float]) -> None:
-        """Raise `EngineError` unless Bullet holds what it was given: it drops what it dislikes in silence."""
+        """Raise `EngineError` unless Bullet has the given values: it silently drops invalid ones."""
         for i, body in enumerate(self._scene.bodies):
             info = self._dynamics(i)
             asked: dict[str, Any] = {"friction": friction[i], "mass": self._mass[i]}
@@ -185,14 +185,14 @@ class BulletSimulation(Simulation):
             if body.motion != "fixed":
                 asked["inertia"] = moments(body, self._mass[i])
             for name, value in asked.items():
-                # 1e-12: the rigid-body path keeps reciprocals.
+                # 1e-12: the rigid-body path stores reciprocals.
                 if not np.allclose(info[name], value, rtol=1e-12, atol=0.0):
                     raise EngineError(f"{body.name}.{name}: bullet holds {info[name]!r}, asked for {value!r}")
 
     # -- running --
 
     def advance(self, steps: int) -> None:
-        """Step; external loads last for one step in Bullet and are applied anew before each."""
+        """Step; external loads last for one step in Bullet and are applied again before each."""
         step, client = self._p.stepSimulation, self._client
         if not (self._loads or self._driven):
             for _ in range(steps):
@@ -217,7 +217,7 @@ class BulletSimulation(Simulation):
     # -- reading --
 
     def pose(self) -> Array:
-        """Poses (n, 7); that of a half-space without the shift to the box that stands for it."""
+        """Poses (n, 7); that of a half-space without the shift to its box."""
         ask, client = self._p.getBasePositionAndOrientation, self._client
         told = np.array([(*place, *turn) for place, turn in (ask(i, physicsClientId=client) for i in self._ids)])
         pose = told[:, [0, 1, 2, 6, 3, 4, 5]]  # w last in Bullet
@@ -239,7 +239,7 @@ class BulletSimulation(Simulation):
         a, b = ([self._index[body] for body in points[column]] for column in (1, 2))
         on_a, on_b, normal, along, across = (np.array(points[column]) for column in (5, 6, 7, 11, 13))
         gap, *forces = (np.array(points[column])[:, None] for column in (8, 9, 10, 12))
-        # Bullet's impulses act on A, along the normal that points from B to A. The sum starts from zero, so that one of
+        # Bullet's impulses act on A, along the normal that points from B to A. The sum starts from zero, so a sum of
         # negative zeros is zero.
         pushed = 0.0 + forces[0] * normal + forces[1] * along + forces[2] * across
         impulse = np.where(gap <= self._solved_gap, -self._dt * pushed, 0.0)
@@ -249,12 +249,12 @@ class BulletSimulation(Simulation):
     def _dynamics(self, index: int) -> dict[str, Any]:
         info = self._p.getDynamicsInfo(self._ids[index], -1, physicsClientId=self._client)
         names = {"mass": 0, "friction": 1, "inertia": 2, "rolling_friction": 6, "spinning_friction": 7, "margin": 11}
-        if not self._maximal:  # not filled in for rigid bodies: it would be what an older answer left there
+        if not self._maximal:  # not filled in for rigid bodies: it would be a value of an older call
             names["restitution"] = 5
         return {name: info[column] for name, column in names.items()}
 
     def readback(self) -> dict[str, Any]:
-        """All that Bullet tells; most solver parameters are write-only and stand in the settings alone."""
+        """All readable values of Bullet; most solver parameters are write-only and are in the settings only."""
         parameters = self._p.getPhysicsEngineParameters(physicsClientId=self._client)
         names = [body.name for body in self._scene.bodies]
         return {

@@ -1,4 +1,4 @@
-"""A scene in Bullet's terms: values per body, boxes for half-spaces, moments."""
+"""A scene for Bullet: values per body, boxes for half-spaces, moments."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from adapters.meeting import Meeting, representable
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
-#: Half thickness of the box that stands for a half-space [m]: thicker than any step is long, and thin enough that
-#: contact distances, computed relative to its centre, keep 1e-14 m.
+#: Half thickness of the box for a half-space [m]: more than the motion in any step, and thin enough that contact
+#: distances, computed relative to its centre, are exact to 1e-14 m.
 FLOOR_DEPTH = 20.0
 #: Bullet's capsules and cylinders lie along their z axis, ours along the body's x: quaternion (x, y, z, w).
 Z_TO_X = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
-#: Half width of that box beyond the outermost body [m]: a body may slide 100 m and stay on it.
+#: Half width of that box beyond the outermost body [m]: a body may slide 100 m on it.
 FLOOR_REACH = 200.0
 
 
 def factors(scene: Scene, coefficient: str) -> list[float] | None:
     """Values per body whose products are the coefficients of all pairs, or of those that meet; None if there are none.
 
-    Bullet multiplies the coefficients of two bodies (btManifoldResult.cpp:58,70). With one free body its partners
-    carry the pair's value and it carries 1, which is exact. Otherwise the logarithms of the positive pairs solve a
-    linear system, and a pair of 0 needs a body that is in no positive pair.
+    Bullet multiplies the coefficients of two bodies (btManifoldResult.cpp:58,70). With one free body its partners have
+    the pair's value and it has 1, which is exact. Otherwise the logarithms of the positive pairs solve a linear system,
+    and a pair of 0 needs a body without a positive pair.
     """
     return representable(scene, lambda pairs: _factors(scene, pairs, coefficient))
 
@@ -48,7 +48,7 @@ def _factors(scene: Scene, meetings: Sequence[Meeting], coefficient: str) -> lis
     logs = np.linalg.lstsq(rows, np.log([value for _, _, value in positive]), rcond=None)[0]
     for body in np.flatnonzero(rows.any(axis=0)):
         shares[body] = float(np.exp(logs[body]))
-    # 1e-12: round-off of the logarithms; anything larger is a table that no product can represent.
+    # 1e-12: round-off of the logarithms; anything larger means that no product represents the table.
     return shares if all(abs(shares[i] * shares[j] - value) <= 1e-12 for i, j, value in pairs) else None
 
 
@@ -63,7 +63,7 @@ def _turn_up_to(normal: tuple[float, ...]) -> tuple[float, float, float, float]:
 
 
 def placement(body: Body, scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """Sizes (half extents, radius, radius and length), position and quaternion (x, y, z, w) as Bullet gets them."""
+    """Sizes (half extents, radius, radius and length), position and quaternion (x, y, z, w) for Bullet."""
     w, x, y, z = body.pose[3:]
     if isinstance(body.shape, Sphere):
         return (body.shape.radius,), body.pose[:3], (x, y, z, w)

@@ -1,4 +1,4 @@
-"""What Bullet does when nothing is set; see `adapters.unset`."""
+"""Bullet without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from adapters.bullet.shipped import LARGEST_FRICTION, RESTITUTION_THRESHOLD
 from adapters.bullet.simulation import pybullet_here
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
-#: Half thickness of the box that is the ground [m].
+#: Half thickness of the ground's box [m].
 DEPTH = 5.0
 
 
 class Bare:
     """A client with one body above a static box."""
 
-    #: Documented; PyBullet does not tell it.
+    #: Documented; PyBullet has no call for it.
     dt = 1.0 / 240.0
 
     def __init__(self, asked: Asked) -> None:
@@ -67,7 +67,7 @@ def _sees(gap: float) -> bool:
 
 
 def _step() -> float:
-    """Step [s]: the speed that a gravity of 1 m/s^2 gives in it."""
+    """Step [s]: the speed gained in it by a gravity of 1 m/s^2."""
     world = Bare(Asked(gravity=1.0))
     world.advance(1)
     return -world.told().up
@@ -88,7 +88,7 @@ UNSET = (
           partial(unset.restitution, Bare, RESTITUTIONS)),
     Unset("no rebound below [m/s]", "0.2: restitutionVelocityThreshold", f"{_GUIDE}, setPhysicsEngineParameter",
           RESTITUTION_THRESHOLD, partial(unset.least_rebound, Bare)),
-    Unset("from afar half a rebound from [m/s]", "not documented: what is left of the way is taken off", _AHEAD, None,
+    Unset("from afar half a rebound from [m/s]", "not documented: the remaining gap is subtracted", _AHEAD, None,
           partial(unset.least_rebound, Bare, 3.0)),
     Unset("linear damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "along"), 2e-4),
     Unset("angular damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "spin"), 2e-4),

@@ -1,9 +1,9 @@
-"""Chipmunk (Munk2D) through pymunk; what stands where is told in `adapters.engine_folder`.
+"""Chipmunk (Munk2D) through pymunk; `adapters.engine_folder` describes the modules.
 
-shipped        numbers of Chipmunk itself, and the releases that were looked at
-profiles       settings with their reasons
-translation    a scene in Chipmunk's terms
-start          touching bodies, and the overlap they start with
+shipped        Chipmunk's own constants, and the reviewed releases
+profiles       settings and their reasons
+translation    a scene for Chipmunk
+start          touching bodies, and their overlap at the start
 simulation     one space
 engine         the adapter
 """

@@ -1,4 +1,4 @@
-"""Chipmunk (Munk2D) through pymunk, behind the plugin line: planar, impulse-based, fixed sweeps.
+"""The adapter of Chipmunk (Munk2D) through pymunk: planar, impulse-based, a fixed number of iterations.
 
     step:  x += (v + v_bias) dt  ->  detect  ->  bounce = e v.n (before forces)  ->  v += (g + f/m) dt
            ->  warm start  ->  N sweeps over the contacts (accumulated clamping, friction with the current total)
@@ -44,7 +44,7 @@ class ChipmunkEngine(CheckedEngine):
         quirks=(
             Quirk("external forces are cleared by every step", "they are set again before each", "cpBody.c:502"),
             Quirk(
-                "restitution and friction of a pair are products of the two shapes' numbers",
+                "restitution and friction of a pair are products of the two shapes' values",
                 "factors are chosen whose products are the pairs' values; a table without such factors is refused",
                 "cpArbiter.c:334-335",
             ),
@@ -56,7 +56,7 @@ class ChipmunkEngine(CheckedEngine):
             Quirk("Body.kinetic_energy is twice the energy", "energies are computed from twists", "cpBody.c:588"),
             Quirk(
                 "mass, moment, elasticity, friction or iterations out of range abort the process",
-                "every number is checked before it is handed over",
+                "every number is checked before it is set",
                 "cpBody.c:258, cpShape.c:141, cpSpace.c:208",
             ),
             Quirk(
@@ -65,18 +65,22 @@ class ChipmunkEngine(CheckedEngine):
                 "cpSpaceStep.c:344",
             ),
             Quirk(
-                "with the shipped persistence of 3, a contact that re-forms within three steps keeps its old "
-                "accumulated impulse although it is not applied: totals over-report and contacts can pull",
-                "left alone in `default`, persistence 1 in `tuned`",
+                "with the shipped persistence of 3, a contact that forms again within three steps keeps its old "
+                "accumulated impulse although it is not applied: totals are too large and contacts can pull",
+                "unchanged in `default`, persistence 1 in `tuned`",
                 "cpArbiter.c:324 and :390",
             ),
-            Quirk("the threaded solver gives a different answer each run", "it is not used", "cpHastySpace.c:594"),
+            Quirk("the threaded solver gives a different result in each run", "it is not used", "cpHastySpace.c:594"),
             Quirk(
                 "a shape query between a circle and a polygon flips the sign of the depth",
-                "only its magnitude is used, where the resting overlap looks for touching pairs",
+                "only its magnitude is used, in the search for touching pairs",
                 "measured on pymunk 7.3.1",
             ),
-            Quirk("nothing is swept: a fast body passes a thin one", "the ground is 1 km thick", "cpSpaceStep.c:400"),
+            Quirk(
+                "there is no swept collision detection: a fast body passes through a thin one",
+                "the ground is 1 km thick",
+                "cpSpaceStep.c:400",
+            ),
         ),
     )
     module = "pymunk"
@@ -87,13 +91,13 @@ class ChipmunkEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Pair tables that no product of two numbers can represent, and masses whose inverse overflows."""
+        """Pairs that are no product of two body values, and masses whose inverse overflows."""
         for body in scene.bodies:
             if body.motion == "free" and not math.isfinite(1.0 / body.mass + 1.0 / moment(body)):
                 return f"{body.name}.mass: the inverse of mass or inertia overflows, the engine's state would be NaN"
         for quantity in ("restitution", "friction"):
             if factors(scene, quantity) is None:
-                return f"pairs: {quantity} of a pair is a product of two factors here, this table has none"
+                return f"pairs: {quantity} of a pair is a product of two factors here; no factors give this table"
         return None
 
     def too_coarse(self, scene: Scene, dt: float) -> str | None:
@@ -105,7 +109,7 @@ class ChipmunkEngine(CheckedEngine):
         return checked(settings)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
-        """Python: attributes of the space, and how deep touching bodies start."""
+        """Python: attributes of the space, and the start overlap of touching bodies."""
         needed = needs(scene)
         told = {"collision_slop": "  # a thousandth of the smallest body"}
         if settings["collision_slop"] != SLOP_SHARE * needed.smallest_size:
@@ -119,7 +123,7 @@ class ChipmunkEngine(CheckedEngine):
         return "\n".join(["# space: your pymunk.Space", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
-        """Chipmunk has no setting for where bodies start."""
+        """Chipmunk has no setting for the start overlap."""
         deep = settings["start_overlap"]
         is_share = deep > 0.0 and deep == START_SHARE * (needs(scene).pull * dt * dt)
         said = f"{START_SHARE:g}*g*dt^2" if is_share else deep
@@ -128,13 +132,13 @@ class ChipmunkEngine(CheckedEngine):
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Single contacts and constant forces are exact here; totals of impulses are not where e = 1 and friction meet.
 
-        A contact that parts and touches again within the persistence keeps its old impulse and does not apply it: what
-        it tells is that plus what acted, so that no step tells less than what acted in it, nor more than all that has
-        acted so far. Over the probe's N steps that is from 1 to N times the sum. Where anything of a hop is lost the
-        probe's box lies still before its impulses count, and they are exact (measured: e = 0.99, 1/60 to 1/960 s).
+        A contact that opens and closes again within the persistence keeps its old impulse without applying it. It
+        reports the sum of both: no less than the step's impulse, and no more than the sum of all impulses so far. Over
+        the probe's N steps that is from 1 to N times the sum. With any loss the probe's box rests before its impulses
+        count, and they are exact (measured: e = 0.99, 1/60 to 1/960 s).
         """
         kept = {s.name: s.value for s in self.settings(profile, needs, dt)}["collision_persistence"] > 1
         if not kept or needs.restitution < 1.0 or needs.friction == 0.0:
             return {}
-        half, because = 0.5 * (SLIDE_TIME / dt - 1.0), "contacts that re-form tell their old impulses once more"
+        half, because = 0.5 * (SLIDE_TIME / dt - 1.0), "contacts that form again report their old impulses once more"
         return {"impulse": Declared(1.0 + half, half + IMPULSE_SHARE, because)}

@@ -1,4 +1,4 @@
-"""What Chipmunk does by design instead of the textbook, predicted from scene and step alone: it sweeps nothing."""
+"""Designed deviations of Chipmunk from the textbook, predicted from scene and step only: it has no swept detection."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.unswept import Push, passing_law, shoved_law
 
 
 def _pushed(profile: str) -> Push:
-    """Push-out of overlaps beyond the slop, in the step after; ``collision_bias`` is the share that a second leaves."""
+    """Correction of overlaps beyond the slop, in the next step; ``collision_bias`` is the share left after a second."""
 
     def push(scene: Scene, dt: float, overlap: float) -> float:
         chosen = {s.name: s.value for s in PROFILES[profile](needs(scene), dt)}
@@ -28,13 +28,14 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for law, because, source in (
         (
             passing_law(metric),
-            "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+            "there is no swept collision detection: no step ends with the ball in the plate, so the contact is "
+            "never found",
             "cpSpaceStep.c:400 (positions, then overlaps)",
         ),
         (
             shoved_law(metric, _pushed(profile)),
-            "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is "
-            "on",
+            "there is no swept collision detection: the step that finds the ball in the plate finds it beyond the "
+            "middle, and pushes it out on the far side",
             "cpSpaceStep.c:400 (positions, then overlaps), cpCollision.c (normal of the least overlap)",
         ),
     )

@@ -1,7 +1,7 @@
-"""Chipmunk's profiles: settings with their reasons.
+"""Chipmunk's profiles: settings and their reasons.
 
 default   as shipped
-tuned     best stock settings for what a scene needs
+tuned     best stock settings for the needs of a scene
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, Check, finite, number, whole
 
-#: What a setting may be. Those of `UNSET` are Chipmunk's own as long as nobody sets them.
+#: Ranges of settings. Those of `UNSET` are Chipmunk's own unless they are set.
 KINDS: Mapping[str, Check] = MappingProxyType(
     {
         "iterations": whole(1, LARGEST_INT),
@@ -30,22 +30,22 @@ KINDS: Mapping[str, Check] = MappingProxyType(
     }
 )
 UNSET = ("damping", "idle_speed_threshold", "sleep_time_threshold")
-#: Overlap that is never pushed out, as a share of the smallest body.
+#: Overlap without correction, as a share of the smallest body.
 SLOP_SHARE = 1e-3
-#: How deep touching bodies start, as a share of the way that they fall in a step.
+#: Start overlap of touching bodies, as a share of the fall in a step.
 START_SHARE = 0.3
 SETTING_NAMES = ("iterations", "collision_slop", "collision_bias", "collision_persistence", "start_overlap")
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
-    """As shipped: what ``pymunk.Space()`` holds."""
+    """As shipped: the values of ``pymunk.Space()``."""
     shipped, source = "as shipped", "cpSpace.c, cpSpaceInit"
     return [
         Setting("iterations", ITERATIONS, shipped, source),
         Setting("collision_slop", COLLISION_SLOP, shipped, source),
         Setting("collision_bias", COLLISION_BIAS, f"{shipped}: 0.9 to the 60th per second", source),
         Setting("collision_persistence", COLLISION_PERSISTENCE, shipped, source),
-        Setting("start_overlap", 0.0, "the scene starts as posed", ""),
+        Setting("start_overlap", 0.0, "the scene starts as given", ""),
     ]
 
 
@@ -57,45 +57,47 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             100 if heavy else 30,
-            "sweeps grow with the mass ratio: 30 lets a column carrying 100 times its mass fall at 1/60 s, 100 holds"
+            "the mass ratio needs them: at 1/60 s a column under 100 times its mass falls with 30 iterations, "
+            "not with 100"
             if heavy
-            else "brings a flat landing to 1e-8 and a column of ten to rest; error shrinks with every sweep",
-            "measured: flat box against sweeps, columns",
+            else "a flat landing is right to 1e-8 and a column of ten rests; each iteration reduces the error",
+            "measured: flat box against iterations, columns",
         ),
         Setting(
             "collision_slop",
             slop,
-            "a thousandth of the smallest body: the shipped 0.1 m is a tenth of it, 0 makes contacts flicker",
+            "a thousandth of the smallest body; the shipped 0.1 m is a tenth of it, and with 0 contacts come and go",
             "cpArbiter.c, cpArbiterPreStep",
         ),
         Setting(
             "collision_bias",
             COLLISION_BIAS if resting else 1.0,
-            "as shipped: resting bodies need the push-out"
+            "as shipped: resting bodies need their overlaps corrected"
             if resting
-            else "1 switches the push-out off, which would add potential energy to every impact found late",
+            else "1 switches the overlap correction off, which would add energy to every impact that is found late",
             "cpSpaceStep.c; measured: a ball with e = 1 then keeps its energy to 2e-15 over 100 s",
         ),
         Setting(
             "collision_persistence",
             1,
-            "the shipped 3 revives old impulses when a contact re-forms, so that contacts can pull",
+            "with the shipped 3 a contact that forms again starts from old impulses, and can pull",
             "cpArbiter.c, cpArbiterUpdate and cpArbiterApplyCachedImpulse",
         ),
         Setting(
             "start_overlap",
             _start_overlap(needs, slop, dt) if resting else 0.0,
-            "touching pairs start 0.3 g dt^2 deep, inside the slop that is never corrected: an exactly touching start "
-            "flickers by g dt^2 and costs a transient"
+            "touching pairs start 0.3 g dt^2 deep, inside the slop, which is never corrected; in an exactly "
+            "touching start contacts come and go, and bodies move by g dt^2"
             if resting
-            else "bodies that hit must not start inside each other: a shock would pass an overlapping chain at once",
+            else "bodies that collide must not start with an overlap: a shock would pass through the whole "
+            "chain at once",
             "crosscheck tune chipmunk --group stand: half the slop was deeper than needed and no steadier",
         ),
     ]
 
 
 def _start_overlap(needs: Needs, slop: float, dt: float) -> float:
-    """Depth at which touching bodies start [m]: a share of g dt^2, and at most half the slop."""
+    """Start overlap of touching bodies [m]: a share of g dt^2, and at most half the slop."""
     fall = START_SHARE * (needs.pull * dt * dt)
     return min(0.5 * slop, fall) if fall > 0.0 else 0.5 * slop
 
@@ -104,7 +106,7 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default_profi
 
 
 def checked(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; a bad number would abort the process."""
+    """Settings with valid names and values for the engine; a bad value would abort the process."""
     for name in settings:
         if name not in KINDS:
             raise EngineError(f"{name}: chipmunk has no such setting, it has {', '.join(SETTING_NAMES)}")

@@ -1,4 +1,4 @@
-"""pymunk over its releases: what changed in what the adapter reads."""
+"""pymunk over its releases: changes of the readings of the adapter."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ RELEASES = Releases(
     distributions=(Distribution("pymunk"),),
     known=">=6.4.0,<8",
     differences=(
-        Difference("<6.5", "the structure of an arbiter is opaque: impulses of single points cannot be read",
-                   "its public total is given to its points in equal parts; what is summed over a pair is exact",
+        Difference("<6.5", "the arbiter structure is opaque: impulses of single points cannot be read",
+                   "the public total is divided equally among the points; sums over a pair are exact",
                    "measured: 6.4.0 refuses to read fields of cpArbiter, 6.5.2 does not"),
-        Difference("6.6.0 and 7.0.0", "pymunk.version is not the release (6.6.0 says 6.6.2, 7.0.0 says 2.0.0)",
+        Difference("6.6.0 and 7.0.0", "pymunk.version is not the release (6.6.2 in 6.6.0, 2.0.0 in 7.0.0)",
                    "the version is read from the distribution's metadata, in every release",
                    "measured"),
     ),

@@ -1,4 +1,4 @@
-"""A run on Chipmunk as a stand-alone script: the calls of `adapters.chipmunk.simulation`, with their numbers."""
+"""A run on Chipmunk as a stand-alone script: the calls of `adapters.chipmunk.simulation`, with their values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SPACE = ("iterations", "collision_slop", "collision_bias", "collision_persisten
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with pymunk; see `adapters.engine.Writer`."""
     chosen = checked(settings)
-    built = ChipmunkSimulation(scene, dt, chosen)  # places and materials are those that it has worked out
+    built = ChipmunkSimulation(scene, dt, chosen)  # places and materials are those computed by the simulation
     lines = [*imports(scene, "import pymunk"), *constants(dt, steps), "", "space = pymunk.Space()"]
     lines.append(f"space.gravity = {literal(scene.gravity)}")
     lines += [f"space.{name} = {chosen[name]!r}" for name in (*_SPACE, *UNSET) if name in chosen]
@@ -52,7 +52,7 @@ def _made(scene: Scene, asked: Body, body: Any, shape: Any) -> list[str]:
 
 
 def _loads(scene: Scene) -> list[str]:
-    """Lines before a step: external loads, which every step clears, and velocities of courses."""
+    """Lines before a step: external loads, which every step clears, and prescribed velocities."""
     lines = [f"bodies[{b.name!r}].velocity = {velocity(b)}" for b in scene.bodies if b.course is not None]
     loaded = [b for b in scene.bodies if b.motion == "free" and (any(b.force) or any(b.torque))]
     return lines + [

@@ -1,18 +1,18 @@
-"""Numbers of Chipmunk as ``pymunk.Space()`` holds them, and the releases looked at.
+"""Defaults of Chipmunk in ``pymunk.Space()``, and the reviewed releases.
 
 The odd digits are single-precision literals in its source. [Munk2D, cpSpace.c, cpSpaceInit]
 """
 
 from __future__ import annotations
 
-#: Prefixes of the releases that laws were checked on.
+#: Prefixes of the releases on which laws were checked.
 CHECKED_ON = ("7.3.",)
 
-#: Sweeps per step.
+#: Iterations per step.
 ITERATIONS = 10
-#: Overlap that is left alone [m].
+#: Overlap without correction [m].
 COLLISION_SLOP = 0.10000000149011612
-#: Share of an overlap that is left after a second: 0.9 to the 60th.
+#: Share of an overlap left after a second: 0.9 to the 60th.
 COLLISION_BIAS = 0.0017970074436457143
-#: Steps that a contact's impulses outlive it.
+#: Steps for which the impulses of an open contact are kept.
 COLLISION_PERSISTENCE = 3

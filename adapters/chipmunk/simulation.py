@@ -1,4 +1,4 @@
-"""One ``pymunk.Space`` and what is read from it.
+"""One ``pymunk.Space`` and its readings.
 
 Position is advanced first, with the old velocity, so pose, contacts and impulses read after a step belong to the
 same instant, and free fall lags the parabola by g t dt / 2. Line numbers are those of Munk2D's ``src/``.
@@ -67,13 +67,13 @@ class ChipmunkSimulation(Simulation):
                 setattr(shape, attribute, value)
 
     def _overlap_start(self, overlap: float) -> None:
-        """Move free bodies so that every touching pair overlaps by ``overlap``, where that is possible."""
+        """Move free bodies so that every touching pair overlaps by ``overlap``, if possible."""
         touching = touching_pairs(self.scene)
         shift = overlap_displacement(self.scene, touching, overlap)
         if shift is None:
             self.initial_change = (
-                "none: no displacement lets all touching pairs overlap by "
-                f"{overlap:.3g} m, so the scene starts touching as posed",
+                "none: no displacement gives all touching pairs an overlap of "
+                f"{overlap:.3g} m, so the scene starts as given",
             )
             return
         if not touching:
@@ -114,7 +114,7 @@ class ChipmunkSimulation(Simulation):
                 continue
 
             def collect(arbiter: Any, i: int = i) -> None:
-                try:  # pymunk prints and swallows what a callback raises
+                try:  # pymunk prints and drops exceptions of a callback
                     j = self.index[id(arbiter.shapes[1])]
                     if i < j or self.scene.bodies[j].motion != "free":
                         rows.extend(_contact_rows(arbiter, i, j))
@@ -127,7 +127,7 @@ class ChipmunkSimulation(Simulation):
         return Contacts.by_pair(rows, 2)
 
     def readback(self) -> dict[str, Any]:
-        """What the space, its bodies and shapes hold."""
+        """Values of the space, its bodies and shapes."""
         space = self.space
         return {
             "dt": self.dt,
@@ -150,7 +150,7 @@ class ChipmunkSimulation(Simulation):
 
 
 def _size(shape: Any) -> list[float]:
-    """Radius, or half extents, as the engine holds them [m]."""
+    """Radius, or half extents, in the engine [m]."""
     if hasattr(shape, "get_vertices"):
         return [float(x) for x in np.max(np.abs(shape.get_vertices()), axis=0)]
     return [float(shape.radius)]

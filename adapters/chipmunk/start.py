@@ -1,4 +1,4 @@
-"""Touching bodies at the start, and where they stand if every touching pair is to overlap a little."""
+"""Touching bodies at the start, and their places with a small overlap of every touching pair."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from adapters.needs import needs
 from adapters.scene import Scene
 
 #: Faces closer than this share of the smallest body count as touching when the resting overlap is applied: a
-#: thousandth of the tuned slop, so what it may misjudge is far below what the overlap itself changes.
+#: thousandth of the tuned slop, so its error is far below the effect of the overlap itself.
 TOUCHING = 1e-6
 
 
 def touching_pairs(scene: Scene) -> list[tuple[int, int, Array, float]]:
-    """Pairs in touch or overlap at the start: ``(i, j, normal from i to j, gap)``, by the engine's own detection.
+    """Touching or overlapping pairs at the start: ``(i, j, normal from i to j, gap)``, by the engine's own detection.
 
-    All shapes are grown by a skin, so that touching pairs overlap whatever the rounding; the skin is taken off the
-    reported depth again.
+    All shapes are grown by a skin, so touching pairs overlap in spite of round-off; the skin is subtracted from the
+    reported depth.
     """
     import pymunk
 
@@ -43,9 +43,9 @@ def touching_pairs(scene: Scene) -> list[tuple[int, int, Array, float]]:
 def overlap_displacement(scene: Scene, touching: list[tuple[int, int, Array, float]], overlap: float) -> Array | None:
     """Smallest translation of each free body after which touching pairs overlap by ``overlap``, (n, 2) [m].
 
-    One equation per pair, ``n . (d_j - d_i) = -overlap - gap``; pairs that the scene itself poses deeper keep their
-    depth (right-hand side 0). A column sinks by one overlap more at each interface, a box on an incline moves along
-    the floor's normal. None if the equations contradict each other (a box that exactly fits between two walls).
+    One equation per pair, ``n . (d_j - d_i) = -overlap - gap``; pairs deeper in the scene itself keep their depth
+    (right-hand side 0). A column sinks by one overlap more at each interface, a box on an incline moves along the
+    floor's normal. None if the equations contradict each other (a box that exactly fits between two walls).
     """
     if not touching:
         return np.zeros((len(scene.bodies), 2))
@@ -56,7 +56,7 @@ def overlap_displacement(scene: Scene, touching: list[tuple[int, int, Array, flo
                 rows[row, 2 * body : 2 * body + 2] = sign * normal
         goal[row] = -overlap - gap if gap > -overlap else 0.0
     shift = np.linalg.lstsq(rows, goal, rcond=None)[0]
-    # A thousandth of the overlap: an order below the accuracy asked of the overlap, far above round-off.
+    # A thousandth of the overlap: an order below the required accuracy of the overlap, far above round-off.
     if np.abs(rows @ shift - goal).max() > 1e-3 * overlap:
         return None
     return np.asarray(shift.reshape(-1, 2))

@@ -1,4 +1,4 @@
-"""A scene in Chipmunk's terms: one number per body for materials of pairs, bodies, shapes, a slab for a half-space."""
+"""A scene for Chipmunk: one value per body for materials of pairs, bodies, shapes, a slab for a half-space."""
 
 from __future__ import annotations
 
@@ -12,22 +12,21 @@ from adapters.meeting import Meeting, representable
 from adapters.needs import needs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene
 
-#: A half-space is one thick static polygon. Nothing is swept, so what sinks deeper than half the depth in one step
-#: leaves on the wrong side: 1 km is safe to 1e5 m/s at 1/240 s. Results do not depend on either number (the
-#: ten-box column is bit-identical for depths 10 m .. 10 km and half widths 1 km .. 10 km).
+#: A half-space is one thick static polygon. Detection is not swept, so a body deeper than half the depth in one step
+#: leaves on the wrong side: 1 km is safe to 1e5 m/s at 1/240 s. Results do not depend on either number (the ten-box
+#: column is bit-identical for depths 10 m .. 10 km and half widths 1 km .. 10 km).
 GROUND_DEPTH = 1e3
 GROUND_HALF_WIDTH = 1e4
-#: Product of two factors may miss a pair's coefficient by the rounding of logarithms, exponentials and a product
-#: (relative; 7e-15, well below the 1e-12 that any check asks of a single contact).
+#: Error of the product of two factors by the rounding of logarithms, exponentials and a product
+#: (relative; 7e-15, well below the 1e-12 of every check of a single contact).
 FACTOR_ROUNDING = 32.0 * np.finfo(float).eps
 
 
 def factors(scene: Scene, quantity: str) -> list[float] | None:
     """One number per body whose products are the pairs' ``quantity``, or None if there are none.
 
-    The immovable partner takes 1 wherever that works, so that a value is handed over exactly; otherwise factors
-    solve ``log f_i + log f_j = log value`` over all pairs, or over those that can meet (a root of the value if it is
-    common to all).
+    The immovable partner has 1 if possible, so a value is exact; otherwise factors solve ``log f_i + log f_j = log
+    value`` over all pairs, or over those that can touch (a root of the value if all are equal).
     """
     return representable(scene, lambda pairs: _factors(scene, pairs, quantity))
 
@@ -61,7 +60,7 @@ def _factors_by_logarithm(n: int, pairs: list[tuple[int, int, float]]) -> list[f
 
 
 def moment(body: Body) -> float:
-    """Planar inertia [kg m^2]; scenes are validated, so a free planar body has one number."""
+    """Planar inertia [kg m^2]; scenes are validated, so a free planar body has one value."""
     assert isinstance(body.inertia, float | int)
     return float(body.inertia)
 
@@ -72,7 +71,7 @@ def leaves_ground(scene: Scene, dt: float) -> str | None:
         return None
     speed = needs(scene).top_speed
     if speed * dt > 0.5 * GROUND_DEPTH:
-        return f"dt: at {speed:.3g} m/s a body passes {0.5 * GROUND_DEPTH:g} m of ground in one step unseen"
+        return f"dt: at {speed:.3g} m/s a body passes {0.5 * GROUND_DEPTH:g} m of ground in one step, undetected"
     return None
 
 
@@ -107,7 +106,7 @@ def made_shape(scene: Scene, asked: Body, body: Any, skin: float) -> Any:
 
 
 def corners(scene: Scene, asked: Body) -> list[tuple[float, float]]:
-    """Corners of the polygon that a shape with corners becomes, in body axes."""
+    """Corners of the polygon of a shape, in body axes."""
     shape = asked.shape
     if isinstance(shape, Box):
         hx, hy = shape.half_extents
@@ -119,7 +118,7 @@ def corners(scene: Scene, asked: Body) -> list[tuple[float, float]]:
 
 
 def _middle(scene: Scene, asked: Body, shape: HalfSpace) -> float:
-    """Where along a half-space's face the bodies are, to a half width of the slab [m]: 0 unless they are far away."""
+    """Middle of the bodies along a half-space's face, to a half width of the slab [m]: 0 unless they are far away."""
     x, y, theta = asked.pose
     nx, ny = shape.normal
     c, s = math.cos(theta), math.sin(theta)
@@ -127,7 +126,7 @@ def _middle(scene: Scene, asked: Body, shape: HalfSpace) -> float:
         (c * dx + s * dy) * ny - (c * dy - s * dx) * nx
         for dx, dy in ((body.pose[0] - x, body.pose[1] - y) for body in scene.bodies if body.motion == "free")
     ]
-    # The middle one: a body far from all others does not draw the slab away from them.
+    # The median: a single far body does not move the slab.
     return GROUND_HALF_WIDTH * round(sorted(along)[len(along) // 2] / GROUND_HALF_WIDTH) if along else 0.0
 
 

@@ -1,4 +1,4 @@
-"""What Chipmunk does when nothing is set; see `adapters.unset`."""
+"""Chipmunk without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from adapters import unset
 from adapters.chipmunk.shipped import COLLISION_SLOP
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
-#: Step of its own examples [s]: a space has none.
+#: Step of its own examples [s]: a space has no default.
 STEP = 1.0 / 60.0
 
 

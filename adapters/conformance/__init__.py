@@ -1,13 +1,13 @@
-"""Is this adapter one? Checks that need no test framework and name what is wrong.
+"""Conformance checks of adapters, without a test framework.
 
-    statements    facts, profiles, refusals, capabilities: what it says, and that it means it
+    statements    facts, profiles, refusals, capabilities
     worlds        start, read-back, shared state, the same bits again, memory
     mechanics     free fall, momentum, contacts and their impulses, symmetry
-    parameters    the parameter receipts of every profile
-    toy, faults   an engine that keeps every promise, and the ways it is spoilt
-    self_test     each fault is caught by the check that names it
+    parameters    the property checks of every profile
+    toy, faults   a correct engine, and faults for it
+    self_test     each fault is noticed by its check
 
-Each check is a function of an engine that returns the first thing wrong, or "" if nothing is. From Python::
+Each check is a function of an engine that returns the first error, or "" if there is none. From Python::
 
     from adapters.conformance import check_adapter
     assert all(finding.holds for finding in check_adapter(MyEngine()))
@@ -20,7 +20,7 @@ as pytest items, one for each check::
     def test_conformance(item):
         item.hold()
 
-and from the command as ``crosscheck check-adapter NAME``. What is known to fail stands in `Engine.expected`.
+and from the command as ``crosscheck check-adapter NAME``. Known failures are in `Engine.expected`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ CHECKS: dict[str, Check] = {
 
 
 def check_adapter(engine: Engine) -> list[Finding]:
-    """Run every check on ``engine``; an exception of the engine's is a finding, never raised."""
+    """Run every check on ``engine``; an exception of the engine is a finding, never raised."""
     findings = [found(name, check, engine) for name, check in CHECKS.items()] + _receipts(engine)
     told = {finding.check for finding in findings}
     for each in engine.expected:
@@ -76,7 +76,7 @@ def check_adapter(engine: Engine) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Item:
-    """One check of one engine, as a test framework wants it."""
+    """One check of one engine, for a test framework."""
 
     name: str
     measure: Callable[[], Finding]
@@ -100,7 +100,7 @@ class Item:
 
 
 def items(engine: Engine) -> list[Item]:
-    """Every check of ``engine``, nothing run yet; receipts are measured once for all quantities."""
+    """Every check of ``engine``, not run yet; property checks are measured once for all quantities."""
 
     def check(name: str) -> Callable[[], Finding]:
         return lambda: found(name, CHECKS[name], engine)

@@ -1,7 +1,6 @@
-"""Ways in which an adapter is wrong, each with the check that must catch it and three sizes that it must be caught at.
+"""Faults of an adapter, each with the check that must notice it, at three sizes.
 
-A share is off by 10, 1 and 0.1 % unless something stands in the way: what a step of motion hides of an extent, or what
-solvers leave of a symmetry.
+Sizes are 10, 1 and 0.1 %, except where the motion of a step hides an extent, or solvers do not keep a symmetry.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from adapters.scene import Body, Box, Scene, Sphere
 
 SHARES = (0.1, 0.01, 0.001)
 COARSE = (1.0, 0.1, 0.01)
-#: Sizes of what must agree bit for bit.
+#: Sizes for values that must agree bit for bit.
 BITS = (1e-3, 1e-6, 1e-9)
 
 
-# ---- what the engine is told ---------------------------------------------------------------------------------------
+# ---- input of the engine -------------------------------------------------------------------------------------------
 
 
 def _each(change: Callable[[Body, float], Body]) -> Callable[[Scene, float], Scene]:
@@ -88,7 +87,7 @@ def _pair(name: str) -> Callable[[Scene, float], Scene]:
     return told
 
 
-# ---- what is read of a world ---------------------------------------------------------------------------------------
+# ---- output of a world ---------------------------------------------------------------------------------------------
 
 
 def _at(rows: Any, columns: Any, amount: Callable[[World], float]) -> Callable[[World, Array, float], Array]:
@@ -103,7 +102,7 @@ def _at(rows: Any, columns: Any, amount: Callable[[World], float]) -> Callable[[
 
 
 def _scaled(rows: Any, columns: Any, power: Callable[[World], float]) -> Callable[[World, Array, float], Array]:
-    """Take a share of ``size`` from some numbers, as often as ``power`` says."""
+    """Reduce some numbers by the share ``size``, ``power`` times."""
 
     def read(world: World, value: Array, size: float) -> Array:
         value = value.copy()
@@ -141,7 +140,7 @@ def _impulse(change: Callable[[Contacts, float], Array]) -> Callable[[World, Con
 
 
 def _late_impulse(world: World, told: Contacts, size: float) -> Contacts:
-    """What the step before reported, by a share; where it had no such contact, nothing."""
+    """A share of the impulse of the step before; nothing where it had no such contact."""
     before = world.before[2]
     if len(before.a) == len(told.a):
         return replace(told, impulse=(1.0 - size) * told.impulse + size * before.impulse)
@@ -169,17 +168,17 @@ def _tilted(world: World, told: Contacts, size: float) -> Contacts:
 
 
 def _tilted_once(world: World, told: Contacts, size: float) -> Contacts:
-    """The last normal alone: others beside it are right."""
+    """Only the last normal; others are right."""
     return replace(told, normal=np.vstack([told.normal[:-1], _tilted(world, told, size).normal[-1:]]))
 
 
 def _long_once(world: World, told: Contacts, size: float) -> Contacts:
-    """The last normal alone is too long."""
+    """Only the last normal is too long."""
     return replace(told, normal=np.vstack([told.normal[:-1], (1.0 + size) * told.normal[-1:]]))
 
 
 def _turned_aside(world: World, value: Array, size: float) -> Array:
-    """The last body moves along one axis for what it has along the other: components add up as before."""
+    """The last body gains along one axis what it loses along the other: the sum of components is unchanged."""
     value = value.copy()
     value[-1, [0, 2]] += np.array([size, -size]) * float(world.steps > 0)
     return value
@@ -198,7 +197,7 @@ def _mirrored_turn(world: World, value: Array, size: float) -> Array:
     return value * np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
 
 
-# ---- what the engine says and keeps --------------------------------------------------------------------------------
+# ---- statements of the engine --------------------------------------------------------------------------------------
 
 
 def _leaking(engine: Spoilt, scene: Scene, dt: float, given: dict[str, Any]) -> tuple[float, dict[str, Any]]:
@@ -236,7 +235,7 @@ FAULTS: dict[str, Fault] = {
     "inertia of a disc given to a ball": Fault("receipt inertia", COARSE, "share", told=_each(_disc)),
     "principal axes swapped": Fault("receipt inertia", COARSE, "share", told=_each(_swapped)),
     "torque too small": Fault("receipt inertia", SHARES, "share", told=_each(_torque)),
-    "torque the wrong way": Fault("receipt turn", told=lambda scene, _: _each(_torque)(scene, 2.0)),
+    "torque with the wrong sign": Fault("receipt turn", told=lambda scene, _: _each(_torque)(scene, 2.0)),
     "gravity too weak": Fault("receipt gravity", SHARES, "share", told=_gravity),
     "gravity sideways": Fault("receipt gravity", SHARES, "rad", told=_sideways),
     "gravity upwards": Fault("receipt gravity", told=lambda scene, _: _gravity(scene, 2.0)),
@@ -246,11 +245,11 @@ FAULTS: dict[str, Fault] = {
     ),
     "restitution too low": Fault("receipt restitution", SHARES, "share", told=_pair("restitution")),
     "restitution ignored": Fault("receipt restitution", told=lambda scene, _: _pair("restitution")(scene, 1.0)),
-    # A box is told to a step of its approach, which is half a per cent of it at 1/240 s.
+    # A box is measured to a step of its approach, half a per cent of it at 1/240 s.
     "extents too small": Fault("receipt size", (0.5, 0.1, 0.01), "share", told=_each(_extent)),
     "step of its own": Fault("receipt step", SHARES, "share", stepped=lambda dt, size: (1.0 - size) * dt),
     "state read late": Fault("receipt sampling", COARSE, "steps", pose=_late_pose, twist=_late_twist),
-    "drag that nobody declares": Fault(
+    "drag that is not declared": Fault(
         "receipt linear_damping", SHARES, "1/s", twist=_scaled(ALL, LINEAR, lambda world: world.steps * world.dt)
     ),
     "spin that dies down": Fault(
@@ -258,17 +257,17 @@ FAULTS: dict[str, Fault] = {
     ),
     "impulses reported too low": Fault("receipt impulse", SHARES, "share", contacts=_impulse(_low)),
     "friction reported too low": Fault("receipt friction_impulse", SHARES, "share", contacts=_impulse(_slipping)),
-    "angles the wrong way": Fault("receipt turn", pose=_mirrored_turn),
-    # The wrong word is the fault, which the type checker sees as well.
-    "role that is none": Fault("facts", facts=lambda facts: replace(facts, roles={"default": "best"})),  # type: ignore[dict-item]
+    "angles with the wrong sign": Fault("receipt turn", pose=_mirrored_turn),
+    # The wrong word is the fault, which the type checker notices as well.
+    "role that does not exist": Fault("facts", facts=lambda facts: replace(facts, roles={"default": "best"})),  # type: ignore[dict-item]
     "setting without a reason": Fault("profiles", settings=_no_reason),
     "setting that is set twice": Fault("profiles", settings=lambda given: given * 2),
     "unknown settings ignored": Fault("refusals", build=_known_only),
     "refusal of several lines": Fault("refusals", refuses=lambda scene, said: "bodies:\nno" if said else None),
-    "step of any number taken": Fault("bad_numbers", build=_any_step),
+    "time step is not checked": Fault("bad_numbers", build=_any_step),
     "step backwards taken": Fault("bad_numbers", build=_any_direction),
-    "count below 1 taken": Fault("bad_numbers", build=_any_count),
-    "refused, and yet built": Fault(
+    "count below 1 is accepted": Fault("bad_numbers", build=_any_count),
+    "refused, but built": Fault(
         "capabilities", refuses=lambda scene, said: said or ("no" if len(scene.bodies) == 1 else None)
     ),
     "prescribed body pushed": Fault("capabilities", SHARES, "m/s", twist=_pushed),
@@ -277,18 +276,18 @@ FAULTS: dict[str, Fault] = {
     "bodies in another order": Fault(
         "states", pose=lambda world, value, _: value[::-1], twist=lambda world, value, _: value[::-1]
     ),
-    "another mass held than told": Fault("readback", SHARES, "share", readback=_held),
+    "another mass is used than reported": Fault("readback", SHARES, "share", readback=_held),
     "nothing read back": Fault("readback", readback=lambda world, held, _: {}),
     "one normal of several tilted": Fault("contacts", (0.1, 0.03, 0.01), "rad", contacts=_tilted_once),
-    "recoil felt too little": Fault("impulse", SHARES, "share", twist=_scaled(0, LINEAR, lambda world: 1.0)),
-    "half a step of gravity too much": Fault(
+    "recoil too small": Fault("impulse", SHARES, "share", twist=_scaled(0, LINEAR, lambda world: 1.0)),
+    "gravity of half a step too much": Fault(
         "free_fall", COARSE, "steps", pose=_at(ALL, 2, lambda world: -0.5 * 9.81 * world.dt * world.steps * world.dt)
     ),
-    "momentum out of nothing": Fault(
+    "momentum without a cause": Fault(
         "momentum", SHARES, "share", twist=_scaled(-1, LINEAR, lambda world: float(world.steps > 0))
     ),
-    "momentum along one axis for that along another": Fault("momentum", SHARES, "m/s", twist=_turned_aside),
-    "spin out of nothing": Fault(
+    "momentum moved from one axis to another": Fault("momentum", SHARES, "m/s", twist=_turned_aside),
+    "spin without a cause": Fault(
         "spin", (1.0, 0.1, 0.03), "share", twist=_scaled(0, ANGULAR, lambda world: float(world.steps > 0))
     ),
     "normal tilted": Fault("contacts", SHARES, "rad", contacts=_tilted),
@@ -297,46 +296,50 @@ FAULTS: dict[str, Fault] = {
     ),
     "one normal of several not of length 1": Fault("contacts", SHARES, "share", contacts=_long_once),
     "normal from the second body": Fault("contacts", contacts=lambda _, told, size: replace(told, normal=-told.normal)),
-    # Bodies may sink by centimetres, and every other place of a body is farther from the floor.
+    # Bodies may sink by centimetres, and every other point of a body is farther from the floor.
     "contact point elsewhere": Fault(
         "contacts", (1.0, 0.3, 0.1), "m", contacts=lambda _, told, size: replace(told, point=told.point + size)
     ),
     "gap of another contact": Fault(
         "contacts", (1.0, 0.3, 0.1), "m", contacts=lambda _, told, size: replace(told, gap=told.gap + size)
     ),
-    "contact's bodies not in order": Fault("contacts", contacts=_backwards),
+    "bodies of a contact in wrong order": Fault("contacts", contacts=_backwards),
     "impulse of the wrong body": Fault(
         "impulse", COARSE, "share", contacts=_impulse(lambda told, size: (1.0 - 2.0 * size) * told.impulse)
     ),
     "impulse of the step before": Fault("sampling", COARSE, "share", contacts=_late_impulse),
-    # The sum over all steps is right: a check that looks at the sum alone sees nothing.
+    # The sum over all steps is right: a check of the sum alone does not notice it.
     "impulse spread over two steps": Fault("sampling", COARSE, "share", contacts=_spread),
     "first body drifts": Fault(
         "order", COARSE, "m/s", pose=_at(0, 0, lambda world: world.steps * world.dt), twist=_at(0, 0, lambda world: 1.0)
     ),
-    "all drift to one side": Fault("mirror", COARSE, "m/s", pose=_at(ALL, 0, lambda world: world.steps * world.dt)),
+    "all bodies drift to one side": Fault(
+        "mirror", COARSE, "m/s", pose=_at(ALL, 0, lambda world: world.steps * world.dt)
+    ),
     "slower upwards than sideways": Fault("quarter_turn", SHARES, "share", twist=_scaled(ALL, 2, lambda world: 1.0)),
-    "world shared with another": Fault("fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.others))),
-    # Nothing is wrong with worlds that are stepped one after another, each to its end.
-    "steps in turn with another world": Fault(
+    "state shared with another world": Fault(
+        "fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.others))
+    ),
+    # Worlds that run one after another, each to its end, are right.
+    "depends on steps of another world": Fault(
         "fresh", BITS, "m a step", pose=_at(ALL, 0, lambda world: float(world.interrupted))
     ),
-    "another answer each time": Fault("repeat", BITS, "m/s", twist=_at(ALL, 0, lambda world: random.random())),
-    "another answer after another scene": Fault(
+    "another result each time": Fault("repeat", BITS, "m/s", twist=_at(ALL, 0, lambda world: random.random())),
+    "another result after another scene": Fault(
         "history", BITS, "m", pose=_at(ALL, 0, lambda world: float(world.after not in ("", world.scene.name)))
     ),
-    "another answer in another process": Fault(
+    "another result in another process": Fault(
         "process", BITS, "m", pose=_at(ALL, 0, lambda world: float(1 + os.getpid() % 9973))
     ),
-    "another answer for many steps at once": Fault(
+    "another result for many steps at once": Fault(
         "stride", BITS, "m", pose=_at(ALL, 0, lambda world: float(world.at_once > 1))
     ),
     "another state in a record": Fault(
         "stride", BITS, "m", record=lambda world, told, size: replace(told, pose=told.pose + size * (told.pose != 0.0))
     ),
-    "contacts of a record a sample late": Fault(
+    "recorded contacts a sample late": Fault(
         "stride", record=lambda world, told, _: replace(told, counts=np.roll(told.counts, 1))
     ),
-    "impulses of a record too low": Fault("stride", SHARES, "share", record=_low_record),
-    "worlds that are never freed": Fault("memory", (1e5, 1e4, 3e3), "bytes a world", build=_leaking),
+    "recorded impulses too low": Fault("stride", SHARES, "share", record=_low_record),
+    "worlds are never freed": Fault("memory", (1e5, 1e4, 3e3), "bytes a world", build=_leaking),
 }

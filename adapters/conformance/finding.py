@@ -1,4 +1,4 @@
-"""What a check of the kit found: it holds, it fails, it could not be asked, or it fails as is known."""
+"""Result of a conformance check: it holds, fails, could not run, or fails as listed."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from adapters.engine import Engine, Expected
 from adapters.plain import one_line
 
 Status = Literal["ok", "FAIL", "refused", "expected", "unexpected pass"]
-#: A check looks at an engine and returns the first thing wrong, or nothing.
+#: A check of an engine returns the first error, or nothing.
 Check = Callable[[Engine], str]
 
 
 class NotAsked(Exception):
-    """The engine refuses every scene that a check has for it; the message is its reason, in one line."""
+    """The engine refuses every scene of a check; the message is its reason, in one line."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found.
+    """Result of one check.
 
     Parameters
     ----------
     status
-        ``ok``; ``FAIL``; ``refused``: nothing was measured, which is no pass; ``expected``: it fails as the engine's
-        `Engine.expected` says; ``unexpected pass``: it holds although that says it would not.
+        ``ok``; ``FAIL``; ``refused``: nothing was measured, which is no pass; ``expected``: it fails as listed in
+        `Engine.expected`; ``unexpected pass``: it holds although listed.
     """
 
     check: str
@@ -35,7 +35,7 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is wrong that is not known."""
+        """Whether there is no unlisted failure."""
         return self.status in ("ok", "refused", "expected")
 
     def __str__(self) -> str:
@@ -44,7 +44,7 @@ class Finding:
 
 
 def found(name: str, check: Check, engine: Engine) -> Finding:
-    """Run one check; whatever the engine raises is a finding."""
+    """Run one check; an exception of the engine is a finding."""
     expected = next((each for each in engine.expected if each.check == name), None)
     try:
         wrong = check(engine)
@@ -57,9 +57,9 @@ def found(name: str, check: Check, engine: Engine) -> Finding:
 
 
 def judged(name: str, wrong: str, meant: str, expected: Expected | None) -> Finding:
-    """Finding of a check that found ``wrong``, or nothing; ``meant`` says what holds then."""
+    """Finding of a check with the error ``wrong``, or none; ``meant`` describes a pass."""
     if expected is None:
         return Finding(name, "FAIL" if wrong else "ok", wrong or meant)
     if wrong:
         return Finding(name, "expected", one_line(f"{expected.because} ({expected.source}): {wrong}"))
-    return Finding(name, "unexpected pass", one_line(f"it holds, but is listed: {expected.because}"))
+    return Finding(name, "unexpected pass", one_line(f"it passes, but is listed as failing: {expected.because}"))

@@ -1,4 +1,4 @@
-"""Mechanics that every engine owes, whatever its contact model: free fall, momentum, bookkeeping, symmetry."""
+"""Mechanics of every engine, whatever its contact model: free fall, momentum, impulses, symmetry."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.trajectory import Trajectory
 
-#: What impulses may miss of a momentum of order 1 [N s]: a solver that stops at a tolerance reports the forces of its
-#: last iterate. The root of a tolerance of 1e-8 on its cost is 1e-4 (2e-5 in a step, measured), times ten.
+#: Error of impulses for a momentum of order 1 [N s]: a solver that stops at a tolerance reports the forces of its last
+#: iterate. The root of a tolerance of 1e-8 on its cost is 1e-4 (2e-5 in a step, measured), times ten.
 BOOKKEEPING = 1e-3
-#: What a solver's tolerance may make of a scene that is turned or mirrored, or whose bodies are swapped, as a share of
-#: metres and metres per second of order 1: the same root, over some tens of steps.
+#: Effect of a solver's tolerance in a rotated, mirrored or reordered scene, for metres and metres per second of order
+#: 1: the same root, over some tens of steps.
 SYMMETRY = 1e-4
 
 
 def _loss(engine: Engine, profile: str, scene: Scene) -> tuple[float, float]:
-    """Largest share of speed and spin that the profile says it takes within the scene."""
+    """Largest declared loss of speed and spin within the scene."""
     declared = engine.declares(profile, needs(scene), DT)
     lost = []
     for name in ("linear_damping", "angular_damping"):
@@ -49,11 +49,11 @@ def _loss(engine: Engine, profile: str, scene: Scene) -> tuple[float, float]:
 
 
 def free_fall(engine: Engine) -> str:
-    """A ball that is thrown and spun follows the discrete law of the declared scheme at every step."""
+    """A thrown and spinning ball follows the discrete law of the declared scheme at every step."""
     scene = flying()
     for profile in engine.profiles:
         asked = accepted(engine, profile, scene)
-        # A delay of d steps that the profile declares is a place d g t dt behind the scheme's, d known to its band.
+        # A declared delay of d steps is a distance d g t dt behind the scheme, with the band of d.
         late = engine.declares(profile, needs(asked), DT).get("sampling")
         offset = engine.scheme(profile).position_offset - 2.0 * (late.value if late else 0.0)
         linear, angular = _loss(engine, profile, asked)
@@ -61,11 +61,11 @@ def free_fall(engine: Engine) -> str:
         t = found.t[:, None]
         velocity = np.array(body.twist[:2]) + g * t
         place = np.array(body.pose[:2]) + np.array(body.twist[:2]) * t + 0.5 * g * t * (t + offset * DT)
-        # Drag takes at most its share of the largest speed there is, and of the way that is gone at it; it may grow
-        # with the square of a speed above 1 m/s.
+        # Drag takes at most its share of the largest speed and of the distance at it; it may grow with the square of a
+        # speed above 1 m/s.
         fastest = float(np.linalg.norm(velocity, axis=1).max())
         slack = engine.facts.round_off + linear * fastest * max(1.0, fastest)
-        # Quaternions that are turned to first order and normalised lose (w dt)^3/12 a step.
+        # Quaternions that are rotated to first order and normalised lose (w dt)^3/12 a step.
         turn = abs(body.twist[2]) * DT
         vague = (late.band if late else 0.0) * float(np.linalg.norm(g)) * scene.duration * DT
         bent = len(found.t) * turn**3 / 12.0
@@ -84,17 +84,17 @@ def free_fall(engine: Engine) -> str:
             ),
         ):
             if not off <= band:
-                return f"{profile}: {what} misses the law of free fall by {off:.2g}, {band:.2g} is allowed"
+                return f"{profile}: {what} differs from free fall by {off:.2g}, {band:.2g} is allowed"
     return ""
 
 
 def momentum(engine: Engine) -> str:
-    """What two bodies in free space exchange takes nothing from their momentum."""
+    """A collision of two bodies in free space conserves momentum."""
     return _conserved(engine, "momentum", _linear)
 
 
 def spin(engine: Engine) -> str:
-    """Two bodies that meet off-centre, with friction, keep their angular momentum."""
+    """An off-centre collision of two bodies with friction conserves angular momentum."""
     return _conserved(engine, "angular momentum", _angular)
 
 
@@ -117,16 +117,16 @@ def _conserved(engine: Engine, what: str, measure: Callable[[Scene, Trajectory],
 
 
 def _linear(scene: Scene, found: Trajectory) -> tuple[Array, float]:
-    """Momentum (samples, 2); it may change by round-off alone: impulses on both bodies are the same numbers."""
+    """Momentum (samples, 2); only round-off may change it: impulses on both bodies are the same numbers."""
     mass = np.array([body.mass for body in scene.bodies])
     return np.asarray((mass[:, None] * found.twist[:, :, :2]).sum(axis=1)), 0.0
 
 
 def _angular(scene: Scene, found: Trajectory) -> tuple[Array, float]:
-    """Angular momentum about the origin (samples,), and what it may change by.
+    """Angular momentum about the origin (samples,), and its allowed change.
 
-    An impulse acts on both bodies at one point, or at the nearest point of each. In the second case, where bodies
-    overlap or part by up to a step of their approach before and one after, friction turns them by that gap as an arm.
+    An impulse acts on both bodies at one point, or at the nearest point of each. In the second case, with an overlap or
+    gap of up to a step of their approach before and one after, friction acts with that gap as a lever arm.
     """
     total = np.zeros(len(found.t))
     for i, body in enumerate(scene.bodies):
@@ -151,7 +151,7 @@ def _lowered(found: Trajectory) -> Trajectory:
 
 
 def contacts(engine: Engine) -> str:
-    """Contacts say which bodies, with unit normals from the lower to the higher index, where they are."""
+    """Contacts have the right bodies, places, and unit normals from the lower to the higher index."""
     for profile, order in product(engine.profiles, (1, -1)):
         scene = accepted(engine, profile, resting(order), resting(order, box=False))
         for given in in_all_dimensions(engine, scene):
@@ -167,18 +167,18 @@ def contacts(engine: Engine) -> str:
 def _wrong_contact(scene: Scene, rows: Contacts, round_off: float) -> str:
     floor, up = scene.index("floor"), scene.dimension - 1
     if not (rows.a < rows.b).all():
-        return "a contact has its bodies not in order of the scene"
+        return "the bodies of a contact are not in the scene's order"
     if not ((rows.a == floor) | (rows.b == floor)).all():
         return "bodies far apart are in contact"
     upwards = np.where(rows.a == floor, rows.normal[:, up], -rows.normal[:, up])
-    # Said so that NaN is wrong as well, but for impulses and gaps, which an engine need not tell.
+    # Written so that NaN is an error too, except for impulses and gaps, which are optional.
     if not np.abs(np.linalg.norm(rows.normal, axis=1) - 1.0).max() <= round_off:
         return "a normal is not of length 1"
     if not upwards.min() >= 1.0 - round_off:
         return "a normal does not point from the first to the second body"
-    # 0.05 m: bodies sink by centimetres at most, and every other place of a body is farther from the floor.
+    # 0.05 m: bodies sink by centimetres at most, and every other point of a body is farther from the floor.
     if not np.abs(rows.point[:, up]).max() <= 0.05 or (np.abs(rows.gap) > 0.05).any():
-        return "a contact point or a gap is not where bodies touch"
+        return "a contact point or a gap does not fit the surfaces"
     pushes = (rows.impulse * rows.normal).sum(axis=1)
     if (pushes < -round_off).any():
         return "an impulse pulls: it must act on the second body, along the normal"
@@ -186,7 +186,7 @@ def _wrong_contact(scene: Scene, rows: Contacts, round_off: float) -> str:
 
 
 def impulse(engine: Engine) -> str:
-    """Impulses account for the momentum of the body they name: sum J = m dv on b, and -J on a."""
+    """Impulses equal the momentum change of their body: sum J = m dv on b, and -J on a."""
     silent = ""
     for profile, order in product(engine.profiles, (1, -1)):
         for scene in in_all_dimensions(engine, accepted(engine, profile, striking(order), striking(order, 0.0))):
@@ -196,19 +196,19 @@ def impulse(engine: Engine) -> str:
                 continue
             if np.abs(gained[1][-1]).max() < 0.1:
                 return f"{profile}: the balls passed through each other"
-            # Drag of a profile acts on the momentum too, and not through contacts: 0.2 s at 2 m/s and 8 %/s is 0.03.
+            # Drag changes the momentum without contact: 0.2 s at 2 m/s and 8 %/s is 0.03.
             slack = BOOKKEEPING + 0.05 * float("linear_damping" in engine.declares(profile, needs(scene), DT))
             told = np.nansum(total, axis=0)
             for name, gain, sign in (("b", gained[1][-1], 1.0), ("a", gained[0][-1], -1.0)):
                 if np.abs(gain - sign * told).max() > slack:
-                    return f"{profile}: body {name} gained {gain} N s, its contacts tell of {sign * told} N s"
+                    return f"{profile}: body {name} gained {gain} N s, its contacts report {sign * told} N s"
     if silent:
         raise NotAsked(silent)
     return ""
 
 
 def sampling(engine: Engine) -> str:
-    """State and contacts of a sample are of the same instant: what a step reports is what it changed."""
+    """State and contacts of a sample belong to the same step."""
     silent = ""
     for profile in engine.profiles:
         for scene in in_all_dimensions(engine, accepted(engine, profile, striking(), striking(restitution=0.0))):
@@ -227,10 +227,9 @@ def sampling(engine: Engine) -> str:
 
 
 def _exchanged(engine: Engine, scene: Scene, profile: str) -> tuple[Array | None, list[Array]]:
-    """Reported impulse on the second body of each step, and the momentum that each body has gained at each sample.
+    """Reported impulse on the second body in each step, and the momentum gained by each body at each sample.
 
-    The impulses are None where contacts are reported, and of none of them an impulse; no contact at all is an impulse
-    of nothing.
+    The impulses are None where contacts are reported without impulses; no contact is an impulse of 0.
     """
     found = driven(engine, scene, profile, contacts=True)
     assert found.contacts is not None
@@ -245,7 +244,7 @@ def _exchanged(engine: Engine, scene: Scene, profile: str) -> tuple[Array | None
 
 
 def order(engine: Engine) -> str:
-    """Bodies that stand in another order in the scene move the same way."""
+    """The order of the bodies in the scene does not change the motion."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, rolling())
         one, other = driven(engine, scene, profile), driven(engine, _swapped(scene), profile)
@@ -256,7 +255,7 @@ def order(engine: Engine) -> str:
 
 
 def mirror(engine: Engine) -> str:
-    """A mirrored scene gives the mirrored motion."""
+    """A mirrored scene has the mirrored motion."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, rolling())
         one = driven(engine, scene, profile)
@@ -269,14 +268,14 @@ def mirror(engine: Engine) -> str:
 
 
 def quarter_turn(engine: Engine) -> str:
-    """A scene that is turned by 90 degrees, with its gravity, gives the turned motion."""
+    """A scene rotated by 90 degrees, with its gravity, has the rotated motion."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, rolling())
         one = driven(engine, scene, profile)
         other = driven(engine, accepted(engine, profile, quarter_turned(scene)), profile)
         back = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         pose = other.pose @ back.T
-        pose[:, 1:, 2] -= 0.5 * math.pi  # the floor, the first body, is not turned but given another normal
+        pose[:, 1:, 2] -= 0.5 * math.pi  # the floor, the first body, is not rotated but gets another normal
         wrong = _differing(one.pose, pose, one.twist, other.twist @ back.T)
         if wrong:
             return f"{profile}: {wrong} when the scene is turned by 90 degrees"
@@ -284,11 +283,11 @@ def quarter_turn(engine: Engine) -> str:
 
 
 def _differing(pose: Array, other_pose: Array, twist: Array, other_twist: Array) -> str:
-    """Where two motions differ by more than `SYMMETRY`, or nothing; angles are compared as turns."""
+    """A difference of two motions above `SYMMETRY`, or nothing; angles are compared as rotations."""
     off = pose - other_pose
     off[..., 2] = np.arctan2(np.sin(off[..., 2]), np.cos(off[..., 2]))
     for what, difference in (("poses", off), ("twists", twist - other_twist)):
-        # The largest numbers of the scene are of order 10: turns a second, and metres.
+        # The largest numbers of the scene are of order 10: radians a second, and metres.
         if not np.abs(difference).max() <= 10.0 * SYMMETRY:
             return f"{what} differ by {np.abs(difference).max():.2g}"
     return ""

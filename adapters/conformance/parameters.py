@@ -1,4 +1,4 @@
-"""Parameter receipts of every profile as findings: one for each quantity."""
+"""Property checks of every profile as findings, one for each quantity."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from adapters.engine import Engine
 from adapters.plain import one_line
 from adapters.receipts import QUANTITIES, receipts
 
-#: Steps of what receipts are measured at [s]: slowest and fastest of the usual range.
+#: Steps of property checks [s]: slowest and fastest of the usual range.
 STEPS = (1.0 / 60.0, 1.0 / 240.0)
 PROBES = "receipt probes"
 
 
 def receipt_findings(engine: Engine) -> list[Finding]:
-    """One finding per quantity: the first receipt of any profile that does not hold, or that all do.
+    """One finding per quantity: the first property check of any profile that fails, or that all hold.
 
-    A quantity that no profile could be asked for in any case is refused; one that some could not be asked for holds,
-    and says where it was not measured.
+    A quantity that was measured in no case is refused; one that some profiles refuse holds, with the cases without a
+    measurement.
     """
     broken: dict[str, str] = {}
     silent: dict[str, str] = {}

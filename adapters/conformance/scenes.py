@@ -1,7 +1,7 @@
-"""Small scenes of the checks, in the plane; engines that live in space get them lifted.
+"""Small planar scenes of the checks; 3-D engines get them embedded.
 
-Bodies touch one point each unless a box stands on a floor, so that the order in which a solver visits its contacts
-changes nothing. An engine that refuses boxes, or a rebound, is shown the same scene without.
+Bodies touch in one point each unless a box stands on a floor, so that the order of contacts in a solver does not
+matter. An engine that refuses boxes, or rebounds, gets the same scene without.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Sampling, Trajectory
 
-#: Step of the checks [s]: the bench's own.
+#: Step of the checks [s]: the usual one.
 DT = 1.0 / 240.0
 GRAVITY = 9.81
 
@@ -37,7 +37,7 @@ def resting(order: int = 1, gravity: float = GRAVITY, box: bool = True) -> Scene
 
 
 def striking(order: int = 1, restitution: float = 0.5) -> Scene:
-    """A ball strikes another one of three times its mass in free space; ``order`` -1 swaps them in the scene."""
+    """A ball hits another one of three times its mass in free space; ``order`` -1 swaps them in the scene."""
     bodies = (
         Body("light", Disc(0.5), 1.0, 0.125, (-0.52, 0.0, 0.0), (2.0, 0.0, 0.0)),
         Body("heavy", Disc(0.5), 3.0, 0.375, (0.52, 0.0, 0.0)),
@@ -46,13 +46,13 @@ def striking(order: int = 1, restitution: float = 0.5) -> Scene:
 
 
 def flying() -> Scene:
-    """A ball is thrown and spun under an oblique gravity, and meets nothing."""
+    """A thrown and spinning ball under an oblique gravity, without contact."""
     ball = Body("ball", Disc(0.5), 2.0, 0.25, (1.0, -2.0, 0.3), (3.0, 2.0, 1.5))
     return Scene("check_flying", 1, 2, (ball,), (), (0.6 * GRAVITY, -0.8 * GRAVITY), 48 * DT)
 
 
 def glancing(restitution: float = 0.5) -> Scene:
-    """Two spinning balls meet off-centre and slowly in free space, with friction."""
+    """Two spinning balls collide off-centre and slowly in free space, with friction."""
     bodies = (
         Body("light", Disc(0.5), 1.0, 0.125, (-0.45, 0.3, 0.0), (0.25, 0.0, 0.8)),
         Body("heavy", Disc(0.5), 3.0, 0.375, (0.361, -0.3, 0.0), (0.0, 0.0, -0.3)),
@@ -61,7 +61,7 @@ def glancing(restitution: float = 0.5) -> Scene:
 
 
 def rolling() -> Scene:
-    """A spinning ball lands on a floor that it slips on, another one meets a third in flight."""
+    """A spinning ball lands on a floor and slips, another one hits a third in flight."""
     bodies = (
         Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"),
         Body("ball", Disc(0.5), 2.0, 0.25, (0.0, 0.51, 0.2), (1.0, -1.0, 5.0)),
@@ -80,14 +80,14 @@ def sliding() -> Scene:
 
 
 def odd_pairs() -> Scene:
-    """Pairs whose coefficients are no product of two numbers."""
+    """Pairs with coefficients that are not products of two values."""
     bodies = tuple(Body(name, Disc(0.5), pose=(2.0 * k, 0.0, 0.0)) for k, name in enumerate("abc"))
     pairs = (Pair("a", "b", 0.9), Pair("b", "c", 0.5), Pair("a", "c", 0.0))
     return Scene("check_pairs", 1, 2, bodies, pairs, (0.0, 0.0), 12 * DT)
 
 
 def carried() -> Scene:
-    """A ball hits one that is moved as prescribed."""
+    """A ball hits a prescribed one."""
     bodies = (
         Body("piston", Disc(0.5), pose=(0.0, 0.0, 0.0), twist=(0.0, 0.5, 0.0), motion="prescribed"),
         Body("ball", Disc(0.5), 2.0, 0.25, (0.0, 1.01, 0.0), (0.0, -1.0, 0.0)),
@@ -109,12 +109,12 @@ def leaning() -> Scene:
 
 
 def mirrored(scene: Scene) -> Scene:
-    """Planar scene with x and all turns reversed."""
+    """Planar scene with x and all rotations reversed."""
     return _mapped(scene, lambda v: (-v[0], v[1]), -1.0, 0.0)
 
 
 def quarter_turned(scene: Scene) -> Scene:
-    """Planar scene turned by +90 degrees about the origin."""
+    """Planar scene rotated by +90 degrees about the origin."""
     return _mapped(scene, lambda v: (-v[1], v[0]), 1.0, 0.5 * math.pi)
 
 
@@ -141,7 +141,7 @@ def _mapped(scene: Scene, vector: Any, sign: float, turn: float) -> Scene:
 
 
 def in_all_dimensions(engine: Engine, scene: Scene) -> Iterator[Scene]:
-    """The scene in every dimension that the engine can be asked for."""
+    """The scene in every dimension of the engine."""
     yield scene
     if 3 in engine.facts.dimensions:
         yield lift(scene)
@@ -170,7 +170,7 @@ def values(engine: Engine, profile: str, scene: Scene) -> dict[str, Any]:
 
 
 def built(engine: Engine, scene: Scene, profile: str) -> Simulation:
-    """World of the scene, lifted where it must be."""
+    """World of the scene, embedded in 3-D where necessary."""
     return engine.build(posed_for(engine, scene), DT, values(engine, profile, scene))
 
 

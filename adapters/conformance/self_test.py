@@ -1,4 +1,4 @@
-"""Do the checks catch what they are there for? Every fault, at every size, by the check that names it."""
+"""Tests the checks: every fault, at every size, must be noticed by its check."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from adapters.engine import Engine
 from adapters.needs import Needs
 from adapters.receipts import receipts
 
-#: A spatial impact with friction: the one kind of scene whose receipts measure every quantity.
+#: A spatial impact with friction: the kind of scene whose property checks measure every quantity.
 EVERYTHING = Needs(3, True, 0.5, 0.5, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)
 RECEIPT = "receipt "
 
 
 @dataclass(frozen=True)
 class Caught:
-    """One fault of one size, NaN where it has none: what must catch it, whether that did, and what it said."""
+    """One fault of one size, NaN where it has none: its check, whether that noticed it, and its message."""
 
     fault: str
     check: str
@@ -34,7 +34,7 @@ class Caught:
 
 
 def self_test() -> Iterator[Caught]:
-    """First the healthy toy, which every check must hold for; then every fault."""
+    """First the correct toy, for which every check must hold; then every fault."""
     wrong = [str(finding) for finding in check_adapter(ToyEngine()) if finding.status != "ok"]
     yield Caught("none: the healthy toy", "all", math.nan, "", not wrong, wrong[0] if wrong else "every check holds")
     for name, fault in FAULTS.items():
@@ -44,9 +44,9 @@ def self_test() -> Iterator[Caught]:
 
 
 def broken(engine: Engine, check: str) -> str:
-    """What the check of that name finds wrong with an engine that has one profile; nothing if it holds.
+    """Error found by the check of that name in an engine with one profile; nothing if it holds.
 
-    Receipts are those of one kind of scene, of all that `check_adapter` asks for: what is caught here is caught there.
+    Property checks are those of one kind of scene of `check_adapter`, which therefore notices the same faults.
     """
     if not check.startswith(RECEIPT):
         finding = found(check, CHECKS[check], engine)

@@ -1,4 +1,4 @@
-"""The toy engine with one fault: what it is told, what it does, or what is read of it, is spoilt by a given amount."""
+"""The toy engine with one fault of a given size in its input, motion or output."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from adapters.scene import Scene
 
 @dataclass(frozen=True)
 class Fault:
-    """One way in which an adapter is wrong.
+    """One fault of an adapter.
 
     Parameters
     ----------
     check
-        What must catch it: the name of a check, or ``receipt <quantity>``.
+        The check that must notice it: its name, or ``receipt <quantity>``.
     sizes
-        Three sizes in ``unit``, the largest first; empty where a thing is wrong or right.
+        Three sizes in ``unit``, the largest first; empty for a fault without size.
     told, stepped
-        What the engine is told instead of the scene and the step.
+        Changes of the scene and the step.
     pose, twist, contacts, readback, record
-        What is read instead, made of the world, what is true, and the size; a record is kept only where it is spoilt.
+        Wrong readings, as functions of the world, the true value and the size; a record exists only with this fault.
     settings, refuses, facts, build
-        What the engine itself says or does instead.
+        Wrong statements or actions of the engine itself.
     """
 
     check: str
@@ -48,7 +48,7 @@ class Fault:
 
 @dataclass
 class Past:
-    """What an engine with a fault keeps between its worlds; a healthy one keeps nothing."""
+    """State that an engine with a fault shares between its worlds; a correct one shares none."""
 
     steps: int = 0
     last: str = ""
@@ -68,7 +68,7 @@ class Spoilt(Engine):
         self.profiles = {profile: self._rule(profile) for profile in self.inner.profiles}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Another process makes the same fault anew."""
+        """Another process makes the same fault again."""
         return Spoilt, self._told
 
     def _rule(self, profile: str) -> Callable[[Needs, float], list[Setting]]:
@@ -83,16 +83,16 @@ class Spoilt(Engine):
         return self.inner.version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """What the toy refuses, or what the fault makes of it."""
+        """The toy's refusals, or those changed by the fault."""
         said = self.inner.refuses(scene, profile)
         return self.fault.refuses(scene, said) if self.fault.refuses else said
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing: no fault is declared."""
+        """No deviations: faults are not declared."""
         return {}
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
-        """A world that is told, stepped or read wrongly."""
+        """A world with a wrong scene, step or reading."""
         given = dict(settings)
         if self.fault.build:
             dt, given = self.fault.build(self, scene, dt, given)
@@ -104,20 +104,20 @@ class Spoilt(Engine):
 
 
 class World(Simulation):
-    """One world of a spoilt engine."""
+    """One world of an engine with a fault."""
 
     def __init__(self, engine: Spoilt, scene: Scene, inner: Simulation, dt: float) -> None:
         self.engine, self.scene, self.inner, self.dt = engine, scene, inner, dt
         self.steps, self.at_once, self.interrupted = 0, 1, 0
-        # Interrupted: steps of its own that came right after one of another world.
-        #: Steps that other worlds of this engine had made when this one was built, and the scene before it.
+        # Interrupted: own steps directly after one of another world.
+        #: Steps of other worlds of this engine before this one was built, and the scene before it.
         self.born, self.after = engine.past.steps, engine.past.last
         engine.past.last = scene.name
         self.before = inner.pose(), inner.twist(), inner.contacts()
 
     @property
     def others(self) -> int:
-        """Steps that other worlds have made since this one was built."""
+        """Steps of other worlds since this one was built."""
         return self.engine.past.steps - self.born - self.steps
 
     def advance(self, steps: int) -> None:

@@ -1,4 +1,4 @@
-"""What an adapter says about itself: facts, profiles, what it refuses, and that it means it."""
+"""Statements of an adapter about itself: facts, profiles, refusals, and their agreement with its behaviour."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from adapters.stepping import posed_for
 
 
 def packages(engine: Engine) -> str:
-    """The package `adapters` on this path is the one that these checks belong to."""
+    """The package `adapters` on this path is the one of these checks."""
     spec = importlib.util.find_spec("adapters")
     found = Path(spec.origin).resolve().parent if spec and spec.origin else None
     ours = Path(str(adapters.__file__)).resolve().parent
@@ -45,7 +45,7 @@ def packages(engine: Engine) -> str:
 
 
 def facts(engine: Engine) -> str:
-    """Facts name the engine, its dimensions, its step order and a customary step."""
+    """Facts contain the engine's name, its dimensions, its step order and a usual step."""
     stated = engine.facts
     if not isinstance(stated, EngineFacts) or not stated.name or not stated.package:
         return "facts need a name and the package to install"
@@ -57,11 +57,12 @@ def facts(engine: Engine) -> str:
     for profile, role in stated.roles.items():
         if profile not in engine.profiles or role not in ROLES:
             return (
-                f"facts.roles: {profile!r} cannot be {role!r}: no such profile, or none of the roles {', '.join(ROLES)}"
+                f"facts.roles: {profile!r} cannot be {role!r}: no such profile, or no such role; roles are "
+                f"{', '.join(ROLES)}"
             )
     if not (math.isfinite(stated.customary_dt) and stated.customary_dt > 0.0):
         return f"facts.customary_dt: {stated.customary_dt!r} must be a positive number of seconds"
-    return "" if isinstance(engine.version(), str) and engine.version() else "version() must say which"
+    return "" if isinstance(engine.version(), str) and engine.version() else "version() must return the version"
 
 
 def profiles(engine: Engine) -> str:
@@ -97,7 +98,7 @@ def all_needs(engine: Engine) -> Iterator[Needs]:
 
 
 def refusals(engine: Engine) -> str:
-    """Unknown profiles and settings raise EngineError, and so does what `refuses` names; a refusal is one line."""
+    """Unknown profiles and settings raise EngineError, and so do scenes of `refuses`; a refusal is one line."""
     first = next(iter(engine.profiles))
     scene = accepted(engine, first, resting(), resting(box=False))
     given = values(engine, first, scene)
@@ -119,7 +120,7 @@ def refusals(engine: Engine) -> str:
 
 
 def _accepted_one(attempts: dict[str, Callable[[], Any]]) -> str:
-    """The first attempt that is not refused in one line, or nothing."""
+    """The first attempt without a refusal in one line, or nothing."""
     for what, attempt in attempts.items():
         try:
             made = attempt()
@@ -133,7 +134,7 @@ def _accepted_one(attempts: dict[str, Callable[[], Any]]) -> str:
 
 
 def bad_numbers(engine: Engine) -> str:
-    """Steps and settings that are no numbers raise EngineError, and so do counts below 1."""
+    """Steps and settings that are not numbers raise EngineError, and so do counts below 1."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, resting(), resting(box=False))
         posed, given = posed_for(engine, scene), values(engine, profile, scene)
@@ -152,7 +153,7 @@ def bad_numbers(engine: Engine) -> str:
 
 
 def capabilities(engine: Engine) -> str:
-    """What `refuses` lets pass is built and honoured, what it names is not; so are the dimensions of the facts."""
+    """Scenes accepted by `refuses` are built and run correctly, refused ones are not; so for stated dimensions."""
     able = False
     for profile in engine.profiles:
         if 3 not in engine.facts.dimensions and not _refused(engine, lift(striking()), profile):
@@ -164,7 +165,7 @@ def capabilities(engine: Engine) -> str:
                 if wrong:
                     return f"{profile}: {asked.name}, {asked.dimension}-D: {wrong}"
     if not able:
-        raise NotAsked(f"every scene is refused, {striking().name} as well")
+        raise NotAsked(f"every scene is refused, even {striking().name}")
     return ""
 
 
@@ -178,18 +179,18 @@ def _refused(engine: Engine, scene: Scene, profile: str) -> bool:
 
 
 def _as_said(engine: Engine, scene: Scene, profile: str) -> str:
-    """What is wrong between what the engine says of a scene and what it does with it, or nothing."""
+    """The contradiction between the engine's statement about a scene and its behaviour, or nothing."""
     reason = engine.refuses(posed_for(engine, scene), profile)
     try:
         simulation = built(engine, scene, profile)
     except EngineError as error:
-        return "" if reason else f"not refused, but {error}"
+        return "" if reason else f"not refused, but stopped by {error}"
     simulation.close()
     if reason:
-        return f"refused ({reason}), and yet built"
+        return f"refused ({reason}), but built"
     trajectory = driven(engine, scene, profile)
     for i, body in enumerate(scene.bodies):
-        # A body that is moved as prescribed keeps its twist whatever hits it; so does a fixed one.
+        # A body with prescribed motion keeps its twist in every impact; so does a fixed one.
         if body.motion != "free" and abs(trajectory.twist[-1, i] - body.twist).max() > engine.facts.round_off:
-            return f"{body.name} is {body.motion} and does not move so"
+            return f"{body.name} is {body.motion} but does not move like that"
     return trajectory.reason

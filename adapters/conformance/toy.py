@@ -1,7 +1,7 @@
-"""A toy engine in plain numpy that keeps every promise: the checks must hold for it, and catch it once it is spoilt.
+"""A correct toy engine in plain numpy: the checks must hold for it, and notice faults in it.
 
 Spatial sequential impulses for balls, boxes and half-spaces: contacts at the old pose, velocity (forces, then
-impulses), then position. It knows balls against balls and anything against a half-space.
+impulses), then position. It has contacts of two balls, and of any shape with a half-space.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ToyEngine(Engine):
         return "1.0"
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Bodies that the toy cannot tell whether they touch."""
+        """Refuse pairs of bodies without contact detection."""
         for i, j, _ in scene.contact_pairs():
             shapes = [scene.bodies[k].shape for k in (i, j)]
             faces = any(isinstance(shape, HalfSpace) for shape in shapes)
@@ -48,7 +48,7 @@ class ToyEngine(Engine):
         return None
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Nothing: all is as asked."""
+        """No deviations."""
         return {}
 
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
@@ -98,7 +98,7 @@ class ToySimulation(Simulation):
                 twist[i, 3:] += dt * self.inverse_inertia[i] @ np.array(body.torque)
         for _ in range(self.iterations):
             if max((row.solve(twist) for row in rows), default=0.0) < 1e-15:
-                break  # nothing moves any more
+                break  # converged
         self.touching = [(row.a, row.b, row.point, row.axes[0], row.impulse @ row.axes, row.gap) for row in rows]
         for i in range(len(pose)):
             pose[i, :3] += dt * twist[i, :3]
@@ -128,11 +128,11 @@ class ToySimulation(Simulation):
             if not (isinstance(a, Sphere) and isinstance(b, Sphere)):
                 raise EngineError("shape: the toy cannot tell whether a box touches another body")
             n = between / distance
-            gap = distance - a.radius - b.radius  # the point is half-way, so that no body is the first
+            gap = distance - a.radius - b.radius  # the point is half-way, symmetric in both bodies
             yield i, j, self.poses[i, :3] + (a.radius + 0.5 * gap) * n, n, gap, pair
 
     def _extremes(self, i: int, direction: Array) -> list[Array]:
-        """Points of a body that may touch a plane: the lowest of a ball, the corners of a box."""
+        """Points of a body for contacts with a plane: the lowest of a ball, the corners of a box."""
         centre, shape = self.poses[i, :3], self.scene.bodies[i].shape
         if isinstance(shape, Sphere):
             return [centre + shape.radius * direction]
@@ -155,7 +155,7 @@ class ToySimulation(Simulation):
         return Contacts.from_rows(self.touching, 3)
 
     def readback(self) -> dict[str, Any]:
-        """What the world holds."""
+        """Values of the world."""
         held = {
             body.name: {"mass": 1.0 / float(inverse), "inertia": (1.0 / moments).tolist()}
             for body, inverse, moments in zip(self.scene.bodies, self.inverse_mass, self.inverse_moments, strict=True)
@@ -214,7 +214,7 @@ def _near(scene: Scene, i: int, j: int) -> bool:
 
 
 def cross(a: Any, b: Any) -> Array:
-    """What np.cross gives, without its overhead."""
+    """As np.cross, without its overhead."""
     (ax, ay, az), (bx, by, bz) = a, b
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 

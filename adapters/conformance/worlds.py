@@ -1,4 +1,4 @@
-"""Worlds of an adapter: they start as asked, hold what was asked, share nothing, and repeat bit for bit."""
+"""Worlds of an adapter: they have the given start and values, share no state, and repeat bit for bit."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ from adapters.plain import one_line
 from adapters.scene import Scene
 from adapters.stepping import CONTACT_FIELDS, advances, posed_for
 
-#: Seconds that a process may take to import an engine and step it 48 times; kernels may be compiled meanwhile.
+#: Time limit of a process that imports an engine and steps it 48 times, with compilation of kernels [s].
 PATIENCE = 300.0
-#: Builds before memory is looked at, and builds that it must be steady over. What a first build fetches is kept.
+#: Builds before the first measurement of memory, and builds with constant memory. The first build may keep memory.
 WARM, BUILDS = 200, 1000
-#: What memory may grow by over `BUILDS` builds [bytes]: allocators keep a page here and there, a thousand worlds
-#: that are not freed take a kilobyte each at the very least.
+#: Allowed growth of memory over `BUILDS` builds [bytes]: allocators keep some pages, but a thousand leaked worlds take
+#: at least a kilobyte each.
 STEADY = 2**20
 
 
 def states(engine: Engine) -> str:
-    """Poses and twists are those of all bodies in the scene's order, and start as the scene says."""
+    """Poses and twists are those of all bodies in the scene's order, and start with the scene's values."""
     for profile, order in product(engine.profiles, (1, -1)):
         planar = accepted(engine, profile, resting(order), resting(order, box=False))
         scene = posed_for(engine, planar)
@@ -59,14 +59,14 @@ def states(engine: Engine) -> str:
         slack = engine.facts.round_off
         if not np.allclose(twist, [body.twist for body in scene.bodies], rtol=0.0, atol=slack):
             return f"{profile}: bodies start with other velocities than the scene's"
-        # A start that was changed on purpose is shown beside the result; it must be said.
+        # A start changed on purpose is shown beside the result; it must be declared.
         if not changed and not np.allclose(pose, asked, rtol=0.0, atol=slack):
-            return f"{profile}: bodies start in another pose than the scene's, and initial_change does not say so"
+            return f"{profile}: bodies start in another pose than the scene's, and initial_change does not report it"
     return ""
 
 
 def readback(engine: Engine) -> str:
-    """What the engine holds is told as data, and is what was declared: step, gravity, masses, moments, materials."""
+    """The engine's values can be read as data, and are the declared ones: step, gravity, masses, moments, materials."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, resting(), resting(box=False))
         simulation = built(engine, scene, profile)
@@ -84,7 +84,7 @@ def readback(engine: Engine) -> str:
 
 
 def _stated(engine: Engine, profile: str, scene: Scene, held: dict[str, Any]) -> list[tuple[str, Any, Any]]:
-    """Name, declared and held value of everything that is read back under the names that the contract knows."""
+    """Name, declared and actual value of all read-back under the names of the interface."""
     pairs = [(f"settings.{k}", v, held[k]) for k, v in values(engine, profile, scene).items() if k in held]
     for name, asked in (("dt", DT), ("gravity", scene.gravity)):
         if name in held:
@@ -104,13 +104,13 @@ def _stated(engine: Engine, profile: str, scene: Scene, held: dict[str, Any]) ->
 
 def _same(asked: Any, told: Any, slack: float) -> bool:
     if isinstance(asked, str):
-        return asked.lower() in str(told).lower()  # an engine may write its own prefix to a word
+        return asked.lower() in str(told).lower()  # an engine may add a prefix to a word
     if isinstance(asked, bool) or asked is None:
         return bool(asked == told)
     try:
         a, b = np.asarray(asked, float), np.asarray(told, float)
     except (TypeError, ValueError):
-        return True  # a table or a word of the engine's own, which only its adapter can read
+        return True  # the engine's own table or word, which only its adapter can read
     return a.shape != b.shape or bool(np.allclose(a, b, rtol=slack, atol=slack * 1e-3))
 
 
@@ -118,14 +118,14 @@ def _same(asked: Any, told: Any, slack: float) -> bool:
 
 
 def fresh(engine: Engine) -> str:
-    """Two worlds stepped in turn give, bit for bit, what each gives alone."""
+    """Two worlds stepped in turn give the same bits as each one alone."""
     for profile in engine.profiles:
         scenes = [accepted(engine, profile, *variants) for variants in _three()]
         alone = [_interleaved(engine, profile, [scene])[0] for scene in scenes]
         together = _interleaved(engine, profile, scenes)
         for scene, a, b in zip(scenes, alone, together, strict=True):
             if not np.array_equal(a, b):
-                return f"{profile}: {scene.name} comes out otherwise when another world is stepped in between"
+                return f"{profile}: the result of {scene.name} changes when another world is stepped in between"
     return ""
 
 
@@ -135,7 +135,7 @@ def _three() -> tuple[tuple[Scene, ...], ...]:
 
 
 def _interleaved(engine: Engine, profile: str, scenes: list[Scene]) -> list[np.ndarray]:
-    """Final states of worlds that are all built first and then stepped in turn."""
+    """Final states of worlds that are all built first, then stepped in turn."""
     worlds: list[Simulation] = []
     try:
         for scene in scenes:
@@ -168,7 +168,7 @@ def history(engine: Engine) -> str:
         for other in (accepted(engine, profile, striking(), *lying), accepted(engine, profile, *lying)):
             driven(engine, other, profile)
             if driven(engine, scene, profile).state_hash() != before:
-                return f"{profile}: {scene.name} comes out otherwise after {other.name}"
+                return f"{profile}: the result of {scene.name} changes after {other.name}"
     return ""
 
 
@@ -178,7 +178,7 @@ def process(engine: Engine) -> str:
     try:
         asked = pickle.dumps(engine)
     except Exception as error:
-        raise NotAsked(f"the engine cannot be named to another process: {type(error).__name__}") from None
+        raise NotAsked(f"the engine cannot be sent to another process: {type(error).__name__}") from None
     try:
         child = Child(serve_hashes)
     except IsolationError as error:
@@ -191,13 +191,13 @@ def process(engine: Engine) -> str:
     finally:
         child.stop()
     if "not there" in there:
-        raise NotAsked(f"the engine cannot be had in another process: {there['not there']}")
+        raise NotAsked(f"the engine cannot be loaded in another process: {there['not there']}")
     differing = [profile for profile in here if there.get(profile) != here[profile]]
-    return f"{', '.join(differing)}: comes out otherwise in a fresh process" if differing else ""
+    return f"{', '.join(differing)}: the result differs in a new process" if differing else ""
 
 
 def serve_hashes(connection: Connection) -> None:
-    """Run the scene of `process` on one engine; runs in the child, which gets the engine from its parent alone."""
+    """Run the scene of `process` on one engine; runs in the child, which gets the engine from its parent only."""
     try:
         engine = pickle.loads(connection.recv_bytes())
     except Exception as error:
@@ -212,21 +212,24 @@ def _hashes(engine: Engine) -> dict[str, str]:
 
 
 def stride(engine: Engine) -> str:
-    """The loop that is timed, many steps at once and nothing read, ends in the bits of the loop that is judged."""
+    """The timed loop, many steps at once without readings, ends with the same bits as the judged loop."""
     for profile in engine.profiles:
         scene = accepted(engine, profile, sliding(), rolling())
         ends = [_stepped(engine, scene, profile, strides) for strides in ((24,), (1,) * 24, (1, 7, 16))]
         if not all(np.array_equal(ends[0], end) for end in ends):
-            return f"{profile}: 24 steps at once end elsewhere than 24 single ones that are read in between"
+            return f"{profile}: 24 steps at once and 24 single steps with readings in between have different results"
         for samples, stride in ((24, 1), (8, 3)):
             wrong = _recorded_otherwise(engine, scene, profile, samples, stride)
             if wrong:
-                return f"{profile}: {wrong} recorded at once ({samples} of {stride} steps) are others than one by one"
+                return (
+                    f"{profile}: {wrong} recorded at once ({samples} of {stride} steps) differ from those of "
+                    "single steps"
+                )
     return ""
 
 
 def one_by_one(simulation: Simulation, samples: int, stride: int) -> Recorded:
-    """What `Simulation.record` has to be, contacts and all."""
+    """The expected result of `Simulation.record`, with contacts."""
     states, told = [], []
     for _ in advances(simulation, samples * stride, stride):
         states.append((np.array(simulation.pose()), np.array(simulation.twist())))
@@ -237,9 +240,9 @@ def one_by_one(simulation: Simulation, samples: int, stride: int) -> Recorded:
 
 
 def _recorded_otherwise(engine: Engine, scene: Scene, profile: str, samples: int, stride: int) -> str:
-    """Which of an engine's records differ from what its readers tell; nothing if none does or it keeps none.
+    """Records of an engine that differ from its readings; nothing if none differs or there are none.
 
-    It goes on from where advance left it, and ends there.
+    The record starts at the state after `advance`, and ends there.
     """
     recorder, reader = built(engine, scene, profile), built(engine, scene, profile)
     try:
@@ -279,9 +282,9 @@ def _stepped(engine: Engine, scene: Scene, profile: str, strides: tuple[int, ...
 
 
 def memory(engine: Engine) -> str:
-    """A thousand worlds that are built, stepped and closed leave no memory behind."""
+    """A thousand worlds that are built, stepped and closed leak no memory."""
     if resident() is None:
-        raise NotAsked("this system does not tell how much memory a process holds")
+        raise NotAsked("this system does not report the memory of a process")
     profile = next(iter(engine.profiles))
     scene = accepted(engine, profile, resting(), resting(box=False))
     posed, given = posed_for(engine, scene), values(engine, profile, scene)
@@ -293,7 +296,7 @@ def memory(engine: Engine) -> str:
             simulation.close()
 
     build(WARM)
-    # An allocator may take a pool more once; what leaks does so again.
+    # An allocator may add a pool once; a leak grows again.
     grown = _growth(build)
     if grown > STEADY:
         grown = min(grown, _growth(build))
@@ -307,20 +310,20 @@ def _growth(build: Callable[[int], None]) -> float:
 
 
 def _settled() -> tuple[float, float]:
-    """Resident memory once all that is free is given back, and what is taken from the heap [bytes].
+    """Resident memory after all free pages are returned, and used bytes of the heap [bytes].
 
-    What an earlier check left free would hide a leak: whole pages are given back, and blocks smaller than a page fill
-    what is free between others without a page more. The heap's own count sees those; memory that an engine maps for
-    itself shows in the pages alone.
+    Memory freed by an earlier check would hide a leak: whole pages are returned, but blocks smaller than a page fill
+    gaps without a new page. The heap's own count contains those; memory mapped by an engine itself is visible in the
+    pages only.
     """
     gc.collect()
-    with contextlib.suppress(AttributeError, OSError, TypeError):  # GNU's allocator alone has it
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # only GNU's allocator has it
         ctypes.CDLL(None).malloc_trim(0)
     return resident() or 0.0, taken() or 0.0
 
 
 class _Heap(ctypes.Structure):
-    """What GNU's allocator tells of itself: ten counts, in this order (mallinfo2, glibc 2.33 and later)."""
+    """Statistics of GNU's allocator: ten counts, in this order (mallinfo2, glibc 2.33 and later)."""
 
     _fields_: ClassVar = [
         (name, ctypes.c_size_t)
@@ -340,7 +343,7 @@ class _Heap(ctypes.Structure):
 
 
 def taken() -> float | None:
-    """Bytes of the heap that are in use, in arenas and in blocks mapped alone; None where the system does not tell."""
+    """Used bytes of the heap, in arenas and in separately mapped blocks; None if the system has no count."""
     try:
         mallinfo = ctypes.CDLL(None).mallinfo2
     except (AttributeError, OSError, TypeError):
@@ -351,7 +354,7 @@ def taken() -> float | None:
 
 
 def resident() -> float | None:
-    """Resident memory of this process [bytes]; None where the system does not tell."""
+    """Resident memory of this process [bytes]; None if the system has no count."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except (OSError, ValueError, IndexError):

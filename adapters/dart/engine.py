@@ -1,9 +1,9 @@
-"""DART behind the plugin line: spatial, velocity-level contact, one engine with pyramids and exact cones of friction.
+"""The adapter of DART: spatial, velocity-level contact, with friction pyramids and exact cones in one engine.
 
     step:  v += (g + f/m) dt  ->  detect  ->  restitution from v  ->  solve the contact problem of all islands
            ->  v += M^-1 J  ->  x += v dt
 
-Profiles differ in what solves the contact problem, and in nothing else.
+Profiles differ in the solver of the contact problem only.
 """
 
 from __future__ import annotations
@@ -40,47 +40,50 @@ class DartEngine(CheckedEngine):
         apart=True,
         quirks=(
             Quirk(
-                "bodies come to rest by themselves: deactivation is on as shipped",
+                "bodies fall asleep: deactivation is on as shipped",
                 "it is off in every profile",
                 "World.getDeactivationOptions; measured with 6.20.0",
             ),
             Quirk(
-                "a plane meets a box at one point: it tips over its corners",
-                "half-spaces are slabs, which meet a box at four",
+                "a plane has one contact point with a box, which tips over its corners",
+                "half-spaces are slabs, which have four",
                 "measured with 6.20.0, all detectors",
             ),
             Quirk(
-                "friction of a pair is the smaller number of two, restitution their product",
-                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "friction of a pair is the smaller of two values, restitution their product",
+                "values per body are chosen that give the values of the pairs; a table without such values is refused",
                 "measured with 6.20.0",
             ),
             Quirk(
-                "solvers of pyramids have no constructor in Python",
-                "PGS is taken from another world, whose second choice it is",
+                "solvers with a friction pyramid have no constructor in Python",
+                "PGS is taken from another world, where it is the fallback solver",
                 "dartpy 6.20.0, PgsBoxedLcpSolver",
             ),
             Quirk(
-                "sweeps of PGS that end above their tolerance are thrown away: a second solver of 30 sweeps answers",
-                "profile pgs gives the second one the same sweeps, whose answer is taken as it is",
+                "a PGS result above its tolerance is discarded, and a fallback solver of 30 iterations is used",
+                "profile pgs gives the fallback solver the same iterations, whose result is used in any case",
                 "BoxedLcpConstraintSolver, secondary solver; measured: 200 and 20 000 sweeps gave the same bits",
             ),
             Quirk(
-                "Dantzig's solver limits friction by the loads that contacts would carry without any",
-                "declared; findings say where it decides",
+                "Dantzig's solver limits friction by the loads that contacts would have without friction",
+                "declared; the findings say where it matters",
                 "DantzigBoxedLcpSolver, findex; measured: a ladder that friction holds with the other solvers slides",
             ),
             Quirk(
-                "contacts give way by 1e-5 of the speed that they are to change; no rebound is slower than 0.1 m/s or "
-                "faster than 100 m/s",
-                "declared; laws predict what blows make of it",
+                "contacts yield by 1e-5 of the speed that they change; a rebound has 0.1 m/s to 100 m/s",
+                "declared; the contact laws predict its effect on blows",
                 "ContactConstraint: constraint force mixing, bouncing velocities; measured: 0.8 comes out as 0.799982",
             ),
             Quirk(
-                f"friction of {SMOOTH:g} and less is taken as none",
-                "declared: what slides that should not reads FAIL",
+                f"friction of {SMOOTH:g} and less counts as none",
+                "declared: a body that slides where it should not gives a FAIL",
                 "ContactConstraint, friction coefficient threshold; measured with 6.20.0",
             ),
-            Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 6.20.0"),
+            Quirk(
+                "there is no swept collision detection: a fast body passes through a thin one",
+                "left alone",
+                "measured with 6.20.0",
+            ),
         ),
     )
     module = "dartpy"
@@ -91,17 +94,17 @@ class DartEngine(CheckedEngine):
     exports = MappingProxyType({"python": python})
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse bodies that are moved as prescribed, tables that no bodies' own numbers give, and piles of cones."""
+        """Refuse bodies with prescribed motion, pairs that no body values give, and piles with exact cones."""
         for body in scene.bodies:
             if body.motion == "prescribed":
-                return f"{body.name}.motion: the adapter moves no body as prescribed"
+                return f"{body.name}.motion: the adapter does not support prescribed motion"
         boxes = sum(isinstance(body.shape, Box) and body.motion == "free" for body in scene.bodies)
         if profile in CONES and boxes > MOST_BOXES:
-            return f"bodies: {boxes} free boxes; of more than {MOST_BOXES} {profile} takes minutes"
+            return f"bodies: {boxes} free boxes; with more than {MOST_BOXES} {profile} takes minutes"
         if restitutions(scene) is None:
-            return "pairs: restitution of a pair is a product of two factors here, this table has none"
+            return "pairs: restitution of a pair is a product of two factors here; no factors give this table"
         if frictions(scene) is None:
-            return "pairs: friction of a pair is the smaller of two numbers here, this table has none"
+            return "pairs: friction of a pair is the smaller of two values here; no values per body give this table"
         return refusal(profile)
 
     def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,12 +112,12 @@ class DartEngine(CheckedEngine):
         return checked(settings)
 
     def profile_of(self, settings: Mapping[str, Any]) -> str:
-        """Name of the solver, after which the profiles of cones are named."""
+        """Name of the solver, which is also the name of the profiles with cones."""
         return str(settings["solver"])
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Restitution under the compliance of contacts, and no friction where it is too small for the engine."""
-        smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} is taken as none")
+        """Restitution with the compliance of contacts, and no friction below the engine's threshold."""
+        smooth = Declared(0.0, self.facts.round_off, f"friction up to {SMOOTH:g} counts as none")
         told = dict.fromkeys(("friction", "friction_impulse"), smooth) if needs.friction <= SMOOTH else {}
         if needs.regime != "impact" or (profile in CONES and needs.friction > MOST_FRICTION):
             return told
@@ -122,10 +125,10 @@ class DartEngine(CheckedEngine):
             half = 0.5 * PUSH_OUT / REBOUND_SPEED
             return {
                 **told,
-                "restitution": Declared(half, half + MIXING, "what overlaps is pushed out, at up to 1 mm/s"),
+                "restitution": Declared(half, half + MIXING, "overlaps are corrected, at up to 1 mm/s"),
             }
         value, left = restitution(needs.restitution, REBOUND_SPEED), solved(profile, needs.friction > 0.0)
         return {
             **told,
-            "restitution": Declared(value, left, "a contact gives way by 1e-5 of the speed it is to change"),
+            "restitution": Declared(value, left, "a contact yields by 1e-5 of the speed that it changes"),
         }

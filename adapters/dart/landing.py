@@ -1,9 +1,8 @@
-"""A box that lands on several of its corners at once, in free space and without friction, as DART solves it.
+"""A box that lands on several of its corners at once, in free space and without friction, as in DART.
 
-    (A + c diag A) j = (1 + e) v        A: what impulses at the corners do to their speeds, c = 1e-5
+    (A + c diag A) j = (1 + e) v        A: speeds of the corners per impulse at the corners, c = 1e-5
 
-Each corner gives way by a share of its own response: what shares a blow among corners gives way more than one that is
-struck alone.
+Each corner yields by a share of its own response, so several corners that share a blow yield more than a single one.
 """
 
 from __future__ import annotations
@@ -17,14 +16,14 @@ from adapters.law import Law, Measure, Prediction
 from adapters.lift import lift
 from adapters.scene import Body, Box, HalfSpace, Scene
 
-#: Height above the lowest corner that counts as its own [m].
+#: Height above the lowest corner within which corners count as lowest [m].
 LEVEL = 1e-9
 
 
 def landing_law(metric: str, profile: str) -> Law:
-    """What the blow makes of ``metric``: *rise* [m/s], *impulse* [N s] or *spin* [rad/s], back towards level.
+    """``metric`` after the blow: *rise* [m/s], *impulse* [N s] or *spin* [rad/s], back towards level.
 
-    Corners are several contacts, of which sweeps leave what several leave.
+    Corners are several contacts, with the residual of sweeps over several.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -36,7 +35,7 @@ def landing_law(metric: str, profile: str) -> Law:
 
 
 def _blow(scene: Scene) -> dict[str, float] | None:
-    """Speed of rise, impulse and spin after the first blow; None where the box does not come down straight."""
+    """Speed of rise, impulse and spin after the first blow; None if the box does not fall vertically."""
     if any(scene.gravity) or len(scene.bodies) != 2 or scene.bodies[0].shape != HalfSpace((0.0, 0.0, 1.0), 0.0):
         return None
     floor, box = scene.bodies

@@ -1,4 +1,4 @@
-"""What DART does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of DART from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from adapters.scene import Box, Scene
 from adapters.single_precision import ROUNDINGS, Method, rounded_law
 from adapters.unswept import passing_law
 
-#: Metrics of blows in free space, by scene, that friction does not change.
+#: Metrics of blows in free space, by scene, which friction does not change.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
@@ -31,10 +31,10 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 
 
 def _corners(scene: Scene) -> float:
-    """Response of a corner over that of four together, where a box comes down flat; 1 for balls.
+    """Response of a corner over that of four together, if a box lands flat; 1 for balls.
 
-    A corner gives way by a share of its own response ``d = 1/m + l^2/I + ...``, four share the load, and together they
-    respond as ``1/m``: ``d m / 4``.
+    A corner yields by a share of its own response ``d = 1/m + l^2/I + ...``; four share the load, and together respond
+    as ``1/m``: ``d m / 4``.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
     free = [body for body in spatial.bodies if body.motion == "free"]
@@ -46,17 +46,18 @@ def _corners(scene: Scene) -> float:
     return (1.0 + box.mass * (b * b / box.inertia[0] + a * a / box.inertia[1])) / 4.0
 
 
-_GIVES = "a contact gives way by 1e-5 of its own response to its load, and "
-_REBOUNDS = "a rebound throws back the velocity that gravity has made in its step, e g dt more than that of the impact"
-_AT_ONCE = _GIVES + "all blows of a step are one"
-_PUSHED = _GIVES + "overlaps are pushed out by 1 mm/s at most"
+_GIVES = "a contact yields by 1e-5 of its response to its load, and "
+_REBOUNDS = "restitution includes gravity of the step, so a rebound is e g dt faster than that of the impact"
+_AT_ONCE = _GIVES + "all blows of a step are solved together"
+_PUSHED = _GIVES + "overlaps are corrected at up to 1 mm/s"
 #: Bands of `meeting_law`, as a share and in the metric's unit. Of a fall: ten thousand roundings of numbers up to 10
-#: (1e-11), times what some bounces make of an error of a height, 1/e <= 2 each. Of balls that meet: roundings of some
-#: hundred steps, times what twenty blows in turn make of an error across a gap of a thousandth of a radius. In a line:
-#: corners that share a load unevenly add another compliance (measured 7e-6 at most).
+#: (1e-11), times the growth of an error of a height in some bounces, 1/e <= 2 each. Of colliding balls: round-off of
+#: some hundred steps, times the growth of an error in twenty blows across a gap of a thousandth of a radius. In a line:
+#: corners with unequal loads add another compliance (measured 7e-6 at most).
 _OF_A_FALL, _OF_BALLS, _IN_LINE = (0.0, 1e-9), (1e-8, 1e-8), (MIXING, 1e-9)
-#: Scenes of bodies that meet, fall or lie on each other: what their motion alone decides, of which profiles, why, and
-#: to which band. Where Dantzig's pivoting finds no solution a second solver of few sweeps answers, which none follows.
+#: Scenes of bodies that collide, fall or lie on each other: the metrics determined by their motion, profiles, reason
+#: and band. If Dantzig's pivoting finds no solution, a second solver with few sweeps replaces it, which no law here
+#: predicts.
 MEETING: tuple[tuple[str, tuple[str, ...], tuple[str, ...], str, tuple[float, float]], ...] = (
     ("cradle", ("energy_defect",), ("fbf",), _AT_ONCE, _OF_BALLS),
     ("rod_gas", ("energy_defect", "misplaced", "wrong_speed"), tuple(PROFILES), _AT_ONCE, _OF_BALLS),
@@ -75,12 +76,12 @@ MEETING: tuple[tuple[str, tuple[str, ...], tuple[str, ...], str, tuple[float, fl
 )
 
 
-#: Speeds at which an overlap may be pushed out [m/s].
+#: Possible correction speeds of an overlap [m/s].
 _PUSHES = (0.0, PUSH_OUT)
 
 
 def blow_law(metric: str, profile: str) -> Law:
-    """Blows in free space; what does not rebound is pushed out as far as it overlaps, at a speed of up to 1 mm/s."""
+    """Blows in free space; without restitution an overlap is corrected, at a speed of up to 1 mm/s."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         rough = any(friction > 0.0 for _, friction in scene.materials())
@@ -101,24 +102,24 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(metric, profile),
-        "a contact gives way by 1e-5 of the speed that it is to change; no rebound is slower than 0.1 m/s or faster "
-        "than 100 m/s; what overlaps is pushed out at up to 1 mm/s",
+        "a contact yields by 1e-5 of the speed that it changes; a rebound has 0.1 m/s to 100 m/s; overlaps are "
+        "corrected at up to 1 mm/s",
         "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
         ("6.20.",),
     )
     for profile in PROFILES
     for scene, metrics in BLOWS.items()
-    # The corners of a box are several contacts, of which sweeps leave more than their tolerance: `shared_law`.
+    # The corners of a box are several contacts, whose residual of sweeps exceeds the tolerance: `shared_law`.
     if scene != "flat_box" or profile not in SWEEPERS
     for metric in metrics
 )
 
 
 def shared_law(metric: str, profile: str) -> Law:
-    """A blow that corners share, solved by sweeps.
+    """A blow shared by corners, solved by sweeps.
 
-    Sweeps see how corners share a load by 1e-5 of it each, and end before: corners give way anything from not at all to
-    twice as much, which is the band.
+    The distribution of a load among corners depends on 1e-5 of it each, and sweeps end before resolving it: corners
+    yield between 0 and twice as much, which is the band.
     """
     even = blow_law(metric, profile)
     stiff = rounded_law(metric, Method(Rebound(0.0, 0.0), unit=solved(profile, True) / ROUNDINGS))
@@ -137,7 +138,7 @@ DEVIATIONS += tuple(
         "flat_box",
         metric,
         shared_law(metric, profile),
-        "a contact gives way by 1e-5 of its own response, and sweeps leave open how corners share a blow",
+        "a contact yields by 1e-5 of its response, and the iterations do not determine how corners share a blow",
         "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
         ("6.20.",),
     )
@@ -166,8 +167,8 @@ DEVIATIONS += tuple(
         "kane",
         metric,
         rubbing_law(metric, profile),
-        "the point of a contact lies half-way into its overlap, which makes the rod's arm shorter; Dantzig's friction "
-        "is limited by the load without friction",
+        "the contact point lies half-way into the overlap, which makes the lever arm shorter; Dantzig's friction is "
+        "limited by the load without friction",
         "FCLCollisionDetector, DantzigBoxedLcpSolver; blow in adapters/dart/rubbing.py",
         ("6.20.",),
     )
@@ -181,7 +182,7 @@ DEVIATIONS += tuple(
         "edge_drop",
         metric,
         landing_law(metric, profile),
-        "a contact gives way by 1e-5 of its own response: corners that share a blow by more than one alone",
+        "a contact yields by 1e-5 of its response, corners that share a blow by more than a single one",
         "ContactConstraint, constraint force mixing; blow in adapters/dart/landing.py",
         ("6.20.",),
     )
@@ -195,15 +196,15 @@ DEVIATIONS += tuple(
         "oblique",
         metric,
         slipping_law(metric, profile),
-        "a contact gives way by 1e-5 of what it is to change, and friction with it; where its cone is a pyramid each "
-        "axis of the floor has the whole of it",
+        "a contact yields by 1e-5 of the speed that it changes, and so does friction; where the friction cone is a "
+        "pyramid each axis of the floor has full friction",
         "ContactConstraint, constraint force mixing; blow in adapters/dart/slipping.py",
         ("6.20.",),
     )
     for profile in PROFILES
     for metric in ("forward_speed", "sideways", "spin_speed")
 )
-#: Scenes of what slips over a floor in both of its axes, and what its motion alone decides.
+#: Scenes with slip over a floor along both of its axes, and the metrics determined by the motion.
 SLIPPING: Mapping[str, tuple[str, ...]] = {
     "slide": ("astray", "braking", "stopping_distance", *(f"friction[{by}]" for by in ("mean", "least", "greatest"))),
     "slide_to_roll": ("astray", "rolling_place", "rolling_time"),
@@ -216,8 +217,8 @@ DEVIATIONS += tuple(
         scene,
         exactly(metric),
         pyramid_law(metric),
-        "the cone of friction is a pyramid: each axis of the floor has the whole of it, and what slips between them is "
-        "braked by up to sqrt(2) of Coulomb's friction",
+        "the friction cone is a pyramid: each axis of the floor has full friction, and slip between them is braked "
+        "by up to sqrt(2) times Coulomb's friction",
         "a boxed LCP, DantzigBoxedLcpSolver and PgsBoxedLcpSolver; recurrence in adapters/dart/pyramid.py",
         ("6.20.",),
     )
@@ -227,7 +228,7 @@ DEVIATIONS += tuple(
 
 
 def wall_law(metric: str, profile: str) -> Law:
-    """What no step finds in a thin wall passes it; what one finds rebounds as any other blow."""
+    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
     passing, blow = passing_law(metric), blow_law(metric, profile)
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -244,8 +245,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric),
-        "nothing is swept: what is on one side of a thin body where a step ends, and on the other where the next one "
-        "does, passes; other blows give way by 1e-5",
+        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+        "other at the end of the next, passes through; other blows yield by 1e-5",
         "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",
         ("6.20.",),
     )

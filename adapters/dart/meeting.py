@@ -1,15 +1,15 @@
-"""Bodies that fall, meet or lie on each other without slip or spin, step by step as DART moves them.
+"""Bodies that fall, collide or lie on each other without slip or spin, step by step as in DART.
 
-    v  <-  v + g dt                    gravity first: what is thrown back has the step's own in it, e g dt
-    for each pair that touches, with its approach s and its overlap p:
-        u = e s                        where that is a rebound, of up to 100 m/s
-        u = min(p/100 dt, 1 mm/s)      where it is none
+    v  <-  v + g dt                    gravity first: a rebound contains that of the step, e g dt
+    for each touching pair, with approach speed s and overlap p:
+        u = e s                        with restitution, up to 100 m/s
+        u = min(p/100 dt, 1 mm/s)      without restitution
     w + (A + c D) j = u, or j = 0      all at once: w of a pair after the step, j its impulse, c = 1e-5
     x  <-  x + v dt
 
-``A`` is what impulses do to the pairs' speeds. ``D`` is a contact's own response, which of flat boxes is that of one
-corner of four: light bodies give way to heavy loads faster than they are pushed out. A blow that others follow before
-it is over is shared: speeds of a rack are those of this law and of no law of mechanics.
+``A`` gives the pairs' speeds per impulse. ``D`` is a contact's own response, for flat boxes that of one corner of four:
+light bodies yield to heavy loads faster than they are corrected. Simultaneous blows are solved together, so the speeds
+of a rack follow from this law, not from mechanics.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 
-#: Gap that counts as touching [m], for places of order 1 in doubles.
+#: Gap that counts as touching [m], for places of order 1 in double precision.
 TOUCHING = 1e-12
 
 
 def meeting_law(metric: str, share: float, least: float) -> Law:
-    """What the recurrence makes of ``metric``, to a ``share`` of its size and to ``least``, in its unit."""
+    """``metric`` by the recurrence, to a ``share`` of its size and to ``least``, in its unit."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         motion = _motion(Held(scene), dt)
@@ -44,7 +44,7 @@ def meeting_law(metric: str, share: float, least: float) -> Law:
 
 
 def _is_told(scene: Scene, bodies: list[Body]) -> bool:
-    """Whether nothing spins or is pushed, and it is smooth balls that nothing pulls, or all happens along one line."""
+    """Whether there is no spin or load, and either smooth balls without gravity, or motion along one line only."""
     balls = [body for body in bodies if isinstance(body.shape, Sphere)]
     boxes = [body for body in bodies if isinstance(body.shape, Box) and body.pose[3:] == (1.0, 0.0, 0.0, 0.0)]
     faces = [body for body in bodies if isinstance(body.shape, HalfSpace) and body.motion == "fixed"]
@@ -54,14 +54,14 @@ def _is_told(scene: Scene, bodies: list[Body]) -> bool:
         return False
     if not boxes and not any(scene.gravity) and not any(friction for _, friction in scene.materials()):
         return True
-    # A plumb line through the middle of all: without a way sideways there is no slip, and friction has nothing to do.
+    # A vertical line through the centres of all: without sideways motion there is no slip and no friction.
     level = all(isinstance(face.shape, HalfSpace) and face.shape.normal == (0.0, 0.0, 1.0) for face in faces)
     still = not any((*scene.gravity[:2], *(speed for body in bodies for speed in body.twist[:2])))
     return level and still and len({body.pose[:2] for body in balls + boxes}) == 1 and not (balls and boxes)
 
 
 def _leaves(ball: Body, other: Body) -> bool:
-    """Whether ``other`` starts beside the ball and moves away from it: nothing here asks for it."""
+    """Whether ``other`` starts beside the ball and moves away from it, without effect here."""
     if other is ball or isinstance(other.shape, HalfSpace) or not isinstance(ball.shape, Sphere):
         return False
     between = np.subtract(other.pose[:2], ball.pose[:2])
@@ -71,7 +71,7 @@ def _leaves(ball: Body, other: Body) -> bool:
 
 @lru_cache(maxsize=32)
 def _motion(held: Held, dt: float) -> Trajectory | None:
-    """The whole run, in the scene's own dimension; what leaves stays where it is."""
+    """The whole run, in the scene's own dimension; leaving bodies are left at their start."""
     scene = held.scene
     spatial = scene if scene.dimension == 3 else lift(scene)
     bodies, axes = spatial.bodies, [0, 1, 2] if scene.dimension == 3 else [0, 2]
@@ -112,7 +112,7 @@ def _apart(first: Body, second: Body, between: Array) -> tuple[float, Array]:
 
 
 def _own(pair: tuple[Body, Body]) -> float:
-    """Response of one point of contact, over as many points as share the load [1/kg]."""
+    """Response of one point of contact, over the number of points that share the load [1/kg]."""
     boxes = [(body, body.shape.half_extents) for body in pair if isinstance(body.shape, Box)]
     linear = sum(1.0 / body.mass for body in pair if body.motion == "free")
     if not boxes:
@@ -125,7 +125,7 @@ def _own(pair: tuple[Body, Body]) -> float:
 def _struck(
     bodies: tuple[Body, ...], x: Array, v: Array, lightness: Array, pairs: list[tuple[int, int, float]], dt: float
 ) -> Array:
-    """Velocities after a step's impulses; contacts that would pull are left out, the worst first."""
+    """Velocities after a step's impulses; contacts with negative impulses are dropped, the worst first."""
     rows, wanted, own = [], [], []
     for i, j, e in pairs:
         gap, normal = _apart(bodies[i], bodies[j], x[j] - x[i])

@@ -1,9 +1,9 @@
-"""Profiles of DART: everything alike but the solver of the contact problem.
+"""Profiles of DART: they differ only in the solver of the contact problem.
 
-default   Dantzig's pivoting, as shipped: a boxed LCP, so that the cone of friction is a pyramid
+default   Dantzig's pivoting, as shipped: a boxed LCP, so the friction cone is a pyramid
 pgs       projected Gauss-Seidel on the same boxed LCP
-nsgs      non-smooth Gauss-Seidel with Coulomb's own cone
-fbf       forward-backward-forward splitting with Coulomb's own cone
+nsgs      non-smooth Gauss-Seidel with Coulomb's cone
+fbf       forward-backward-forward splitting with Coulomb's cone
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SECOND: Mapping[str, settings.Check] = {
     "second_sweeps": settings.whole(1, 10**6),
     "second_tolerance": settings.number(0.0, 1.0),
 }
-#: What each solver takes: Dantzig's pivots, and has neither sweeps nor a tolerance; PGS is its own second choice.
+#: Settings of each solver: Dantzig's pivots, without sweeps or a tolerance; PGS is its own fallback.
 TAKEN: Mapping[str, Mapping[str, settings.Check]] = MappingProxyType(
     {
         "dantzig": {**_PLAIN, **_SECOND},
@@ -44,12 +44,12 @@ _SOURCE = "dartpy 6.20, dart.constraint"
 
 
 def _second() -> list[Setting]:
-    """Who answers where the solver finds nothing."""
+    """Fallback if the solver finds no solution."""
     source = "BoxedLcpConstraintSolver, secondary solver; PgsBoxedLcpSolverOption"
-    why = "as shipped: where the solver finds no solution, projected Gauss-Seidel answers with so many sweeps"
+    why = "as shipped: iterations of projected Gauss-Seidel where the solver finds no solution"
     return [
         Setting("second_sweeps", SECOND_SWEEPS, why, source),
-        Setting("second_tolerance", SECOND_TOLERANCE, "as shipped: changes below it, as a share, stop them", source),
+        Setting("second_tolerance", SECOND_TOLERANCE, "as shipped: a smaller relative change stops them", source),
     ]
 
 
@@ -68,34 +68,33 @@ def _sweeping(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
         Setting(
             "iterations",
             SWEEPS[solver],
-            "30 as shipped leave a column unsolved" if solver == "pgs" else "100 as shipped leave two boxes unsolved",
+            "the shipped 30 do not solve a column" if solver == "pgs" else "the shipped 100 do not solve two boxes",
             _SOURCE,
         ),
-        Setting("tolerance", TOLERANCES[solver], "changes below it stop the sweeps", _SOURCE),
+        Setting("tolerance", TOLERANCES[solver], "a smaller relative change stops the iterations", _SOURCE),
         *([] if solver == "pgs" else _second()),
     ]
 
 
 #: Profiles whose friction is a pyramid along the axes of the floor.
 PYRAMIDS = ("default", "pgs")
-#: Profiles whose friction is a cone, and how many free boxes they are asked to solve at once: two of which one is a
-#: hundred times as heavy take 35 to 90 s for 5 s of motion, a column of ten more than 3 min (measured with 6.20.0 on
-#: one core; Dantzig's 3 s).
+#: Profiles whose friction is a cone, and the largest number of free boxes in one problem: two with a mass ratio of 100
+#: take 35 to 90 s for 5 s of motion, a column of ten more than 3 min (measured with 6.20.0 on one core; Dantzig's 3 s).
 CONES = ("nsgs", "fbf")
-#: Profiles that sweep over contacts one by one.
+#: Profiles with sweeps over single contacts.
 SWEEPERS = ("pgs", "nsgs")
 MOST_BOXES = 1
-#: Changes below which the sweeps of a profile stop, as a share.
+#: Relative changes at which the sweeps of a profile stop.
 TOLERANCES = {"pgs": 1e-12, "nsgs": 1e-10, "fbf": 1e-8}
-#: Sweeps of a profile at most.
+#: Largest number of sweeps of a profile.
 SWEEPS = {"pgs": 200, "nsgs": 1000, "fbf": 1000}
 
-#: Sweeps of the second choice, and changes below which they stop, as a share; a thousandth of that as it stands.
+#: Sweeps of the fallback, and relative and absolute changes at which they stop; the absolute is a thousandth of it.
 SECOND_SWEEPS, SECOND_TOLERANCE = 30, 1e-3
 
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": _pivoting,
-    "pgs": partial(_sweeping, "pgs", "the sweeps of a textbook on the pyramid of the shipped solver"),
+    "pgs": partial(_sweeping, "pgs", "projected Gauss-Seidel on the friction pyramid of the shipped solver"),
     "nsgs": partial(_sweeping, "nsgs", "the exact cone: friction opposes the slip, whatever its direction"),
     "fbf": partial(_sweeping, "fbf", "the exact cone by another method"),
 }
@@ -103,14 +102,14 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
 def solved(profile: str, rough: bool) -> float:
-    """What a profile's solver leaves of a single contact, as a share: with friction ten times its own tolerance."""
+    """Relative residual of a profile's solver for a single contact: with friction ten times its own tolerance."""
     return max(SOLVED, 10.0 * TOLERANCES.get(profile, 0.0)) if rough else SOLVED
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`.
+    """Settings with valid names and values for the engine; see `adapters.settings.checked`.
 
-    A solver that is asked for in the place of Dantzig's, alone, brings the sweeps and the tolerance of its own profile.
+    A solver set alone in place of Dantzig's has the sweeps and the tolerance of its own profile.
     """
     name = asked.get("solver")
     if name in TOLERANCES and not {"iterations", "tolerance"} & set(asked):

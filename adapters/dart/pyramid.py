@@ -1,12 +1,12 @@
-"""A box or a ball that slips over a level floor under a pyramid of friction, step by step as DART makes it.
+"""A box or a ball that slips over a level floor with a friction pyramid, step by step as in DART.
 
-    vz  <-  vz - g dt                     and is stopped, or pushed out, where something touches: meeting.py
+    vz  <-  vz - g dt                     then stopped, or corrected, in a contact: meeting.py
     for each axis of the floor by itself, with its slip s and the floor's push n of this step:
         j = min(mu n, m |s|/(1 + k))      k = m r^2/I of a ball, 0 of a box, which does not turn
         v <- v - j/m,  s <- s - (1 + k) j/m
     x   <-  x + v dt
 
-Whether what touches exactly is found in the first step or in the second is not known: both are told, as a band.
+An exact touch may be found in the first or in the second step: the band covers both.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
-#: Gap of a start that is not found touching [m]: a rounding of places of order 1.
+#: Gap at the start without contact [m]: round-off of places of order 1.
 ROUNDED = 1e-15
-#: What compliance makes of loads and slips, and an arm that is shorter by an overlap of one step of a fall: the
-#: friction's share of it, tenfold for what a metric makes of two speeds.
+#: Effect of compliance on loads and slips, and of a lever arm shorter by the overlap of one step of a fall: the
+#: friction's share of it, times ten for metrics of two speeds.
 SHARE = 10.0 * MIXING
 
 
 def pyramid_law(metric: str) -> Law:
-    """What the recurrence makes of ``metric``."""
+    """``metric`` by the recurrence."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         if not _simple(scene):
@@ -46,7 +46,7 @@ def pyramid_law(metric: str) -> Law:
 
 
 def _simple(scene: Scene) -> bool:
-    """Whether a ball, or a box that is not turned, slips on the floor it touches, and nothing else acts."""
+    """Whether a ball, or an unrotated box, slips on the floor that it touches, without other loads."""
     if scene.dimension != 3 or len(scene.bodies) != 2 or any(scene.gravity[:2]):
         return False
     floor, body = scene.bodies

@@ -1,4 +1,4 @@
-"""dartpy over its releases: what changed in what the adapter calls."""
+"""dartpy over its releases: changes of the calls of the adapter."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ RELEASES = Releases(
                    "measured: 6.19.5 has none, 6.20.0 has it"),
         Difference("<6.19", "bodies at rest are never deactivated, and there is no option for it", "nothing is set",
                    "measured: 6.18.0 has no DeactivationOptions, 6.19.0 has them"),
-        Difference("<6.20", "positions are not corrected by split impulses, and nothing asks for it",
+        Difference("<6.20", "positions are not corrected by split impulses, and there is no option for it",
                    "it reads as off", "measured: 6.19.5 has no isSplitImpulseEnabled"),
-        Difference("<6.20", "the solver that answers where Dantzig's finds nothing is out of reach, and so are the "
-                   "solvers of the exact cone",
+        Difference("<6.20", "the fallback solver of Dantzig's has no interface, and there are no solvers with "
+                            "the exact cone",
                    "`default` leaves it as shipped; the other profiles are refused",
                    "measured: 6.19.5 has no getSecondaryBoxedLcpSolver, NsgsFrictionSolver or FbfFrictionSolver"),
     ),
@@ -27,7 +27,7 @@ RELEASES = Releases(
 
 
 def keep_awake(world: Any) -> None:
-    """Let no body of a world be deactivated."""
+    """Disable sleeping of a world's bodies."""
     if hasattr(world, "getDeactivationOptions"):
         rest = world.getDeactivationOptions()
         rest.mEnabled = False
@@ -35,7 +35,7 @@ def keep_awake(world: Any) -> None:
 
 
 def may_sleep(world: Any) -> bool:
-    """Whether bodies of a world may be deactivated."""
+    """Whether bodies of a world may sleep."""
     return hasattr(world, "getDeactivationOptions") and bool(world.getDeactivationOptions().mEnabled)
 
 
@@ -45,7 +45,7 @@ def splits_impulses(solver: Any) -> bool:
 
 
 def refusal(profile: str) -> str | None:
-    """Why the installed release has no such profile; None if it has."""
+    """Why the installed release lacks a profile; None if it has it."""
     import dartpy
 
     if profile in SWEEPS and not hasattr(dartpy.constraint, "NsgsFrictionSolver"):
@@ -54,5 +54,5 @@ def refusal(profile: str) -> str | None:
 
 
 def second_choice(solver: Any) -> Any:
-    """Return the solver that answers where the first finds nothing; None where a release keeps it to itself."""
+    """Return the fallback of the solver; None if a release does not expose it."""
     return solver.getSecondaryBoxedLcpSolver() if hasattr(solver, "getSecondaryBoxedLcpSolver") else None

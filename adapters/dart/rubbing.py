@@ -1,11 +1,11 @@
-"""A leaning box that lands on its lower edge while that edge slides, in free space, as DART solves its blow.
+"""A leaning box that lands on its sliding lower edge, in free space, with the blow as in DART.
 
-    arm      from the centre to half-way into the overlap that the step of the blow finds: the detector's point
-    give     of each of the edge's two corners, which share the load, by 1e-5 of its own response
-    cone     Coulomb's: the edge sticks if it takes no more than mu times the load, else it slips by that
-    Dantzig  by mu times the load that there would be without friction, whatever the load is
+    arm      from the centre to half-way into the overlap in the step of the blow: the detector's point
+    give     compliance of each of the edge's two corners, which share the load: 1e-5 of its own response
+    cone     Coulomb's: the edge sticks with up to mu times the load, else it slips with that
+    Dantzig  mu times the load without friction, independent of the actual load
 
-The last is what its pivoting makes of a cone: limits of friction are set once, when all loads have been found without.
+The last follows from its pivoting: limits of friction are set once, after all loads are solved without friction.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from adapters.lift import lift, lower_twist
 from adapters.scene import Body, Box, HalfSpace, Scene
 from adapters.trajectory import Trajectory
 
-#: Steps by which a touch must miss a step's end, or roundings decide which step finds it.
+#: Least distance of a touch from a step's end in steps; below it round-off decides which step finds it.
 CLEAR = 1e-9
 
 
 def rubbing_law(metric: str, profile: str) -> Law:
-    """What the blow makes of ``metric``.
+    """``metric`` after the blow.
 
-    Sweeps see how two corners share a load by 1e-5 of it each, and end before: corners give way anything from not at
-    all to twice as much, which is the band.
+    The distribution of a load among two corners depends on 1e-5 of it each, and sweeps end before resolving it: corners
+    yield between 0 and twice as much, which is the band.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -49,7 +49,7 @@ def rubbing_law(metric: str, profile: str) -> Law:
 
 
 def _after(scene: Scene, dt: float, mixing: float, once: bool) -> Array | None:
-    """Twist after the blow (6,); None where it is not as simple as said above."""
+    """Twist after the blow (6,); None outside the assumptions above."""
     if any(scene.gravity) or len(scene.bodies) != 2 or scene.bodies[0].shape != HalfSpace((0.0, 0.0, 1.0), 0.0):
         return None
     floor, box = scene.bodies
@@ -65,7 +65,7 @@ def _after(scene: Scene, dt: float, mixing: float, once: bool) -> Array | None:
     if arm is None or overlap is None:
         return None
     arm[1] += 0.5 * overlap
-    # Response of the edge along the normal and along x, times the mass; of one corner alone also by its place across.
+    # Response of the edge along the normal and along x, times the mass; for one corner also from its place across.
     turn, across = box.mass / box.inertia[1], box.shape.half_extents[1]
     lean = np.array([arm[0], -arm[1]])
     response = np.eye(2) + turn * np.outer(lean, lean)
@@ -77,14 +77,14 @@ def _after(scene: Scene, dt: float, mixing: float, once: bool) -> Array | None:
     if blow is None:
         return None
     after = np.array(box.twist)
-    # An impulse up at x turns it by -x about y, one along x at z by z.
+    # An upward impulse at x gives a moment -x about y, one along x at z a moment z.
     after[[2, 0]] += blow
     after[4] = turn * float(blow @ np.array([-arm[0], arm[1]]))
     return after
 
 
 def _blow(response: Array, wanted: float, stop: float, friction: float, once: bool) -> Array | None:
-    """Impulse over the mass (up, along), (2,) [m/s]: by Coulomb, or within limits that are set ``once``."""
+    """Impulse over the mass (up, along), (2,) [m/s]: by Coulomb's law, or with limits set ``once``."""
     sticking = np.linalg.solve(response, (wanted, stop))
     if once:
         limit = friction * wanted / response[0, 0]
@@ -111,14 +111,14 @@ def _corner(box: Body, angle: float) -> Array | None:
 
 
 def _across(box: Body, angle: float) -> tuple[float, float]:
-    """What an impulse across at half the width adds to a corner's response up and along, over the width's square."""
+    """Addition to a corner's response up and along by its place at half the width, over the width's square."""
     assert isinstance(box.inertia, tuple)
     c, s = math.cos(angle), math.sin(angle)
     return c * c / box.inertia[0] + s * s / box.inertia[2], s * s / box.inertia[0] + c * c / box.inertia[2]
 
 
 def _found(box: Body, speed: float, dt: float) -> float | None:
-    """Overlap that the first step to find one finds [m]; None where a rounding decides which it is."""
+    """Overlap in the first step with one [m]; None if round-off decides which step that is."""
     arm = _corner(box, 2.0 * math.atan2(box.pose[5], box.pose[3]))
     if arm is None:
         return None
@@ -128,7 +128,7 @@ def _found(box: Body, speed: float, dt: float) -> float | None:
 
 
 def _told(scene: Scene, after: Array, dt: float) -> Trajectory:
-    """Start and end of the run: places are not asked for."""
+    """Start and end of the run, without places."""
     pose = np.array([[body.pose for body in scene.bodies]] * 2)
     twist = np.array([[body.twist for body in scene.bodies]] * 2)
     twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0]

@@ -1,4 +1,4 @@
-"""A run on DART as a stand-alone script: what `adapters.dart.simulation` calls, as it is recorded."""
+"""A run on DART as a stand-alone script: the recorded calls of `adapters.dart.simulation`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.recording import written
 from adapters.scene import Scene
 from adapters.script import constants, imports, literal, stepped, text
 
-#: Variables of a script, and the calls whose values they hold.
+#: Variables of a script, and the calls that return their values.
 _NAMES = {
     "world": "World",
     "held": "getConstraintSolver",

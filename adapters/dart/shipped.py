@@ -1,4 +1,4 @@
-"""Numbers of DART as it ships them."""
+"""Defaults of DART."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ from dataclasses import dataclass
 
 #: Compliance of a contact, as a share of its own response. [`ContactConstraint`, constraint force mixing]
 MIXING = 1e-5
-#: Speed of a rebound up to which there is none, and that is never exceeded [m/s]. [`ContactConstraint`, bouncing
-#: velocity threshold, maximal bouncing velocity; measured: 0.2 of 0.499 m/s does not come, of 0.501 m/s it does; 0.8 of
-#: 150 m/s leaves 100 m/s]
+#: Threshold and largest speed of a rebound [m/s]. [`ContactConstraint`, bouncing velocity threshold, maximal bouncing
+#: velocity; measured: with e = 0.2 no rebound from 0.499 m/s, but from 0.501 m/s; with e = 0.8 150 m/s rebound at 100
+#: m/s]
 THRESHOLD, FASTEST = 0.1, 100.0
-#: Friction up to which there is none. [`ContactConstraint`, friction coefficient threshold; measured: 0.001 does not
-#: come, 0.00101 does]
+#: Threshold of friction. [`ContactConstraint`, friction coefficient threshold; measured: no effect at 0.001, but at
+#: 0.00101]
 SMOOTH = 1e-3
-#: Largest speed at which an overlap is pushed out, where nothing rebounds [m/s]; measured: 2.0 m/s leave 1e-3 m/s.
+#: Largest correction speed of an overlap without restitution [m/s]; measured: 1e-3 m/s after an impact at 2.0 m/s.
 PUSH_OUT = 1e-3
-#: Share of an overlap that a step pushes out, up to that speed. [`ContactConstraint`, error reduction parameter]
+#: Share of an overlap corrected in a step, up to that speed. [`ContactConstraint`, error reduction parameter]
 PUSHED_SHARE = 0.01
-#: What a solver leaves of a single contact without friction, as a share: measured 7e-16 at most, for all four, at
-#: ratios of mass from 1e-4 to 1e4 and speeds from 0.3 to 50 m/s; the round-off that any engine is allowed.
+#: Relative residual of a solver for a single contact without friction: measured 7e-16 at most, for all four, at
+#: ratios of mass from 1e-4 to 1e4 and speeds from 0.3 to 50 m/s; the tolerance of round-off for every engine.
 SOLVED = 1e-12
 
 
 @dataclass(frozen=True)
 class Rebound:
-    """Restitution that comes out at an approach of some speed; where nothing rebounds, a body is pushed out.
+    """Restitution at some impact speed; without restitution a body leaves with the correction speed.
 
     Parameters
     ----------
     push
-        Speed at which an overlap is pushed out [m/s], from 0 to `PUSH_OUT`.
+        Correction speed of an overlap [m/s], from 0 to `PUSH_OUT`.
     mixing
-        Compliance of what is struck, as a share of its response.
+        Compliance of the contact, as a share of its response.
     """
 
     push: float = 0.0
@@ -40,7 +40,7 @@ class Rebound:
     def __call__(self, e: float, speed: float) -> float:
         """Restitution at an approach of ``speed`` [m/s]: the impulse is smaller by the compliance.
 
-        What that leaves of an approach without a rebound is gone after the next steps.
+        Its residual approach speed without restitution vanishes in the next steps.
         """
         if e * speed <= THRESHOLD:
             return self.push / speed
@@ -48,5 +48,5 @@ class Rebound:
 
 
 def restitution(e: float, speed: float) -> float:
-    """Restitution at an approach of ``speed`` [m/s], where nothing overlaps."""
+    """Restitution at an approach of ``speed`` [m/s], without overlap."""
     return Rebound()(e, speed)

@@ -1,4 +1,4 @@
-"""One DART world and what is read from it: velocities first, then positions; contacts are those of the step's start."""
+"""One DART world and its readings: velocities first, then positions; contacts belong to the step's start."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ DETECTORS = {
 
 
 class DartSimulation(Simulation):
-    """One world; bodies in the scene's order, each a skeleton of its own.
+    """One world; bodies in the scene's order, one skeleton each.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
@@ -54,11 +54,11 @@ class DartSimulation(Simulation):
         self.index = {node.getName(): index for index, node in enumerate(self.nodes)}
 
     def _solver(self, held: Any, settings: Mapping[str, Any]) -> Any:
-        """Make and set the solver of the contact problem, and who answers where it finds none; Dantzig's is there."""
+        """Make and set the solver of the contact problem, and its fallback; Dantzig's is the default."""
         dartpy, name = self.dartpy, settings["solver"]
         option = dartpy.constraint.PgsBoxedLcpSolverOption()
-        # Sweeps that end above the tolerance count as failed, and what the second choice finds is taken as it is: where
-        # PGS is asked for, that has to be as many sweeps.
+        # Sweeps that end above the tolerance count as failed, and the result of the fallback is used unchecked: for PGS
+        # the fallback has the same number of sweeps.
         first = ("iterations", "tolerance") if name == "pgs" else ("second_sweeps", "second_tolerance")
         option.mMaxIteration, option.mRelativeDeltaXTolerance = (settings[key] for key in first)
         option.mDeltaXThreshold = settings[first[1]] * (1.0 if name == "pgs" else 1e-3)
@@ -68,7 +68,7 @@ class DartSimulation(Simulation):
         if name == "dantzig":
             return None
         if name == "pgs":
-            # Its class has no constructor in Python; every world brings one as its second choice.
+            # Its class has no constructor in Python; every world has one as its fallback.
             self.other = dartpy.simulation.World()
             solver = self.other.getConstraintSolver().getSecondaryBoxedLcpSolver()
             solver.setOption(option)
@@ -91,7 +91,7 @@ class DartSimulation(Simulation):
         place = dartpy.math.Isometry3()
         shape = asked.shape
         if isinstance(shape, HalfSpace):
-            # A plane meets a box at one point only: a slab, whose upper face is the surface.
+            # A plane touches a box at one point only; here a slab, whose upper face is the surface.
             normal = np.array(shape.normal)
             place.set_rotation(turned(normal))
             place.set_translation(list((shape.offset - self.reach) * normal))
@@ -158,7 +158,7 @@ class DartSimulation(Simulation):
         return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
-        """What the world and its bodies hold."""
+        """Values of the world and its bodies."""
         held = self.world.getConstraintSolver()
         return {
             "dt": self.world.getTimeStep(),

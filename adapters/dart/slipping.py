@@ -1,11 +1,11 @@
-"""A ball that lands on a floor and goes on slipping over it, in free space, as DART solves its blow.
+"""A ball that lands on a floor and keeps slipping, in free space, with the blow as in DART.
 
-    j = m (1 + e) v                         short by the compliance of a contact
+    j = m (1 + e) v                         reduced by the compliance of a contact
     pyramid   each axis of the floor by itself: mu j against its own share of the slip
     cone      mu j against the slip
 
-Nothing is said where friction stops the slip, along an axis of a pyramid or at all. The ball turns about a point that
-lies in the floor by up to a step of its fall: what friction makes of its spin is known within that.
+There is no prediction where friction stops the slip, along an axis of a pyramid or entirely. The contact point lies in
+the floor by up to a step of the ball's fall: the spin from friction is known within that.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from adapters.trajectory import Trajectory
 
 
 def slipping_law(metric: str, profile: str) -> Law:
-    """What the blow makes of ``metric``, by the profile's own friction."""
+    """``metric`` after the blow, with the profile's own friction."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         spatial = scene if scene.dimension == 3 else lift(scene)
@@ -41,7 +41,7 @@ def slipping_law(metric: str, profile: str) -> Law:
 
 
 def _after(scene: Scene, late: float, pyramid: bool) -> Array | None:
-    """Twist after the blow (6,), found ``late`` [s]; None where that is not as simple as said above."""
+    """Twist after the blow (6,), found ``late`` [s]; None outside the assumptions above."""
     floor, ball = scene.bodies[0], scene.bodies[1]
     alone = len(scene.bodies) == 2 and not any((*scene.gravity, *ball.force, *ball.torque))
     if not alone or floor.shape != HalfSpace((0.0, 0.0, 1.0), 0.0) or not isinstance(ball.shape, Sphere):
@@ -68,7 +68,7 @@ def _after(scene: Scene, late: float, pyramid: bool) -> Array | None:
 
 
 def _told(scene: Scene, after: Array, dt: float) -> Trajectory:
-    """Start and end of the run: places are not asked for."""
+    """Start and end of the run, without places."""
     pose = np.array([[body.pose for body in scene.bodies]] * 2)
     twist = np.array([[body.twist for body in scene.bodies]] * 2)
     twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0]

@@ -1,4 +1,4 @@
-"""Materials of pairs as one number per body: DART takes the product of restitutions and the smaller friction."""
+"""Materials of pairs from one value per body: DART takes the product of restitutions and the smaller friction."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
-#: What a root and a product may miss of a number.
+#: Relative round-off of a root and a product.
 ROUNDING = 1e-15
 
 
 def restitutions(scene: Scene) -> list[float] | None:
-    """Factors whose products are the pairs' restitutions: against what is fixed, or roots; None if neither works."""
+    """Factors whose products are the pairs' restitutions: those with fixed bodies, or roots; None if neither works."""
     return representable(scene, lambda pairs: _restitutions(scene, pairs))
 
 
@@ -32,7 +32,7 @@ def _restitutions(scene: Scene, meetings: Sequence[Meeting]) -> list[float] | No
 
 
 def frictions(scene: Scene) -> list[float] | None:
-    """Numbers of which the smaller one is each pair's friction; None if there are none."""
+    """Values of which the smaller one is each pair's friction; None if there are none."""
     return representable(scene, lambda pairs: _frictions(scene, pairs))
 
 

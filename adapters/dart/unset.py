@@ -1,4 +1,4 @@
-"""What DART does when nothing is set; see `adapters.unset`."""
+"""DART without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from adapters import unset
 from adapters.dart.shipped import THRESHOLD
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
-#: Half thickness of the box that is the ground [m].
+#: Half thickness of the ground's box [m].
 DEPTH = 5.0
 
 
 class Bare:
-    """A world with one body above a box that is welded to it."""
+    """A world with one body above a welded box."""
 
     def __init__(self, asked: Asked) -> None:
         import dartpy
@@ -76,12 +76,12 @@ UNSET = (
     Unset("no rebound below [m/s]", "0.1", _CONTACT, THRESHOLD, partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
-    Unset("in flight at 1 mm/s asleep after [s]", "never: only what touches another body may sleep", _RESTS, math.inf,
+    Unset("in flight at 1 mm/s asleep after [s]", "never: only bodies in contact can sleep", _RESTS, math.inf,
           partial(unset.sleep, Bare)),
     Unset("rolling slower than 1 mm/s asleep after [s]", "0.5: mTimeUntilSleep, below a tenth of 1 cm/s", _RESTS, 0.5,
           partial(unset.sleep, Bare, rolls=True), 2e-3),
     Unset("gap at rest [m]", "not documented", _PAIR, None, partial(unset.rest, Bare)),
-    Unset("left of 0.2 m of overlap [m]", "not documented: pushed out by at most 1 mm/s", _PAIR, None,
+    Unset("left of 0.2 m of overlap [m]", "not documented: corrected at up to 1 mm/s", _PAIR, None,
           partial(unset.left, Bare)),
     Unset("gravity, upwards [m/s^2]", "-9.81", "World", -9.81, partial(unset.gravity, Bare), 1e-6),
     Unset("step [s]", "0.001", "World.getTimeStep", 0.001, lambda: Bare(Asked()).dt, 1e-12),

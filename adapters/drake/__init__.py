@@ -1,8 +1,8 @@
-"""Drake through pydrake; what stands where is told in `adapters.engine_folder`.
+"""Drake through pydrake; `adapters.engine_folder` describes the modules.
 
-shipped        its own numbers
+shipped        default values
 profiles       one approximation of contact each: Lagged, SAP, TAMSI, Similar
-translation    friction of pairs as one number per body
+translation    friction of pairs from one value per body
 simulation     one world
 engine         the adapter
 """

@@ -1,8 +1,8 @@
-"""Drake behind the plugin line: spatial, compliant contact that is solved implicitly, discrete steps.
+"""The adapter of Drake: spatial, compliant contact, solved implicitly in discrete steps.
 
     step:  detect  ->  solve  M (v' - v) = dt (M g + f) + J^T j(x, v')  ->  q' = q + dt N(q) v'
 
-Profiles differ in the approximation of ``j``, and in nothing else.
+Profiles differ in the approximation of ``j`` only.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
 from adapters.scene import Capsule, Cylinder, Scene, Sphere
 
-#: What the solver of a convex step leaves, as a share of what it changes, and of a speed [m/s]; measured 6e-6 at most.
+#: Residual of a convex step's solver, as a share of the change, and of a speed [m/s]; measured 6e-6 at most.
 SOLVED_SHARE, SOLVED = 1e-5, 1e-6
-#: Profiles whose friction does not keep to the load of the step, and why.
+#: Profiles whose friction does not follow the load of the step, and why.
 APPROXIMATE: Mapping[str, str] = MappingProxyType(
     {
-        "default": "friction is limited by the load that springs would have at the velocities of the step's start, "
-        "which of a box that rocks is another one",
-        "sap": "what slips is lifted by a share of its slip and glides: it hops over the floor",
-        "similar": "what slips is lifted by a share of its slip and glides: it hops over the floor",
+        "default": "friction is limited by the load that the springs would have at the velocities of the step's "
+        "start; for a rocking box that differs from the load of the step",
+        "sap": "slip lifts a body by a share of itself; the body glides and hops over the floor",
+        "similar": "slip lifts a body by a share of itself; the body glides and hops over the floor",
     }
 )
 
 
 def _unsound(scene: Scene) -> str | None:
-    """Why a capsule or a cylinder that can meet anything but a ball is refused; see the quirk."""
+    """Why a capsule or a cylinder that can touch another shape than a ball is refused; see the quirk."""
     if not any(isinstance(body.shape, Capsule | Cylinder) for body in scene.bodies):
         return None
     for i, j, _ in meeting_pairs(scene):
@@ -49,7 +49,9 @@ def _unsound(scene: Scene) -> str | None:
             rod, other = other, rod
         if isinstance(rod.shape, Capsule | Cylinder) and not isinstance(other.shape, Sphere):
             kind = type(rod.shape).__name__.lower()
-            return f"{rod.name}.shape: Drake's contact of a {kind} is exact with balls alone, it can meet {other.name}"
+            return (
+                f"{rod.name}.shape: Drake's contact of a {kind} is exact with balls only, and it can touch {other.name}"
+            )
     return None
 
 
@@ -69,39 +71,43 @@ class DrakeEngine(CheckedEngine):
         abilities=frozenset({"capsule", "cylinder"}),
         quirks=(
             Quirk(
-                "contacts have no restitution: what they dissipate depends on the speed, and on the step",
+                "contacts have no coefficient of restitution; their dissipation depends on speed and step",
                 "restitution above 0 is refused",
                 "MultibodyPlant, Hunt & Crossley dissipation; measured with 1.51.1",
             ),
             Quirk(
-                "a pair of shapes has one point of contact, over whose corners a box rocks",
-                "boxes and half-spaces are hydroelastic: a surface each; pairs with a ball have their point",
+                "a pair of shapes has one contact point, so a box rocks over its corners",
+                "boxes and half-spaces are hydroelastic, with contact surfaces; pairs with a ball have one point",
                 "ContactModel.kHydroelasticWithFallback; measured with 1.51.1",
             ),
             Quirk(
                 "bodies overlap at rest: contacts are springs",
-                "left alone; stiffness and modulus are the engine's own",
+                "unchanged; stiffness and modulus are those of the engine",
                 "SceneGraphConfig.default_proximity_properties",
             ),
             Quirk(
-                "slips below a tolerance are viscous, so that nothing that friction holds stands still",
-                "left alone: 0.1 mm/s as shipped",
+                "friction is viscous at slips below a tolerance, so a body that friction holds creeps",
+                "unchanged: 0.1 mm/s as shipped",
                 "MultibodyPlantConfig.stiction_tolerance",
             ),
             Quirk(
-                "friction of a pair is the harmonic mean of two numbers",
-                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "friction of a pair is the harmonic mean of two values",
+                "values per body are chosen that give the values of the pairs; a table without such values is refused",
                 "CalcContactFrictionFromSurfaceProperties",
             ),
             Quirk(
-                "on a face a capsule or a cylinder has one point, over which it rocks for ever or sinks, or a surface "
-                "of facets, over which it does not roll; where an end meets another one, or a box, the normal is wrong "
-                "by a tenth of a radian and more",
-                "these pairs are refused, but for a model's own profile; with a ball the point is exact",
+                "on a face a capsule or a cylinder has one contact point, on which it rocks for ever or sinks, or a "
+                "surface of facets, on which it does not roll; where an end touches another one or a box, the "
+                "normal is wrong by a tenth of a radian and more",
+                "these pairs are refused, except in a model's own profile; with a ball the point is exact",
                 "ComputePointPairPenetration, AddCompliantHydroelasticProperties; measured with 1.51.1, "
                 "tests/adapters/test_rods_of_drake.py",
             ),
-            Quirk("nothing is swept: a fast body passes a thin one", "left alone", "measured with 1.51.1"),
+            Quirk(
+                "there is no swept collision detection: a fast body passes through a thin one",
+                "left alone",
+                "measured with 1.51.1",
+            ),
         ),
     )
     module = "pydrake"
@@ -119,14 +125,14 @@ class DrakeEngine(CheckedEngine):
     )
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse restitution, moved bodies, tables that no single bodies' numbers give, and rods that touch no ball."""
+        """Refuse restitution, moved bodies, pairs that no body values give, and some capsules and cylinders."""
         for body in scene.bodies:
             if body.motion == "prescribed":
-                return f"{body.name}.motion: the adapter moves no body as prescribed"
+                return f"{body.name}.motion: the adapter does not support prescribed motion"
         if any(restitution > 0.0 for restitution, _ in scene.materials()):
-            return "pairs: contacts of drake have no restitution"
-        if profile != PROFILE and frictions(scene) is None:  # a model brings its bodies' own numbers
-            return "pairs: friction of a pair is a harmonic mean of two numbers here, this table has none"
+            return "pairs: contacts of drake have no coefficient of restitution"
+        if profile != PROFILE and frictions(scene) is None:  # a model has its bodies' own values
+            return "pairs: friction of a pair is a harmonic mean of two values here; no values per body give this table"
         return None if profile == PROFILE else _unsound(scene)
 
     def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -134,29 +140,28 @@ class DrakeEngine(CheckedEngine):
         return checked(settings)
 
     def profile_of(self, settings: Mapping[str, Any]) -> str:
-        """Profile of a model, if it brings its bodies' own numbers."""
+        """Profile of a model, if it has its bodies' own values."""
         return PROFILE if OWN in settings else ""
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What springs throw back, and friction where the approximation of contact does not keep to the load."""
+        """Rebounds of springs, and friction where the approximation of contact does not follow the load."""
         declared = {}
         if needs.regime == "impact":
             most = slowest_rebound(profile, REBOUND_SPEED, dt) / REBOUND_SPEED
-            declared["restitution"] = Declared(
-                0.5 * most, 0.5 * most + SOLVED, "what overlaps is pushed out by springs"
-            )
+            declared["restitution"] = Declared(0.5 * most, 0.5 * most + SOLVED, "springs push overlapping bodies apart")
         if profile != "tamsi":
-            because = "the step is solved to a share of 1e-5 of what it changes"
+            because = "a step is solved to 1e-5 of its change"
             declared["impulse"] = Declared(1.0, SOLVED_SHARE, because)
         if needs.friction > 0.0 and profile in APPROXIMATE:
             because = APPROXIMATE[profile]
-            # A convex step keeps to its cone whatever it lifts: friction is at most mu times the load. Lagged's is not.
+            # A convex step satisfies its friction cone: friction is at most mu times the load. In Lagged it may be
+            # more.
             half = 0.5 * needs.friction
-            capped = Declared(half, half + FRICTION_SHARE * needs.friction, f"{because}: less than asked, never more")
+            capped = Declared(
+                half, half + FRICTION_SHARE * needs.friction, f"{because}: less than the scene's value, never more"
+            )
             told = Declared(needs.friction, UNTOLD, because) if profile == "default" else capped
             declared |= {"friction": told, "friction_impulse": told}
-            if (
-                profile == "sap"
-            ):  # measured: 1 but for a box that lands in space at 1/60 s, 1.42, of which no law is known
+            if profile == "sap":  # measured: 1 except for a box that lands in 3-D at 1/60 s: 1.42, without a known law
                 declared["impulse"] = Declared(1.0, UNTOLD, because)
         return declared

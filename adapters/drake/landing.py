@@ -1,14 +1,14 @@
-"""A ball that falls onto a floor of springs, step by step as Drake makes it.
+"""A ball that falls onto a floor of springs, step by step as in Drake.
 
-    x          overlap at the start of the step, 0 where there is none: a contact is found in overlaps alone
+    x          overlap at the start of the step, 0 if there is none: contacts are found in overlaps only
     m (v' - v + g dt) = j(v')              v' upwards, implicit in the load
 
     SAP        j = ((x - (dt + tau) v')/((dt + tau) R))+,  R = max(1/(dt (dt + tau) k), near)
     others     j = dt k (x - dt v')+ (1 - d v')+
 
-``near`` bounds the stiffness that a step resolves, beta^2/(4 pi^2) of the root mean square of what an impulse of 1 does
-along three axes at the contact, which lies half-way into the overlap. Nothing here is solved for a rebound: what
-overlaps is pushed out, by Hunt and Crossley at up to 1/d, by SAP at up to x/(dt + tau).
+``near`` bounds the stiffness that a step resolves: beta^2/(4 pi^2) times the root mean square of the inverse masses
+along three axes at the contact, which lies half-way into the overlap. There is no restitution: overlaps are pushed out,
+with Hunt and Crossley at up to 1/d, with SAP at up to x/(dt + tau).
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from adapters.scene import HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
-#: What a step's solver leaves of a speed, as a share of the fastest. Measured 2e-8 at most.
+#: Residual of a step's solver, as a share of the fastest speed. Measured 2e-8 at most.
 LEFT = 1e-6
 
 
 def slowest_rebound(profile: str, speed: float, dt: float) -> float:
-    """Bound on the speed [m/s] at which a ball that came in at ``speed`` is pushed out."""
+    """Bound on the rebound speed [m/s] of a ball with impact ``speed``."""
     return speed * dt / (dt + RELAXATION) if profile == "sap" else 1.0 / DISSIPATION
 
 
 def _pressed(profile: str, lightness: float, rubbed: float, x: float, v: float, dt: float) -> float:
-    """Speed of parting after a step that starts ``x`` deep and would end with ``v``.
+    """Separation speed after a step that starts ``x`` deep and without contact ends with ``v``.
 
-    ``lightness`` and ``rubbed`` [1/kg]: what an impulse of 1 does along the normal, and across it.
+    ``lightness`` and ``rubbed`` [1/kg]: inverse masses along the normal and across it.
     """
     if x <= 0.0:
         return v
@@ -59,9 +59,9 @@ def _pressed(profile: str, lightness: float, rubbed: float, x: float, v: float, 
 
 
 def landing_law(metric: str, profile: str) -> Law:
-    """What the recurrence makes of ``metric``: a ball above a level floor, thrown or dropped, or two that overlap.
+    """``metric`` by the recurrence: a ball above a level floor, thrown or dropped, or two that overlap.
 
-    Two balls that start inside each other are one, with the reduced mass, that starts inside a floor.
+    Two overlapping balls are equivalent to one, with the reduced mass, that starts inside a floor.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -104,7 +104,7 @@ def _motion(scene: Scene, dt: float, profile: str) -> Trajectory | None:
 
 
 def _parted(scene: Scene, dt: float, profile: str) -> Trajectory | None:
-    """Two balls in free space, one beside the other along x, that move alike and do not turn."""
+    """Two balls in free space, one beside the other along x, with equal velocities and without rotation."""
     spatial = scene if scene.dimension == 3 else lift(scene)
     if len(scene.bodies) != 2 or any(spatial.gravity):
         return None

@@ -1,4 +1,4 @@
-"""What Drake does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Drake from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from adapters.drake.landing import landing_law
 from adapters.drake.profiles import PROFILES
 from adapters.law import Deviation, exactly
 
-#: Scenes of a ball that falls straight onto a floor without a rebound, or of two that overlap, and what that decides.
+#: Scenes of a ball that falls straight onto a floor without restitution, or of two overlapping balls, and the metrics
+#: that this determines.
 FALLING: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_growth", "rest_time"),
@@ -22,8 +23,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         landing_law(metric, profile),
-        "contacts are springs that dissipate: what overlaps when it is found is pushed out, by Hunt and Crossley at up "
-        "to 1/d, 20 mm/s as shipped, by SAP within its relaxation time",
+        "contacts are springs with dissipation: an overlap is corrected, with Hunt and Crossley's dissipation at up "
+        "to 1/d, 20 mm/s as shipped, with SAP within its relaxation time",
         "MultibodyPlant, discrete contact; recurrence in adapters/drake/landing.py",
         ("1.51.",),
     )

@@ -1,13 +1,13 @@
-"""What stands in an SDF model: its numbers are checked, and it is rid of what does not move bodies.
+"""Elements of an SDF model: values are checked, elements without effect on motion are removed.
 
     <sdf> -- <world> -- gravity, physics (step), frame, joint, <model>
           -- <model> -- static, self_collide, pose, frame, joint, <link>
                          <link> -- pose, inertial, <collision> -- pose, geometry, surface, drake:proximity_properties
 
-Drake's parser, which is libsdformat's, takes ``2,5`` for 2, a second ``<mass>`` for none, a sphere without a radius for
-one of 1 m, and ends the process at a radius that is no number; a world's gravity and step it leaves unread (measured
-with 1.51.1). So all of it is checked here first. What has no place in a scene is refused with its element and line, or
-left out where that is wanted.
+Drake's parser, which is libsdformat's, reads ``2,5`` as 2, ignores a second ``<mass>``, gives a sphere without a radius
+1 m, and aborts at a radius that is not a number; it ignores gravity and step of a world (measured with 1.51.1). So
+everything is checked here first. Elements that a scene cannot represent are refused with element and line, or dropped
+on demand.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from adapters.markup import MOST_MADE, Element
 from adapters.plain import NAME, is_visible, one_line
 from adapters.scene import SceneError
 
-#: Gravity [m/s^2] and step [s] where a model states none. [SDFormat 1.12, <gravity>, <max_step_size>]
+#: Gravity [m/s^2] and step [s] of a model without them. [SDFormat 1.12, <gravity>, <max_step_size>]
 GRAVITY, STEP = (0.0, 0.0, -9.8), 0.001
-#: A number as everybody reads it.
+#: Format of a number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _VERSION = re.compile(r"\d{1,3}\.\d{1,3}")
-#: Share of the largest moment of inertia that the other two may miss it by: round-off of a body that is flat.
+#: Tolerance of the triangle inequality of moments of inertia, as a share of the largest: round-off of a flat body.
 _FLAT = 1e-9
 _TRUE, _FALSE = ("1", "true"), ("0", "false")
 
 
 @dataclass(frozen=True)
 class Place:
-    """How often an element may stand in another, and what it says.
+    """How often an element may occur in another, and its content.
 
     Parameters
     ----------
     many
-        Whether it may stand there more than once.
+        Whether it may occur there more than once.
     numbers
-        How many numbers it may hold; empty: it holds none.
+        Allowed counts of numbers; empty: none.
     positive
-        Whether they must be above 0.
+        Whether they must be positive.
     flag
-        Whether it says yes or no.
+        Whether it is boolean.
     """
 
     many: bool = False
@@ -58,9 +58,9 @@ class Place:
 _ONE, _MANY, _FLAG = Place(), Place(many=True), Place(flag=True)
 _SCALAR, _SIZE = Place(numbers=(1,)), Place(numbers=(1,), positive=True)
 _POSE, _VECTOR = Place(numbers=(6, 7)), Place(numbers=(3,))
-#: Moments of inertia, and what they are where they are not stated [kg m^2]. [SDFormat 1.12, <inertia>]
+#: Moments of inertia and their defaults [kg m^2]. [SDFormat 1.12, <inertia>]
 MOMENTS = {"ixx": 1.0, "iyy": 1.0, "izz": 1.0, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
-#: What is read, by the element that it stands in.
+#: Elements that are read, by their parent element.
 READ: Mapping[str, Mapping[str, Place]] = {
     "sdf": {"world": _MANY, "model": _MANY},
     "world": {"gravity": _VECTOR, "physics": _MANY, "model": _MANY, "frame": _MANY, "joint": _MANY},
@@ -95,9 +95,9 @@ READ: Mapping[str, Mapping[str, Place]] = {
         ),
     },
 }
-#: What is read here alone: Drake's parser leaves it unread, and says so.
+#: Elements read only here: Drake's parser ignores them with a warning.
 UNTOLD = frozenset(("physics", "gravity", "self_collide", "velocity_decay", "bounce"))
-#: What must stand in an element: a shape without its sizes has those that nobody wrote.
+#: Required elements: a shape without sizes would have arbitrary ones.
 NEEDED = {
     "collision": ("geometry",),
     "plane": ("normal",),
@@ -107,28 +107,28 @@ NEEDED = {
     "capsule": ("radius", "length"),
     "joint": ("parent", "child"),
 }
-#: Elements that only draw, measure or speak of air, or that tell engines of others how to search and when to sleep.
+#: Elements of drawing, sensors and air, or of search and sleep in other engines.
 SILENT = frozenset(
     ("visual", "sensor", "light", "gui", "scene", "magnetic_field", "atmosphere", "wind", "audio", "audio_source",
      "audio_sink", "spherical_coordinates", "road", "projector", "particle_emitter", "battery", "laser_retro",
      "max_contacts", "allow_auto_disable", "must_be_base_link", "threshold")
 )  # fmt: skip
-#: Elements of <physics> that tell engines of others how to solve.
+#: Elements of <physics> for the solvers of other engines.
 SOLVERS = frozenset(("ode", "bullet", "simbody", "dart", "max_contacts", "real_time_factor", "real_time_update_rate"))
-#: Elements that say nothing as long as they say this, and why they have no place where they say more.
+#: Elements without effect at this value, and why other values are refused.
 IDLE: Mapping[tuple[str, str], tuple[tuple[str, ...], str]] = {
-    ("link", "gravity"): (_TRUE, "in a scene gravity pulls at all bodies alike"),
+    ("link", "gravity"): (_TRUE, "in a scene gravity acts on all bodies alike"),
     ("link", "kinematic"): (_FALSE, "bodies of a scene are free or fixed"),
     ("link", "enable_wind"): (_FALSE, "a scene has neither wind nor water"),
     ("model", "enable_wind"): (_FALSE, "a scene has neither wind nor water"),
     ("velocity_decay", "linear"): (("0",), "a scene's bodies have no damping"),
     ("velocity_decay", "angular"): (("0",), "a scene's bodies have no damping"),
-    ("bounce", "restitution_coefficient"): (("0",), "Drake's contacts have no restitution"),
-    ("ode", "slip1"): (("0",), "a scene has Coulomb's friction alone"),
-    ("ode", "slip2"): (("0",), "a scene has Coulomb's friction alone"),
+    ("bounce", "restitution_coefficient"): (("0",), "Drake's contacts have no coefficient of restitution"),
+    ("ode", "slip1"): (("0",), "a scene has Coulomb friction only"),
+    ("ode", "slip2"): (("0",), "a scene has Coulomb friction only"),
     ("ode", "fdir1"): (("0 0 0",), "a scene's friction has no direction"),
 }
-#: Elements that a scene has no place for, or that another program reads, and why.
+#: Elements that a scene cannot represent, or that another program reads, and why.
 NO_PLACE = {
     "include": "other files are not read",
     "plugin": "plugins are not loaded",
@@ -136,36 +136,36 @@ NO_PLACE = {
     "heightmap": "a scene has no height fields",
     "image": "a scene has no height fields",
     "empty": "a scene has no bodies without a shape",
-    "actor": "bodies of a scene follow no script",
+    "actor": "a scene has no scripted bodies",
     "state": "a saved state is not read",
     "population": "models are not replicated",
-    "gripper": "a scene has no joints but fixed ones",
+    "gripper": "a scene has no joints except fixed ones",
     "fluid_added_mass": "a scene has neither wind nor water",
-    "torsional": "torsional friction has no place in a scene",
-    "contact": "what Gazebo's engines alone read of contacts is not read",
+    "torsional": "a scene has no torsional friction",
+    "contact": "contact elements of Gazebo's engines are not read",
     "soft_contact": "bodies of a scene are rigid",
-    "bullet": "what Bullet alone reads is not read",
+    "bullet": "Bullet's own elements are not read",
     "density": "masses are not computed from densities",
 }
 #: Why another element is refused.
-NOWHERE = "there is no place for it in a scene"
-#: Attributes that are read.
+NOWHERE = "a scene has no such element"
+#: Supported attributes.
 ATTRIBUTES = frozenset(
     ("name", "version", "relative_to", "degrees", "rotation_format", "canonical_link", "placement_frame", "attached_to",
      "type", "default")
 )  # fmt: skip
-#: Numbers of friction that must be alike, and what they are.
+#: Friction values that must be equal, and their meaning.
 FRICTION = {
     "ode": ("mu", "mu2", "in two directions"),
     "drake:proximity_properties": ("drake:mu_static", "drake:mu_dynamic", "at rest and in motion"),
 }
-#: Friction that a shape has which states none. [SDFormat 1.12, <mu>]
+#: Friction of a shape without a stated value. [SDFormat 1.12, <mu>]
 FRICTIONAL = 1.0
 
 
 @dataclass
 class Stated:
-    """What a model says beside its bodies.
+    """Statements of a model beside its bodies.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class Stated:
     step
         [s]
     dropped, notes
-        What was left out, and what a reader of results must know.
+        Dropped elements, and notes for a reader of results.
     """
 
     gravity: tuple[float, ...] = GRAVITY
@@ -184,7 +184,7 @@ class Stated:
 
 
 def child(element: Element, *tags: str) -> Element | None:
-    """The first child with that tag, of that the first child with the next one, and so on."""
+    """The first child with the first tag, its first child with the next one, and so on."""
     found: Element | None = element
     for tag in tags:
         found = next((e for e in found.children if e.tag == tag), None) if found else None
@@ -192,23 +192,23 @@ def child(element: Element, *tags: str) -> Element | None:
 
 
 def is_true(element: Element | None) -> bool:
-    """Whether an element says yes; one that is not there says no."""
+    """Value of a boolean element; a missing one is false."""
     return element is not None and element.text.strip().lower() in _TRUE
 
 
 def told(element: Element) -> Element:
-    """The model as Drake's parser is handed it: without what is read here."""
+    """The model for Drake's parser: without the elements that are read here."""
     children = [told(e) for e in element.children if e.tag not in UNTOLD]
     return Element(element.tag, element.attributes, element.line, children, element.text)
 
 
 def cleaned(root: Element, drop: bool) -> Stated:
-    """Rid the model of what does not move bodies; returns what it says beside them.
+    """Remove elements without effect on motion; returns the statements beside the bodies.
 
     Raises
     ------
     SceneError
-        Naming the first element that has no place in a scene, unless ``drop``; or that says what cannot be meant.
+        Naming the first element that a scene cannot represent, unless ``drop``; or that has an impossible value.
     """
     made = sum(element.tag in ("link", "collision") for element in root.walk())
     if made > MOST_MADE:
@@ -225,7 +225,7 @@ def cleaned(root: Element, drop: bool) -> Stated:
 
 
 def cut(holder: Element, joint: Element) -> None:
-    """Leave out a joint of a model or a world, the link that hangs by it, and all that hangs on that one."""
+    """Drop a joint of a model or a world, its child link, and all links attached to that one."""
     left = [joint]
     while left:
         gone = left.pop()
@@ -240,7 +240,7 @@ def cut(holder: Element, joint: Element) -> None:
 
 
 def _holds(element: Element) -> bool:
-    """Whether it is a joint that lets a link move, but not freely."""
+    """Whether it is a joint with some degrees of freedom, but not six."""
     return element.tag == "joint" and element.attributes.get("type") != "fixed"
 
 
@@ -274,7 +274,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         if _holds(e):
             kind = one_line(e.attributes.get("type", "nameless"), 20)
             line = f"{e}: a {kind} joint holds a link; bodies of a scene are free or fixed"
-            _refuse(line, drop, stated, "; it and what hangs on it")
+            _refuse(line, drop, stated, "; it and all links attached to it")
             kept.append(e)
             continue
         unread = _unread_shape(e)
@@ -283,7 +283,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
             _refuse(f"{unread}: {why}", drop, stated, "; the shape")
             continue
         if not places[e.tag].many and any(other.tag == e.tag for other in kept):
-            raise SceneError(f"model: {e}: stands twice in {element}")
+            raise SceneError(f"model: {e}: is given twice in {element}")
         _check(e, places[e.tag])
         _clean(e, drop, stated)
         kept.append(e)
@@ -294,7 +294,7 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
         raise SceneError(f"model: {kept[1]}: is a second shape" if kept else f"model: {element}: has no shape")
     normal = child(element, "normal") if element.tag == "plane" else None
     if normal and not any(float(word) for word in normal.text.split()):
-        raise SceneError(f"model: {normal}: is no direction")
+        raise SceneError(f"model: {normal}: is not a direction")
     if element.tag == "inertia":
         _check_inertia(element)
     for needed in NEEDED.get(element.tag, ()):
@@ -303,19 +303,19 @@ def _clean(element: Element, drop: bool, stated: Stated) -> None:
 
 
 def _plain(element: Element) -> str:
-    """What an element says, numbers as they are written shortest."""
+    """Content of an element, with numbers in their shortest form."""
     words = element.text.lower().split()
     return " ".join(f"{float(word) + 0.0:g}" if _NUMBER.fullmatch(word) else word for word in words)
 
 
 def _unread_shape(element: Element) -> Element | None:
-    """The shape of a collision that a scene has no place for."""
+    """The shape of a collision that a scene cannot represent."""
     geometry = child(element, "geometry") if element.tag == "collision" else None
     return next((e for e in geometry.children if e.tag not in READ["geometry"]), None) if geometry else None
 
 
 def _check(element: Element, place: Place) -> None:
-    """Raise `SceneError` unless an element has a name that can be shown, attributes that are read, and its numbers."""
+    """Raise `SceneError` unless an element has a printable name, supported attributes, and its numbers."""
     name = element.attributes.get("name", "")
     if not is_visible(name) or len(name) > NAME - 4:
         raise SceneError(f"model: line {element.line}: {one_line(name, 40)!r} cannot be a name")
@@ -338,24 +338,24 @@ def _check(element: Element, place: Place) -> None:
 
 
 def _check_inertia(inertia: Element) -> None:
-    """Raise `SceneError` unless a body can have these moments: none is larger than the other two together."""
+    """Raise `SceneError` unless a body can have these moments: none exceeds the sum of the other two."""
     xx, yy, zz, xy, xz, yz = (
         float(found.text) if (found := child(inertia, tag)) else default for tag, default in MOMENTS.items()
     )
     first, second, third = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     if not first > 0.0 or not third - second - first <= _FLAT * third:
         said = f"{first:.4g}, {second:.4g} and {third:.4g} kg m^2"
-        raise SceneError(f"model: {inertia}: no body has principal moments of {said}")
+        raise SceneError(f"model: {inertia}: a body cannot have principal moments of {said}")
 
 
 def _make_alike(element: Element, drop: bool, stated: Stated) -> None:
-    """Friction is one number: both of a shape's are stated, and the same."""
+    """Friction is one number: a shape's two values are both stated and equal."""
     first, second, how = FRICTION[element.tag]
     found = [child(element, tag) for tag in (first, second)]
     if element.tag != "ode" and None in found:
-        return  # Drake takes the one for both
+        return  # Drake uses the one for both
     a, b = (float(e.text) if e else FRICTIONAL for e in found)
-    # Drake's solvers take what holds in motion; of two directions none is more than the other.
+    # Drake's solvers use kinetic friction; the two directions are equivalent.
     kept, gone = (a, second) if element.tag == "ode" else (b, first)
     if a != b:
         line = f"{element}: friction {a:g} and {b:g} {how}; a scene has one number"
@@ -365,7 +365,7 @@ def _make_alike(element: Element, drop: bool, stated: Stated) -> None:
 
 
 def _state(root: Element, stated: Stated) -> None:
-    """Gravity and step, which Drake's parser leaves unread."""
+    """Gravity and step, which Drake's parser ignores."""
     world = child(root, "world")
     physics = [e for e in world.children if e.tag == "physics"] if world else []
     physics.sort(key=lambda e: e.attributes.get("default", "").lower() not in _TRUE)
@@ -375,7 +375,7 @@ def _state(root: Element, stated: Stated) -> None:
     if gravity is not None:
         stated.gravity = tuple(float(word) + 0.0 for word in gravity.text.split())
     else:
-        stated.notes.append(f"gravity {-GRAVITY[2]:g} m/s^2 down: SDF's own, the model states none")
+        stated.notes.append(f"gravity {-GRAVITY[2]:g} m/s^2 downwards: the default of SDF, the model states none")
     step = child(physics[0], "max_step_size") if physics else None
     if step is not None:
         stated.step = float(step.text)

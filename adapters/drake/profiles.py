@@ -1,7 +1,7 @@
-"""Profiles of Drake: everything alike but the approximation of contact that a step solves.
+"""Profiles of Drake: they differ only in the approximation of contact in a step.
 
 default   Lagged, as shipped: a convex problem whose friction is regularised by the last step's load
-sap       SAP: linear dissipation, and friction that glides
+sap       SAP: linear dissipation, and friction with gliding (separation proportional to slip)
 tamsi     TAMSI: an implicit step by Newton's method, sub-stepped until it converges
 similar   SAP's friction with the dissipation of the others
 """
@@ -33,8 +33,8 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
         "stiction_tolerance": settings.number(1e-12, 1.0),
     }
 )
-#: Setting that a model brings: what each body's contacts are made of, in the order of the bodies. A row is friction;
-#: the kind of surface: ``none``, ``rigid`` or ``compliant``; how finely it is resolved [m]; modulus [Pa]; stiffness of
+#: Setting of a model: contact parameters of each body, in the order of the bodies. A row is friction;
+#: the kind of surface: ``none``, ``rigid`` or ``compliant``; its resolution [m]; modulus [Pa]; stiffness of
 #: a point [N/m]; dissipation [s/m]; relaxation time [s].
 OWN = "own"
 _KINDS_OF_A_ROW: tuple[settings.Check, ...] = (
@@ -46,17 +46,15 @@ _PLANT, _GRAPH = "MultibodyPlantConfig", "SceneGraphConfig.default_proximity_pro
 
 
 def rule(approximation: str, why: str) -> list[Setting]:
-    """Settings with which Drake runs as shipped but for its approximation of contact; boxes have surfaces."""
+    """Drake's settings as shipped except for the approximation of contact; boxes have surfaces."""
     return [
         Setting("approximation", approximation, why, f"{_PLANT}.discrete_contact_approximation"),
-        Setting(
-            "boxes", "hydroelastic", "a pair of shapes has one point of contact otherwise: boxes would rock", _PLANT
-        ),
+        Setting("boxes", "hydroelastic", "otherwise a pair of shapes has one contact point, and boxes rock", _PLANT),
         Setting("point_stiffness", POINT_STIFFNESS, "as shipped: of pairs with a ball [N/m]", _GRAPH),
         Setting("modulus", MODULUS, "as shipped: of free boxes [Pa]", _GRAPH),
         Setting("dissipation", DISSIPATION, "as shipped [s/m]; SAP has its own", _GRAPH),
         Setting("relaxation_time", RELAXATION, "as shipped: SAP's dissipation [s]", _GRAPH),
-        Setting("stiction_tolerance", STICTION, "as shipped: slower slips are viscous [m/s]", _PLANT),
+        Setting("stiction_tolerance", STICTION, "as shipped: friction of slower slips is viscous [m/s]", _PLANT),
     ]
 
 
@@ -66,7 +64,7 @@ def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting
 
 _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "default": partial(_rule, "lagged", "as shipped"),
-    "sap": partial(_rule, "sap", "the convex approximation, solved to its end"),
+    "sap": partial(_rule, "sap", "the convex approximation, solved to convergence"),
     "tamsi": partial(_rule, "tamsi", "the implicit step of earlier releases"),
     "similar": partial(_rule, "similar", "SAP's friction with Hunt's and Crossley's dissipation"),
 }
@@ -74,7 +72,7 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names and numbers the engine can take; see `adapters.settings.checked`. `OWN` may be missing."""
+    """Settings with valid names and values for the engine; see `adapters.settings.checked`. `OWN` may be missing."""
     found = settings.checked("drake", KINDS, {name: value for name, value in asked.items() if name != OWN})
     for row in asked.get(OWN, ()):
         if not isinstance(row, tuple) or len(row) != len(_KINDS_OF_A_ROW):

@@ -1,4 +1,4 @@
-"""A run on Drake as a stand-alone script: what `adapters.drake.simulation` calls, as it is recorded."""
+"""A run on Drake as a stand-alone script: the recorded calls of `adapters.drake.simulation`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from adapters.recording import written
 from adapters.scene import Capsule, Cylinder, Scene
 from adapters.script import constants, imports, literal, stepped, text
 
-#: Variables of a script, and the calls whose values they hold.
+#: Variables of a script, and the calls that return their values.
 _NAMES = {
     "builder": "DiagramBuilder",
     "plant, graph": "AddMultibodyPlantSceneGraph",

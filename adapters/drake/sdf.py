@@ -1,12 +1,12 @@
 """SDF models of free and fixed links with one primitive shape each, as scenes.
 
-    text -> markup.py (numbers checked, nothing from outside, nothing that only draws) -> Drake's parser -> Scene
+    text -> markup.py (checks values, refuses external files, removes drawing) -> Drake's parser -> Scene
 
-Drake's parser is libsdformat's, and strict here: frames and poses are its business, and an inertia that no body has it
-refuses instead of guessing another. What it made must be what a scene can hold: bodies with one shape about their
-centre of mass, free or fixed, which all touch each other. SDF does not say what friction a pair has of its two bodies'
-numbers: the harmonic mean, as in Drake. Contact properties of Drake's own and the step become the settings of the
-profile that runs the model as Drake would; other engines are asked for rigid bodies without rebound.
+Drake's parser is libsdformat's, in strict mode: it resolves frames and poses, and refuses impossible inertias instead
+of replacing them. The result must fit into a scene: bodies with one shape about their centre of mass, free or fixed,
+which all may touch each other. SDF does not define the friction of a pair from its bodies' values: the harmonic mean,
+as in Drake. Drake's own contact properties and the step become settings of the profile that runs the model as Drake
+would; other engines run it with rigid bodies without restitution.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, 
 from adapters.plain import one_line
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, SceneError, Shape, Sphere
 
-#: Where Drake's parser says that something is wrong: the text that it is handed keeps its lines.
+#: Line in an error of Drake's parser: its text has the same lines as the model.
 _WHERE = re.compile(r"^(?:<[\w-]+>(?:\.sdf)?:(?P<line>\d+): )?(?:error: )?(?:Error: )?")
 
 
 class _Refused(Exception):
-    """Elements have no place in a scene.
+    """Elements that a scene cannot represent.
 
     Parameters
     ----------
     found
-        Each with what holds it, and why in half a sentence.
+        Each with its parent, and a short reason.
     """
 
     def __init__(self, *found: tuple[Element, Element, str]) -> None:
@@ -48,7 +48,7 @@ class _Refused(Exception):
 
 @dataclass(frozen=True)
 class _Part:
-    """One shape that touches, with the elements that state it."""
+    """One collision shape, with its elements."""
 
     model: Element
     link: Element
@@ -64,7 +64,7 @@ def read(text: str, drop: bool) -> Model:
     Raises
     ------
     SceneError
-        Naming the element that has no place in a scene, or with the parser's complaint.
+        Naming the element that a scene cannot represent, or with the parser's message.
     """
     root = parsed(text, "sdf", "a model of SDF begins with <sdf>")
     stated = cleaned(root, drop)
@@ -86,13 +86,13 @@ def read(text: str, drop: bool) -> Model:
 
 
 def _drop_empty(root: Element) -> None:
-    """A model of which all links were left out is none."""
+    """Drop a model without links."""
     for holder in [e for e in root.walk() if e.tag in ("sdf", "world")]:
         holder.children = [e for e in holder.children if e.tag != "model" or child(e, "link")]
 
 
 class _Reading:
-    """One attempt at a model, which either succeeds or says what stands in its way."""
+    """One attempt at a model, which either succeeds or raises with all obstacles."""
 
     def __init__(self, root: Element, drop: bool, stated: Stated) -> None:
         import pydrake.geometry
@@ -100,7 +100,7 @@ class _Reading:
         import pydrake.multibody.plant
         import pydrake.systems.framework
 
-        # Its stubs know no arrays as NumPy types them.
+        # Its stubs have no NumPy array types.
         self.drake: Any = pydrake.geometry
         builder: Any = pydrake.systems.framework.DiagramBuilder()
         plant: Any
@@ -110,7 +110,7 @@ class _Reading:
         try:
             parser.AddModelsFromString(text_of(told(root)), "sdf")
             plant.Finalize()
-        except (RuntimeError, ValueError, SystemExit) as error:  # it leaves where its C++ would end the process
+        except (RuntimeError, ValueError, SystemExit) as error:  # it raises where its C++ would abort the process
             raise SceneError(f"model: Drake does not read it: {_complaint(error)}") from None
         self.root, self.drop, self.stated, self.plant = root, drop, stated, plant
         self.diagram = builder.Build()
@@ -126,29 +126,31 @@ class _Reading:
         Raises
         ------
         _Refused
-            Naming what has no place in one.
+            Naming elements that a scene cannot represent.
         """
         self._joints()
         parts = list(self._parts())
         self._links(parts)
         if not any(part.free for part in parts):
-            raise SceneError("model: has no free body: nothing can move")
+            raise SceneError("model: has no free body, so nothing can move")
         names = unique(self._name(part, parts) for part in parts)
         dropped = list(self.stated.dropped) + list(self._apart(parts))
         bodies = tuple(self._bodies(parts, names))
         self._defaults(parts, names)
         scene = Scene(self._title(), 1, 3, bodies, self._pairs(parts, bodies), self.stated.gravity, DURATION)
-        self.notes.append("restitution 0 in all engines: Drake's contacts have none, and a model's own is refused")
+        self.notes.append(
+            "restitution 0 in all engines: Drake's contacts have none, and a model that states it is refused"
+        )
         return Model(scene, tuple(self.notes), tuple(dropped), tuple(self._settings(parts)), self.stated.step)
 
     def _title(self) -> str:
         named = next(e for e in self.root.children if e.tag in ("world", "model"))
         return one_line(named.attributes.get("name", ""), 60) or "model"
 
-    # ---- what there is ----
+    # ---- elements ----
 
     def _joints(self) -> None:
-        """A fixed joint holds its link to the world; two links that move as one are no body of a scene."""
+        """A fixed joint holds its link to the world; two rigidly joined moving links are no body of a scene."""
         plant = self.plant
         held = [
             (joint.name(), plant.GetModelInstanceName(joint.model_instance()))
@@ -160,14 +162,14 @@ class _Reading:
             for e in [e for e in holder.children if e.tag == "joint"]:
                 name = e.attributes.get("name")
                 if (name, holder.attributes["name"]) in held or (holder.tag == "world" and name in dict(held)):
-                    found.append((holder, e, "holds two links together that move; a scene's body is one link"))
+                    found.append((holder, e, "connects two moving links; a scene's body is one link"))
         if found:
             raise _Refused(*found)
         if held:
-            raise SceneError(f"model: {one_line(held[0][0], 60)}: holds two links together that move")
+            raise SceneError(f"model: {one_line(held[0][0], 60)}: connects two moving links")
 
     def _parts(self) -> Iterator[_Part]:
-        """Shapes that touch, in the order of the text."""
+        """Collision shapes, in the order of the text."""
         plant, inspector = self.plant, self.inspector
         found = {}
         for geometry in inspector.GetAllGeometryIds(self.drake.Role.kProximity):
@@ -180,7 +182,7 @@ class _Reading:
                 for shape in (e for e in link.children if e.tag == "collision"):
                     path = (model.attributes["name"], link.attributes["name"], shape.attributes["name"])
                     if path not in found:
-                        raise SceneError(f"model: {shape}: is no shape of Drake's")
+                        raise SceneError(f"model: {shape}: is not a shape of Drake")
                     body, geometry = found[path]
                     yield _Part(model, link, shape, body, geometry, not plant.IsAnchored(body))
 
@@ -194,13 +196,13 @@ class _Reading:
                 own = count[id(link)]
                 if own == 1 or self.plant.IsAnchored(self.plant.GetBodyByName(link.attributes["name"], instance)):
                     continue
-                why = "has several shapes that touch; a scene's body has one" if own else "has no shape that touches"
+                why = "has several shapes that collide; a scene's body has one" if own else "has no shape that collides"
                 found.append((model, link, why))
         if found:
             raise _Refused(*found)
 
     def _name(self, part: _Part, parts: list[_Part]) -> str:
-        """The shortest of model, model::link and model::link::collision that is its own."""
+        """The shortest unique one of model, model::link and model::link::collision."""
         words = [e.attributes["name"] for e in (part.model, part.link, part.collision)]
         for count, element in ((1, part.model), (2, part.link)):
             if sum(element is other.model or element is other.link for other in parts) == 1:
@@ -208,16 +210,19 @@ class _Reading:
         return "::".join(words)
 
     def _apart(self, parts: list[_Part]) -> Iterator[str]:
-        """Links of one model touch each other only where the model says so."""
+        """Links of one model touch each other only if the model says so."""
         for model in self.models.values():
             own = [part for part in parts if part.model is model]
             shy = {part.link.attributes["name"]: part.free for part in own if not _touches(part.link)}
             if _touches(model) or len(shy) < 2 or not any(shy.values()):
                 continue
-            line = f"{model}: its links pass through each other, self_collide is not true; in a scene all bodies touch"
+            line = (
+                f"{model}: its links do not collide with each other, as self_collide is not true; in a scene all "
+                "bodies can collide"
+            )
             if not self.drop:
                 raise SceneError(f"model: {line}")
-            yield f"{line}; that they pass"
+            yield f"{line}; that they do not collide"
 
     # ---- bodies ----
 
@@ -272,7 +277,7 @@ class _Reading:
             if not isinstance(shape, Sphere):
                 why = "its principal axes are not its shape's; a scene's body has both in one direction"
                 raise _Refused((part.model, part.link, why))
-            axes = np.linalg.eigh(about)[1]  # a ball has no axes but those of its inertia
+            axes = np.linalg.eigh(about)[1]  # the only axes of a ball are those of its inertia
             axes[:, 2] *= np.linalg.det(axes)
             moments, turn = axes.T @ about @ axes, held.rotation().matrix() @ axes
         first, second, third = _numbers(np.diag(moments))
@@ -285,18 +290,20 @@ class _Reading:
         return unit(pydrake.math.RotationMatrix(turn).ToQuaternion().wxyz())
 
     def _defaults(self, parts: list[_Part], names: list[str]) -> None:
-        """Say what was filled in."""
+        """Note the default values."""
         free = [(part, name) for part, name in zip(parts, names, strict=True) if part.free]
         for what, tags in (("mass 1 kg", ["mass"]), ("moments of inertia 1 kg m^2", ["ixx", "iyy", "izz"])):
             stated = [{e.tag for e in part.link.walk()} for part, _ in free]
             of = [name for (_, name), said in zip(free, stated, strict=True) if not said.issuperset(tags)]
             if of:
-                self.notes.append(f"{what} of {one_line(', '.join(of), 120)}: SDF's own, the model states none")
+                self.notes.append(
+                    f"{what} of {one_line(', '.join(of), 120)}: the default of SDF, the model states none"
+                )
         if any(
             child(part.collision, "surface", "friction") is None and not _drakes(part, "drake:mu_dynamic")
             for part in parts
         ):
-            self.notes.append("friction 1 of shapes that state none: SDF's own")
+            self.notes.append("friction 1 of shapes that state none: the default of SDF")
 
     # ---- contacts ----
 
@@ -315,15 +322,20 @@ class _Reading:
                 if a.free or parts[j].free:
                     found[i, j] = own[i] if own[i] == own[j] else pair_of(own[i], own[j])
         if len(set(own)) > 1:
-            self.notes.append("friction of a pair is the harmonic mean of its bodies', as in Drake: SDF does not say")
+            self.notes.append(
+                "friction of a pair is the harmonic mean of its bodies' values, as in Drake; SDF does not define it"
+            )
         return pairs_of(found, bodies)
 
     def _settings(self, parts: list[_Part]) -> Iterator[Setting]:
-        """As Drake ships, with what the shapes' contacts say."""
+        """Drake's defaults with the contact properties of the shapes."""
         for setting in rule("lagged", "as shipped"):
             if setting.name == "boxes":
                 yield Setting(
-                    "boxes", "point", "as shipped: shapes that state no surface touch in a point", setting.source
+                    "boxes",
+                    "point",
+                    "as shipped: shapes without a stated surface have one contact point",
+                    setting.source,
                 )
             else:
                 yield setting
@@ -337,7 +349,7 @@ class _Reading:
             raise SceneError(f"model: {part.collision}: its surface is both rigid and compliant")
         kind = kinds[0] if kinds else "none"
         if kind == "compliant" and isinstance(self._shape(part.geometry), HalfSpace):
-            raise SceneError(f"model: {part.collision}: a plane that gives has a thickness, which is not read")
+            raise SceneError(f"model: {part.collision}: a compliant plane has a thickness, which is not read")
         numbers = [self._property(part, "hydroelastic", name) for name in ("resolution_hint", "hydroelastic_modulus")]
         names = ("point_contact_stiffness", "hunt_crossley_dissipation", "relaxation_time")
         numbers += [self._property(part, "material", name) for name in names]
@@ -358,7 +370,7 @@ def _numbers(values: Any) -> tuple[float, ...]:
 
 
 def _complaint(error: BaseException) -> str:
-    """What the parser says, with the line in the model instead of its own name for the text."""
+    """The parser's message, with the line in the model instead of its own name for the text."""
     said = one_line(" ".join(str(error).split()), 300)
     where = _WHERE.match(said)
     line = f"line {where['line']}: " if where and where["line"] else ""

@@ -1,4 +1,4 @@
-"""One Drake plant and what is read from it: contacts are solved where the step begins, velocities before positions."""
+"""One Drake plant and its readings: contacts are found at the start of the step, velocities come before positions."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Spher
 
 
 class DrakeSimulation(Simulation):
-    """One plant and its simulator; bodies in the scene's order, what is fixed belongs to the world.
+    """One plant and its simulator; bodies in the scene's order, fixed ones belong to the world.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
@@ -74,7 +74,7 @@ class DrakeSimulation(Simulation):
         elif isinstance(shape, Capsule | Cylinder):
             kind = drake.Capsule if isinstance(shape, Capsule) else drake.Cylinder
             made = kind(shape.radius, 2.0 * shape.half_length)
-            # Theirs lie along z, the scene's along x.
+            # Drake's lie along z, the scene's along x.
             place = place.multiply(drake.RigidTransform(drake.RotationMatrix.MakeYRotation(0.5 * np.pi), np.zeros(3)))
         else:
             assert isinstance(shape, Box)
@@ -84,7 +84,7 @@ class DrakeSimulation(Simulation):
         return body
 
     def _held(self, index: int, shape: Any) -> Any:
-        """What a body's contacts are made of."""
+        """Contact parameters of a body."""
         drake, held = self.drake, self.drake.ProximityProperties()
         friction, kind, resolution, modulus, stiffness, dissipation, relaxation = self.materials[index]
         drake.AddContactMaterial(
@@ -103,7 +103,7 @@ class DrakeSimulation(Simulation):
         return held
 
     def _load(self) -> None:
-        """Forces and torques of the scene, for good."""
+        """Constant forces and torques of the scene."""
         drake, loads = self.drake, []
         for body, asked in zip(self.bodies, self.scene.bodies, strict=True):
             if asked.motion == "free" and (any(asked.force) or any(asked.torque)):
@@ -175,7 +175,7 @@ class DrakeSimulation(Simulation):
         return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
-        """What the plant, its bodies and their shapes hold."""
+        """Values of the plant, its bodies and their shapes."""
         plant, inspector = self.plant, self.graph.model_inspector()
         held = {index: inspector.GetProximityProperties(geometry) for geometry, index in self.owner.items()}
         own = [
@@ -205,12 +205,12 @@ class DrakeSimulation(Simulation):
 
 
 def made_of(scene: Scene, settings: Mapping[str, Any]) -> list[tuple[Any, ...]]:
-    """What each body's contacts are made of, a row like those of `OWN`: what its model says, or the settings.
+    """Contact parameters of each body, a row as in `OWN`: from its model, or from the settings.
 
     Raises
     ------
     EngineError
-        If a model's rows are not one for each body.
+        If the number of a model's rows differs from that of the bodies.
     """
     own = settings.get(OWN)
     if own is not None and len(own) != len(scene.bodies):

@@ -1,4 +1,4 @@
-"""Friction of pairs as one number per body: Drake takes the harmonic mean of two, 2 a b/(a + b)."""
+"""Friction of pairs from one value per body: Drake uses the harmonic mean of two, 2 a b/(a + b)."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
 
-#: What a quotient may miss of a number, and what the solution of a linear system in such numbers.
+#: Round-off of a quotient, and of the solution of a linear system in such numbers.
 ROUNDING, SOLVED = 1e-15, 1e-13
-#: Of more bodies no system is solved: it has a row for each pair.
+#: Largest number of bodies of the linear system, which has a row for each pair.
 MOST_BODIES = 64
 
 
 def pair_of(a: float, b: float) -> float:
-    """Friction of a pair of two bodies' numbers."""
+    """Friction of a pair from two bodies' values."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
 def frictions(scene: Scene) -> list[float] | None:
-    """Numbers whose harmonic means are the pairs' friction; None if there are none.
+    """Values whose harmonic means are the pairs' friction; None if there are none.
 
-    The largest of each body's pairs, if that does; else reciprocals solve a linear system, ``1/a + 1/b = 2/f``.
+    The largest of each body's pairs, if that suffices; else reciprocals solve a linear system, ``1/a + 1/b = 2/f``.
     """
     return representable(scene, lambda pairs: _largest(scene, pairs) or _solved(scene, pairs))
 

@@ -1,4 +1,4 @@
-"""What Drake does when nothing is set; see `adapters.unset`."""
+"""Drake without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from adapters.unset import (
     Unset,
 )
 
-#: Half thickness of the box that is the ground [m].
+#: Half thickness of the ground's box [m].
 DEPTH = 5.0
-#: Friction of a pair where nothing is set.
+#: Default friction of a pair.
 FRICTION = 0.5
 
 
 class Bare:
-    """A plant with one body above a box that belongs to the world; its mass is 1 kg, as there is none unless told.
+    """A plant with one body above a box of the world; its mass is 1 kg, because there is no default.
 
     ``pull`` is an acceleration along the ground [m/s^2], given with gravity.
     """
@@ -106,15 +106,15 @@ def _stiffness() -> float:
 def _viscous() -> float:
     """Slip [m/s] at which friction is mu N/sqrt(2): it is mu N s/sqrt(s^2 + v^2), with v the tolerance.
 
-    Friction of a rolling ball is two sevenths of what pulls at it.
+    Friction of a rolling ball is two sevenths of the pull.
     """
     world = Bare(Asked(gap=0.0, gravity=GRAVITY), pull=3.5 * FRICTION * GRAVITY / math.sqrt(2.0))
     world.advance(round(SLIDE_TIME / world.dt))
     return world.slip
 
 
-#: A ball, as a box has one point of contact, over whose corners it rocks; so fast that it does not roll within a time
-#: in which friction that is a step late hardly matters [m/s, s].
+#: A ball, because a box has one point of contact and rocks; so fast that it does not roll within a time in which one
+#: step of delay of friction is negligible [m/s, s].
 _SLIDE: tuple[Any, ...] = ("ball", 30.0, 0.25)
 _PROPERTIES, _CONFIG = "SceneGraphConfig.default_proximity_properties", "MultibodyPlantConfig"
 _LEAVES = f"{_PROPERTIES}, hunt_crossley_dissipation"
@@ -125,7 +125,7 @@ UNSET = (
     Unset("friction of 0.2 and 0.9", "0.327, the harmonic mean", _PAIR, 0.36 / 1.1,
           partial(unset.friction, Bare, FRICTIONS, *_SLIDE)),
     Unset("friction is viscous below [m/s]", f"{STICTION:g}: stiction_tolerance", _CONFIG, STICTION, _viscous, 1e-6),
-    Unset("restitution of a pair at 5 m/s", f"no such number: what leaves has at most 1/{DISSIPATION:g} m/s", _LEAVES,
+    Unset("restitution of a pair at 5 m/s", f"no such number: bodies leave with up to 1/{DISSIPATION:g} m/s", _LEAVES,
           1.0 / DISSIPATION / BLOW_SPEED, partial(unset.restitution, Bare), 1e-4),
     Unset("linear damping [1/s]", "0", _CONFIG, 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", _CONFIG, 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
@@ -134,9 +134,9 @@ UNSET = (
           partial(unset.reach, _sees), 1e-12),
     Unset("stiffness of a contact [N/m]", f"{0.5 * POINT_STIFFNESS:g}: two of {POINT_STIFFNESS:g} in series",
           f"{_PROPERTIES}, point_stiffness", 0.5 * POINT_STIFFNESS, _stiffness, 1.0),
-    Unset("gap below a box on a box after 2 s [m]", "not documented: they have one point of contact, and it sinks",
+    Unset("gap below a box on a box after 2 s [m]", "not documented: they have one contact point, and it sinks in",
           f"{_CONFIG}, contact_model", None, partial(unset.rest, Bare)),
-    Unset("left of 0.2 m of overlap [m]", f"0.16: pushed out by at most 1/{DISSIPATION:g} m/s in 2 s", _LEAVES,
+    Unset("left of 0.2 m of overlap [m]", f"0.16: corrected at up to 1/{DISSIPATION:g} m/s in 2 s", _LEAVES,
           DEEP - SETTLING / DISSIPATION, partial(unset.left, Bare), 1e-3),
     Unset("gravity, upwards [m/s^2]", "-9.81", "UniformGravityFieldElement", -9.81, partial(unset.gravity, Bare), 1e-9),
     Unset("step [s]", "0.001: time_step", _CONFIG, 0.001, lambda: Bare(Asked()).dt, 1e-12),

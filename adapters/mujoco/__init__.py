@@ -1,12 +1,12 @@
-"""MuJoCo (`mujoco-core` or `mujoco`, >= 4.0.1); what stands where is told in `adapters.engine_folder`.
+"""MuJoCo (`mujoco-core` or `mujoco`, >= 4.0.1); `adapters.engine_folder` describes the files.
 
-shipped        numbers of MuJoCo itself, and the releases that were looked at
+shipped        constants of MuJoCo, and the checked releases
 profiles       settings with their reasons
-pairs          what a setting means for a pair of materials
+pairs          meaning of settings for a pair of materials
 spec           a scene as MuJoCo's own model
 simulation     one model and its data
 engine         the adapter
-releases       what older releases do differently, and how that is handled
+releases       differences of older releases, and their handling
 contact_law    one contact, as a scalar recurrence; box_on_face, ball_on_face, blows and motions build on it
 """
 

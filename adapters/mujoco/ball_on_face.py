@@ -4,8 +4,8 @@
         |     |
         +-----+------> x     state  x, z, theta (counter-clockwise), vx, vz, omega
 
-The cone is convex and knows no complementarity: a contact that slips on its edge pushes along ``n - mu t``, so that
-stopping the slip also lifts the ball.
+The cone is convex, without complementarity: a contact that slips on its edge pushes along ``n - mu t``, so stopping the
+slip also lifts the ball.
 
 Source: MuJoCo documentation, "Computation: constraint model", friction cones and primal problem.
 """
@@ -38,9 +38,9 @@ from adapters.mujoco.predictions import (
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 
-#: Metrics that are ways, and those that are accelerations over half a run; all others are speeds, times and ratios.
+#: Metrics that are distances, and those that are accelerations over half a run; others are speeds, times and ratios.
 WAYS, ACCELERATIONS = ("rolling_place", "hop"), ("acceleration", "turning")
-#: Of these and of speeds, what is read from the spin, at the surface.
+#: Of these and of speeds, those from the spin, at the surface.
 SPINS = ("turning", "spin_speed")
 
 
@@ -62,7 +62,7 @@ def _path(ball: BallOnFace, steps: int, height: float, twist: Triple) -> Array:
 
 
 def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
-    """The problem of a scene with one ball and one rough face, or None if it is not that."""
+    """The problem of a scene with one ball and one rough face; None for other scenes."""
     if len(scene.bodies) != 2:
         return None
     face, body = scene.bodies
@@ -86,9 +86,9 @@ def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
 
 
 def rolling_law(profile: str, metric: str) -> Law:
-    """A ball on a level face that moves and turns in one upright plane, measured like the engine's own.
+    """Prediction for a ball on a level face that moves and turns in one upright plane, measured like the engine's run.
 
-    An elliptic cone does not know the heading; a pyramid does, and the law is silent off its axes.
+    An elliptic cone does not depend on the heading; a pyramid does, and there is no prediction off its axes.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -117,13 +117,13 @@ def rolling_law(profile: str, metric: str) -> Law:
         if value is None or None in others:
             return None
         spread = max(abs(other - value) for other in others if other is not None)
-        # One step of the solver is off by `off` in speed: that over the whole run in place. In each step anew it is an
-        # acceleration, at most that of all in the same direction; of speeds and times it is as likely of either sign.
+        # One step of the solver has an error `off` in speed, which over the run is an error in position. Repeated in
+        # each step it is at most a constant acceleration; in speeds and times either sign is as likely.
         unit = scene.duration if metric in WAYS else 1.0 / dt if metric in ACCELERATIONS else 1.0
         share = turn * ball.half_height if metric in SPINS else off
         floor = (share + EPS / (1.0 - ball.law.impedance.deep)) * unit
         factor = max(SPREAD_FACTOR, math.sqrt(steps))
-        # On the edge between two paths (one hop more or less) the engine takes either.
+        # Between two paths (one hop more or less) the engine may take either.
         if spread > BLURRED * abs(value):
             return (value, 2.0 * spread + floor) if spread <= EITHER * abs(value) else None
         return value, factor * spread + floor

@@ -1,4 +1,4 @@
-"""MuJoCo's laws of a box that slides to a stop, asked of one that a belt takes along."""
+"""MuJoCo's laws of a box that slides to a stop, for a box on a belt."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from adapters.mujoco.predictions import stopping_law
 from adapters.scene import HalfSpace, Scene
 from adapters.trajectory import Measured, Trajectory
 
-#: What is told of a box on a belt, and what that is called of a box that slides to a stop.
+#: Metrics of a box on a belt, and their names for a box that slides to a stop.
 SEEN_AS = {"slipped": "stopping_distance", "pull": "braking"}
 
 
 def on_a_belt(profile: str, metric: str) -> Law:
-    """The law of a slide to a stop, asked of the belt's frame: friction knows velocities against the surface only."""
+    """The law of a slide to a stop in the belt's frame, as friction depends on the velocity relative to the surface."""
     inner = stopping_law(profile, SEEN_AS.get(metric, metric))
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -35,7 +35,7 @@ def on_a_belt(profile: str, metric: str) -> Law:
 
 
 def _from_the_belt(scene: Scene) -> Scene | None:
-    """The scene as it is seen by who goes with the belt, the first body; None if that is no half-space that stands."""
+    """The scene in the frame of the belt, the first body; None if that is not a half-space at rest."""
     belt = scene.bodies[0]
     if not any(belt.surface_velocity) or not isinstance(belt.shape, HalfSpace) or belt.motion != "fixed":
         return None

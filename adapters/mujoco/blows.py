@@ -1,10 +1,10 @@
 """MuJoCo's contact law for a blow between bodies without a load: one recurrence of the closing speed.
 
-Whatever two bodies meet at a fixed point along a fixed normal, their closing speed u follows the scalar law of one
-contact: with A the inverse mass at the point, ``du = dt A f``, ``f = (aref - a)/R``, ``R = (1 - d)/d s D/n``. D is
-what the engine takes for A, the sum of the bodies' translational inverse masses; n contacts side by side share the
-force. Central blows have D = A; beside the centre the engine is softer by D/A than it should be, and a box that lands
-on four corners stiffer by 4. How far the law is from restitution is thus of order 1 - d.
+For two bodies with a contact at a fixed point and normal, the closing speed u follows the scalar law of one contact:
+with A the inverse mass at the point, ``du = dt A f``, ``f = (aref - a)/R``, ``R = (1 - d)/d s D/n``. D is the engine's
+estimate of A, the sum of the bodies' translational inverse masses; n contacts side by side share the force. Central
+blows have D = A; beside the centre the engine is softer by D/A, and a box that lands on four corners stiffer by 4. The
+deviation from restitution is thus of order 1 - d.
 
     head_on      D = A, n = 1         off_centre   D < A, n = 1
     flat_box     D = A, n = 4         edge_drop    D < A, n = 2
@@ -25,7 +25,7 @@ from adapters.stepping import step_count
 
 @dataclass(frozen=True)
 class Turning:
-    """A bar that spins under a ball: its spin [rad/s], where the ball is over its centre [m], how fast it comes [m/s].
+    """A bar that spins under a ball: its spin [rad/s], the ball's place over its centre [m], the ball's speed [m/s].
 
     ``moment`` [kg m^2] is the bar's, ``lightness`` [1/kg] the sum of both inverse masses.
     """
@@ -46,7 +46,7 @@ class Turning:
 
 @dataclass(frozen=True)
 class Blow:
-    """What a blow is, read off a scene.
+    """A blow of a scene.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class Blow:
     inverse_mass, estimate
         A and D of the module's text [1/kg].
     contacts
-        How many contacts share it.
+        Number of contacts that share it.
     turning
-        What is struck turns meanwhile; None if it does not.
+        Rotation of the struck body meanwhile; None if it does not rotate.
     """
 
     gap: float
@@ -68,7 +68,7 @@ class Blow:
     turning: Turning | None = None
 
     def as_found(self, dt: float) -> Blow:
-        """The blow at the first step that begins in it: what turns has another arm and normal there."""
+        """The blow at the first step that begins in it, where a rotating body has another lever arm and normal."""
         if self.turning is None:
             return self
         reached = self.gap / self.closing / dt
@@ -77,11 +77,11 @@ class Blow:
 
     @property
     def energy(self) -> float:
-        """Energy of the closing speed, u^2/2A [J]: all that a blow can take."""
+        """Energy of the closing speed, u^2/2A [J], the largest loss of a blow."""
         return 0.5 * self.closing**2 / self.inverse_mass
 
     def after(self, law: ContactLaw, steps: int, moved: float = 0.0) -> float:
-        """Speed with which the bodies part [m/s], for a gap that is ``moved`` [m] larger."""
+        """Separation speed [m/s], for a gap that is ``moved`` [m] larger."""
         soft = replace(law, softness=law.softness * self.estimate / self.inverse_mass / self.contacts)
         gap, speed = self.gap + moved, -self.closing
         for _ in range(steps):
@@ -90,7 +90,7 @@ class Blow:
 
 
 def blow_of(scene: Scene) -> Blow | None:
-    """The blow of a scene with two bodies that meet once without a load; None if it is not of that kind."""
+    """The blow of a scene with two bodies that collide once without a load; None for other scenes."""
     if len(scene.bodies) != 2 or any(scene.gravity):
         return None
     d, (first, second) = scene.dimension, scene.bodies
@@ -123,7 +123,7 @@ def steps_of(scene: Scene, dt: float) -> int:
 
 
 def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
-    """Metrics of a scene whose bodies part with ``after`` [m/s]: the blow fixes the impulse, and that everything."""
+    """Metrics of a scene whose bodies separate with ``after`` [m/s], which determines everything else."""
     p, impulse = scene.params, (blow.closing + after) / blow.inverse_mass
     made: dict[str, Callable[[], dict[str, float]]] = {
         "head_on": lambda: {
@@ -147,7 +147,7 @@ def metrics_of(scene: Scene, blow: Blow, after: float) -> dict[str, float]:
         },
     }
     found = made[scene.name]() if scene.name in made else {}
-    # Where a body turns, all but the share that is lost depends on when within a step the two are found.
+    # Where a body turns, everything except the lost share depends on the phase of the step.
     return {"energy_lost": found["energy_lost"]} if blow.turning and found else found
 
 
@@ -157,7 +157,7 @@ def moment_of(body: Body) -> float:
 
 
 def edge_of(box: Body) -> tuple[float, float]:
-    """Lowest edge of a box that is turned in the plane of motion: along the floor from the centre, and below it [m]."""
+    """Lowest edge of a box rotated in the plane of motion: along the floor from the centre, and below it [m]."""
     assert isinstance(box.shape, Box)
     turn = box.pose[2] if len(box.pose) == 3 else -2.0 * math.atan2(box.pose[5], box.pose[3])
     c, s = math.cos(turn), math.sin(turn)

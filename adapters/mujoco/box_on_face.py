@@ -1,8 +1,8 @@
-"""MuJoCo's contact law for one box on a level face, in the plane: what a box on an incline does, step by step.
+"""MuJoCo's contact law for one box on a level face, in 2-D: the motion of a box on an incline, step by step.
 
       z ^   +-------+         state  x, z, theta (counter-clockwise), vx, vz, omega
         |   |   o   |         per unit of mass, inertia i = I/m
-        |   +-------+         each lower corner of the figure stands for two of the box
+        |   +-------+ each lower corner of the figure is two of the box
         +--------------> x
 
 One step minimises over accelerations a
@@ -13,9 +13,9 @@ with s(jar) = 1/2 D jar^2 over the rows that push. Four edges ``n +- mu t``, ``n
 contact has a normal and a friction row and, outside its cone, acts along the cone's edge only. The minimum is found by
 Newton's method on three unknowns: the cost is convex and made of quadratic pieces.
 
-Longer than a law is meant to be: it explains 70 rows of the standard suite, of what creeps, hops and stops in incline,
-pressed_box, tilt_table, slide, far_origin and conveyor, at any step.
-[MuJoCo documentation, "Computation: constraint model", friction cones and primal problem]
+Longer than other laws: it explains 70 rows of the standard suite, of creep, hops and stops in incline, pressed_box,
+tilt_table, slide, far_origin and conveyor, at any step. [MuJoCo documentation, "Computation: constraint model",
+friction cones and primal problem]
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ Row = tuple[tuple[float, float, float], float, float]
 Triple = tuple[float, float, float]
 #: Lower triangle of a symmetric 3 x 3 matrix, row by row.
 Lower = tuple[float, float, float, float, float, float]
-#: Newton steps and halvings of a step: three unknowns and at most sixteen rows settle in a handful.
+#: Newton steps and halvings of a step: three unknowns and at most sixteen rows converge in a handful.
 NEWTON_STEPS, HALVINGS = 60, 40
 #: A gradient this small against the forces in it is round-off.
 SOLVED = 1e-13
-#: A step that lowers the cost by less than this share cannot be judged by the cost: it is the last one.
+#: A step that lowers the cost by less than this share is the last one, as the cost cannot judge it.
 UNSEEN = 1e-15
 
 
@@ -59,7 +59,7 @@ class BoxOnFace:
     load
         Acceleration without contact, along and up [m/s^2].
     share
-        Contacts of the engine that each contact of the figure stands for.
+        Number of the engine's contacts for each contact of the figure.
     """
 
     law: ContactLaw
@@ -190,7 +190,7 @@ class BoxOnFace:
     def _model(self, parts: list[list[Row]], free: Triple, a: Triple) -> tuple[float, Triple, Lower]:
         """Cost, gradient and Hessian at ``a``.
 
-        Written out: a run is judged by half a million of these, and loops over three unknowns take twice the time.
+        Written out, as a run takes half a million of these, and loops over three unknowns take twice the time.
         """
         a0, a1, a2 = a
         o0, o1, o2 = a0 - free[0], a1 - free[1], a2 - free[2]

@@ -1,8 +1,8 @@
-"""How MuJoCo combines what two geoms say of their contact.
+"""MuJoCo's combination of two geoms' contact parameters.
 
-[MuJoCo documentation: computation/contact parameters] The geom of higher ``priority`` decides alone. Otherwise the
+[MuJoCo documentation: computation/contact parameters] The geom of higher ``priority`` alone counts. Otherwise the
 dimension and the coefficients of friction are the larger ones; ``solref`` and ``solimp`` are weighted by ``solmix``
-(``solref`` in the direct format: the smaller ones); margins add up. A stated pair decides over both.
+(``solref`` in the direct format: the smaller ones); margins add up. A stated pair overrides both.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Contact:
     softness
         ``solref``, ``solimp``, ``solreffriction`` (None: as ``solref``), ``margin`` [m].
     refusal
-        What a scene has no word for; empty if it has all.
+        What a scene cannot express; empty if it can.
     """
 
     condim: int
@@ -84,11 +84,11 @@ def _share(first: float, second: float) -> float:
 
 
 def _moves_along(model: Any, a: int, b: int) -> str:
-    """What newer releases add to a contact, and no scene has."""
+    """Contact parameters of newer releases that no scene has."""
     for name in ("geom_surfacevel", "geom_adhesion"):
         values = getattr(model, name, None)
         if values is not None and (np.any(values[a]) or np.any(values[b])):
-            return f"{name.removeprefix('geom_')}: a scene's surfaces neither move nor stick by themselves"
+            return f"{name.removeprefix('geom_')}: a scene's surfaces have no motion or adhesion of this kind"
     return ""
 
 
@@ -105,11 +105,11 @@ def _contact(
     if condim >= 3 and friction[0] != friction[1]:
         refusal = "friction differs by direction; a scene's is the same in all"
     elif condim >= 4 and friction[2] > 0.0:
-        refusal = f"condim {condim}: torsional friction has no place in a scene"
+        refusal = f"condim {condim}: a scene has no torsional friction"
     elif condim >= 6 and max(friction[3], friction[4]) > 0.0:
-        refusal = f"condim {condim}: rolling friction has no place in a scene"
+        refusal = f"condim {condim}: a scene has no rolling friction"
     elif gap:
-        refusal = "gap: a scene's contacts push where they are"
+        refusal = "gap: a scene's contacts act where they are found"
     rows = tuple(float(x) for x in solref), tuple(float(x) for x in solimp)
     sliding = tuple(float(x) for x in solreffriction) if np.any(solreffriction) else None
     return Contact(min(condim, 3), float(friction[0]) if condim >= 3 else 0.0, (*rows, sliding, float(margin)), refusal)

@@ -7,8 +7,8 @@
     v <- v + h (a0 + f),   r <- r + h v                     semi-implicit Euler
 
 s = 1 for frictionless and elliptic contacts. The pyramidal cone replaces the normal by four edges ``n +- mu t`` that
-share one regulariser; together they act like a normal with s = mu^2 (1 + mu^2)/2. Nothing here runs the engine: its
-adapter uses the law to declare what a profile realises, deviation laws use it to predict.
+share one regulariser; together they act like a normal with s = mu^2 (1 + mu^2)/2. Nothing here runs the engine: the
+adapter uses the law for declarations, contact laws use it for predictions.
 
 Sources: MuJoCo documentation, "Modeling: solver parameters" (impedance, reference; equations solref_standard and
 solref_direct) and "Computation: constraint model"; the factor of the pyramid follows from writing the four edge rows
@@ -73,7 +73,7 @@ def softness_of(cone: str, condim: int, mu: float) -> float:
 class ContactLaw:
     """The scalar law of one contact at step ``dt`` [s].
 
-    ``damping`` b [1/s] and ``stiffness`` k [1/s^2] as they stand in aref; ``softness`` is s of the module's text;
+    ``damping`` b [1/s] and ``stiffness`` k [1/s^2] of aref; ``softness`` is s of the module's text;
     contact acts at gaps below ``margin`` [m] and counts r from there.
     """
 

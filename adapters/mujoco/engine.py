@@ -1,9 +1,9 @@
-"""MuJoCo behind the plugin line: soft, convex contact; velocity first, then position.
+"""Adapter of MuJoCo: soft, convex contact; velocity first, then position.
 
 A contact pushes with the force f >= 0 that makes its acceleration ``a = d aref + (1 - d) a0``, where a0 is the
-acceleration without the contact, ``aref = -b v - k r`` a spring and damper (``solref``) and 0 < d < 1 the
-impedance (``solimp``). This model has no coefficient of restitution and no static friction; what the profiles make
-of that stands in `adapters.mujoco.profiles`. [MuJoCo documentation: computation, modeling/solver parameters]
+acceleration without the contact, ``aref = -b v - k r`` a spring and damper (``solref``) and 0 < d < 1 the impedance
+(``solimp``). This model has no coefficient of restitution and no static friction; `adapters.mujoco.profiles`
+approximates them. [MuJoCo documentation: computation, modeling/solver parameters]
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PHASES = 128
 
 @final
 class MujocoEngine(Engine):
-    """MuJoCo behind the plugin line."""
+    """Adapter of MuJoCo."""
 
     facts = EngineFacts(
         name="mujoco",
@@ -56,23 +56,23 @@ class MujocoEngine(Engine):
         abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "cylinder", "hull"}),
         quirks=(
             Quirk(
-                "a state that is not finite is reset to the start, time included, and stepping goes on",
-                "autoreset is disabled, the state stays not finite and the run counts as diverged",
+                "a state that is not finite is reset to the start, with its time, and the run continues",
+                "autoreset is disabled; the run then counts as diverged",
                 f"{DOC}, option/flag/autoreset",
             ),
             Quirk(
                 "warnings go to the console and to MUJOCO_LOG.TXT in the working directory",
-                "both are switched off; the counters of d.warning stand in the certificate",
+                "both are switched off; the certificate has the counters of d.warning",
                 f"{DOC}, mjLogConfig",
             ),
             Quirk(
-                "geoms combine friction by the larger of the two, and solref by rules of their own",
-                "one material for all: set on every geom; else every pair is stated as <contact><pair>",
+                "a pair has the larger friction of two geoms, and solref by other rules",
+                "a single material is set on every geom; otherwise every pair is stated as <contact><pair>",
                 f"{DOC}, modeling: contact parameters",
             ),
             Quirk(
                 "mass = nan, timestep = 0 and a negative friction compile without an error",
-                "every number is checked before MuJoCo sees it",
+                "every number is checked before it is given to MuJoCo",
                 "measured with 4.0.1",
             ),
             Quirk(
@@ -81,24 +81,24 @@ class MujocoEngine(Engine):
                 "measured with 4.0.1",
             ),
             Quirk(
-                "after a step, contacts and their forces belong to the step's start",
-                "force times dt is the impulse of the step just made; gaps lag the pose by one step",
+                "after a step, contacts and their forces are those of the step's start",
+                "force times dt is the impulse of the last step; gaps are one step older than the pose",
                 f"{DOC}, programming/simulation",
             ),
             Quirk(
                 "a mocap body has no velocity in contacts",
-                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; solvers "
-                "stop by the mass of all that moves, so that tolerances are multiplied by the free bodies' share; "
-                "it then pushes like a mocap body whose speed is known",
+                "a prescribed body is a free one, 1e15 times heavier than the rest, without gravity or load; "
+                "solvers scale tolerances with the mass of all moving bodies, so these are multiplied by the share "
+                "of the free ones; it then acts like a mocap body with a known speed",
                 f"{DOC}, modeling: mocap bodies; engine_solver.c, mj_solPrimal",
             ),
             Quirk(
-                "corners of a mesh are kept in single precision",
-                "a hull is a mesh, off by 6e-8 of its size; a planar polygon is a prism",
+                "mesh vertices are stored in single precision",
+                "a hull is a mesh, accurate to 6e-8 of its size; a planar polygon is a prism",
                 "measured: a cube as a hull slides like the box to 1e-7",
             ),
             Quirk(
-                "a plane belongs to a body that has no joint, and no surface runs",
+                "a plane belongs to a body without a joint, and surfaces have no velocity",
                 "a moving half-space is a mocap body; its velocity, as that of a running surface, enters aref of each "
                 "contact's rows between mj_step1 and mj_step2",
                 f"{DOC}, computation: constraint model; programming/simulation",
@@ -118,13 +118,13 @@ class MujocoEngine(Engine):
         return str(mujoco.__version__)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse inertias that no mass distribution has, and those that count as none: MuJoCo does not compile them."""
+        """Refuse impossible and too small inertias, which MuJoCo does not compile."""
         for body in scene.bodies:
             if body.motion == "free":
                 a, b, c = sorted(moments(body))
                 if min(body.mass, a) < MINVAL:
                     what, least = ("mass", body.mass) if body.mass < MINVAL else ("inertia", a)
-                    return f"{body.name}.{what}: {least:g} is less than {MINVAL:g}, which a moving body must have"
+                    return f"{body.name}.{what}: {least:g} is less than {MINVAL:g}, the minimum of a moving body"
                 if a + b < c * (1.0 - 1e-9):
                     return f"{body.name}.inertia: {a:g} + {b:g} < {c:g}, no mass distribution has these moments"
         return None
@@ -143,7 +143,7 @@ class MujocoEngine(Engine):
         Raises
         ------
         EngineError
-            For a scene or a setting that MuJoCo cannot honour.
+            For a scene or a setting that MuJoCo does not support.
         """
         if not (math.isfinite(dt) and dt > 0.0):
             raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
@@ -152,7 +152,7 @@ class MujocoEngine(Engine):
             raise EngineError(refusal)
         check_settings(settings)
         if moved(scene) and settings["integrator"] == "RK4":
-            raise EngineError("integrator: RK4 looks for contacts within a step, where no face that moves is known")
+            raise EngineError("integrator: RK4 detects contacts within a step, where moving faces have no velocity")
         return MujocoSimulation(scene, dt, settings)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
@@ -169,8 +169,8 @@ class MujocoEngine(Engine):
             law = contact_law(settings, needs.restitution, needs.friction, dt)
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
             middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
-            because = "spring and damper with force >= 0: the phase of the step decides, e has no say"
-            # Between two of the phases the rebound changes by no more than between them and their neighbours.
+            because = "spring and damper with force >= 0: the rebound depends on the phase of the step, not on e"
+            # Between two phases the rebound changes by no more than between neighbouring phases.
             steepest = max(abs(x - y) for x, y in pairwise(ratios))
             declared["restitution"] = Declared(middle, half + steepest + 1e-12, because)
         return declared
@@ -185,23 +185,23 @@ class MujocoEngine(Engine):
 
 
 def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declared:
-    """Impulses as reported over the momentum of the landing probe: forces are solved to a tolerance and to round-off.
+    """Reported impulses over the momentum of the landing probe: forces are solved to a tolerance and to round-off.
 
-    Newton stops when a step gains less than ``tolerance`` of its cost, which counts in units of the mean inertia times
-    the unknowns, 6 for each of the four bodies. Short of its minimum by that, the gradient (what forces and momentum
-    differ by) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance /
-    (1 - d)) m/s^2 in each step of the probe.
+    Newton's method stops when a step gains less than ``tolerance`` of its cost, in units of the mean inertia times the
+    unknowns, 6 for each of the four bodies. That far from the minimum, the gradient (the difference of forces and
+    momentum) is up to ``sqrt(2 H tolerance)``, H being a contact's stiffness m/(1 - d): sqrt(2 * 24 * tolerance / (1 -
+    d)) m/s^2 in each step of the probe.
 
-    A force is stiffness times acceleration, and an acceleration of six components is known to six roundings: of all
-    impulses together ``6 epsilon H/m``. H is larger in a pyramid, whose edges have ``d/((1 - d) 2 mu^2)`` of a unit
-    mass each (documentation, computation: contact), four of them at each of the box's four corners; at mu = 1e-5,
-    which a pair without friction keeps, that is 1.5e12.
+    A force is stiffness times acceleration, and an acceleration of six components has six roundings: for all impulses
+    together ``6 epsilon H/m``. H is larger in a pyramid, whose edges have ``d/((1 - d) 2 mu^2)`` of a unit mass each
+    (documentation, computation: contact), four of them at each of the box's four corners; at mu = 1e-5, which a pair
+    without friction keeps, that is 1.5e12.
     """
     deep = min(float(settings["solimp"][1]), IMPEDANCE_RANGE[1])
     gradient = math.sqrt(2.0 * 24.0 * float(settings["tolerance"]) / (1.0 - deep))
     steps = math.ceil(2.0 * LANDING_LEAD + 1.0)
     band = IMPULSE_SHARE + steps * dt * gradient / LANDING_SPEED
-    because = "forces are solved to a tolerance: so much may they and the momentum differ in each step of the landing"
+    because = "forces are solved to a tolerance, which bounds the momentum error of each step of the landing"
     if settings["cone"] == "pyramidal" and (friction > 0.0 or settings["smooth_condim"] == 3):
         mu = max(min(friction, MOST_FRICTION), SMALLEST_FRICTION) / math.sqrt(float(settings["impratio"]))
         band += 6.0 * 2.0**-52 * 16.0 * deep / ((1.0 - deep) * 2.0 * mu * mu)
@@ -210,12 +210,12 @@ def _impulses(settings: Mapping[str, Any], friction: float, dt: float) -> Declar
 
 
 def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str, Declared]:
-    """Friction over load of the box that the probe slides, by the law of its contacts, where that is not mu.
+    """Friction over load of the probe's sliding box, by the law of its contacts, where that is not mu.
 
-    Normal and friction are one convex problem: what stops a slip lifts the box. While it slides or flies that leaves mu
-    what it is. Above mu = 1 or so the box is thrown up and turned, lands on an edge, and there a pyramid's edges across
-    the slip, or an edge that stops, carry load without as much friction. Newton stops at a tolerance in each step
-    (`adapters.mujoco.predictions.solver_error`); a start that is off by it says how much that matters.
+    Normal and friction are one convex problem: stopping a slip lifts the box. While it slides or flies that does not
+    change mu. Above mu = 1 or so the box is thrown up and turned, and lands on an edge, where a pyramid's edges across
+    the slip, or a stopping edge, carry load with less friction. Newton's method stops at a tolerance in each step
+    (`adapters.mujoco.predictions.solver_error`), whose effect is found from a start with that error.
     """
     case = Case(needs.dimension, needs.restitution, needs.friction, dt, 0.0)
     scene, steps = slide(case), step_count(SLIDE_TIME, dt)
@@ -228,12 +228,15 @@ def _friction(settings: Mapping[str, Any], needs: Needs, dt: float) -> dict[str,
     if all(abs(ratio - needs.friction) <= FRICTION_SHARE * needs.friction for ratio in ratios):
         return {}  # as asked
     band = FRICTION_SHARE * needs.friction + 2.0 * max(abs(ratio - ratios[0]) for ratio in ratios)
-    because = "contact is convex: what stops a slip lifts the box; a landing has less friction than mu of its load"
+    because = (
+        "the contact model is convex: stopping a slip lifts the box; at a landing friction is less than mu "
+        "times the load"
+    )
     return dict.fromkeys(("friction", "friction_impulse"), Declared(ratios[0], band, because))
 
 
 def _second_order_fall() -> dict[str, Declared]:
-    """What the free-fall probe sees of a scheme whose positions follow ``g t^2/2`` without an offset.
+    """Result of the free-fall probe for a scheme whose positions follow ``g t^2/2`` without an offset.
 
     It compares with velocity-first stepping: positions are half a step early, velocities are not; and the path of
     step n, ``(v_n + v_(n-1))/2 dt``, falls short of ``v_n dt``.

@@ -1,4 +1,4 @@
-"""Deviation laws of MuJoCo, as data: which law of `adapters.mujoco.predictions` speaks about which rows, and why."""
+"""Contact laws of MuJoCo, as data: rows covered by each law of `adapters.mujoco.predictions`, and reasons."""
 
 from __future__ import annotations
 
@@ -24,24 +24,27 @@ _BALL_METRICS = {
     ),
 }
 _BECAUSE = {
-    ("default", "ball"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
-    ("default", "stack"): "contact is a soft spring of 0.02 s: boxes sink until it carries the weight above",
-    ("default", "incline"): "friction is viscous and couples to the normal: sticking boxes creep, sliding boxes hop",
-    ("tuned", "ball"): "the velocity is reflected in the step after contact: exact in speed, located within a step",
-    ("tuned", "stack"): "impedance is relative to the light body's own mass: 1e-4 of the load above gets through",
-    ("tuned", "incline"): "friction couples to the normal: a sliding box hops, the window catches part of a hop",
+    ("default", "ball"): "contact is a critically damped spring (0.02 s) that never pulls, and e is none of its "
+    "parameters",
+    ("default", "stack"): "contact is a soft spring (0.02 s): boxes sink in until it carries the weight above",
+    ("default", "incline"): "friction is viscous and couples to the normal: boxes at rest creep, sliding boxes hop",
+    ("tuned", "ball"): "the velocity is reversed in the step after contact: exact in speed, late by up to a step",
+    ("tuned", "stack"): "impedance is relative to the mass of the light body: 1e-4 of the load above yields",
+    ("tuned", "incline"): "friction couples to the normal: a sliding box hops, and the time window contains part of "
+    "a hop",
     (
         "default",
         "slide",
     ): "friction is viscous and couples to the normal: a sliding box is thrown up and brakes unevenly",
-    ("tuned", "slide"): "friction couples to the normal: a sliding box hops, and friction is that of its hops",
-    ("default", "rolling"): "contact is a soft spring of 0.02 s, friction is viscous and couples to the normal: a ball "
-    "sinks in, and one that slides is thrown up",
-    ("tuned", "rolling"): "friction couples to the normal, as the cone is convex without complementarity: what stops "
-    "the slip lifts the ball",
-    ("default", "blow"): "contact is a critically damped spring of 0.02 s that never pulls; e is no parameter of it",
-    ("tuned", "blow"): "impedance ends at 0.9999 of an inverse mass that is estimated: beside the centre, or at four "
-    "corners, a blow is off by 1e-4 of it",
+    ("tuned", "slide"): "friction couples to the normal: a sliding box hops, and friction follows the load of its hops",
+    ("default", "rolling"): "contact is a soft spring (0.02 s), and friction is viscous and couples to the normal: "
+    "a ball sinks in, and a sliding one is thrown up",
+    ("tuned", "rolling"): "the convex contact model couples friction and normal force: stopping the slip lifts the "
+    "ball",
+    ("default", "blow"): "contact is a critically damped spring (0.02 s) that never pulls, and e is none of its "
+    "parameters",
+    ("tuned", "blow"): "impedance ends at 0.9999 of an estimated inverse mass: off the centre, or at four corners, "
+    "a blow is wrong by 1e-4",
 }
 #: Speeds and spins after bounces, accelerations and hops of balls.
 _ROLLING = {
@@ -49,7 +52,7 @@ _ROLLING = {
     "slide_to_roll": ("final_speed", "slip", "rolling_time", "rolling_place", "hop"),
     "roll_incline": ("acceleration", "turning", "hop"),
 }
-#: Beside the centre the shipped contact lasts so long that the bar turns under it: what then acts is not predicted.
+#: Beside the centre the shipped contact lasts so long that the bar turns under it, which is not predicted.
 _BLOWS = (
     ("default", "head_on", ("rebound_ratio", "first_speed", "second_speed", "impulse")),
     ("default", "flat_box", ("rebound_ratio", "impulse")),
@@ -134,7 +137,7 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         passing_law(metric),
-        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
+        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
         "MuJoCo documentation, computation: collision detection at the start of a step",
         CHECKED_ON,
     )
@@ -149,7 +152,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         shoved_law(metric),
-        "nothing is swept: the step that finds the ball in the plate finds it beyond the middle, from where out is on",
+        "there is no swept collision detection: the step that finds the ball in the plate finds it beyond the "
+        "middle, and pushes it out on the far side",
         "MuJoCo documentation, computation: collision detection at the start of a step",
         CHECKED_ON,
     )

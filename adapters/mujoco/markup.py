@@ -1,7 +1,7 @@
-"""What stands in an MJCF or URDF model: it is rid of what does not move bodies, before MuJoCo compiles it.
+"""Cleans MJCF and URDF models: removes elements without effect on motion before MuJoCo compiles them.
 
-What has no place in a scene is refused with its element and line, or left out where that is wanted; so is what reaches
-outside the text, and a model that would make more bodies than a scene may have.
+Unsupported elements are refused with element and line, or left out on request; references to outside the text, and
+models with too many bodies, are always refused.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ KEPT = frozenset(
     ("mujoco", "compiler", "option", "flag", "default", "worldbody", "body", "geom", "inertial", "freejoint", "joint",
      "frame", "replicate", "contact", "pair", "keyframe", "key", "asset", "statistic")
 )  # fmt: skip
-#: Elements that only draw, measure or reserve: nothing moves otherwise without them.
+#: Elements that only draw, measure or reserve memory, without effect on motion.
 SILENT = frozenset(["visual", "custom", "sensor", "size", "texture", "material", "site", "camera", "light", "user"])
-#: Elements that reach outside the text.
+#: Elements that refer to outside the text.
 FOREIGN = {
     "include": "other files are not read",
     "attach": "other models are not read",
@@ -27,33 +27,33 @@ FOREIGN = {
     "extension": "plugins are not loaded",
     "plugin": "plugins are not loaded",
 }
-#: Elements that a scene has no place for, and why.
+#: Unsupported elements, with reasons.
 NO_PLACE = {
     "tendon": "a scene has no tendons",
-    "equality": "a scene has no constraints but contact",
+    "equality": "a scene has no constraints except contact",
     "actuator": "a scene has no motors",
-    "exclude": "in a scene all bodies touch",
+    "exclude": "in a scene all bodies can collide",
     "deformable": "bodies of a scene are rigid",
     "flexcomp": "bodies of a scene are rigid",
     "composite": "bodies of a scene are rigid and free",
     "skin": "bodies of a scene are rigid",
-    "mesh": "a scene has no meshes but hulls of vertices",
+    "mesh": "a scene has no meshes except convex hulls of vertices",
     "hfield": "a scene has no height fields",
 }
-#: What a mesh may state that is the hull of its vertices, a solid of one density.
+#: Attributes of a mesh that is the convex hull of its vertices, a solid of one density.
 HULL = frozenset(["name", "class", "vertex", "scale"])
 
 
 def cleaned(root: Element, drop: bool) -> list[str]:
-    """Rid the model of what does not move bodies; returns what was left out besides.
+    """Remove elements without effect on motion; returns the unsupported ones left out.
 
-    Every body and geom gets a name, by its line where it has none, so that it can be spoken of.
+    Every body and geom gets a name, by its line where it has none, for messages.
 
     Raises
     ------
     SceneError
-        Naming the first element that has no place in a scene, unless ``drop``; or that reaches outside the text, or
-        makes too many bodies, in any case.
+        Naming the first unsupported element, unless ``drop``; in any case one that refers to outside the text or makes
+        too many bodies.
     """
     dropped: list[str] = []
     _clean(root, drop, dropped)
@@ -69,12 +69,12 @@ def cleaned(root: Element, drop: bool) -> list[str]:
 def rid_of(
     root: Element, drop: bool, kept: Collection[str], silent: Collection[str], no_place: Mapping[str, str]
 ) -> list[str]:
-    """Rid a model of another language than MJCF of what does not move bodies; returns what was left out besides.
+    """The same for a model in another language than MJCF; returns the unsupported elements left out.
 
     Raises
     ------
     SceneError
-        Naming the first element that has no place in a scene, unless ``drop``; or that cannot have its name.
+        Naming the first unsupported element, unless ``drop``; or one with an invalid name.
     """
     dropped: list[str] = []
     left = [root]
@@ -85,7 +85,7 @@ def rid_of(
             if child.tag in silent:
                 continue
             if child.tag not in kept:
-                line = f"{child}: {no_place.get(child.tag, 'there is no place for it in a scene')}"
+                line = f"{child}: {no_place.get(child.tag, 'a scene has no such element')}"
                 if not drop:
                     raise SceneError(f"model: {line}")
                 dropped.append(line)
@@ -115,7 +115,7 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
         if "file" in child.attributes:
             why = "other files are not read"
         elif child.tag not in KEPT and child.tag not in NO_PLACE and element.tag != "default":
-            why = "there is no place for it in a scene"
+            why = "a scene has no such element"
         if why:
             if not drop:
                 raise SceneError(f"model: {child}: {why}")
@@ -134,13 +134,13 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
 
 
 def _no_hull(mesh: Element) -> str | None:
-    """What a mesh, or a default of meshes, states that the hull of its vertices does not have."""
+    """Attributes of a mesh, or of mesh defaults, that a hull of vertices does not have."""
     other = sorted(set(mesh.attributes) - HULL - {"file"})
     return f"{other[0]}: {NO_PLACE['mesh']}" if other else None
 
 
 def _made(element: Element) -> float:
-    """Bodies and geoms that the compiler makes of an element, without making them."""
+    """Number of bodies and geoms that the compiler would make of an element."""
     inside = sum(_made(child) for child in element.children)
     if element.tag == "replicate":
         try:

@@ -1,18 +1,18 @@
-"""Newton's restitution and Coulomb's friction exactly, made of MuJoCo's own solver: the loop of profile ``matched``.
+"""Exact Newton restitution and Coulomb friction with MuJoCo's solver: the loop of profile ``matched``.
 
 MuJoCo's contacts are one convex problem: their forces lie in the cones of friction, the accelerations ``J a - aref`` in
-the dual cones, and each contact yields by its regulariser R. Newton's and Coulomb's laws ask for something else, which
-a shift of the references ``aref`` between MuJoCo's own calls reaches:
+the dual cones, and each contact yields by its regulariser R. Newton's and Coulomb's laws differ from that; a shift of
+the references ``aref`` between MuJoCo's calls satisfies them:
 
-    normal      the velocity -e v is asked for, one step later; of what rests, a part of its overlap over the step
-    slip        ``aref_n`` is lowered by mu |slip|/dt, so that what the dual cone lifts, it lifts to nothing (De Saxce)
-    softness    ``aref`` is raised by R f, so that what a contact yields to its own force, it is asked for beforehand
+    normal      target velocity -e v one step later; for resting bodies a part of the overlap over the step
+    slip        ``aref_n`` is lowered by mu |slip|/dt, which cancels the lift by the dual cone (De Saxce)
+    softness    ``aref`` is raised by R f, which cancels the yielding of a contact under its force
 
-The last two depend on the answer: a round solves, looks at slips and forces, and solves again. Of one contact the first
-error falls by ``mu^2 G/(1 + mu^2 G)`` a round, G being its mobility along the face over that across it (1 of a box
-that only slides, 7/2 of a ball), the second by ``R/(G + R)``, 1 - d; a secant along the last change (Anderson's mixing
-of depth one) makes five rounds of dozens. Rounds end when all shifts agree with what they gave to `AGREED`, or when
-what is missed stays the same: four corners of a face cannot all meet distances that are rounded.
+The last two depend on the solution: a round solves, computes slips and forces, and solves again. For one contact the
+first error falls by ``mu^2 G/(1 + mu^2 G)`` a round, G being its mobility along the face over that across it (1 of a
+box that only slides, 7/2 of a ball), the second by ``R/(G + R)``, 1 - d; a secant along the last change (Anderson's
+mixing of depth one) reduces dozens of rounds to five. Rounds end when all shifts agree with their results to `AGREED`,
+or when the difference does not fall: four corners of a face cannot all satisfy rounded distances.
 
 Sources: De Saxce and Feng, "The bipotential method" (1998), the shift; Hestenes and Powell (1969), the method of
 multipliers, the softness; Anderson (1965), the secant; MuJoCo documentation, computation: constraint model.
@@ -29,12 +29,12 @@ import numpy as np
 from adapters.scene import Scene
 from adapters.script import literal
 
-#: How well shifts agree in the end, as a share of the largest acceleration that contacts have to make: some thousand
-#: roundings, which forces of contacts 1e4 times stiffer than their bodies cost.
+#: Final agreement of shifts, as a share of the largest contact acceleration: some thousand roundings, by contacts 1e4
+#: times stiffer than their bodies.
 AGREED = 1e-13
-#: The share that may be missed in the end; a run that misses more is INVALID. Corners of a mesh are kept in single
-#: precision: four of a face contradict each other by 6e-8 m, and a tenth of that over the square of a step is 3.5e-5 g
-#: at 1/240 s, 5.6e-4 g at 1/960 s. So much is shared among them; what it does to a number is judged by its check.
+#: Allowed final difference, as such a share; a run above it is INVALID. Mesh corners are in single precision: four of a
+#: face differ by 6e-8 m, and a tenth of that over the square of a step is 3.5e-5 g at 1/240 s, 5.6e-4 g at 1/960 s. The
+#: effect on values is judged by their checks.
 SETTLED = 1e-3
 
 
@@ -44,16 +44,16 @@ def matched_step2(mujoco, model, data, restitution, law):
     Parameters
     ----------
     restitution
-        Of two geoms by their numbers, the smaller first; 0 where it is not stated.
+        By indices of two geoms, the smaller first; 0 where it is missing.
     law
-        The part of an overlap that a step takes away, and the fastest that it does so [m/s]; most rounds; the share of
-        the largest acceleration at which they end.
+        Share of an overlap that a step corrects, and the largest speed of that [m/s]; most rounds; the share of the
+        largest acceleration at which they end.
 
     Returns
     -------
     made, apart
-        Rounds, and how far from each other shifts and what they gave are in the last, as such a share; 0 where that is
-        no more than roundings of velocities over a step.
+        Number of rounds, and the final difference between shifts and their results, as such a share; 0 where that is
+        round-off of velocities over a step.
     """
     share, fastest, rounds, agreed = law
     contacts, dt = data.contact, model.opt.timestep
@@ -62,13 +62,13 @@ def matched_step2(mujoco, model, data, restitution, law):
     if not len(normal):
         mujoco.mj_step2(model, data)
         return 0, 0.0
-    # A contact without friction has one row: it is given its own for both tangents, and mu = 0.
+    # A contact without friction has one row: it is used for both tangents as well, with mu = 0.
     rough = contacts.dim[touching] > 1
     mu = np.where(rough, contacts.friction[touching, 0], 0.0)
     first, second = normal + rough, normal + 2 * rough
     pairs = np.sort(contacts.geom[touching], axis=1).tolist()
     e = np.array([restitution.get((a, b), 0.0) for a, b in pairs])
-    # As compiled, references ask for the velocity 0 one step later: -v/dt.
+    # Compiled references have the target velocity 0 one step later: -v/dt.
     asked = data.efc_aref.copy()
     approach = asked[normal] * dt
     out = np.minimum(-share * contacts.dist[touching] / dt, fastest)
@@ -100,7 +100,7 @@ def matched_step2(mujoco, model, data, restitution, law):
             if abs(along) < 100.0:
                 shift = given - along * (given - last[0])
         last = given, change
-    # A relative velocity is a sum of twelve products, rounded twice each: over a step nothing is known to less.
+    # A relative velocity is a sum of twelve products, rounded twice each, which limits the accuracy over a step.
     if apart * largest <= 24.0 * 2.0**-52 * np.abs(data.qvel).max() / dt:
         apart = 0.0
     mujoco.mj_checkAcc(model, data)
@@ -109,18 +109,18 @@ def matched_step2(mujoco, model, data, restitution, law):
 
 
 def by_geoms(model, rebounding):
-    """Restitution by the numbers of two geoms, the smaller first, of rows of two bodies by theirs and restitution."""
+    """Restitution by the indices of two geoms, the smaller first, from rows of two bodies' indices and restitution."""
     geom = {body: int(model.geom(f"geom{body}").id) for row in rebounding for body in row[:2]}
     return {tuple(sorted((geom[a], geom[b]))): e for a, b, e in rebounding}
 
 
 def rebounding(scene: Scene) -> list[tuple[int, int, float]]:
-    """Pairs of bodies that have a restitution, and which."""
+    """Pairs of bodies with restitution, and its value."""
     return [(a, b, material.restitution) for a, b, material in scene.contact_pairs() if material.restitution > 0.0]
 
 
 def law_of(settings: Mapping[str, Any]) -> tuple[float, float, int, float]:
-    """What `matched_step2` is handed as law."""
+    """Arguments ``law`` of `matched_step2`."""
     push, fastest, agreed = (float(settings[name]) for name in ("push_out", "push_out_speed", "agreed"))
     return push, fastest, int(settings["rounds"]), agreed
 
@@ -130,7 +130,7 @@ SECOND_HALF = "matched_step2(mujoco, model, data, RESTITUTION, LAW)"
 
 
 def loop_lines(scene: Scene, settings: Mapping[str, Any]) -> list[str]:
-    """Lines that a script needs before its loop: the functions above and what they are handed."""
+    """Lines of a script before its loop: the functions above and their arguments."""
     functions = ["", "", *inspect.getsource(by_geoms).splitlines(), "", ""]
     functions += [*inspect.getsource(matched_step2).splitlines(), "", ""]
     return [
@@ -142,7 +142,7 @@ def loop_lines(scene: Scene, settings: Mapping[str, Any]) -> list[str]:
 
 
 class Matched:
-    """Makes the second halves of one model's steps and remembers how they ended."""
+    """Makes the second halves of one model's steps and stores how they ended."""
 
     def __init__(self, mujoco: Any, scene: Scene, settings: Mapping[str, Any], model: Any, data: Any) -> None:
         self._mujoco, self._model, self._data = mujoco, model, data
@@ -157,10 +157,10 @@ class Matched:
         self.unsolved += ran_out or not apart <= SETTLED
 
     def told(self) -> dict[str, Any]:
-        """How the rounds ended; a run with a step in which they do not agree is none of this profile's answers."""
+        """Result of the rounds; a run with a step without agreement is no result of this profile."""
         found: dict[str, Any] = {"rounds": self.most, "shifts_apart": self.apart}
         if self.unsolved:
             steps = "step" if self.unsolved == 1 else "steps"
-            reason = f"in {self.unsolved} {steps} the shifts of references do not settle: {self.apart:.2g} apart"
+            reason = f"in {self.unsolved} {steps} the shifts of references do not converge: {self.apart:.2g} apart"
             found |= {"certified": False, "reasons": [reason]}
         return found

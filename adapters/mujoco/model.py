@@ -2,11 +2,10 @@
 
     text -> markup.py (nothing from outside, nothing that only draws) -> MuJoCo's own compiler -> Scene + settings
 
-MuJoCo's compiler says where everything is and what it weighs: frames, defaults, replication, densities and inertias are
-its business. What it compiled must be what a scene can hold: bodies with one shape about their centre of mass, free or
-fixed, which all touch each other. Contact softness, solver options and step become the settings of the profile that
-runs the model as MuJoCo would; other engines are asked for rigid bodies with the model's sliding friction, and for no
-rebound, since MJCF states none.
+MuJoCo's compiler resolves frames, defaults, replication, densities and inertias. The compiled model must fit a scene:
+bodies with one shape about their centre of mass, free or fixed, which can all collide. Contact softness, solver options
+and step become settings of the profile that runs the model as MuJoCo would; other engines run rigid bodies with the
+model's sliding friction, without rebound, since MJCF states none.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def read(text: str, drop: bool) -> Model:
     Raises
     ------
     SceneError
-        Naming the element that has no place in a scene, or with the compiler's complaint.
+        Naming the unsupported element, or with the compiler's error.
     """
     root = parsed(text, "mujoco", "a model of MJCF begins with <mujoco>")
     dropped = cleaned(root, drop)
@@ -55,11 +54,11 @@ def read_tree(
     Parameters
     ----------
     dropped, notes
-        What was left out of it so far, and what a reader of results must know.
+        Elements left out so far, and notes for readers of results.
     tags
-        Elements that the compiled model knows by their names.
+        Elements that the compiled model has by name.
     without
-        Takes one of them out, with what cannot be without it; whether it was there.
+        Removes one of them, with dependent ones; returns whether it was there.
 
     Raises
     ------
@@ -84,14 +83,14 @@ def read_tree(
 
 
 def _without_what_hangs(root: Element, dropped: list[str]) -> None:
-    """Leave out what hangs on something that was left out: shapes without their mesh, bodies without any mass."""
+    """Leave out elements that depend on removed ones: shapes without their mesh, bodies without any mass."""
     meshes = {e.attributes.get("name") for e in root.walk() if e.tag == "mesh"}
     for shape in [e for e in root.walk() if _is_shapeless(e, meshes)]:
         root.without(shape)
         dropped.append(f"{shape}: its shape was left out")
     for body in [e for e in root.walk() if e.tag == "body" and _is_hollow(e)]:
         root.without(body)
-        dropped.append(f"{body}: nothing is left of it that has a mass")
+        dropped.append(f"{body}: no part of it with a mass remains")
 
 
 def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
@@ -102,7 +101,7 @@ def _is_shapeless(element: Element, meshes: Collection[str | None]) -> bool:
 
 
 def _is_hollow(body: Element) -> bool:
-    """Whether a body can move, and neither states a mass nor has a geom or a body that brings one."""
+    """Whether a body can move but has no mass, itself or by a geom or child body."""
     moves = any(child.tag in ("freejoint", "joint") for child in body.children)
     heavy = any(child.tag in ("inertial", "body", "replicate", "frame") for child in body.children)
     given = [
@@ -114,26 +113,26 @@ def _is_hollow(body: Element) -> bool:
 
 
 def _shown(root: Element, refused: Refused) -> str:
-    """What was refused, where it is no body or geom of the text: an option, or what the compiler made."""
+    """Name of a refused element that is not in the text: an option, or one made by the compiler."""
     where = next((str(child) for child in root.children if child.tag == refused.kind.partition("/")[0]), refused.kind)
     return f"{where}: {one_line(refused.name, 60)}"
 
 
 def filled_in(root: Element) -> Iterator[str]:
-    """Numbers that MuJoCo takes where no geom and no default of geoms states one: friction, and density of bodies."""
+    """MuJoCo's defaults for values that no geom or geom default states: friction, and density of bodies."""
     defaults = [e for top in root.children if top.tag == "default" for e in top.walk() if e.tag == "geom"]
     said = {name for each in defaults for name in each.attributes}
     owners = [(e, [g for g in e.children if g.tag == "geom"]) for e in root.walk() if e.tag in ("worldbody", "body")]
     rough = [g for _, geoms in owners for g in geoms if "friction" not in g.attributes]
     if rough and "friction" not in said:
-        yield f"friction 1 of {_count(rough)} none, MuJoCo's own; of two geoms the larger holds"
+        yield f"friction 1 of {_count(rough)} none, MuJoCo's default; a pair has the larger of two"
     heavy = [
         g for owner, geoms in owners for g in geoms
         if owner.tag == "body" and not any(e.tag == "inertial" for e in owner.children)
         and not {"mass", "density"} & set(g.attributes)
     ]  # fmt: skip
     if heavy and not {"mass", "density"} & said:
-        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's own"
+        yield f"density 1000 kg/m^3 of {_count(heavy)} neither mass nor density, MuJoCo's default"
 
 
 def _count(geoms: Sequence[Element]) -> str:
@@ -141,7 +140,7 @@ def _count(geoms: Sequence[Element]) -> str:
 
 
 class _Reading:
-    """One attempt at a model, which either succeeds or says what stands in its way."""
+    """One attempt to read a model, which succeeds or names the obstacle."""
 
     def __init__(
         self, root: Element, drop: bool, dropped: list[str], lines: Mapping[str, Element], notes: list[str]
@@ -168,7 +167,7 @@ class _Reading:
         Raises
         ------
         Refused
-            Naming what has no place in one.
+            Naming an unsupported element.
         """
         m = self.compiled
         settings = option_settings(self.mujoco, m)
@@ -176,7 +175,7 @@ class _Reading:
         shaped = list(self._shaped())
         bodies = tuple(self._body(g, names) for g, names in zip(shaped, self._names(shaped), strict=True))
         if not any(body.motion == "free" for body in bodies):
-            raise SceneError("model: has no free body: nothing can move")
+            raise SceneError("model: has no free body, so nothing can move")
         contacts = self._contacts(shaped, bodies)
         gravity = tuple(float(g) + 0.0 for g in m.opt.gravity)
         if m.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
@@ -185,12 +184,14 @@ class _Reading:
         if beside:
             which = one_line(", ".join(beside), 120)
             self.notes.append(
-                f"{which}: MuJoCo moves a body's origin, which is not its centre of mass; profile model moves the "
-                "centre: a step of a body that turns ends otherwise by |w|^2 dt^2/2 of the way between them"
+                f"{which}: MuJoCo moves a body's origin, which is not its centre of mass, and profile model moves "
+                "the centre; for a rotating body a step differs by |w|^2 dt^2/2 times the distance between them"
             )
         pairs = pairs_of({ij: contact.friction for ij, contact in contacts.items()}, bodies)
         self.notes += filled_in(self.root)
-        self.notes.append("restitution 0 in all engines but its own: the model states none, contacts rebound by solref")
+        self.notes.append(
+            "restitution 0 in all engines but MuJoCo: the model states none, its contacts rebound by solref"
+        )
         name = self.root.attributes.get("model") or self.root.attributes.get("name") or "model"
         scene = Scene(one_line(name, 60), 1, 3, bodies, pairs, gravity, DURATION)
         settings += self._softness(contacts)
@@ -219,7 +220,7 @@ class _Reading:
                 raise Refused("body", body, "its joint has stiffness; a scene's bodies have none")
 
     def _shaped(self) -> Iterator[int]:
-        """Geoms that touch, in the order of the model; each free body has one."""
+        """Colliding geoms, in the order of the model; each free body has one."""
         m = self.compiled
         paired = {int(g) for k in range(m.npair) for g in (m.pair_geom1[k], m.pair_geom2[k])}
         owners: Counter[int] = Counter()
@@ -229,18 +230,18 @@ class _Reading:
             weld = int(m.body_weldid[m.geom_bodyid[g]])
             owners[weld] += weld != 0
             if owners[weld] > 1:
-                raise Refused("body", self._name("body", weld), "has several geoms that touch; a scene's body has one")
+                raise Refused(
+                    "body", self._name("body", weld), "has several geoms that collide; a scene's body has one"
+                )
             yield g
         for body in range(1, m.nbody):
             if m.body_weldid[body] == body and not owners[body]:
-                raise Refused("body", self._name("body", body), "has no geom that touches")
+                raise Refused("body", self._name("body", body), "has no geom that collides")
             if m.body_gravcomp[body]:
-                raise Refused(
-                    "body", self._name("body", body), "gravcomp: in a scene gravity pulls at all bodies alike"
-                )
+                raise Refused("body", self._name("body", body), "gravcomp: in a scene gravity acts on all bodies alike")
 
     def _names(self, shaped: list[int]) -> list[str]:
-        """Names of bodies: of the body if it is free, of the geom if it is fixed; of some several, numbered."""
+        """Names of bodies: of the body if it is free, of the geom if it is fixed; repeated ones are numbered."""
         m = self.compiled
         found = []
         for g in shaped:
@@ -300,7 +301,7 @@ class _Reading:
         )
 
     def _turns_beside_centre(self, g: int) -> bool:
-        """Whether a geom's body is free, and may turn about another point than its joint moves."""
+        """Whether a geom's body is free, and its centre of mass is not the origin of its joint."""
         weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
         apart = np.abs(self.data.xipos[weld] - self.data.xpos[weld]).max()
         return bool(weld) and float(apart) > ALIGNED * self._shape(g).smallest_size
@@ -321,12 +322,12 @@ class _Reading:
         named = kind.name.removeprefix("mjGEOM_").lower()
         weld = int(self.compiled.body_weldid[self.compiled.geom_bodyid[g]])
         why = f"{'an' if named[0] in 'aeiou' else 'a'} {named}; a scene has spheres, boxes, rods, hulls and planes"
-        if weld and self.drop:  # a body without its shape is none
+        if weld and self.drop:  # a body needs a shape
             raise Refused("body", self._name("body", weld), f"its geom is {why}")
         raise Refused("geom", self._name("geom", g), why)
 
     def _hull(self, g: int) -> Shape:
-        """Corners of a mesh that states vertices alone: those of its hull, in the compiler's singles."""
+        """Corners of a mesh of vertices only: those of its hull, in the compiler's single precision."""
         m, mesh = self.compiled, int(self.compiled.geom_dataid[g])
         first, count = int(m.mesh_vertadr[mesh]), int(m.mesh_vertnum[mesh])
         graph = m.mesh_graph[int(m.mesh_graphadr[mesh]) :]
@@ -342,7 +343,7 @@ class _Reading:
     # ---- contacts ----
 
     def _contacts(self, shaped: list[int], bodies: tuple[Body, ...]) -> dict[tuple[int, int], Contact]:
-        """What MuJoCo does where two bodies touch, for all pairs of which one is free."""
+        """Contact parameters of all pairs with a free body."""
         m = self.compiled
         stated = {frozenset((int(m.pair_geom1[k]), int(m.pair_geom2[k]))): k for k in range(m.npair)}
         found = {}
@@ -354,7 +355,10 @@ class _Reading:
                 meets = (m.geom_contype[a] & m.geom_conaffinity[b]) or (m.geom_contype[b] & m.geom_conaffinity[a])
                 pair = stated.get(frozenset((a, b)))
                 if pair is None and not meets:
-                    why = f"contype and conaffinity keep it apart from {bodies[i].name}; in a scene all bodies touch"
+                    why = (
+                        f"contype and conaffinity exclude contact with {bodies[i].name}; in a scene all bodies can "
+                        "collide"
+                    )
                     raise Refused("geom", self._name("geom", b), why, fatal=True)
                 contact = contact_of(m, a, b, pair)
                 if contact.refusal and not self.drop:
@@ -365,8 +369,8 @@ class _Reading:
         return found
 
     def _softness(self, contacts: Mapping[tuple[int, int], Contact]) -> list[Setting]:
-        """Settings of the pairs: those of most of them, and the others one by one."""
-        if not contacts:  # one body alone: any softness will do
+        """Settings of the pairs: the most common, and the others one by one."""
+        if not contacts:  # one body only: any softness will do
             contacts = {(0, 0): contact_of(self.compiled, 0, 0, None)}
         usual = Counter(contact.softness for contact in contacts.values()).most_common(1)[0][0]
         smooth = {contact.condim for contact in contacts.values() if contact.friction == 0.0}
@@ -377,7 +381,9 @@ class _Reading:
         ]
         settings.append(Setting("smooth_condim", max(smooth, default=3), "of the model's frictionless pairs", source))
         if len(smooth) > 1:
-            raise SceneError("model: some pairs without friction have condim 1, others 3; a model has one kind")
+            raise SceneError(
+                "model: some pairs without friction have condim 1, others 3; only one of them is supported"
+            )
         apart = tuple((i, j, *c.softness) for (i, j), c in contacts.items() if c.softness != usual)
         if apart:
             settings.append(Setting("apart", apart, "pairs of bodies that are softer or harder than the rest", source))
@@ -385,9 +391,9 @@ class _Reading:
 
 
 def _in_plane(turn: Any) -> Any:
-    """A turn of what is round about its first axis, about which it may lie anyhow: y stays y where that axis has none.
+    """Rotation of a body round about its first axis, so that y stays y where that axis has no y component.
 
-    MuJoCo's ``fromto`` turns a rod over that points down.
+    MuJoCo's ``fromto`` flips a rod that points down.
     """
     axis = np.where(np.abs(turn[:, 0]) < ROUNDING, 0.0, turn[:, 0])
     if axis[1] != 0.0:

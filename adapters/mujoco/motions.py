@@ -1,4 +1,4 @@
-"""Motions that MuJoCo's contact law makes of a ball and of a column, and trajectories as the step loop records them."""
+"""Motions of a ball and a column by MuJoCo's contact law, as trajectories like those of the step loop."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CORNERS = 4
 def fall(law: ContactLaw, height: float, velocity: float, rest: float, load: float, steps: int) -> Array:
     """Height, velocity and contact's velocity change of one body over a face, (steps + 1, 3).
 
-    ``rest`` is the height at which it touches; the height is kept, not the gap, since that is what an engine rounds.
+    ``rest`` is the height at contact; the state is the height, not the gap, as an engine rounds the height.
     """
     rows = [(height, velocity, 0.0)]
     for _ in range(steps):
@@ -43,10 +43,10 @@ def column(
 ) -> Array:
     """Heights, velocities and normal impulses of boxes on each other, (steps + 1, 3, n); all at rest at the start.
 
-    Face i lies below box i, has `CORNERS` contacts that share its load, and couples two inverse masses. One step
-    solves ``(A + R) f = aref - a0`` over the faces that push. Pushing one box loads only its neighbours (A has no
-    positive entry off its diagonal), so faces are only ever added [Chandrasekaran 1970]. A face touches if its gap is
-    below ``-edge``: boxes that fall together keep a gap of round-off, and its sign is nobody's.
+    Face i lies below box i, has `CORNERS` contacts that share its load, and couples two inverse masses. One step solves
+    ``(A + R) f = aref - a0`` over the active faces. A has no positive entry off its diagonal, so faces are only ever
+    added [Chandrasekaran 1970]. A face is in contact if its gap is below ``-edge``: boxes that fall together keep a gap
+    of round-off, with an undetermined sign.
     """
     n = len(heights)
     inverse = 1.0 / np.array(masses)
@@ -85,7 +85,7 @@ def _face_forces(law: ContactLaw, gap: Array, approach: Array, coupling: Array, 
 
 
 def as_trajectory(scene: Scene, dt: float, rows: Array) -> Trajectory:
-    """What the step loop would have recorded: ``rows`` (steps, 3, n) are heights, velocities, impulses from below."""
+    """The record of the step loop: ``rows`` (steps, 3, n) are heights, velocities, impulses from below."""
     d, (steps, _, n) = scene.dimension, rows.shape
     pose = np.empty((steps, n + 1, 3 if d == 2 else 7))
     pose[:] = [body.pose for body in scene.bodies]
@@ -101,7 +101,7 @@ def as_trajectory(scene: Scene, dt: float, rows: Array) -> Trajectory:
 
 
 def is_vertical(scene: Scene) -> bool:
-    """A half-space facing up at height 0 and upright free bodies above it that can only move up and down."""
+    """A half-space facing up at height 0 and upright free bodies above it that move only up and down."""
     d = scene.dimension
     upright = (0.0,) if d == 2 else (1.0, 0.0, 0.0, 0.0)
     face = scene.bodies[0].shape
@@ -116,7 +116,7 @@ def is_vertical(scene: Scene) -> bool:
 
 
 def along_a_heading(scene: Scene, dt: float, heading: Array, motion: Array) -> Trajectory:
-    """What the step loop would have recorded of a planar ``motion`` (steps, 2, 3) along a level unit vector."""
+    """The record of the step loop of a planar ``motion`` (steps, 2, 3) along a level unit vector."""
     d, steps = scene.dimension, len(motion)
     pose = np.empty((steps, 2, 3 if d == 2 else 7))
     pose[:] = [body.pose for body in scene.bodies]
@@ -126,7 +126,7 @@ def along_a_heading(scene: Scene, dt: float, heading: Array, motion: Array) -> T
     twist[:, 1, : d - 1], twist[:, 1, d - 1] = np.outer(vx, heading), vy
     if d == 2:
         pose[:, 1, 2], twist[:, 1, 2] = turn, omega
-    else:  # a turn from the heading towards the vertical is one about (heading_y, -heading_x)
+    else:  # a rotation from the heading towards the vertical is about (heading_y, -heading_x)
         axis = np.array([heading[1], -heading[0], 0.0])
         pose[:, 1, 3:] = np.column_stack([np.cos(0.5 * turn), np.outer(np.sin(0.5 * turn), axis)])
         twist[:, 1, 3:] = np.outer(omega, axis)

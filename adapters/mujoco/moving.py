@@ -1,8 +1,8 @@
-"""Faces that move and surfaces that run, which MuJoCo has no word for: their velocity enters the contacts of a step.
+"""Moving faces and surface velocities, which MuJoCo does not have: their velocity is added to the contacts of a step.
 
-A constraint asks for the acceleration ``aref = -b v - k r``, where v is the velocity of the bodies that MuJoCo moves. A
-face that is moved from outside (a mocap body, which has no velocity in contacts) adds its own, row by row, between the
-two halves of a step: ``aref -= b (v of the face along the row)``.
+A constraint has the reference acceleration ``aref = -b v - k r``, where v is the velocity of the bodies that MuJoCo
+moves. The velocity of a face moved from outside (a mocap body, without velocity in contacts) is added row by row
+between the two halves of a step: ``aref -= b (v of the face along the row)``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def is_moved_face(body: Body) -> bool:
 
 
 def moved(scene: Scene) -> dict[int, Body]:
-    """Bodies by index whose contacts need a velocity that MuJoCo does not know of."""
+    """Indices of bodies whose contacts need a velocity that MuJoCo does not have."""
     return {i: b for i, b in enumerate(scene.bodies) if is_moved_face(b) or any(b.surface_velocity)}
 
 
@@ -37,7 +37,7 @@ def motions(scene: Scene, dt: float, step: int) -> dict[int, tuple[tuple[float, 
 
 
 def enter_motions(model, data, motions):
-    """Let contacts with geoms that move, by their numbers, know of it; after ``mj_step1``, before ``mj_step2``."""
+    """Add the velocities of moving geoms, by index, to their contacts; after ``mj_step1``, before ``mj_step2``."""
     for k in range(data.ncon):
         contact = data.contact[k]
         row, frame = contact.efc_address, contact.frame.reshape(3, 3)
@@ -47,7 +47,7 @@ def enter_motions(model, data, motions):
         for side, geom in ((-1.0, contact.geom[0]), (1.0, contact.geom[1])):
             face, surface = motions.get(int(geom), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
             run = frame @ np.array(surface)
-            run[0] = 0.0  # what runs along itself neither lifts nor sinks
+            run[0] = 0.0  # a surface velocity has no normal component
             away += side * (frame @ np.array(face) + run)
         if contact.dim == 1:
             rows = away[:1]
@@ -60,7 +60,7 @@ def enter_motions(model, data, motions):
 
 
 def script_lines(scene: Scene, dt: float, second_half: str) -> tuple[list[str], list[str]]:
-    """Lines that a script needs before its loop, and those of a step; ``second_half`` is a line, or empty: MuJoCo's."""
+    """Lines of a script before its loop, and of a step; ``second_half`` is a line, or empty for MuJoCo's."""
     if not moved(scene):
         return [], ["mujoco.mj_step1(model, data)", second_half] if second_half else ["mujoco.mj_step(model, data)"]
     first = {i: face for i, (face, _) in motions(scene, dt, 0).items()}
@@ -79,7 +79,7 @@ def script_lines(scene: Scene, dt: float, second_half: str) -> tuple[list[str], 
 
 
 class Moved:
-    """Moves the faces of one model and lets its contacts know."""
+    """Moves the faces of one model and adds their velocities to contacts."""
 
     def __init__(self, scene: Scene, dt: float, model: Any, data: Any) -> None:
         self._scene, self._dt, self._model, self._data = scene, dt, model, data
@@ -88,7 +88,7 @@ class Moved:
         self._given = motions(scene, dt, 0)
 
     def enter(self, step: int) -> None:
-        """Let the contacts of step number ``step`` know how faces move; after ``mj_step1``."""
+        """Add face velocities to the contacts of step number ``step``; after ``mj_step1``."""
         given = motions(self._scene, self._dt, step)
         enter_motions(self._model, self._data, {self._geoms[i]: motion for i, motion in given.items()})
         self._given = given
@@ -99,6 +99,6 @@ class Moved:
             self._data.mocap_pos[row] += self._dt * np.array(self._given[i][0])
 
     def state(self, poses: Any, twists: Any) -> None:
-        """Write where the faces are and how they move over the last step (the first, before any)."""
+        """Write the places of the faces and their motion of the last step (before any step, the first)."""
         for i, row in self.faces.items():
             poses[i, :3], twists[i, :3] = self._data.mocap_pos[row], self._given[i][0]

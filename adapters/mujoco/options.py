@@ -1,4 +1,4 @@
-"""``<option>`` of a model as settings, of the profile that runs it as MuJoCo would and of whoever sets one."""
+"""``<option>`` of a model as settings, for the model's profile and for settings of users."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from adapters.engine import Setting
 from adapters.mujoco.refusal import Refused
 from adapters.settings import LARGEST_INT, Check, either, number, one_of, row, whole, word, words
 
-#: Flags that nothing in a scene asks about, or that are said otherwise (gravity).
+#: Flags without meaning for a scene, or set in another way (gravity).
 SILENT = frozenset(
     ("actuation", "autoreset", "clampctrl", "damper", "equality", "filterparent", "frictionloss", "gravity", "limit",
      "sensor", "spring")
 )  # fmt: skip
-#: Flags that are handed on.
+#: Flags that are passed on.
 CARRIED = frozenset(("eulerdamp", "island", "midphase", "multiccd", "nativeccd", "refsafe", "warmstart"))
 #: Flags that only measure.
 MEASURING = frozenset(("energy", "fwdinv"))
 
 
-#: Options that are no setting: --dt asks for the step, the scene for gravity, and flags have names.
+#: Options that are not settings: --dt sets the step, the scene gravity, and flags have names.
 ASKED_OTHERWISE = frozenset(("timestep", "gravity", "disableflags", "enableflags", "disableactuator"))
 #: Options that are one of an enumeration: its name, and what its members' names begin with.
 ENUMERATED = {
@@ -33,14 +33,14 @@ ENUMERATED = {
     "jacobian": ("mjtJacobian", "mjJAC_"),
     "solver": ("mjtSolver", "mjSOL_"),
 }
-#: Words of theirs that a setting has with other letters than small ones.
+#: Their words that a setting has in other than lower case.
 SPELT = {"euler": "Euler", "rk4": "RK4", "pgs": "PGS", "cg": "CG", "newton": "NEWTON"}
 _ANY, _POSITIVE = number(-math.inf, math.inf), number(0.0, math.inf)
 
 
 @cache
 def own_kinds() -> dict[str, Check]:
-    """What can be set with the release that is installed: its options and flags, and how soft contacts are."""
+    """Settings of the installed release: its options and flags, and the softness of contacts."""
     import mujoco
 
     option = mujoco.MjModel.from_xml_string("<mujoco/>").opt
@@ -63,13 +63,13 @@ def own_kinds() -> dict[str, Check]:
 
 
 def members_of(mujoco: Any, kind: str, prefix: str) -> dict[str, int]:
-    """Members of an enumeration by their names in small letters; the one that counts them has another prefix."""
+    """Members of an enumeration by name in lower case; the one that counts them has another prefix."""
     members = getattr(mujoco, kind).__members__.items()
     return {name.removeprefix(prefix).lower(): int(value) for name, value in members if name.startswith(prefix)}
 
 
 def set_own(mujoco: Any, option: Any, settings: Mapping[str, Any]) -> None:
-    """Hand over settings that no profile states: options by their names, and flags that are switched on."""
+    """Apply settings that no profile has: options by name, and flags that are switched on."""
     for name, value in settings.items():
         if name == "jacobian":
             option.jacobian = getattr(mujoco.mjtJacobian, f"mjJAC_{value.upper()}")
@@ -86,7 +86,7 @@ def option_settings(mujoco: Any, model: Any) -> list[Setting]:
     Raises
     ------
     Refused
-        For what acts on bodies and no scene has: wind, a fluid, contacts that are switched off.
+        For effects that no scene has: wind, a fluid, disabled contacts.
     """
     option = model.opt
     for name in ("density", "viscosity", "wind"):
@@ -95,9 +95,9 @@ def option_settings(mujoco: Any, model: Any) -> list[Setting]:
     disabled = {bit.name.removeprefix("mjDSBL_").lower() for bit in _bits(mujoco.mjtDisableBit, option.disableflags)}
     enabled = {bit.name.removeprefix("mjENBL_").lower() for bit in _bits(mujoco.mjtEnableBit, option.enableflags)}
     for name in sorted(disabled - SILENT - CARRIED):
-        raise Refused("option/flag", name, "without it nothing touches", fatal=True)
+        raise Refused("option/flag", name, "without it there are no contacts", fatal=True)
     for name in sorted(enabled - MEASURING):
-        raise Refused("option/flag", name, "a scene has no word for what it changes", fatal=True)
+        raise Refused("option/flag", name, "a scene cannot express what it changes", fatal=True)
     integrator = mujoco.mjtIntegrator(int(option.integrator)).name.removeprefix("mjINT_").lower()
     words = {
         "integrator": {"euler": "Euler", "rk4": "RK4"}.get(integrator, integrator),

@@ -1,4 +1,4 @@
-"""What MuJoCo's settings mean for one pair of materials: its ``solref``, its ``solreffriction``, its law."""
+"""MuJoCo's settings for one pair of materials: its ``solref``, ``solreffriction`` and law."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from adapters.mujoco.contact_law import ContactLaw, softness_of
 
 
 def pair_solref(settings: Mapping[str, Any], restitution: float, dt: float) -> tuple[float, float]:
-    """``solref`` of a pair; "reflect" asks for the velocity -e v one step after contact, v' = v - dt (1+e)/dt v."""
+    """``solref`` of a pair; "reflect" has the target velocity -e v one step after contact, v' = v - dt (1+e)/dt v."""
     if settings["solref"] != "reflect":
         return (settings["solref"][0], settings["solref"][1])
     kappa = settings["kappa_elastic" if restitution > 0.0 else "kappa_plastic"]
@@ -17,10 +17,10 @@ def pair_solref(settings: Mapping[str, Any], restitution: float, dt: float) -> t
 
 
 def pair_solreffriction(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
-    """``solreffriction`` of a pair; "stick" asks friction to stop the slip within the step, v' = v - dt/dt v."""
+    """``solreffriction`` of a pair; with "stick" friction stops the slip within the step, v' = v - dt/dt v."""
     value = settings["solreffriction"]
     if value is None:
-        return (0.0, 0.0)  # MuJoCo's own way of saying: as solref
+        return (0.0, 0.0)  # MuJoCo's notation for: as solref
     return (0.0, -1.0 / dt) if value == "stick" else (value[0], value[1])
 
 

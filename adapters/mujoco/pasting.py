@@ -1,4 +1,4 @@
-"""Settings of MuJoCo in its own words: MJCF to paste, with the formulas of numbers made of e, the step or gravity."""
+"""Settings of MuJoCo as MJCF for pasting, with formulas of numbers that depend on e, the step or gravity."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from adapters.scene import HalfSpace, Scene
 
 #: Settings that are attributes of MJCF's ``<option>``, by the same name.
 OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
-#: MuJoCo's own torsional and rolling friction of a pair, which our materials do not have.
+#: MuJoCo's torsional and rolling friction of a pair, which our materials do not have.
 TURNING = (0.005, 0.0001, 0.0001)
-#: Pairs of bodies that a comment names before it counts.
+#: Number of pairs of bodies that a comment names; others are counted.
 NAMED = 3
 
 #: Restitution and friction of a pair.
 Material = tuple[float, float]
-#: Value of an attribute, and the formula that it is made from; an empty one for a constant.
+#: Value of an attribute and its formula; empty for a constant.
 Told = tuple[Any, str]
 
 
@@ -43,8 +43,8 @@ def words(settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tup
 def snippet(settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
     """See `adapters.engine.Engine.snippet`.
 
-    One ``<default>`` where all pairs of the scene need the same; else one ``<pair>`` for each material, with its
-    friction, to be written for each pair of geoms.
+    One ``<default>`` where all pairs of the scene are alike; else one ``<pair>`` for each material, with its friction,
+    for each pair of geoms.
     """
     pairs: dict[Material, list[str]] = {}
     for i, j, material in scene.contact_pairs():
@@ -65,7 +65,7 @@ def snippet(settings: Mapping[str, Any], names: Collection[str], scene: Scene, d
 def _of_pair(
     settings: Mapping[str, Any], names: Collection[str], material: Material, scene: Scene, dt: float
 ) -> dict[str, Told]:
-    """Attributes of a pair of this material, of those that ``names`` ask for."""
+    """Attributes in ``names`` of a pair of this material."""
     restitution, friction = material
     found: dict[str, Told] = {}
     if {"solref", "kappa_elastic", "kappa_plastic"} & set(names):
@@ -86,14 +86,14 @@ def _of_pair(
 def _of_all(
     pairs: Mapping[Material, Sequence[str]], asked: Mapping[Material, Mapping[str, Told]], scene: Scene, dt: float
 ) -> list[str]:
-    """Defaults for all geoms and for explicit pairs, which take nothing from their geoms, and whom they touch."""
+    """Defaults for all geoms and for explicit pairs, which take nothing from their geoms."""
     pair = next(iter(asked.values()))
     bounces = {restitution for restitution, _ in pairs} if "solref" in pair else set()
     said = ["every geom of the model that has no value of its own"]
     if pair.get("condim", (3, ""))[0] == 1:
         said.append('condim="1" takes all friction from them: leave it out of those with friction')
     geom = dict(pair)
-    if "margin" in pair:  # a pair's is the sum of its geoms'
+    if "margin" in pair:  # the value of a pair is the sum of its geoms'
         depth, _ = pair["margin"]
         geom["margin"] = (0.5 * depth, _margin_formula(0.5 * depth, scene, dt))
     of_geoms = _comment([*said, *_holds(geom, bounces, scene, dt)])
@@ -105,7 +105,7 @@ def _of_all(
 def _of_pairs(
     pairs: Mapping[Material, Sequence[str]], asked: Mapping[Material, Mapping[str, Told]], scene: Scene, dt: float
 ) -> list[str]:
-    """One pair for each material, and a comment on which pairs it is for; a pair takes no friction from its geoms."""
+    """One pair for each material, with a comment on the pairs of bodies; a pair takes no friction from its geoms."""
     lines = ["<contact>", "  <!-- a line for each pair of geoms that may touch, with their names for A and B -->"]
     for material, told in asked.items():
         if not told:
@@ -129,9 +129,9 @@ def _solref_formula(settings: Mapping[str, Any], restitution: float) -> str:
 
 
 def _margin_formula(margin: float, scene: Scene, dt: float) -> str:
-    """The margin as a share of the way that a body falls, ``g dt^2``, where it is a round one; else empty.
+    """The margin as a multiple of one step's fall, ``g dt^2``, where it is a round one; else empty.
 
-    Round to four digits: the profiles take a thousandth of it, and a margin that somebody sets is none to 1e-9.
+    Round to four digits: the profiles use a thousandth of it, and a user's margin is not round to 1e-9.
     """
     fall = needs(scene).pull * dt**2
     share = margin / fall if fall else 0.0
@@ -139,14 +139,14 @@ def _margin_formula(margin: float, scene: Scene, dt: float) -> str:
 
 
 def _formulas(told: Mapping[str, Told], bounces: Collection[float]) -> list[str]:
-    """Attributes with their formulas in place of the numbers; nothing where all are constants."""
+    """Attributes with formulas instead of numbers; empty where all are constants."""
     formulas = " ".join(f'{name}="{formula}"' for name, (_, formula) in told.items() if formula)
     which = f" with e {'>' if max(bounces) > 0.0 else '='} 0" if bounces else ""
     return [f"for others{which}: {formulas}"] if formulas else []
 
 
 def _holds(told: Mapping[str, Told], bounces: Collection[float], scene: Scene, dt: float) -> list[str]:
-    """For which e, step and gravity numbers are, and the formulas for others; nothing where all are constants."""
+    """The e, step and gravity of the numbers, and formulas for others; empty where all are constants."""
     formulas = _formulas(told, bounces)
     if not formulas:
         return []
@@ -156,13 +156,13 @@ def _holds(told: Mapping[str, Told], bounces: Collection[float], scene: Scene, d
 
 
 def _comment(said: Sequence[str]) -> str:
-    """An XML comment, a line for each thing that is said."""
+    """An XML comment, one line for each text."""
     text = ";\n       ".join(said).replace("--", "- -")
     return f"<!-- {text} -->"
 
 
 def _element(name: str, attributes: Mapping[str, Told]) -> str:
-    """One empty MJCF element; numbers keep all digits that matter to a step."""
+    """One empty MJCF element; numbers keep all digits that matter in a step."""
 
     def text(value: Any) -> str:
         if isinstance(value, tuple | list):

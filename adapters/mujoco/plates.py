@@ -1,4 +1,4 @@
-"""MuJoCo's laws of a box on a half-space, asked of one on a plate."""
+"""MuJoCo's laws of a box on a half-space, for a box on a plate."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from adapters.scene import Body, Box, HalfSpace, Pair, Scene
 
 
 def on_a_plate(law: Law, metric: str) -> Law:
-    """The law of a box on a half-space, asked of one on a level plate: the engine makes the same contacts of both.
+    """The law of a box on a half-space, for a box on a level plate, which has the same contacts.
 
-    Wherever the plate is: what is told of the box is told from there. But gaps are differences of places, known to the
-    last place of a number of their size; taken out within a step that is a speed, which the run turns into a way, and
-    a mean over a third of it into an acceleration at both its ends.
+    The place of the plate does not matter to relative values, except that gaps are differences of coordinates with
+    their rounding; corrected within a step that is a speed, which over the run is a distance, and in a mean over a
+    third of it an acceleration error at both ends.
     """
 
     def same(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -30,7 +30,7 @@ def on_a_plate(law: Law, metric: str) -> Law:
 
 
 def _flat(scene: Scene) -> Scene | None:
-    """The scene with a half-space at level 0 in the place of its plate; None if it has something else there."""
+    """The scene with a half-space at level 0 instead of its plate; None if it has no plate."""
     if len(scene.bodies) != 2:
         return None
     (plate, box), d = scene.bodies, scene.dimension

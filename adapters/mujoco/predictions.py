@@ -1,14 +1,13 @@
-"""What MuJoCo's laws predict: its documented contact law on balls, columns and inclines, without running it.
+"""Predictions of MuJoCo's documented contact law for balls, columns and inclines, without running it.
 
     ball on a floor      one scalar recurrence (`adapters.mujoco.contact_law`)
     column of boxes      the same law at every face, coupled: each step solves  (A + R) f = aref - a0,  f >= 0
     box that slides      the same law with friction and rotation, in the plane (`box_on_face`)
-    blow without load    the scalar law with what the engine takes for the inverse mass (`blows`)
+    blow without load    the scalar law with the engine's estimate of the inverse mass (`blows`)
 
-A recurrence is put into a trajectory and measured by the scene's own metrics, so that a prediction and a measurement
-differ by physics only. Every prediction is made twice or more, with a start moved by what the engine's solver or
-round-off may be off; what the predictions differ by, times a factor, is the band, and where it is large the law is
-silent.
+A recurrence gives a trajectory, which is measured by the scene's own metrics, so that a prediction and a measurement
+differ by physics only. Every prediction is made twice or more, with a start moved by the error of the engine's solver
+or round-off; the difference times a factor is the band, and where it is large there is no prediction.
 
 Sources: MuJoCo documentation, "Computation: constraint model" (a convex problem; friction cones without
 complementarity; impedance relative to an estimate of the inverse inertia), "Modeling: solver parameters" (solref,
@@ -44,22 +43,22 @@ EPS = float(np.finfo(float).eps)
 #: starts are moved: two of each sign, since a contact found a step later is a jump.
 GAP_ROUND_OFF = 1e-14
 PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
-#: Runs that are moved on purpose may miss the engine's own error by this factor.
+#: Factor on the differences of moved runs, as the engine's own error may be larger.
 SPREAD_FACTOR = 10.0
-#: A metric that moves by more than this share of its scale is not predicted.
+#: A metric that changes by more than this share of its scale is not predicted.
 BLURRED = 1e-4
-#: Two paths of a box are still told apart from anything else if they differ by less than this share of the scale.
+#: Largest difference of two paths of a box for a prediction, as a share of the scale.
 EITHER = 1e-2
-#: A box stands where it is slower than this share of a step's fall (as the scenes of columns measure it).
+#: A box is at rest below this share of the speed of a step's fall (as in the scenes of columns).
 STILL = 0.01
-#: Newton ends when its faces are right: fewer steps than this for the two of a pair.
+#: Newton's method ends when the active faces are right: fewer steps than this for the two of a pair.
 ENOUGH = 10
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
 
 
 def settings_of(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
-    """Settings of a profile by their names, as a scene needs them."""
+    """Settings of a profile for a scene, by name."""
     return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
 
 
@@ -70,10 +69,10 @@ def law_of(profile: str, scene: Scene, dt: float) -> ContactLaw:
 
 
 def solver_error(profile: str, scene: Scene, dt: float) -> float:
-    """Velocity [m/s] by which one step of a box may be off: Newton stops when a step gains less than the tolerance.
+    """Velocity error [m/s] of a step of a box: Newton's method stops when a step gains less than the tolerance.
 
-    The cost counts in units of the mean inertia, (3 m + 3 I)/6 < m here, times 6 unknowns; short of its minimum by
-    that, an acceleration is off by ``sqrt(2 * 6 * tolerance)`` m/s^2 at most.
+    The cost is in units of the mean inertia, (3 m + 3 I)/6 < m here, times 6 unknowns; that far from its minimum, an
+    acceleration has an error of ``sqrt(2 * 6 * tolerance)`` m/s^2 at most.
     """
     return math.sqrt(12.0 * float(settings_of(profile, scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
 
@@ -92,7 +91,7 @@ def _ball_metrics(scene: Scene, measure: Measure, law: ContactLaw, moved: float)
 
 
 def _force_round_off(law: ContactLaw) -> float:
-    """Relative round-off of forces as reported: ``f = (aref - a)/R`` is a small difference of large numbers.
+    """Relative round-off of reported forces: ``f = (aref - a)/R`` is a small difference of large numbers.
 
     Two roundings of a number of size aref, over R, against aref m: 2 eps/(R m) for each of four edges, which have
     R m = 4 s (1 - d)/d. A pair without friction keeps mu = 1e-5, and with it s = 5e-11.
@@ -110,7 +109,7 @@ def _scale(scene: Scene, metric: str) -> float:
 
 
 def ball_law(profile: str, metric: str) -> Law:
-    """A ball on a floor, followed from some starts that differ by the round-off of its gap."""
+    """A ball on a floor, from several starts that differ by the round-off of its gap."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         if not (is_vertical(scene) and len(scene.bodies) == 2 and isinstance(scene.bodies[1].shape, Disc | Sphere)):
@@ -147,8 +146,8 @@ def column_law(profile: str, metric: str) -> Law:
         sizes = tuple(2.0 * shape.half_extents[up] for shape in shapes)
         masses = tuple(body.mass for body in boxes)
         steps, load = step_count(scene.duration, dt), scene.gravity[up]
-        # Faces between boxes that fall together: all touch by round-off, or none. The engine finds a mixture, which
-        # may go a little further than either; twice their difference.
+        # Faces between boxes that fall together: all in contact by round-off, or none. The engine finds a mixture,
+        # which may lie a little beyond either; twice their difference.
         paths = [column(contact, heights, sizes, masses, load, steps, edge) for edge in (0.0, GAP_ROUND_OFF)]
         value, other = (measure(scene, as_trajectory(scene, dt, path))[metric][0] for path in paths)
         if value is None or other is None:
@@ -157,13 +156,13 @@ def column_law(profile: str, metric: str) -> Law:
         if spread > 0.5 * value:
             return None
         if metric == "settle_time":
-            # A speed that falls below its threshold may do so one step away; or at any time until the end, if what
-            # Newton leaves keeps a box above it.
+            # A speed may fall below its threshold one step earlier or later; or at any time until the end, if the
+            # residual of Newton's method keeps a box above it.
             if _trembles(profile, scene, dt) > STILL * abs(load) * dt:
                 half = 0.5 * (scene.duration - value)
                 return value + half, half + 2.0 * spread + dt
             return value, 2.0 * spread + dt
-        # Half-way into a box the nearest way out is another: boxes come to lie beside each other.
+        # Half-way into a box the nearest exit is another face: boxes end side by side.
         if value > 0.5 * min(sizes):
             return None
         # Each corner's force is a difference over R, (1 - d)/d of an inertia.
@@ -175,12 +174,11 @@ def column_law(profile: str, metric: str) -> Law:
 
 
 def _trembles(profile: str, scene: Scene, dt: float) -> float:
-    """Speed [m/s] at which a box of a column may go on because Newton stops at its tolerance.
+    """Residual speed [m/s] of a box in a column because Newton's method stops at its tolerance.
 
-    The cost counts in units of the mean inertia, of n boxes (3 m + 3 I)/6 on the average, times 6 n unknowns: short of
-    its minimum by the tolerance, the lightest is accelerated by ``sqrt(2 tolerance 6 n inertia/m)``. A critically
-    damped contact turns a steady push into a speed of 2/e of its time constant at most, which is as many times longer
-    as the root of what its own mass goes into the load.
+    The cost is in units of the mean inertia, for n boxes (3 m + 3 I)/6 on average, times 6 n unknowns: that far from
+    its minimum, the lightest is accelerated by ``sqrt(2 tolerance 6 n inertia/m)``. A critically damped contact turns a
+    constant push into a speed of at most 2/e of its time constant, which grows with the root of load over mass.
     """
     settings = settings_of(profile, scene, dt)
     if settings["solref"] == "reflect":
@@ -195,7 +193,7 @@ def _trembles(profile: str, scene: Scene, dt: float) -> float:
 
 
 def column_asked(profile: str, metric: str) -> AskedLaw:
-    """The same at counts of Newton's steps that it does not use up; silent below."""
+    """The same at counts of Newton steps that are not used up; no prediction below."""
     own = column_law(profile, metric)
 
     def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
@@ -213,7 +211,7 @@ def _slide(box: BoxOnFace, steps: int, velocity: float) -> Array:
 
 
 def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
-    """The planar problem of one box on a level face that is pulled along x, or None if the scene is not that."""
+    """The planar problem of one box on a level face with a load along x; None for other scenes."""
     if len(scene.bodies) != 2 or any(scene.gravity[1:-1]):
         return None
     face, body = scene.bodies
@@ -225,7 +223,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
 
 
 def incline_law(profile: str, metric: str) -> Law:
-    """A box at rest on an incline: its planar motion, started with what the solver may be off."""
+    """A box at rest on an incline: its planar motion, started with the solver's error."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         box = box_on_face(profile, scene, dt)
@@ -243,7 +241,7 @@ def incline_law(profile: str, metric: str) -> Law:
         round_off = EPS * d / (1.0 - d) * scale
         floor = round_off + (error if metric == "creep" else 2.0 * error / window)
         if spread > BLURRED * scale:
-            # On the edge between two paths (one hop more or less): the engine takes either.
+            # Between two paths (one hop more or less) the engine may take either.
             return (value, 2.0 * spread + floor) if spread <= EITHER * scale else None
         return value, SPREAD_FACTOR * spread + floor
 
@@ -256,11 +254,11 @@ def _motion(box: BoxOnFace, steps: int, velocity: float) -> Array:
 
 
 def stopping_law(profile: str, metric: str) -> Law:
-    """A box that slides to a stop: its planar motion along the heading, measured like the engine's own.
+    """A box that slides to a stop: its planar motion along the heading, measured like the engine's run.
 
-    An elliptic cone does not know the heading, but the box does: seen along it, it is as long as its side or, at most,
-    as its projection. Both are followed, and the band spans them. A pyramid brakes each heading otherwise, and turns
-    it: the law is silent there.
+    An elliptic cone does not depend on the heading, but the box does: along it, its length is its side or, at most, its
+    projection. Both are computed, and the band covers them. A pyramid brakes differently in each heading, and turns the
+    box: no prediction.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -282,8 +280,8 @@ def stopping_law(profile: str, metric: str) -> Law:
         if value is None or None in others:
             return None
         *moved, other = (abs(each - value) for each in others if each is not None)
-        # One step of the solver is off by `error` in speed: that over the whole run in place, and at both ends of the
-        # mean over a third of the run.
+        # One step of the solver has an error `error` in speed, which over the run is an error in position, and at both
+        # ends of the mean over a third of the run.
         floor = error * (6.0 / scene.duration if metric == "braking" else scene.duration)
         # On the edge between two paths (one hop more or less) the engine takes either.
         factor = SPREAD_FACTOR if max(moved) <= BLURRED * abs(value) else 2.0
@@ -296,7 +294,7 @@ def stopping_law(profile: str, metric: str) -> Law:
 
 
 def blow_law(profile: str, metric: str) -> Law:
-    """A blow between two bodies: how fast they part fixes the impulse, and that everything."""
+    """A blow between two bodies: the separation speed determines the impulse, and that everything."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         touch = blow_of(scene)
@@ -310,11 +308,11 @@ def blow_law(profile: str, metric: str) -> Law:
         value, *others = (run[metric] for run in runs)
         scale = 1.0 / blow.inverse_mass * blow.closing if metric == "impulse" else max(1.0, blow.closing)
         band = SPREAD_FACTOR * max(abs(other - value) for other in others) + SUM_ROUND_OFF * scale
-        # The solver stops short in every step of a contact; a ratio of speeds and energies alike.
+        # The solver has its error in every step of a contact; for ratios of speeds and energies alike.
         band += solver_error(profile, scene, dt) * (scale if metric == "impulse" else 1.0)
         if metric == "impulse":
             band += _force_round_off(contact) * scale
-        # What is lost is told as a share of what a blow has that is found when the bodies touch.
+        # The loss is relative to the energy of a blow found when the bodies touch.
         found = blow.energy / touch.energy if metric == "energy_lost" else 1.0
         return value * found, band * found
 

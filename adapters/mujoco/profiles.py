@@ -2,7 +2,7 @@
 
 default   as shipped
 tuned     best stock settings for what a scene needs
-matched   Newton's and Coulomb's laws by references that a loop around the solver sets (`adapters.mujoco.matched`)
+matched   Newton's and Coulomb's laws by a loop around the solver that shifts references (`adapters.mujoco.matched`)
 """
 
 from __future__ import annotations
@@ -26,36 +26,36 @@ REFLECT = f"{DOC}, computation/speculative: elastic restitution"
 DE_SAXCE = "De Saxce and Feng, The bipotential method, 1998; adapters/mujoco/matched.py"
 NEWTON = "Newton's law of restitution; adapters/mujoco/matched.py"
 MEASURED = "measured with 4.0.1"
-CARRIES = "a load needs a spring of stiffness kappa/dt^2 to rest on"
+CARRIES = "a load rests on a spring of stiffness kappa/dt^2"
 
-#: Impedance as close to 1 as MuJoCo lets it be, the same at every depth.
+#: Largest impedance that MuJoCo allows, the same at every depth.
 RIGID = (IMPEDANCE_RANGE[1], IMPEDANCE_RANGE[1], 0.001, 0.5, 1.0)
 #: Stiffness of a resting contact in units of 1/dt^2: with damping 1/dt a depth shrinks by 1 - kappa a step. 0.1 settles
-#: in ten steps and stays clear of the limit of 1. 0.5 rests less deep still, but a column of ten at one Newton step
-#: explodes with it (`crosscheck tune mujoco --group stand`).
+#: in ten steps and is far from the limit of 1. With 0.5 bodies rest less deep, but a column of ten at one Newton step
+#: explodes (`crosscheck tune mujoco --group stand`).
 KAPPA = 0.1
-#: The same for blows whose softness a loop undoes round by round: what a contact yields then falls by 1e-2 a round, and
-#: forces, which are differences over (1 - d)/d, have 2e-14 of round-off in place of 2e-12.
+#: The same for blows whose softness a loop corrects: the yielding of a contact then falls by 1e-2 a round, and forces,
+#: which are differences over (1 - d)/d, have 2e-14 of round-off instead of 2e-12.
 FIRM = (0.99, 0.99, 0.001, 0.5, 1.0)
-#: Tolerance of Newton's method where its answer is looked at again: a step that gains less than this share of the mean
-#: inertia's kinetic energy at 1 m/s^2 gains round-off. With 0 it goes on to its count, a hundred times as long.
+#: Tolerance of Newton's method in the loop: a step that gains less than this share of the mean inertia's kinetic energy
+#: at 1 m/s^2 gains round-off. With 0 it runs to its count, a hundred times as long.
 SOLVED = 1e-15
-#: Rounds that are allowed where friction needs fewer.
+#: Least limit of rounds.
 FEWEST_ROUNDS = 100
 
 
 def default(needs: Needs, dt: float) -> list[Setting]:
-    """As shipped, whatever the scene needs; friction is given to both geoms of a pair."""
+    """As shipped, for every scene; both geoms of a pair get its friction."""
     shipped = "as shipped"
     return [
         Setting("integrator", "Euler", shipped, DOC),
         Setting("cone", "pyramidal", shipped, DOC),
         Setting("impratio", 1.0, shipped, DOC),
-        Setting("iterations", ITERATIONS, f"{shipped}: at most so many Newton steps", DOC),
+        Setting("iterations", ITERATIONS, f"{shipped}: largest number of Newton steps", DOC),
         Setting("tolerance", TOLERANCE, shipped, DOC),
         Setting("noslip_iterations", 0, shipped, DOC),
         Setting("smooth_condim", 3, f"{shipped}: a pair with mu = 0 keeps friction rows, of mu = 1e-5", DOC),
-        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; e has no say", MANUAL),
+        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; no restitution", MANUAL),
         Setting("solimp", SOLIMP, shipped, MANUAL),
         Setting("solreffriction", None, f"{shipped}: friction is damped like the normal", FRICTION),
         Setting("margin", 0.0, f"{shipped} [m]: contact starts when bodies overlap", DOC),
@@ -65,35 +65,45 @@ def default(needs: Needs, dt: float) -> list[Setting]:
 def tuned(needs: Needs, dt: float) -> list[Setting]:
     """Best stock settings for the scene's needs."""
     if needs.regime == "free":
-        return _replaced(default(needs, dt), Setting("integrator", "RK4", "nothing can touch: fourth order", DOC))
+        return _replaced(
+            default(needs, dt),
+            Setting("integrator", "RK4", "no contact is possible, so a fourth-order method is accurate", DOC),
+        )
     settings = _replaced(
         default(needs, dt),
-        Setting("cone", "elliptic", "the pyramid is an L1 cone: mu/sqrt(2) at 45 degrees", f"{DOC}, computation"),
+        Setting("cone", "elliptic", "the pyramid limits friction to mu/sqrt(2) at 45 degrees", f"{DOC}, computation"),
         Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
-        Setting("solref", "reflect", "asks for velocity -e v one step after contact: damping (1 + e)/dt", REFLECT),
-        Setting("solimp", RIGID, "d = 0.9999: only the 1e-4 that is left of the load gets through", MANUAL),
-        Setting("tolerance", 0.0, "Newton goes on to round-off: forces add up too, at no cost", MEASURED),
-        Setting("kappa_elastic", 0.0, "a stiffness kappa/dt^2 would add kappa times the phase to e", MEASURED),
-        Setting("kappa_plastic", 0.0, "without a load there is nothing to carry", MANUAL),
+        Setting("solref", "reflect", "target velocity -e v one step after contact: damping (1 + e)/dt", REFLECT),
+        Setting("solimp", RIGID, "d = 0.9999: only 1e-4 of the load yields", MANUAL),
+        Setting("tolerance", 0.0, "Newton's method converges to round-off; forces then balance, at no cost", MEASURED),
+        Setting(
+            "kappa_elastic",
+            0.0,
+            "a stiffness kappa/dt^2 would change e with the phase of the impact in its step",
+            MEASURED,
+        ),
+        Setting("kappa_plastic", 0.0, "there is no load to carry", MANUAL),
     )
     if needs.regime == "rest":
         settings = _replaced(settings, *_resting(needs, dt))
     elif needs.gravity > 0.0 and needs.restitution > 0.0:
         settings = _replaced(settings, Setting("kappa_plastic", KAPPA, CARRIES, MANUAL))
     if needs.friction > 0.0 and needs.restitution > 0.0:
-        reverses = "the normal's damping (1 + e)/dt would reverse the slip: 1/dt stops it"
+        reverses = "the damping of the normal, (1 + e)/dt, would reverse the slip; 1/dt stops it"
         settings = _replaced(settings, Setting("solreffriction", "stick", reverses, FRICTION))
     return settings
 
 
 def _resting(needs: Needs, dt: float) -> list[Setting]:
-    """What changes for bodies that only rest, stick and slide (e = 0 everywhere)."""
+    """Changes for bodies that only rest, stick and slide (e = 0 everywhere)."""
     settings = [Setting("kappa_plastic", KAPPA, CARRIES, MANUAL)]
     depth = (1.0 - RIGID[0]) / KAPPA * needs.pull * dt**2
-    touches = "the depth (1-d)/kappa g dt^2 at which a body rests: touching bodies then start and stay in contact"
+    touches = "the depth (1-d)/kappa g dt^2 at which a body rests; touching bodies then start and stay in contact"
     settings.append(Setting("margin", depth, touches, f"{MANUAL}; {DOC}, margin"))
     if needs.friction > 0.0:
-        creeps = "stick is viscous, creep (1-d)/(d b n impratio) g sin(theta): 100 puts it far below g dt^2/s"
+        creeps = (
+            "friction at rest creeps with (1-d)/(d b n impratio) g sin(theta); 100 makes that far less than g dt^2/s"
+        )
         settings.append(Setting("impratio", 100.0, creeps, FRICTION))
     if needs.slide:
         # Stiff friction damping throws a sliding body up, soft damping stops it late. Over 25 inclines with
@@ -107,7 +117,7 @@ def _resting(needs: Needs, dt: float) -> list[Setting]:
 
 
 def matched(needs: Needs, dt: float) -> list[Setting]:
-    """Newton's restitution and Coulomb's friction by references of our own, wherever anything can touch."""
+    """Newton's restitution and Coulomb's friction by shifted references, wherever contact is possible."""
     if needs.regime == "free":
         return tuned(needs, dt)
     fall, depth = needs.pull * dt, (1.0 - RIGID[0]) / KAPPA * needs.pull * dt**2
@@ -116,22 +126,26 @@ def matched(needs: Needs, dt: float) -> list[Setting]:
         default(needs, dt),
         Setting("cone", "elliptic", "Coulomb's cone is round", f"{DOC}, computation"),
         Setting("smooth_condim", 1, "a pair with mu = 0 has no friction rows", f"{DOC}, computation: contact"),
-        Setting("solref", (0.0, -firm[0] / dt), "asks for velocity 0 one step later; the loop adds the rest", MANUAL),
-        Setting("solimp", firm, "what is left of the load is small, and the loop asks for it", MANUAL),
-        Setting("tolerance", SOLVED, "Newton goes on until a step gains no more than round-off", MEASURED),
+        Setting("solref", (0.0, -firm[0] / dt), "target velocity 0 one step later; the loop adds the rebound", MANUAL),
+        Setting("solimp", firm, "a small part of the load yields, and the loop corrects it", MANUAL),
+        Setting("tolerance", SOLVED, "Newton's method stops when a step gains round-off only", MEASURED),
         Setting("margin", depth, "bodies that touch at a distance of exactly 0 are in contact", f"{DOC}, margin"),
-        Setting("rounds", _rounds(needs.friction), "enough for the shifts to agree without the secant", DE_SAXCE),
-        Setting("agreed", AGREED, "share of the contacts' largest acceleration that rounds end at", DE_SAXCE),
-        Setting("push_out", KAPPA, "share of an overlap that a step takes away", CARRIES),
-        Setting("push_out_speed", fall, "no faster than the load brings it back in a step: nothing hops", NEWTON),
+        Setting(
+            "rounds", _rounds(needs.friction), "enough for the shifts to converge without the secant method", DE_SAXCE
+        ),
+        Setting(
+            "agreed", AGREED, "rounds end when shifts agree to this share of the largest contact acceleration", DE_SAXCE
+        ),
+        Setting("push_out", KAPPA, "share of an overlap that a step corrects", CARRIES),
+        Setting("push_out_speed", fall, "no faster than the load returns it in a step, so nothing hops", NEWTON),
     )
 
 
 def _rounds(friction: float) -> int:
-    """Rounds after which `adapters.mujoco.matched` agrees by its contraction alone, of a ball as of a box.
+    """Rounds after which `adapters.mujoco.matched` converges by contraction only, for a ball as for a box.
 
     The slower of two: ``mu^2 G/(1 + mu^2 G)`` a round with G = 7/2, the mobility of a ball's surface, and that of the
-    softness, 1e-4 of an inverse mass, which mass ratios of 1e4 slow down to two thirds.
+    softness, 1e-4 of an inverse mass, which falls to two thirds at mass ratios of 1e4.
     """
     slip = 3.5 * friction**2
     return max(FEWEST_ROUNDS, math.ceil(math.log(AGREED) / math.log(slip / (1.0 + slip)))) if slip else FEWEST_ROUNDS
@@ -146,7 +160,7 @@ def _replaced(settings: list[Setting], *changes: Setting) -> list[Setting]:
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned, "matched": matched})
 
 
-#: Settings whose value is one of these words.
+#: Settings with one of these words as value.
 WORDS = {
     "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
     "cone": ("pyramidal", "elliptic"),
@@ -169,7 +183,7 @@ NUMBERS = {
 NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
 ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
 ONLY_MATCHED = frozenset({"rounds", "agreed", "push_out", "push_out_speed"})
-#: Settings that only a model brings (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
+#: Settings of models only (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
 #: switched off, and pairs (indices of bodies) with a softness of their own.
 BROUGHT = frozenset({"solver", "disabled", "apart"})
 SOLVERS = ("PGS", "CG", "NEWTON")
@@ -189,7 +203,7 @@ def check_settings(settings: Mapping[str, Any]) -> None:
     for name in sorted((set(settings) - BROUGHT - set(own)) ^ wanted):
         raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
     for name, words in WORDS.items():
-        # The release that is installed may have a word that no profile uses.
+        # The installed release may have a word that no profile uses.
         if settings[name] not in words and (name not in ENUMERATED or own_kinds()[name](settings[name])):
             raise EngineError(f"{name}: {settings[name]!r} must be one of {', '.join(map(str, words))}")
     for name, (low, whole) in NUMBERS.items():
@@ -209,13 +223,13 @@ def check_settings(settings: Mapping[str, Any]) -> None:
 
 
 def own_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that no profile and no model states: options of the release that is installed."""
+    """Settings outside profiles and models: options of the installed release."""
     others = set(settings) - NAMES - BROUGHT
     return {name: settings[name] for name in sorted(others) if name in own_kinds()}
 
 
 def _check_brought(settings: Mapping[str, Any]) -> None:
-    """Settings that a model brings; a file may hold anything under their names."""
+    """Settings of a model; a file may have anything under their names."""
     if settings.get("solver", "NEWTON") not in SOLVERS:
         raise EngineError(f"solver: {settings['solver']!r} must be one of {', '.join(SOLVERS)}")
     for name in settings.get("disabled", ()):

@@ -1,17 +1,17 @@
-"""What stops a model from being a scene: the element that has no place in one."""
+"""The error for an element of a model that a scene does not support."""
 
 from __future__ import annotations
 
 
 class Refused(Exception):
-    """An element has no place in a scene.
+    """A scene does not support an element.
 
     Parameters
     ----------
     kind, name
-        Of the element, as the compiled model has them.
+        Of the element, in the compiled model.
     why
-        In half a sentence.
+        The reason in half a sentence.
     fatal
         Whether leaving it out would make another model.
     """

@@ -1,4 +1,4 @@
-"""MuJoCo over its releases: what changed in its Python interface, and a writer of MJCF for those without `MjSpec`.
+"""Releases of MuJoCo: changes of its Python interface, and a writer of MJCF for releases without `MjSpec`.
 
 `Mjcf` has the few methods of ``mujoco.MjSpec`` that `adapters.mujoco.spec` calls, and writes the same model as text.
 Numbers are written with all their digits, so that both ways compile to the same model, bit by bit
@@ -18,39 +18,40 @@ RELEASES = Releases(
     distributions=(Distribution("mujoco", "<4.0.0"), Distribution("mujoco-core", ">=4.0.0")),
     known=">=3.0.0,<5",
     requirements=(
-        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's "
-                    "arrays reads as the first one; the receipt of impulses fails (measured with 3.0.0 to 3.1.3)"),
+        Requirement("<3.1.4", "numpy<2", "built for numpy 1: with numpy 2 every element of a contact's arrays "
+                                         "reads as the first one; the property check of impulses fails "
+                                         "(measured with 3.0.0 to 3.1.3)"),
     ),
     differences=(
         Difference("<3.2.4", "MjSpec is missing, or takes no attributes where a body, geom or pair is added",
-                   "the model is written as MJCF by `Mjcf`, which is the same model to the last bit",
+                   "`Mjcf` writes the model as MJCF, which gives the same model to the last bit",
                    "measured: 3.1.6 has none, 3.2.0 to 3.2.2 refuse attributes, 3.2.3 its own options, 3.2.4 "
                    "gives and takes all of them"),
-        Difference("<3.2.4", "there is no flag that disables autoreset: a state that is not finite starts anew",
-                   "the counters of bad states are read after every advance; one that counts ends the run",
+        Difference("<3.2.4", "autoreset cannot be disabled: a state that is not finite is reset",
+                   "the counters of bad states are read after every step; a bad state ends the run",
                    "measured: mjtDisableBit.mjDSBL_AUTORESET is there from 3.2.4 on"),
         Difference("<3.5.0", "a contact's margin is the larger of its geoms', not their sum",
-                   "a geom gets all of it there, and half of it where they are added",
+                   "a geom gets the whole margin there, and half of it where margins are added",
                    "change log of 3.5.0, item 12"),
         Difference("<3.1.3", "contact.geom holds floating-point numbers", "they are turned into integers",
                    "measured: 3.1.2 float64, 3.1.3 int32"),
         Difference("<3.10.0", "there is no MjLogConfig: warnings cannot be switched off",
-                   "none is expected; a file MUJOCO_LOG.TXT may be written where an unstable run warns",
+                   "an unstable run may write a file MUJOCO_LOG.TXT",
                    "measured: 3.3.7 has none, 3.10.0 has it"),
         Difference("==3.9.0", "a step ends with an error where the box-box collider, given a margin, returns 9 "
                    "contacts of the 8 that are announced",
-                   "such cells crash with MuJoCo's own words: another margin would be another profile than is judged "
-                   "elsewhere",
+                   "such cases crash with MuJoCo's own message; another margin would be another profile than in other "
+                   "releases",
                    "measured: with margin 0 the same stacks of 10 and 20 run through; 3.8.1 and 3.10.0 do with it"),
         Difference(">=4.0.0", "the bindings moved from the distribution mujoco to mujoco-core",
-                   "both are this engine; mujoco 4.0.0 itself holds no engine, only tools on top of mujoco-core",
+                   "both are this engine; mujoco 4.0.0 itself has only tools on top of mujoco-core",
                    "metadata of mujoco 4.0.0"),
     ),
 )  # fmt: skip
 
 
 def empty_spec(mujoco: Any) -> Any:
-    """An empty ``MjSpec``, or what stands for it in releases whose own cannot be written as the adapter does."""
+    """An empty ``MjSpec``, or its replacement in releases whose own does not support the adapter's calls."""
     try:
         spec = mujoco.MjSpec()
         spec.worldbody.add_body(name="asked")
@@ -66,7 +67,7 @@ def no_autoreset(mujoco: Any) -> int:
 
 
 def check_state(mujoco: Any, data: Any) -> None:
-    """Refuse to go on from a state that was reset because it was not finite.
+    """Refuse to continue from a state that was reset because it was not finite.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def check_state(mujoco: Any, data: Any) -> None:
 
 
 def geom_margin(mujoco: Any, margin: float) -> float:
-    """What a geom must have for two of them to make a contact's ``margin`` [m]."""
+    """Margin of a geom so that two of them give a contact's ``margin`` [m]."""
     return margin if _older(mujoco, 3, 5) else 0.5 * margin
 
 
@@ -92,7 +93,7 @@ def _older(mujoco: Any, major: int, minor: int) -> bool:
 
 
 def silence(mujoco: Any) -> None:
-    """Switch the log off, where a release lets us."""
+    """Switch the log off, where a release allows it."""
     if hasattr(mujoco, "MjLogConfig"):
         log = mujoco.MjLogConfig.get()
         log.logto_file = log.logto_console = False
@@ -122,7 +123,7 @@ class Mjcf:
     def add_load(self, name: str, wrench: tuple[float, ...]) -> None:
         """Push a free body with a constant force and torque, (6,) world axes [N, N m].
 
-        An actuator without gain whose bias is 1: its gear is what acts. ``jointinparent`` means world axes.
+        An actuator without gain whose bias is 1, so its gear is the force. ``jointinparent`` means world axes.
         """
         joint = self.worldbody.element.find(f"body[@name='{name}']/freejoint")
         assert joint is not None
@@ -132,11 +133,11 @@ class Mjcf:
         ElementTree.SubElement(self._actuator, "general", given)
 
     def add_key(self, **attributes: Any) -> None:
-        """Add a state to start from."""
+        """Add a start state."""
         self._keys.append(ElementTree.Element("key", _text(attributes)))
 
     def add_mesh(self, *, name: str, uservert: list[float]) -> None:
-        """Add a mesh by its corners, whose hull is what touches."""
+        """Add a mesh by its corners, whose hull collides."""
         self._meshes.append(ElementTree.Element("mesh", {"name": name, "vertex": _written(uservert)}))
 
     def compile(self) -> Any:
@@ -158,7 +159,7 @@ class Mjcf:
             solver = mj.mjtSolver(said["solver"]).name.removeprefix("mjSOL_")
             said["solver"] = {"NEWTON": "Newton"}.get(solver, solver)
         option = ElementTree.SubElement(self._root, "option", _text(said))
-        members = mj.mjtDisableBit.__members__.values()  # one of them is their number
+        members = mj.mjtDisableBit.__members__.values()  # one of them is their count
         off = [bit.name for bit in members if int(bit).bit_count() == 1 and int(bit) & flags]
         on = [bit.name for bit in mj.mjtEnableBit.__members__.values() if int(bit) & enabled]
         if off or on:

@@ -21,7 +21,7 @@ def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> st
     Raises
     ------
     EngineError
-        For a course, a face that moves or a loop around the solver: a model has no word for them.
+        For a course, a moving face or a loop around the solver, which a model cannot express.
     """
     if "rounds" in settings:
         raise EngineError("rounds: MJCF has no word for a loop around the solver; python has")
@@ -71,7 +71,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
 
 
 def _state(scene: Scene) -> list[str]:
-    """Lines of the function that reads all bodies, with the places of faces that move."""
+    """Lines of the function that reads all bodies, with the places of moving faces."""
     faces = [
         f'    pose[{i}, :3], twist[{i}, :3] = data.mocap_pos[model.body("body{i}").mocapid[0]], faces[{i}]'
         for i, body in enumerate(scene.bodies)
@@ -80,7 +80,7 @@ def _state(scene: Scene) -> list[str]:
     return [*_STATE[:-1], *faces, _STATE[-1]]
 
 
-#: Lines of the function that reads all bodies: MuJoCo keeps angular velocity in body axes.
+#: Lines of the function that reads all bodies: MuJoCo has angular velocity in body axes.
 _STATE = [
     "",
     "",

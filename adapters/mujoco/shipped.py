@@ -1,13 +1,13 @@
-"""Numbers of MuJoCo itself: what it ships with, what it clamps to, and the releases looked at."""
+"""Constants of MuJoCo: shipped values, limits, and checked releases."""
 
 from __future__ import annotations
 
-#: Prefixes of the releases that laws were checked on.
+#: Prefixes of the releases on which laws were checked.
 CHECKED_ON = ("4.0.",)
-#: Releases that give wrong answers, and why.
+#: Releases with wrong results, and why.
 KNOWN_BAD = {"4.0.0": "wrong sparse Newton factor: wrong accelerations, divergence (fixed in 4.0.1)"}
 
-#: Where its documented behaviour is read.
+#: Source of its documented behaviour.
 DOC = "MuJoCo documentation"
 
 #: Time constant [s] and damping ratio of a contact.
@@ -16,7 +16,7 @@ SOLREF = (0.02, 1.0)
 SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
 #: Most Newton steps in a step, and the gain at which they end.
 ITERATIONS, TOLERANCE = 100, 1e-8
-#: The gain at which sweeps against slip end, where there are any.
+#: The gain at which no-slip iterations end, if there are any.
 NOSLIP_TOLERANCE = 1e-6
 
 #: Impedances are clamped to this range (mjMINIMP, mjMAXIMP), friction coefficients from below (mjMINMU).

@@ -1,8 +1,8 @@
 """One MuJoCo model and its data.
 
 After a step MuJoCo holds positions and velocities of the step's end, but contacts, gaps and contact forces of its
-start. ``force * dt`` is therefore the impulse of the step just made, and `Contacts.gap` is the gap that step began
-with: it lags the pose by one step.
+start. ``force * dt`` is therefore the impulse of the last step, and `Contacts.gap` is the gap at its start, one step
+older than the pose.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class MujocoSimulation(Simulation):
         Raises
         ------
         EngineError
-            If MuJoCo dropped contacts for want of memory.
+            If MuJoCo dropped contacts because of too little memory.
         """
         if self._driven or self._moved or self._matched:
             for _ in range(steps):
@@ -71,7 +71,7 @@ class MujocoSimulation(Simulation):
         kinds = self._mujoco.mjtWarning
         for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
             if self._data.warning[kind].number:
-                raise EngineError("memory: MuJoCo's arena is too small, it dropped contacts")
+                raise EngineError("memory: MuJoCo's arena is too small, so contacts were dropped")
 
     def _drive(self) -> None:
         """Make a step in which bodies move by a course, faces move, surfaces run or references are matched."""
@@ -114,7 +114,7 @@ class MujocoSimulation(Simulation):
     def contacts(self) -> Contacts:
         """Contacts and gaps at the start of the last step, impulses of that step.
 
-        RK4 solves contacts four times a step and keeps the last: its impulses are not available (NaN).
+        RK4 solves contacts four times a step and stores the last, so impulses are not available (NaN).
         """
         contact, count = self._data.contact, self._data.ncon
         if not count:
@@ -137,7 +137,7 @@ class MujocoSimulation(Simulation):
         return np.asarray(inertial - self._data.qfrc_smooth - self._data.qfrc_constraint)
 
     def readback(self) -> dict[str, Any]:
-        """What the compiled model holds."""
+        """Values of the compiled model."""
         model, mj = self._model, self._mujoco
         option = model.opt
         values: dict[str, Any] = {

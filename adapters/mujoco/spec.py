@@ -19,7 +19,7 @@ from adapters.mujoco.shipped import NOSLIP_TOLERANCE
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
-#: below the round-off that every check allows.
+#: below the round-off in every tolerance.
 PRESCRIBED_MASS = 1e15
 #: MuJoCo's capsules and cylinders lie along their z axis, ours along the body's x.
 Z_TO_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
@@ -27,12 +27,12 @@ Z_TO_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 
 def moments(body: Body) -> tuple[float, float, float]:
     """Principal moments of a body [kg m^2]."""
-    assert isinstance(body.inertia, tuple), "MuJoCo is spatial: planar scenes arrive lifted"
+    assert isinstance(body.inertia, tuple), "MuJoCo is a 3-D engine: 2-D scenes must be embedded in 3-D before"
     return body.inertia
 
 
 def has_joint(body: Body) -> bool:
-    """Whether MuJoCo moves a body: free ones, and prescribed ones but half-spaces."""
+    """Whether MuJoCo moves a body: free ones, and prescribed ones except half-spaces."""
     return body.motion != "fixed" and not is_moved_face(body)
 
 
@@ -65,7 +65,7 @@ class Spec:
         self.mujoco, self.scene, self.dt, self.settings = mujoco, scene, dt, settings
         self.spec = spec or empty_spec(mujoco)
         materials = scene.materials()
-        #: Softness of pairs that have one of their own: solref, solimp, solreffriction, margin.
+        #: Softness of pairs with their own: solref, solimp, solreffriction, margin.
         self.apart = {(row[0], row[1]): row[2:] for row in settings.get("apart", ())}
         one = len(materials) == 1 and settings["solreffriction"] is None and not self.apart
         self.shared = materials.pop() if one else None
@@ -82,10 +82,10 @@ class Spec:
                 self._pair(a, b, material.restitution, material.friction)
 
     def _tolerances(self) -> None:
-        """Let solvers stop as they would beside mocap bodies: by what free bodies gain.
+        """Scale tolerances so that solvers stop as with mocap bodies: by the gain of free bodies.
 
-        They stop where a step gains less than a tolerance times the sum of all moving masses and moments, with
-        prescribed ones at once. What touches no prescribed body is solved apart, and more strictly than it would be.
+        Solvers stop where a step gains less than a tolerance times the sum of all moving masses and moments, which with
+        prescribed ones is at once. Islands without a prescribed body are solved more strictly than otherwise.
         [engine_solver.c, mj_solPrimal; from 3.3.6 on it is the sum of an island, and ``stat.meaninertia`` is not read]
         """
         moving = [body for body in self.scene.bodies if has_joint(body)]
@@ -190,7 +190,7 @@ class Spec:
         )
 
     def compile(self) -> Any:
-        """Model; MuJoCo's complaint becomes one line."""
+        """Compile the model; MuJoCo's error becomes one line."""
         try:
             return self.spec.compile()
         except ValueError as error:

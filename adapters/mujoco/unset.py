@@ -1,4 +1,4 @@
-"""What MuJoCo does when nothing is set; see `adapters.unset`."""
+"""MuJoCo's defaults; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, Asked, To
 
 
 class Bare:
-    """A model of one free body above a plane, as MJCF that says no more than it must."""
+    """A model of one free body above a plane, in minimal MJCF."""
 
     def __init__(self, asked: Asked) -> None:
         import mujoco

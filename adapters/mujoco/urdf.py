@@ -2,9 +2,9 @@
 
     text -> nothing from outside, nothing that only draws -> MuJoCo's own compiler -> model.py
 
-URDF does not say whether a robot is held: as in Bullet and Gazebo its root is free, unless it is called ``world`` or
-has no mass. It states neither friction, nor softness, nor a floor: what MuJoCo takes for them is said. Joints that are
-neither fixed nor floating, and meshes, have no place in a scene.
+URDF does not define whether a robot is fixed: as in Bullet and Gazebo its root is free, unless it is called ``world``
+or has no mass. It has neither friction, nor softness, nor a floor: MuJoCo's defaults are used, with notes. Joints that
+are neither fixed nor floating, and meshes, are not supported.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ KEPT = frozenset(
     ("robot", "link", "joint", "inertial", "mass", "inertia", "origin", "collision", "geometry", "box", "sphere",
      "cylinder", "capsule", "parent", "child", "axis")
 )  # fmt: skip
-#: Elements that only draw, or speak of motors that a joint which is free or fixed has none of.
+#: Elements that only draw, or belong to motors, which free and fixed joints do not have.
 SILENT = frozenset(["visual", "material", "transmission", "ros2_control", "verbose", "sensor"])
-#: Elements that a scene has no place for, or that another program reads, and why.
+#: Unsupported elements, and those of other programs, with reasons.
 NO_PLACE = {
     "mesh": "a scene has no meshes",
     "sdf": "other files are not read",
-    "contact": "what Bullet alone reads of contacts is not read",
-    "gazebo": "what Gazebo alone reads is not read",
-    "mujoco": "what MuJoCo alone reads is not read",
-    "limit": "a scene has no joints but fixed ones",
-    "dynamics": "a scene has no joints but fixed ones",
-    "mimic": "a scene has no joints but fixed ones",
+    "contact": "Bullet's own contact elements are not read",
+    "gazebo": "Gazebo's own elements are not read",
+    "mujoco": "MuJoCo's own elements are not read",
+    "limit": "a scene has no joints except fixed ones",
+    "dynamics": "a scene has no joints except fixed ones",
+    "mimic": "a scene has no joints except fixed ones",
     "safety_controller": "a scene has no motors",
     "calibration": "a scene has no motors",
 }
-#: Name of a link that holds what hangs on it.
+#: Name of a link that fixes its children.
 WORLD = "world"
 
 
@@ -57,17 +57,17 @@ def read(text: str, drop: bool) -> Model:
             line = f"{joint}: a {kind} joint holds a link; bodies of a scene are free or fixed"
             if not drop:
                 raise SceneError(f"model: {line}")
-            dropped.append(f"{line}: and what hangs on it")
+            dropped.append(f"{line}: and all links attached to it")
             _cut(root, joint)
     links = [child for child in root.children if child.tag == "link"]
     joints = [child for child in root.children if child.tag == "joint"]
-    notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's own"]
+    notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's default"]
     notes += _let_go(root, links, joints)
     own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false"}, 0)])
     root.children.insert(0, own)
 
     def without(gone: Element) -> bool:
-        """Leave out a link with the joint that it hangs by, or a shape."""
+        """Leave out a link with its joint, or a shape."""
         name = gone.attributes["name"]
         hung = [e for e in root.children if gone.tag == "link" and e.tag == "joint" and _link_of(e, "child") == name]
         for joint in hung:
@@ -78,7 +78,7 @@ def read(text: str, drop: bool) -> Model:
 
 
 def _cut(root: Element, joint: Element) -> None:
-    """Leave out a joint, the link that hangs by it, and all that hangs on that one."""
+    """Leave out a joint with its link and all descendants."""
     if not root.without(joint):
         return
     name = _link_of(joint, "child")
@@ -89,12 +89,12 @@ def _cut(root: Element, joint: Element) -> None:
 
 
 def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[str]:
-    """Hang the root on the world by a floating joint, unless it is the world or has no mass; says so."""
+    """Attach the root to the world by a floating joint, unless it is the world or has no mass; adds a note."""
     held = {_link_of(joint, "child") for joint in joints}
     roots = [link for link in links if link.attributes["name"] not in held]
     if len(roots) != 1:
-        which = f"{roots[1]}: is a second root" if roots else "no link is its root"
-        raise SceneError(f"model: {which}; a robot has one, on which all others hang")
+        which = f"{roots[1]}: is a second root" if roots else "no link is the root"
+        raise SceneError(f"model: {which}; a robot has one root, to which all other links are attached")
     name = roots[0].attributes["name"]
     if name == WORLD:
         return []
@@ -106,9 +106,11 @@ def _let_go(root: Element, links: list[Element], joints: list[Element]) -> list[
     free = Element("joint", {"name": f"{WORLD}@free", "type": "floating"}, roots[0].line)
     free.children = [Element("parent", {"link": WORLD}, 0), Element("child", {"link": name}, 0)]
     root.children += [Element("link", {"name": WORLD}, 0), free]
-    return [f"{one_line(name, 60)} is free: URDF does not say whether a robot's root is held, a link 'world' holds it"]
+    return [
+        f"{one_line(name, 60)} is free: URDF does not say whether a robot's root is fixed; a root link 'world' fixes it"
+    ]
 
 
 def _link_of(joint: Element, end: str) -> str:
-    """Name of the link at one end of a joint; empty where it states none."""
+    """Name of the link at one end of a joint; empty if missing."""
     return next((child.attributes.get("link", "") for child in joint.children if child.tag == end), "")

@@ -1,7 +1,7 @@
-"""Newton's XPBD solver on the CPU, through Warp; what stands where is told in `adapters.engine_folder`.
+"""Newton's XPBD solver on the CPU, through Warp; `adapters.engine_folder` describes the modules.
 
-shipped        numbers of the engine
-profiles       settings with their reasons
+shipped        default values of the engine
+profiles       settings and their reasons
 simulation     one world
 engine         the adapter
 """

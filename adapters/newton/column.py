@@ -1,15 +1,14 @@
-"""A column of upright boxes on a floor, step by step as Newton's XPBD makes it: `motion`'s formulas along one axis.
+"""A column of upright boxes on a floor, step by step as in Newton's XPBD: the formulas of `motion` along one axis.
 
-Faces that lie level meet in four contacts, one at each corner of the smaller face, which are equally deep and ask for
-the same; nothing turns, and nothing slips. Of box i, between n_i contacts (eight, or four of the topmost), a sweep
-takes back
+Level faces touch in four contacts, one at each corner of the smaller face, with equal depths and corrections; there is
+no rotation and no slip. Box i, with n_i contacts (eight, or four for the topmost), gets in an iteration the correction
 
-    r/n_i (4 d_i/K_i - 4 d_(i+1)/K_(i+1))/m_i        d the depths below and above, 1/K the mass that a corner feels
+    r/n_i (4 d_i/K_i - 4 d_(i+1)/K_(i+1))/m_i        d the depths below and above, 1/K the effective mass at a corner
 
-so that what stands still has L_i - L_(i+1) = n_i m g dt between the sums L of what the corners of a face ask for: four
-weights a step on the top, eight more a box. Told of a face is the mean that both bodies make of it,
-2 L/(n_i + n_(i-1)), and L/n_1 at the floor: 2/3 of the weight under the topmost box, n - i + 1/2 of n - i + 1 boxes
-below it, if all faces press in every sweep.
+so at rest L_i - L_(i+1) = n_i m g dt holds for the sums L of the corrections at the corners of a face: four weights per
+step at the top, eight more for each box. The reported impulse of a face is the mean of both bodies, 2 L/(n_i +
+n_(i-1)), and L/n_1 at the floor: 2/3 of the weight under the topmost box, n - i + 1/2 of n - i + 1 boxes below it, if
+all faces press in every iteration.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ CORNERS = 4.0
 
 
 def column_of(scene: Scene) -> list[int] | None:
-    """Numbers of a spatial scene's floor and of the boxes on it from below; None if it is no column.
+    """Indices of a 3-D scene's floor and of the boxes on it from below; None if it is no column.
 
-    Its boxes are upright about one line, move along it alone, and touch none but their neighbours.
+    Its boxes are upright about one line, move only along it, and touch only their neighbours.
     """
     fixed = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
     free = sorted((k for k, body in enumerate(scene.bodies) if body.motion == "free"), key=lambda k: _height(scene, k))
@@ -62,7 +61,7 @@ def _is_upright(body: Body, first: Body) -> bool:
 
 
 def _corner_feels(below: Body, above: Body) -> float:
-    """1/K of a corner of the face between two bodies [1/kg]; the floor feels nothing."""
+    """K: inverse mass at a corner of the face between two bodies [1/kg]; the floor's share is 0."""
     boxes = [body for body in (below, above) if isinstance(body.shape, Box)]
     levers = np.min([body.shape.half_extents[:2] for body in boxes if isinstance(body.shape, Box)], axis=0)
     felt = 0.0
@@ -83,9 +82,9 @@ def column_moved(
     blur: tuple[float, float, float],
     flat: bool,
 ) -> Trajectory | None:
-    """Motion of a column; None where boxes go so deep that more than faces of neighbours decide.
+    """Motion of a column; None if boxes are so deep that other contacts matter than those of neighbours' faces.
 
-    ``longer``, ``single`` and ``blur`` as in `motion.moved`; ``flat``: of a planar scene, told in its numbers.
+    ``longer``, ``single`` and ``blur`` as in `motion.moved`; ``flat``: of a 2-D scene, in its own coordinates.
     """
     from adapters.newton.column_recurrence import Boxes, ColumnSettings, ColumnTold, run_column
 
@@ -115,19 +114,19 @@ def column_moved(
     run_column(world, numbers, told)
     if not _is_told(told.place, bodies):
         return None
-    # Along one axis: where boxes lie, and how they lie, else is as it was.
+    # Only heights change: other coordinates and orientations are those of the start.
     pose = np.repeat(np.array([[body.pose for body in boxes]], float), steps, axis=0)
     twist = np.repeat(np.array([[body.twist for body in boxes]], float), steps, axis=0)
     pose[..., 2], twist[..., 2] = told.place[:, 1:], told.speed[:, 1:]
     impulse = np.zeros((steps, many, 3))
     impulse[..., 2] = told.impulse
-    faces = np.stack([np.roll(column, 1), column], axis=1)  # nothing is below the floor, and nothing presses there
+    faces = np.stack([np.roll(column, 1), column], axis=1)  # there is no body and no contact below the floor
     record = told_contacts(told.pressed, faces, impulse, flat)
     return told_trajectory(spatial, column[1:], pose, twist, record, dt, flat)
 
 
 def _is_told(place: np.ndarray[Any, np.dtype[Any]], bodies: list[Body]) -> bool:
-    """Whether faces part boxes where they overlap least, and none reaches through its neighbour, at all times."""
+    """Whether the least overlap is always across the faces, and no box reaches through its neighbour."""
     sizes = [body.shape.half_extents if isinstance(body.shape, Box) else (np.inf, np.inf, 0.0) for body in bodies]
     least = [2.0 * min(*a[:2], *b[:2]) for a, b in pairwise(sizes)]
     low, high = (place + sign * np.array([size[2] for size in sizes]) for sign in (-1.0, 1.0))

@@ -1,7 +1,7 @@
-"""Newton's step of a column of upright boxes as a compiled loop, in the numbers that its arrays are of.
+"""Newton's step of a column of upright boxes as a compiled loop, in the precision of its arrays.
 
-Nothing turns or slips there: the four corners of a face ask for the same, and one height says where a box is.
-`adapters.newton.column` says which scenes are columns and lays the arrays out; formulas are those of `recurrence`.
+There is no rotation or slip: the four corners of a face have equal corrections, and a box has one coordinate.
+`adapters.newton.column` selects the scenes and prepares the arrays; formulas are those of `recurrence`.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class Boxes(NamedTuple):
-    """Heights and speeds of the floor (0, which nothing moves) and the boxes on it, from below."""
+    """Heights and speeds of the floor (index 0, fixed) and the boxes on it, from below."""
 
     place: Numbers
     speed: Numbers
     lightness: Numbers
     #: Half its height.
     half: Numbers
-    #: What gravity and loads do to it [m/s^2].
+    #: Acceleration by gravity and loads [m/s^2].
     pull: Numbers
-    #: What one corner feels of the face below a box: inverse masses and levers of both.
+    #: Inverse mass at a corner of the face below a box: from inverse masses and lever arms of both.
     felt: Numbers
-    #: Room: faces in axes of the boxes below and above them, whether they are within reach, what is asked for.
+    #: Work arrays: faces in axes of the boxes below and above them, whether they are in range, corrections.
     under: Numbers
     over: Numbers
     near: Numbers
@@ -37,14 +37,14 @@ class Boxes(NamedTuple):
 
 
 class ColumnSettings(NamedTuple):
-    """Constants in the kind of all numbers, and counts."""
+    """Constants in the precision of all numbers, and counts."""
 
     dt: Numbers
     relaxation: Numbers
     reach: Numbers
-    #: Square of the speed that is stopped.
+    #: Square of the speed below which bodies stop.
     stopped: Numbers
-    #: Share of its place by which the two sides of a face are seen apart.
+    #: Perturbation of the gap of a face, as a share of its place.
     blur: Numbers
     #: 0, 1/2, 1, and 4, the corners of a face.
     plain: Numbers
@@ -53,7 +53,7 @@ class ColumnSettings(NamedTuple):
 
 
 class ColumnTold(NamedTuple):
-    """What is kept of each step: heights, speeds, impulses of faces and whether they were pressed."""
+    """Records of each step: heights, speeds, impulses of faces and whether they pressed."""
 
     place: Numbers
     speed: Numbers
@@ -63,7 +63,7 @@ class ColumnTold(NamedTuple):
 
 @kernel
 def run_column(boxes: Boxes, chosen: ColumnSettings, told: ColumnTold) -> None:
-    """Make all steps that ``told`` has place for."""
+    """Make all steps that ``told`` can record."""
     dt, share, stopped = chosen.dt[0], chosen.relaxation[0] / chosen.dt[0], chosen.stopped[0]
     zero, half, one, corners = chosen.plain[0], chosen.plain[1], chosen.plain[2], chosen.plain[3]
     x, v, most = boxes.place, boxes.speed, len(boxes.place)
@@ -98,7 +98,7 @@ def run_column(boxes: Boxes, chosen: ColumnSettings, told: ColumnTold) -> None:
             for i in range(1, most):
                 if boxes.load[i] == zero:
                     continue
-                # Told is the mean over the numbers of contacts of both; of what stands on the floor, its own.
+                # Recorded is the mean over the contact counts of both bodies; at the floor, the box's own.
                 many = boxes.many[i] if i == 1 else half * (boxes.many[i] + boxes.many[i - 1])
                 told.pressed[step, i] = 1
                 told.impulse[step, i] += corners * boxes.load[i] / (many if chosen.weighted else one)
@@ -110,7 +110,7 @@ def run_column(boxes: Boxes, chosen: ColumnSettings, told: ColumnTold) -> None:
                 if v[i] * v[i] < stopped:
                     v[i] = zero
             idle = 0 if found else idle + 1
-            if idle == 2:  # nothing that a sweep looks at has changed
+            if idle == 2:  # no input of an iteration has changed
                 break
         for i in range(1, most):
             told.place[step, i], told.speed[step, i] = x[i], v[i]

@@ -1,9 +1,9 @@
-"""Newton's XPBD solver behind the plugin line: spatial, position-based contact, single precision.
+"""The adapter of Newton's XPBD solver: spatial, position-based contact, single precision.
 
-    step:  detect  ->  v += g dt, x += v dt  ->  n sweeps: each contact takes back its overlap, friction its slip, and
-           v with them  ->  rebounds, on velocities alone
+    step:  detect  ->  v += g dt, x += v dt  ->  n iterations: each contact corrects its overlap, friction its slip,
+           and v with them  ->  restitution, on velocities only
 
-Overlaps of a step's end are taken back, all contacts at once; a body gets the mean of what its contacts ask for.
+Overlaps at a step's end are corrected, all contacts at once; a body gets the mean of its contacts' corrections.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from adapters.probes import GRAVITY, SLIDE_TIME
 from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
 
-#: Most that the mass of a box is above what its corner feels, on any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 + c^2).
+#: Largest ratio of a box's mass to the effective mass at a corner, for any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 +
+#: c^2).
 LEAST_SHARE = 7.0
 
 
@@ -44,48 +45,48 @@ class NewtonEngine(CheckedEngine):
         abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "hull"}),
         quirks=(
             Quirk(
-                "restitution is ignored unless the solver is asked for it",
-                "asked for where a scene has any",
+                "restitution is ignored unless enable_restitution is set",
+                "set where a scene has any",
                 "SolverXPBD, enable_restitution",
             ),
             Quirk(
-                "materials of a pair are means of two bodies' numbers",
-                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "materials of a pair are means of two bodies' values",
+                "values per body are chosen that give the values of the pairs; a table without such values is refused",
                 "xpbd/kernels.py, _solve_body_contact_positions",
             ),
             Quirk(
-                "what rubs resists rolling and spinning as well, by 0.1 mm and 5 mm of the load",
-                "left alone in `default` where a body has friction; not in `tuned`",
+                "contacts with friction also resist rolling and spinning, by 0.1 mm and 5 mm times the load",
+                "unchanged in `default` where a body has friction; 0 in `tuned`",
                 "ModelBuilder.ShapeConfig, mu_rolling and mu_torsional",
             ),
             Quirk(
-                "a body slower than 0.1 mm/s is stopped, and so is a spin below 0.1 mrad/s",
+                "speeds below 0.1 mm/s and spins below 0.1 mrad/s are set to 0",
                 "left alone",
                 "xpbd/kernels.py, apply_body_deltas",
             ),
             Quirk(
-                "two bodies with different numbers of contacts get different impulses from the one they share",
-                "left alone; impulses of such a contact are a mean",
+                "two bodies with different numbers of contacts get different impulses from the contact between them",
+                "unchanged; the impulse of such a contact is a mean",
                 "SolverXPBD, rigid_contact_con_weighting",
             ),
             Quirk(
-                "impulses are told of positions alone",
-                "where rebounds are solved as well impulses are not stated (NaN)",
+                "only impulses of position corrections are reported",
+                "where rebounds are solved too, impulses are not stated (NaN)",
                 "SolverXPBD, ObservableKind.CONTACT_F; xpbd/solver_xpbd.py: rebounds come after it",
             ),
             Quirk(
                 "kernels are compiled at the first steps, into Warp's own cache",
-                "left alone: the first cells on a machine take 35 s of CPU more, which no later ones do",
+                "unchanged: the first cases on a machine take 35 s of CPU more",
                 "warp.config.kernel_cache_dir, ~/.cache/warp; measured: 41 s of CPU and 6 MB for all of them",
             ),
             Quirk(
-                "a step costs a millisecond of launches",
-                "a step is recorded once and replayed by Warp, to the same bits",
+                "launching a step costs a millisecond",
+                "Warp records a step once and replays it, bit for bit",
                 "warp.ScopedCapture; measured: 1.2 ms and 0.03 ms",
             ),
             Quirk(
-                "a body that is moved is never moved by the solver",
-                "placed where its step ends before each step, with the velocity that took it there",
+                "the solver does not move a prescribed body",
+                "before each step it is placed where the step ends, with the velocity of that motion",
                 "BodyFlags.KINEMATIC, copy_kinematic_body_state_kernel",
             ),
         ),
@@ -98,32 +99,32 @@ class NewtonEngine(CheckedEngine):
 
     def version(self) -> str:
         """Version of the installed distribution."""
-        imported()  # without the words of its first import
+        imported()  # without the output of its first import
         return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """What two sweeps leave of an approach, what stopping takes, and rebounds without friction."""
+        """Residual approach speeds after two iterations, momentum lost by stopping, and rebounds without friction."""
         declared, sweeps = {}, TUNED_ITERATIONS if profile == "tuned" else ITERATIONS
         left = (1.0 - RELAXATION) ** sweeps
         if needs.regime == "impact" and needs.restitution == 0.0 and left > self.facts.epsilon:
-            # Two steps of a ball: the first leaves a share of its overlap, which the second pushes out.
+            # Two steps of a ball: the first leaves a share of its overlap, which the second corrects.
             most = left * (1.0 - 2.0 * left)
-            because = "what is left of an overlap is pushed out in the step after"
+            because = "the rest of an overlap is corrected in the next step"
             declared["restitution"] = Declared(0.5 * most, 0.5 * most + self.facts.round_off, because)
-        # Each sweep stops what is slow and tells its impulse all the same. What a sweep is asked for falls by the share
-        # of an overlap that it takes back, for a box on four corners a seventh of the relaxation or more.
+        # Each iteration stops slow bodies but still reports its impulse. Corrections fall with each iteration by the
+        # corrected share of an overlap, for a box on four corners a seventh of the relaxation or more.
         stopped = STOPPED * min(sweeps, LEAST_SHARE / RELAXATION)
-        because = "impulses of sweeps that end below 0.1 mm/s are told, and are not kept"
+        because = "impulses of iterations that end below 0.1 mm/s are reported but not applied"
         band = stopped / (GRAVITY * dt) + self.facts.round_off
         declared["impulse"] = Declared(1.0, band, because)
         if needs.friction > 0.0 and needs.restitution > 0.0 and profile != "tuned":
-            # A corner that came in at over 2 g dt is thrown back, by an impulse of at most (1 + e) 3 g dt a mass.
+            # A corner with an impact above 2 g dt rebounds, with an impulse of at most (1 + e) 3 g dt per mass.
             most = (1.0 + needs.restitution) * (LEAST_APPROACH + 1.0) * dt / SLIDE_TIME
-            because = "rebounds of what rocks carry no friction"
+            because = "rebounds of a rocking body have no friction"
             declared["friction"] = Declared(
                 needs.friction * (1.0 - 0.5 * most), needs.friction * (0.5 * most + FRICTION_SHARE), because
             )

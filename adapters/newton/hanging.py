@@ -1,7 +1,7 @@
-"""A box too far away for single numbers: it stays where it is, and its speed grows as if it fell.
+"""A box too far away for single precision: it does not move, but its speed grows as in a fall.
 
-XPBD takes back overlaps and slips of places alone. Where a step's way is below half the spacing of singles a place
-never changes; a box that touches overlaps nothing, and nothing brakes it or holds it up.
+XPBD corrects overlaps and slips of places only. If the motion in a step is below half the spacing of single precision,
+a place never changes; a touching box has no overlap, so no contact brakes or supports it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from adapters.trajectory import Trajectory
 
 
 def hanging_law(metric: str) -> Law:
-    """A box on a fixed plate, of which no step's way is kept; nothing is said where one is.
+    """A box on a fixed plate whose place never changes; no prediction otherwise.
 
-    The band is what sums of as many speeds in singles are rounded by, half a unit of the last at most each.
+    The band is the round-off of sums of as many speeds in single precision, half a unit of the last place each.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -30,7 +30,7 @@ def hanging_law(metric: str) -> Law:
         pull = np.array(scene.gravity[:axes]) + np.array(box.force[:axes]) / box.mass
         start, fastest = np.array(box.twist[:axes]), np.abs(box.twist[:axes]) + np.abs(pull) * steps * dt
         single = np.array(box.pose[:axes], np.float32)
-        below = np.abs(np.nextafter(single, np.float32(0.0)) - single)  # the narrower of the two beside it
+        below = np.abs(np.nextafter(single, np.float32(0.0)) - single)  # the smaller of the two neighbouring spacings
         turns = any(box.twist[axes:]) or any(np.atleast_1d(box.torque))
         if plate.motion != "fixed" or turns or not (fastest * dt < 0.5 * below).all() or _overlaps(scene):
             return None
@@ -46,7 +46,7 @@ def hanging_law(metric: str) -> Law:
 
 
 def _overlaps(scene: Scene) -> bool:
-    """Whether the box is found below the plate's face, in singles."""
+    """Whether the box is below the plate's face in single precision."""
     plate, box = scene.bodies
     assert isinstance(plate.shape, Box) and isinstance(box.shape, Box)
     up = scene.dimension - 1

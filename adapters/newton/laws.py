@@ -1,9 +1,9 @@
-"""What Newton's XPBD does by design instead of the textbook, predicted from scene and step alone.
+"""Designed deviations of Newton's XPBD from the textbook, predicted from scene and step only.
 
-The recurrence of its sweeps is ten times as long as a law is meant to be, and stays: it explains 1 097 rows of the
-standard suite, of 32 scenes, 643 of balls and boxes among planes and 454 of columns. As findings they would be as many
-lines, in some forty families, and hold at one step and for these parameters alone. And five families of what trembles,
-sinks through, settles late or creeps have their proof from it: the same recurrence in doubles does not.
+The recurrence of its iterations is ten times as long as a usual law, but it explains 1 097 rows of the standard suite,
+of 32 scenes: 643 of balls and boxes among planes and 454 of columns. As known failures they would need as many lines,
+in some forty families, valid only at one step and for these parameters. It is also the proof of five families
+(trembling, sinking through, late rest, creep): the same recurrence in double precision shows none of these.
 """
 
 from __future__ import annotations
@@ -17,25 +17,33 @@ from adapters.newton.profiles import PROFILES
 from adapters.single_precision import UNIT, Method, plane_law, rounded_law
 from adapters.unswept import passing_law
 
-_SWEPT = "overlaps and slips are taken back by a share in each sweep, and what a sweep leaves or adds is a velocity"
-_REBOUNDS = "rebounds come after the sweeps, from approaches before them, without friction, and numbers are singles"
-_WALLS = (
-    "a wall along x leans by one rounding of its quaternion, 2^-24 rad, and each blow turns what meets in a line "
-    "further from it; numbers are singles"
+_SWEPT = "each iteration corrects a share of overlaps and slips, and its residual becomes a velocity"
+_REBOUNDS = (
+    "rebounds are solved after the iterations, from approach speeds before them, without friction, in single precision"
 )
-_ROLLS = "what rubs resists rolling and spinning as shipped, by 0.1 mm and 5 mm of its load; numbers are singles"
-_ROCKS = f"{_SWEPT}; as shipped what rubs resists rolling as well"
-_SPINS = _ROLLS + ", and a spin gains or loses what rounding leaves of its quaternion's size"
-_DIGITS = "numbers are singles: an overlap of 0.1 mm has three digits, and a load is made of it"
-_PAIRS = "a body gets the mean of what its contacts ask for, each of two another one: momentum is not kept"
+_WALLS = (
+    "a wall along x is tilted by one rounding of its quaternion, 2^-24 rad, and each blow turns bodies in a line "
+    "further from it; single precision"
+)
+_ROLLS = (
+    "contacts with friction also resist rolling and spinning as shipped, by 0.1 mm and 5 mm times the load; "
+    "single precision"
+)
+_ROCKS = f"{_SWEPT}; as shipped contacts with friction also resist rolling"
+_SPINS = _ROLLS + ", and rounding of the quaternion's length changes a spin"
+_DIGITS = "single precision resolves an overlap of 0.1 mm to three digits, and the load follows from it"
+_PAIRS = (
+    "a body moves by the mean of its contacts' corrections, which differs between the two bodies of a contact: "
+    "momentum is not conserved"
+)
 _COLUMNS = (
-    "a sweep gives a box the mean of what its contacts ask for, and tells of a face the mean of two boxes; what it "
-    "leaves of an overlap is a velocity"
+    "an iteration moves a box by the mean of its contacts' corrections, and the reported impulse of a face is the "
+    "mean of two boxes; the rest of an overlap becomes a velocity"
 )
 _STANDING = ("settle_time", "penetration", "kinetic_energy", "impulse_scatter")
 
-#: Metrics by scene that the recurrence of the solver decides, and why they differ from the textbook. Scenes and metrics
-#: were chosen at 1/240 s.
+#: Metrics by scene predicted by the solver's recurrence, and why they differ from the textbook. Scenes and metrics were
+#: chosen at 1/240 s.
 MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "impact": (_SWEPT, ("rebound_ratio", "rebound_speed", "velocity_change", "impulse")),
     "bounce": (_REBOUNDS, (*(f"apex[{n}]" for n in range(1, 6)), "rest_time")),
@@ -71,8 +79,8 @@ MOTIONS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "heavy_on_light": (_COLUMNS, (*_STANDING, "interface_impulse[1]", "interface_impulse[2]")),
 }
 
-_ROUNDED = "numbers are singles: what they round is not the same on both sides of a balance"
-#: Balances by scene: in doubles the recurrence makes nothing of them, or less than singles round.
+_ROUNDED = "single precision rounds differently on both sides of a balance"
+#: Balances by scene: in double precision the recurrence gives 0, or less than the round-off of single precision.
 BALANCES: Mapping[str, tuple[str, ...]] = {
     "impact": ("momentum_defect",),
     "head_on": ("momentum_defect",),
@@ -86,10 +94,10 @@ BALANCES: Mapping[str, tuple[str, ...]] = {
     "overlap": ("centre_moved",),
 }
 _STOPS = (
-    "numbers are singles; what sweeps leave below 0.1 mm/s is stopped, which no impulse tells: what overlaps ask for "
-    "after it makes up for it, but for roundings of places"
+    "single precision; velocities below 0.1 mm/s are set to 0 without a reported impulse, which later overlap "
+    "corrections make up for, except for rounding of positions"
 )
-#: Why by scene and metric; what is a balance in some cells alone keeps the reason of the others.
+#: Reasons by scene and metric; a metric that is a balance in some cells only has the reason of the others.
 _DECIDED = {(scene, metric): _ROUNDED for scene, metrics in BALANCES.items() for metric in metrics}
 _DECIDED[("impact", "momentum_defect")] = _STOPS
 _DECIDED |= {(scene, metric): because for scene, (because, metrics) in MOTIONS.items() for metric in metrics}
@@ -111,7 +119,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for (scene, metric), because in _DECIDED.items()
 )
 
-#: Round-off of a place after a thousand steps, as a share of the way.
+#: Round-off of a place after a thousand steps, as a share of the distance.
 PLACES = 1000.0 * UNIT
 DEVIATIONS += tuple(
     Deviation(
@@ -120,8 +128,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         passing_law(metric, PLACES),
-        "nothing is swept: what is farther than two gaps from a thin body where a step begins, and beyond it where the "
-        "step ends, passes",
+        "there is no swept collision detection: a body farther than two gaps from a thin body at the start of a "
+        "step, and beyond it at the end, passes through",
         "ModelBuilder.rigid_gap; motion in adapters/unswept.py",
         ("1.8.",),
     )
@@ -134,7 +142,7 @@ DEVIATIONS += tuple(
         scene,
         exactly(metric),
         rounded_law(metric, Method(lambda e, speed: e)),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "xpbd/restitution_kernels.py, built for floats; motion in adapters/single_precision.py",
         ("1.8.",),
     )
@@ -142,8 +150,8 @@ DEVIATIONS += tuple(
     for metric in metrics
 )
 _PLACES = (
-    "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost, so that nothing is found to "
-    "overlap or to slip, while speeds go on growing"
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost, so no "
+    "overlap or slip is found while speeds grow"
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -158,7 +166,7 @@ DEVIATIONS += tuple(
     )
     for metric in ("stopping_distance", "braking", "end_speed")
 )
-#: Blows of edges and faces in free space, after which no more than roundings leave the plane.
+#: Blows of edges and faces in free space, after which the motion is planar to round-off.
 DEVIATIONS += tuple(
     Deviation(
         "newton",
@@ -166,7 +174,7 @@ DEVIATIONS += tuple(
         scene,
         "out_of_plane",
         plane_law,
-        "numbers are singles: what they round is not the same on both sides of a plane",
+        "single precision rounds differently on both sides of a plane",
         "xpbd/kernels.py, built for floats; band in adapters/single_precision.py",
         ("1.8.",),
     )

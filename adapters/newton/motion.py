@@ -1,36 +1,37 @@
-"""Bodies among fixed planes, step by step as Newton's XPBD makes them: the recurrence behind its laws.
+"""Bodies among fixed planes, step by step as in Newton's XPBD: the recurrence of its laws.
 
-    v += dt g,  x += dt v;  then sweeps, in each of which every contact that is d < 0 deep asks for
+    v += dt g,  x += dt v;  then iterations, in each of which every contact with gap d < 0 has the corrections
 
-        along the normal    l = r (-d)/(dt K)                     r the relaxation, 1/K the mass that the contact feels
+        along the normal    l = r (-d)/(dt K)                     r the relaxation, K the inverse mass at the contact
         across it           min(r |slip|/(dt K'), mu l)           slip of its two points since the step began
         about the normal    min(r |w_n|/K'', mu_t l),  and against rolling  min(r |w_t|/K''', mu_r l)
 
-    and a body gets the mean of them, in velocity and place alike; what is slower than 0.1 mm/s is stopped.
+    and a body gets their mean, in velocity and place; bodies slower than 0.1 mm/s are stopped.
 
-Rebounds come last, for contacts that were found deep: those that approached at more than 2 g dt are given e times their
-approach, 8 sweeps over the contacts of a pair, twice, of which a body gets the mean over its pairs. Contacts are found
-where the step begins, of corners and planes, of two balls, or of a ball and a box, if they are nearer than twice the
-gap, and keep their normals.
+Restitution comes last, for contacts found with an overlap: those with an approach speed above 2 g dt get e times that
+speed, in 8 iterations over the contacts of a pair, twice, and a body gets the mean over its pairs. Contacts are found
+at the start of the step, between corners and planes, two balls, or a ball and a box, if nearer than twice the gap, and
+keep their normals.
 [xpbd/kernels.py and restitution_kernels.py of newton 1.8.0]
 
-Nothing here is Newton's own code: it is what its formulas make of a scene, in doubles and in singles. The steps are
+None of this is Newton's own code: it evaluates its formulas for a scene, in double and single precision. The steps are
 compiled loops (`recurrence`).
 
-A law predicts what doubles make of the scene and what roundings add to it in the mean. Its band is about roundings,
-which are drawn. What rests or slides moves by a fixed way a step, which is rounded at the place where it is: the same
-fraction of a last digit is lost in each step, and a depth of 0.1 mm has three digits. Doubles and singles therefore
-make steps that are longer by some ten-thousandths, in which another fraction is lost, and what singles miss of doubles
-at one length is a draw. The engine does the same operations in an order of its own, which is one more draw of the same
-kind. The mean of draws is not nothing where roundings keep a motion going: a column that comes to rest in doubles
-trembles in singles, in every draw, and its loads are off to the same side. The distance of one more draw from the mean
-of n, over their standard deviation and the root of 1 + 1/n, is a Student's t of n - 1 degrees of freedom, if draws are
-normal. A number that is counted, in steps or samples, may be off by one in all of a few draws and not in the next: a
-band is never less than their mean. The last operation of a step is no such sum: what it leaves of a number is a unit in
-the last place, or none. Of each number of a draw one is added or taken, or neither, by chance.
+A law predicts the result in double precision plus the mean effect of round-off. Its band covers round-off, which is
+sampled. A resting or sliding body moves by a fixed distance per step, which is rounded at its place: each step loses
+the same fraction of a last digit, and a depth of 0.1 mm has three digits. Therefore the recurrence runs in double and
+single precision with steps longer by some ten-thousandths, which lose another fraction; the difference of both at one
+step length is one sample. The engine does the same operations in another order, which is one more sample of the same
+kind. The mean of the samples is not 0 if round-off sustains a motion: a column that comes to rest in double precision
+trembles in single precision, in every sample, and its loads are shifted to the same side. The distance of one more
+sample from the mean of n, over their standard deviation and the root of 1 + 1/n, has a Student's t distribution with
+n - 1 degrees of freedom, if samples are normal. A count of steps or output samples may be off by one in all of a few
+samples and not in the next: a band is never less than their mean. The last operation of a step is no such sum: its
+round-off is a unit in the last place, or none. Each number of a sample is therefore changed by a unit up or down, or
+not at all, at random.
 
-What the engine's own order of operations makes of a place is beyond draws where it is the same in every step. The band
-has a bound of that beside them: what doubles miss if both points of each contact are seen apart by a share of their
+An effect of the engine's order of operations that is the same in every step is not sampled. The band contains a bound
+of it: the change of the double-precision result if the two points of each contact are shifted apart by a share of their
 place, along one axis after the other.
 """
 
@@ -59,22 +60,23 @@ from adapters.single_precision import UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import Measured, Trajectory
 
-#: Draws of roundings, and the band in units of their standard deviation: Student's t of 7 degrees of freedom is beyond
-#: 7.88 once in 10 000 times, on either side; an eighth of the variance more for the mean, which is drawn as well.
+#: Number of samples of round-off, and the band in units of their standard deviation: Student's t of 7 degrees of
+#: freedom is beyond 7.88 once in 10 000 times, on either side; an eighth of the variance more for the mean, which is
+#: sampled as well.
 DRAWS, QUANTILE = 8, 7.88
-#: Share by which the steps of one draw are longer than those of the next: a way of 0.2 mm a step (g dt^2 at 1/240 s) at
-#: a place of half a metre loses another fraction of 2^-24 m, by the golden ratio, which fills the unit evenly.
+#: Relative difference of the step lengths of two samples: a motion of 0.2 mm per step (g dt^2 at 1/240 s) at
+#: a place of half a metre loses another fraction of 2^-24 m, by the golden ratio, for a uniform distribution.
 LONGER = 1.618e-4
-#: Share of a value beyond which a band says nothing about it.
+#: Width of a band, as a share of the value, above which there is no prediction.
 VAGUE = 0.02
-#: Most bodies that are followed.
+#: Largest number of bodies.
 MOST_BODIES = 12
 
 Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class _Layout:
-    """Arrays of free balls and boxes among fixed ones and half-spaces, as `recurrence` takes them, in one kind."""
+    """Arrays of free balls and boxes among fixed ones and half-spaces, for `recurrence`, in one precision."""
 
     def __init__(
         self,
@@ -90,11 +92,11 @@ class _Layout:
         self.free = [k for k, body in enumerate(scene.bodies) if body.motion == "free"]
         rest = [k for k, body in enumerate(scene.bodies) if body.motion != "free"]
         self.planes = [k for k in rest if isinstance(scene.bodies[k].shape, HalfSpace)]
-        #: Numbers in the scene of all bodies but planes, those that are free first.
+        #: Indices in the scene of all bodies but planes, free ones first.
         self.solid = self.free + [k for k in rest if k not in self.planes]
 
         def rows(of: Callable[[Body], Any], last: Any) -> Numbers:
-            """One row for each free body, ``last`` for what is fixed."""
+            """One row for each free body, ``last`` for fixed ones."""
             free = [of(scene.bodies[k]) for k in self.free]
             return np.array([*free, *(last for _ in self.solid[len(free) :]), last], kind)
 
@@ -113,7 +115,7 @@ class _Layout:
             *blank,
         )
         may = list(self._candidates())
-        #: The two bodies of each pair whose impulses are told, in the scene's numbers.
+        #: The two bodies of each pair with recorded impulses, as indices in the scene.
         self.pairs = sorted({between for between, *_ in may})
         first_fixed = len(self.free)
         bodies = sorted({(min(a, first_fixed), min(b, first_fixed)) for _, a, b, *_ in may})
@@ -151,7 +153,7 @@ class _Layout:
         )  # fmt: skip
 
     def _candidates(self) -> Any:
-        """Rows of `recurrence.Candidates`, with the two bodies in place of the numbers of pairs."""
+        """Rows of `recurrence.Candidates`, with the two bodies in place of the indices of pairs."""
         world, still = len(self.solid), (0.0,) * 3
         for i, k in enumerate(self.free):
             body = self.scene.bodies[k]
@@ -167,7 +169,7 @@ class _Layout:
             body = self.scene.bodies[k]
             for i2, k2 in enumerate(self.solid):
                 other = self.scene.bodies[k2]
-                # Each pair once, and a ball second; what is fixed meets only what is free.
+                # Each pair once, and a ball second; fixed bodies touch free ones only.
                 if not isinstance(body.shape, Sphere) or min(i, i2) >= len(self.free) or i == i2:
                     continue
                 size, thick = still, 0.0
@@ -183,11 +185,11 @@ class _Layout:
 
 
 def held_plane(plane: HalfSpace) -> tuple[tuple[float, ...], float]:
-    """Normal and offset [m] of a spatial half-space as Newton has them.
+    """Normal and offset [m] of a 3-D half-space in Newton.
 
-    It keeps a plane as a turn of the z axis, the quaternion (z x n, 1 + z . n) made to size one in singles, and turns
-    that axis by it again: a wall along x leans by one rounding, 2^-24 rad. Balls that meet in a line leave it by that.
-    [ModelBuilder.add_shape_plane; warp, quat_between_vectors and quat_rotate]
+    It stores a plane as a rotation of the z axis, the quaternion (z x n, 1 + z . n) normalised in single precision, and
+    rotates that axis by it again: a wall along x is tilted by one rounding, 2^-24 rad. Balls that collide in a line
+    leave the line by that. [ModelBuilder.add_shape_plane; warp, quat_between_vectors and quat_rotate]
     """
     given = np.array(plane.normal, float) / np.linalg.norm(plane.normal)
     x, y, z = given.astype(np.float32)
@@ -207,7 +209,7 @@ def _corners(body: Body) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def followed(scene: Scene) -> bool:
-    """Whether the recurrence speaks about a spatial scene: free balls, at most one free box, and fixed half-spaces.
+    """Whether the recurrence covers a 3-D scene: free balls, at most one free box, and fixed half-spaces.
 
     Balls may be fixed as well; so may boxes, if no box is free.
     """
@@ -245,7 +247,7 @@ def _moved(
     )  # fmt: skip
     run(layout.bodies, layout.may, layout.touching, layout.chosen, told, *layout.room)
     flat = scene.dimension == 2
-    # Unknown where rebounds are solved as well.
+    # Unknown with restitution.
     impulse = told.impulse * (np.nan if chosen["rebounds"] else 1.0)
     record = told_contacts(told.pressed, np.array(layout.pairs, np.int64), impulse, flat)
     return told_trajectory(spatial, layout.free, told.pose, told.twist, record, dt, flat)
@@ -262,9 +264,9 @@ def moved(
 ) -> Trajectory | None:
     """The motion of a scene, every step, in doubles or singles; None if it is neither `followed` nor a column.
 
-    ``longer``: share by which steps are longer, under the same settings; times are told as if they were not.
-    ``blur``: by which share of its place the two points of a contact are seen apart, along three axes.
-    ``iterations``: sweeps that are asked for, in place of the profile's.
+    ``longer``: relative change of the step length, with the same settings; reported times do not contain it.
+    ``blur``: shift between the two points of a contact as a share of their place, along three axes.
+    ``iterations``: iterations, in place of the profile's.
     """
     spatial = scene if scene.dimension == 3 else lift(scene)
     chosen = settings_of(scene, dt, profile, iterations)
@@ -278,13 +280,13 @@ def moved(
 
 
 def settings_of(scene: Scene, dt: float, profile: str, iterations: int | None) -> dict[str, Any]:
-    """What a profile sets, with the sweeps that are asked for."""
+    """Settings of a profile, with the given iterations."""
     chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
     return chosen if iterations is None else chosen | {"iterations": iterations}
 
 
 class _Asked:
-    """A scene and what reads its numbers, as an argument of a cached function: scenes hold a table and have no hash."""
+    """A scene and its metrics, as an argument of a cached function: scenes contain a table and have no hash."""
 
     def __init__(self, scene: Scene, measure: Measure) -> None:
         self.scene, self.measure, self.told = scene, measure, (repr(scene), measure)
@@ -297,15 +299,15 @@ class _Asked:
 
 
 class _Said(NamedTuple):
-    """Of each metric its value and the band that roundings ask for, and how many roundings there are."""
+    """Value of each metric, its band from round-off, and the number of roundings."""
 
     table: Mapping[str, tuple[float, float]]
     counted: Roundings | None
 
 
-@lru_cache(maxsize=4096)  # tables of some twenty numbers: more cells than any suite asks of one engine
+@lru_cache(maxsize=4096)  # tables of some twenty numbers: more cells than any suite has for one engine
 def _readings(asked: _Asked, dt: float, profile: str, iterations: int | None = None) -> _Said:
-    """What the recurrence makes of each metric of a scene."""
+    """Each metric of a scene by the recurrence."""
     scene = asked.scene
     values: Mapping[str, Measured] = {}
     counted: Roundings | None = None
@@ -341,7 +343,7 @@ def _readings(asked: _Asked, dt: float, profile: str, iterations: int | None = N
 
 
 def _band(missed: list[float]) -> float:
-    """Band about the mean of draws: of one more of them, and of a unit that is counted."""
+    """Band about the mean of samples: for one more of them, and for a counted unit."""
     if not np.isfinite(missed).all():
         return math.inf
     scatter = float(np.std(missed, ddof=1)) * math.sqrt(1.0 + 1.0 / len(missed))
@@ -349,7 +351,7 @@ def _band(missed: list[float]) -> float:
 
 
 def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generator) -> Trajectory:
-    """A motion in singles with a unit in the last place of each number added, taken, or neither."""
+    """A motion in single precision with each number changed by a unit in the last place up or down, or not at all."""
     free = np.array([body.motion == "free" for body in scene.bodies])[None, :, None]
 
     def other(numbers: Numbers) -> Numbers:
@@ -359,7 +361,7 @@ def _told_otherwise(motion: Trajectory, scene: Scene, chance: np.random.Generato
         motion.contacts, rows=replace(motion.contacts.rows, impulse=other(motion.contacts.rows.impulse))
     )
     pose, twist = (np.where(free, other(part), part) for part in (motion.pose, motion.twist))
-    # Where it starts is the scene's.
+    # The start is the scene's.
     pose[0], twist[0] = motion.pose[0], motion.twist[0]
     return replace(motion, pose=pose, twist=twist, contacts=record)
 
@@ -369,15 +371,15 @@ def _predicted(
 ) -> Prediction | None:
     table, counted = _readings(_Asked(scene, measure), dt, profile, iterations)
     value, band = table.get(metric, (0.0, math.inf))
-    band = max(band, QUANTILE * UNIT * abs(value))  # a number that is told is rounded at least once
+    band = max(band, QUANTILE * UNIT * abs(value))  # each reported number is rounded at least once
     most = max(VAGUE * abs(value), LIMITS[metric](counted) if balance and counted else 0.0)
     return (value, band) if 0.0 < band <= most else None
 
 
 def motion_law(metric: str, profile: str, balance: bool = False) -> Law:
-    """What the recurrence makes of ``metric``; nothing where single numbers make too much of a difference.
+    """``metric`` by the recurrence; no prediction if single precision has too large an effect.
 
-    ``balance``: all of it may be round-off, as much as `roundings` counts.
+    ``balance``: the whole value may be round-off, up to the bound of `roundings`.
     """
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -387,7 +389,7 @@ def motion_law(metric: str, profile: str, balance: bool = False) -> Law:
 
 
 def swept_law(metric: str, profile: str, balance: bool = False) -> AskedLaw:
-    """As `motion_law`, at another number of sweeps."""
+    """As `motion_law`, with another number of iterations."""
 
     def law(scene: Scene, dt: float, measure: Measure, iterations: int) -> Prediction | None:
         return _predicted(scene, dt, measure, metric, profile, iterations, balance)

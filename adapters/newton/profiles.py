@@ -1,7 +1,7 @@
-"""Profiles of Newton's XPBD solver: settings with their reasons.
+"""Profiles of Newton's XPBD solver: settings and their reasons.
 
 default   `SolverXPBD` and its shapes as constructed
-tuned     more sweeps, without friction that no scene asks for
+tuned     more iterations, without rolling and spinning friction
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from adapters.newton.shipped import (
     TORSIONAL,
 )
 
-#: Sweeps of `tuned`: a fifth to the 50th power is nothing in singles.
+#: Iterations of `tuned`: a fifth to the 50th power is 0 in single precision.
 TUNED_ITERATIONS = 50
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
@@ -39,12 +39,12 @@ _SOLVER, _SHAPE = "SolverXPBD", "ModelBuilder.ShapeConfig"
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
-    """As constructed; restitution is asked for where the scene has one, since it is off otherwise."""
+    """As constructed; restitution is switched on if the scene has one, because it is off by default."""
     said = "as shipped"
     return [
-        Setting("iterations", ITERATIONS, f"{said}: sweeps over positions", f"{_SOLVER}, iterations"),
+        Setting("iterations", ITERATIONS, f"{said}: iterations on positions", f"{_SOLVER}, iterations"),
         Setting(
-            "relaxation", RELAXATION, f"{said}: share of an overlap that a sweep takes back",
+            "relaxation", RELAXATION, f"{said}: share of an overlap that an iteration corrects",
             f"{_SOLVER}, rigid_contact_relaxation",
         ),
         Setting(
@@ -52,16 +52,17 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
             f"{_SOLVER}, rigid_contact_con_weighting",
         ),
         Setting(
-            "rebounds", needs.restitution > 0.0, "off as shipped, which ignores restitution: on where a scene has any",
+            "rebounds", needs.restitution > 0.0, "off as shipped, which ignores restitution; on where the "
+                                                 "scene has any",
             f"{_SOLVER}, enable_restitution",
         ),
         Setting(
-            "rebound_iterations", REBOUND_ITERATIONS, f"{said}: sweeps over rebounds",
+            "rebound_iterations", REBOUND_ITERATIONS, f"{said}: iterations of rebounds",
             f"{_SOLVER}, rigid_contact_restitution_iterations",
         ),
         Setting("torsional", TORSIONAL, f"{said}: friction about the normal [m]", f"{_SHAPE}, mu_torsional"),
         Setting("rolling", ROLLING, f"{said}: friction against rolling [m]", f"{_SHAPE}, mu_rolling"),
-        Setting("gap", GAP, f"{said}: contacts are made so far ahead, of each shape [m]", "ModelBuilder.rigid_gap"),
+        Setting("gap", GAP, f"{said}: contacts act from this distance, of each shape [m]", "ModelBuilder.rigid_gap"),
     ]  # fmt: skip
 
 
@@ -70,12 +71,12 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     changed = {
         "iterations": (
             TUNED_ITERATIONS,
-            "what two leave of an overlap is a speed, of a slip creep",
+            "two iterations leave overlaps, which become velocities, and slip, which becomes creep",
             "derived",
         ),
-        "torsional": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_torsional"),
-        "rolling": (0.0, "no friction that the scene does not ask for", f"{_SHAPE}, mu_rolling"),
-        "gap": (max(GAP, needs.top_speed * dt), "nothing crosses it unseen within a step", "derived"),
+        "torsional": (0.0, "the scene has no such friction", f"{_SHAPE}, mu_torsional"),
+        "rolling": (0.0, "the scene has no such friction", f"{_SHAPE}, mu_rolling"),
+        "gap": (max(GAP, needs.top_speed * dt), "no body passes it within a step", "derived"),
     }
     return [
         Setting(each.name, *changed[each.name]) if each.name in changed else each

@@ -1,10 +1,10 @@
-"""Newton's step as compiled loops, in the numbers that its arrays are of: singles or doubles.
+"""Newton's step as compiled loops, in the precision of its arrays: single or double.
 
     contacts where the step begins  ->  v += dt g, x += dt v  ->  sweeps  ->  what is slow stops  ->  rebounds
 
-`adapters.newton.motion` says what the formulas are and lays the arrays out. Constants come as arrays of the same kind,
-for a literal would make doubles of singles. All kernels stand in this file: numba keeps machine code by the file that
-the outermost of them stands in.
+`adapters.newton.motion` describes the formulas and prepares the arrays. Constants are arrays of the same precision,
+because a literal would convert single to double precision. All kernels are in this file: numba caches machine code by
+the file of the outermost one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 class Bodies(NamedTuple):
-    """State and inertia of free bodies, then of fixed balls and boxes, the world last.
+    """State and inertia of free bodies, then of fixed balls and boxes, last of the world.
 
     ``q`` is w, x, y, z, spins and inertias as in `motion`.
     """
@@ -40,21 +40,21 @@ class Bodies(NamedTuple):
     old_w: Numbers
     push: Numbers
     twist: Numbers
-    #: How many contacts ask.
+    #: Number of contacts with a correction.
     many: Numbers
 
 
 class Candidates(NamedTuple):
-    """What may touch: a corner (or centre) ``at`` of body ``b`` and a plane, a ball ``b`` and a ball or box ``a``.
+    """Possible contacts: a corner (or centre) ``at`` of body ``b`` and a plane, a ball ``b`` and a ball or box ``a``.
 
-    Of a box ``at`` is half its size.
+    For a box ``at`` is half its size.
     """
 
     a: Numbers
     b: Numbers
-    #: Number of the pair of bodies, in rising order of both; what is fixed is one body.
+    #: Index of the pair of bodies, in rising order of both; all fixed bodies count as one.
     pair: Numbers
-    #: Number of the pair of the scene's bodies, of which impulses are told: all that is fixed apart.
+    #: Index of the pair of the scene's bodies with recorded impulses: fixed bodies count separately.
     told: Numbers
     at: Numbers
     #: Normal and offset of the plane.
@@ -67,7 +67,7 @@ class Candidates(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Contacts of a step: number of the candidate, normal, points and arms in body axes, and what a sweep finds."""
+    """Contacts of a step: candidate, normal, points and lever arms in body axes, and results of an iteration."""
 
     of: Numbers
     normal: Numbers
@@ -81,7 +81,7 @@ class Touching(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """Settings: constants in the kind of all numbers, and counts."""
+    """Settings: constants in the precision of all numbers, and counts."""
 
     dt: Numbers
     gravity: Numbers
@@ -89,10 +89,10 @@ class Chosen(NamedTuple):
     #: Friction about the normal and against rolling [m].
     resists: Numbers
     reach: Numbers
-    #: Square of the speed that is stopped, and least approach that rebounds.
+    #: Square of the speed below which bodies stop, and threshold speed of restitution.
     stopped: Numbers
     least: Numbers
-    #: Shares of its place by which the two points of a contact are seen apart, along three axes.
+    #: Shift between the two points of a contact as shares of their place, along three axes.
     blur: Numbers
     #: 0, 1/2, 1, 2.
     plain: Numbers
@@ -101,12 +101,12 @@ class Chosen(NamedTuple):
     rebounds: int
     rebound_iterations: int
     inner: int
-    #: How many bodies move: the first ones.
+    #: Number of moving bodies: the first ones.
     moving: int
 
 
 class Told(NamedTuple):
-    """What is kept of each step: places and turns, velocities, impulses by pair and whether there were any."""
+    """Records of each step: places and orientations, velocities, impulses by pair and whether there were any."""
 
     pose: Numbers
     twist: Numbers
@@ -116,7 +116,7 @@ class Told(NamedTuple):
 
 @inner_kernel
 def _set_turns(turn: Numbers, q: Numbers, plain: Numbers) -> None:
-    """Quaternions as they are now, each with 2 w^2 - 1 behind it."""
+    """Current quaternions, each followed by 2 w^2 - 1."""
     for k in range(len(q)):
         for d in range(4):
             turn[k, d] = q[k, d]
@@ -140,9 +140,9 @@ def _turned(
 ) -> tuple[float, float, float]:
     """A vector turned by quaternion (w, u): x (2 w^2 - 1) + 2 u (u . x) + 2 w u x x.
 
-    In this form a quaternion that is not of size one, by the rounding that its last step left, makes a vector along its
-    axis longer or shorter by twice as much: what spins about one axis gains or loses a few last digits in every step,
-    all to one side. A matrix, in which that axis stands as 1, would not show it. [warp, quat_rotate]
+    In this form a quaternion of a size different from 1, by round-off of its last step, changes the length of a vector
+    along its axis by twice as much: a spin about one axis changes in its last digits in every step, always in the same
+    direction. A matrix, with 1 for that axis, would not show it. [warp, quat_rotate]
     """
     along = a * x + b * y + c * z
     along += along
@@ -163,7 +163,7 @@ def _into(t: Numbers, x: float, y: float, z: float) -> tuple[float, float, float
 
 @inner_kernel
 def _rotate(q: Numbers, k: int, dt: float, half: float, x: float, y: float, z: float) -> None:
-    """Turn body ``k`` by ``dt`` times a spin, to first order."""
+    """Rotate body ``k`` by ``dt`` times a spin, to first order."""
     a, b, c = half * dt * x, half * dt * y, half * dt * z
     w, x, y, z = q[k, 0], q[k, 1], q[k, 2], q[k, 3]
     w, x, y, z = (
@@ -178,7 +178,7 @@ def _rotate(q: Numbers, k: int, dt: float, half: float, x: float, y: float, z: f
 
 @inner_kernel
 def _stop(bodies: Bodies, stopped: float, zero: float) -> None:
-    """What is slow stands still."""
+    """Stop slow bodies."""
     for v in (bodies.v, bodies.w):
         for k in range(len(v)):
             if v[k, 0] * v[k, 0] + v[k, 1] * v[k, 1] + v[k, 2] * v[k, 2] < stopped:
@@ -187,7 +187,7 @@ def _stop(bodies: Bodies, stopped: float, zero: float) -> None:
 
 @inner_kernel
 def _felt(bodies: Bodies, k: int, x: float, y: float, z: float) -> float:
-    """What an impulse of 1 does, by its lever about body ``k``, to the velocity that it acts on."""
+    """Inverse mass at a point of body ``k`` by rotation, for a lever of an impulse of 1."""
     a, b, c = _into(bodies.turn[k], x, y, z)
     soft = bodies.softness[k]
     return a * a * soft[0] + b * b * soft[1] + c * c * soft[2]
@@ -202,7 +202,7 @@ def _clipped(value: float, most: float) -> float:
 def _on_box(
     bodies: Bodies, may: Candidates, c: int, n: Numbers, points: Numbers, arms: Numbers, zero: float
 ) -> float:  # fmt: skip
-    """Distance of a ball from the nearest point of a box, whose contact is laid out; a centre must lie outside."""
+    """Distance of a ball from the nearest point of a box, and its contact; the centre must be outside."""
     x, y, t, radius = bodies.x[may.b[c]], bodies.x[may.a[c]], bodies.turn[may.b[c]], may.radii[c, 1]
     s, half = bodies.turn[may.a[c]], may.at[c]
     at = arms[0]
@@ -223,7 +223,7 @@ def _on_box(
 
 @inner_kernel
 def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) -> int:
-    """Contacts where the step begins; how many."""
+    """Contacts at the start of the step; their number."""
     count, zero = 0, chosen.plain[0]
     for c in range(len(may.a)):
         a, b = may.a[c], may.b[c]
@@ -237,7 +237,8 @@ def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) 
             radius = may.radii[c, 1]
             if not height - radius < chosen.reach[0]:
                 continue
-            # Points stand about the middle between corner and foot, in body axes: that costs singles digits.
+            # Points are relative to the middle between corner and foot, in body axes, which loses digits in single
+            # precision.
             half = chosen.plain[1] * height
             mx, my, mz = px - half * n[0], py - half * n[1], pz - half * n[2]
             points[0, 0], points[0, 1], points[0, 2] = mx - half * n[0], my - half * n[1], mz - half * n[2]
@@ -274,7 +275,7 @@ def _found(bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen) 
 
 @inner_kernel
 def _asks(bodies: Bodies, body: int, sign: float, push: Numbers, x: float, y: float, z: float) -> None:
-    """Add what a contact asks of a body: an impulse and a turn about it."""
+    """Add a contact's correction of a body: an impulse and a moment about it."""
     for d in range(3):
         bodies.push[body, d] += sign * push[d]
     bodies.twist[body, 0] += x
@@ -284,7 +285,7 @@ def _asks(bodies: Bodies, body: int, sign: float, push: Numbers, x: float, y: fl
 
 @inner_kernel
 def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: Chosen) -> bool:
-    """What one contact asks for in a sweep; whether it overlaps."""
+    """Correction of one contact in an iteration; whether it overlaps."""
     zero, one = chosen.plain[0], chosen.plain[2]
     c = touching.of[k]
     a, b, n = may.a[c], may.b[c], touching.normal[k]
@@ -337,7 +338,7 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
             turning = about if kind == 0 else speed
             hx, hy, hz = (n[0], n[1], n[2]) if kind == 0 else (rx, ry, rz)
             felt = _felt(bodies, a, hx, hy, hz) + _felt(bodies, b, hx, hy, hz)
-            felt = felt if felt > zero else one  # nothing turns
+            felt = felt if felt > zero else one  # no rotation
             resisted = _clipped(chosen.relaxation[0] * turning / felt, load * chosen.resists[kind])
             ax, ay, az = ax + resisted * hx, ay + resisted * hy, az + resisted * hz
             bx, by, bz = bx - resisted * hx, by - resisted * hy, bz - resisted * hz
@@ -350,7 +351,7 @@ def _press(bodies: Bodies, may: Candidates, touching: Touching, k: int, chosen: 
 
 @inner_kernel
 def _take(bodies: Bodies, chosen: Chosen) -> None:
-    """Change velocities and places by the mean of what contacts ask for, and stop what is slow."""
+    """Change velocities and places by the mean of the contacts' corrections, and stop slow bodies."""
     one, dt = chosen.plain[2], chosen.dt[0]
     for k in range(chosen.moving):
         many = bodies.many[k] if chosen.weighted and bodies.many[k] > one else one
@@ -378,7 +379,7 @@ def _take(bodies: Bodies, chosen: Chosen) -> None:
 def _sweep(
     bodies: Bodies, may: Candidates, touching: Touching, count: int, chosen: Chosen, impulse: Numbers, pressed: Numbers
 ) -> int:
-    """One sweep over all contacts; how many of them overlapped."""
+    """One iteration over all contacts; the number of overlapping ones."""
     zero, one = chosen.plain[0], chosen.plain[2]
     _set_turns(bodies.turn, bodies.q, chosen.plain)
     bodies.push[:], bodies.twist[:], bodies.many[:] = zero, zero, zero
@@ -391,7 +392,7 @@ def _sweep(
             found += 1
     for k in range(count):
         if touching.least[k] > zero:
-            # Told is what a body gets, the mean of its contacts; between two, by the mean number.
+            # Recorded is the impulse on a body, the mean of its contacts; between two bodies, by the mean count.
             c = touching.of[k]
             free, total = zero, zero
             for body in (may.a[c], may.b[c]):
@@ -407,7 +408,7 @@ def _sweep(
 
 @inner_kernel
 def _part(bodies: Bodies, a: int, b: int, n: Numbers, levers: Numbers, v: Numbers, w: Numbers) -> float:
-    """Speed at which a contact parts, of velocities and spins of its two bodies."""
+    """Separation speed of a contact, from velocities and spins of its two bodies."""
     normal = n[0] * (v[1, 0] - v[0, 0]) + n[1] * (v[1, 1] - v[0, 1]) + n[2] * (v[1, 2] - v[0, 2])
     right = levers[1, 0] * w[1, 0] + levers[1, 1] * w[1, 1] + levers[1, 2] * w[1, 2]
     left = levers[0, 0] * w[0, 0] + levers[0, 1] * w[0, 1] + levers[0, 2] * w[0, 2]
@@ -419,7 +420,7 @@ def _rebound(
     bodies: Bodies, may: Candidates, touching: Touching, count: int, chosen: Chosen, levers: Numbers, soft: Numbers,
     felt: Numbers, both: Numbers, gained: Numbers, fired: Numbers,
 ) -> None:  # fmt: skip
-    """Speeds at which contacts part, by how they came before the sweeps; pair by pair."""
+    """Set separation speeds of contacts from their approach speeds before the iterations; pair by pair."""
     zero, one, least = chosen.plain[0], chosen.plain[2], chosen.least[0]
     for k in range(count):
         if not touching.deep[k]:
@@ -505,7 +506,7 @@ def run(
     bodies: Bodies, may: Candidates, touching: Touching, chosen: Chosen, told: Told, levers: Numbers, soft: Numbers,
     felt: Numbers, both: Numbers, gained: Numbers, fired: Numbers,
 ) -> None:  # fmt: skip
-    """Make all steps that ``told`` has place for; the other arrays are room to work in."""
+    """Make all steps that ``told`` can record; the other arrays are work space."""
     dt, half = chosen.dt[0], chosen.plain[1]
     for step in range(len(told.pose)):
         _set_turns(bodies.turn, bodies.q, chosen.plain)
@@ -532,7 +533,7 @@ def run(
                 found = _sweep(bodies, may, touching, count, chosen, told.impulse[step], told.pressed[step])
                 any_deep += found
                 idle = 0 if found else idle + 1
-                if idle == 2:  # nothing that a sweep looks at has changed
+                if idle == 2:  # no input of an iteration has changed
                     break
         _stop(bodies, chosen.stopped[0], chosen.plain[0])
         if chosen.rebounds and any_deep:

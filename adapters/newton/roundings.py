@@ -1,21 +1,21 @@
-"""Most that single numbers make of a balance in a run of Newton's XPBD: operations counted, each half a unit off.
+"""Bound on a balance from round-off of single precision in Newton's XPBD: half a unit for each counted operation.
 
-A balance is a number that is nothing but for round-off. What changes it is the rounding of velocities and places in
-the steps of a motion that is known, that of the recurrence in doubles:
+A balance is a number that is 0 except for round-off. It changes by the rounding of velocities and places in the steps
+of a known motion, that of the recurrence in double precision:
 
     a step                  v += dt g                               2 roundings of a velocity, none without loads
     a sweep that presses    v += l n/(m n_c)                        3
     rebounds                8 sweeps of v += l n/m, and a mean      3 each, and 2
     a step that presses     overlaps and slips, over the step       `ROUNDINGS` of a place
 
-Sweeps take back what those before them were off by, a share each, so that roundings of places count once a step. An
-impulse is one number for both bodies: places do not change a sum of momenta. Rebounds set the speed at which a contact
-parts, whatever sweeps have left of it: of places only the lever of a blow changes what two bodies have of its energy.
+Each iteration corrects a share of the errors before it, so roundings of places count once per step. An impulse is one
+number for both bodies: places do not change a sum of momenta. Restitution sets the separation speed of a contact,
+independent of the iterations before: among places only the lever arm of a blow changes the energy of the two bodies.
 
-Where sweeps stop a body it is otherwise. A stop takes what a sweep has left of a velocity, at most 0.1 mm/s, and no
-impulse tells of it; the sweeps after it ask for as much, the way that was left of the overlap over the step. In doubles
-both are the same number. In singles sweeps end where no overlap is seen any more, so that what they ask for is off by
-the roundings of a place over the step, as in any step that presses, and these are momentum.
+Stops of bodies are different. A stop removes the rest of a velocity after an iteration, at most 0.1 mm/s, without a
+recorded impulse; later iterations correct the same amount, the rest of the overlap over the step. In double precision
+both are equal. In single precision iterations end without a visible overlap, so their corrections have an error of the
+roundings of a place over the step, as in any step with contact, and this error is momentum.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from adapters.scene import Body, Box, Scene, Sphere
 from adapters.single_precision import UNIT
 from adapters.trajectory import Trajectory
 
-#: Roundings of the place where two points touch, of which one tells depth and slip: each is taken from the world to a
-#: body's axes (taken away, turned about two axes) and back (turned, added), and may be half a unit off each time. At a
-#: place that does not change they are off the same way in every step, which no draw shows.
+#: Roundings of the place of two touching points, which determine depth and slip: each is transformed from the world to
+#: a body's axes (subtracted, rotated about two axes) and back (rotated, added), with up to half a unit of error each
+#: time. At a constant place the error is the same in every step, which no sample shows.
 ROUNDINGS = 12.0
 
 
 class Roundings(NamedTuple):
-    """What they add up to at most, and what a balance is told in.
+    """Bounds of their sums, and the scales of a balance.
 
-    ``speed`` of velocities alone, ``levered`` with what levers of blows make of them, ``placed`` with what overlaps and
-    slips do, ``told`` of impulses against velocities [m/s]; ``place`` [m]; ``spin`` that a blow gives a body beside its
-    speed [rad/m]; ``start``, the fastest body as the scene starts [m/s].
+    ``speed`` of velocities only, ``levered`` with lever arms of blows, ``placed`` with overlaps and slips, ``told`` of
+    impulses relative to velocities [m/s]; ``place`` [m]; ``spin`` of a body per speed by a blow [rad/m]; ``start``, the
+    fastest body at the start [m/s].
     """
 
     speed: float
@@ -54,11 +54,11 @@ class Roundings(NamedTuple):
 
 
 def _share(of: Roundings, speed: float) -> float:
-    """Of the speed that a scene starts with; nothing is known of one that starts at rest."""
+    """A share of the start speed; unknown for a start at rest."""
     return speed / of.start if of.start > 0.0 else 0.0
 
 
-#: Most that roundings make of a metric which is a balance, in its unit.
+#: Bound of round-off in a metric which is a balance, in its unit.
 LIMITS: Mapping[str, Callable[[Roundings], float]] = {
     "momentum_defect": lambda of: _share(of, of.told),
     "energy_defect": lambda of: _share(of, 2.0 * of.levered),
@@ -72,14 +72,14 @@ LIMITS: Mapping[str, Callable[[Roundings], float]] = {
 
 
 def roundings_of(spatial: Scene, motion: Trajectory, dt: float, chosen: Mapping[str, Any]) -> Roundings:
-    """Count and add up.
+    """Count and add roundings.
 
     Parameters
     ----------
     spatial
         The scene, in three dimensions.
     motion
-        Of the same bodies, every step, in the scene's own dimension.
+        Motion of the same bodies, every step, in the scene's own dimension.
     dt
         Step [s].
     chosen
@@ -100,14 +100,14 @@ def roundings_of(spatial: Scene, motion: Trajectory, dt: float, chosen: Mapping[
     speed, off = UNIT * many * float(speeds.max()), UNIT * pressed * ROUNDINGS * far
     place = UNIT * far * (steps + pressed * chosen["iterations"]) + speed * steps * dt
     levered = speed + off * spin * float(speeds.max())
-    # Rebounds come after the last stop: what they leave at rest was not stopped.
+    # Restitution comes after the last stop: a body at rest after it was not stopped.
     stopped = not chosen["rebounds"] and bool((pressing[:, None] & (speeds[:-1] > 0.0) & (speeds[1:] == 0.0)).any())
     placed = speed + off / dt
     return Roundings(speed, levered, placed, placed if stopped else speed, place, spin, float(speeds[0].max()))
 
 
 def _turns(body: Body, rubs: bool) -> bool:
-    """Whether blows turn a body: smooth balls are struck towards their centres."""
+    """Whether blows rotate a body: those of smooth balls go through their centres."""
     return rubs or not isinstance(body.shape, Sphere)
 
 

@@ -1,6 +1,6 @@
-"""A run on Newton as a stand-alone script: the calls of `adapters.newton.simulation`, with their numbers.
+"""A run on Newton as a stand-alone script: the calls of `adapters.newton.simulation`, with their values.
 
-Steps are made one by one: the graph that the adapter records for speed replays the same launches.
+Steps are made one by one: the adapter's graph, for speed, replays the same launches.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _made(asked: Body, settings: Mapping[str, Any], numbers: tuple[float, float]
 
 
 def _shape(asked: Body, moving: bool) -> list[str]:
-    """Lines that make a shape; that of a body that moves stands in its middle."""
+    """Lines that make a shape; that of a moving body is at its centre."""
     shape, where = asked.shape, "None" if moving else "pose"
     if isinstance(shape, HalfSpace):
         plane = literal((*(float(n) for n in shape.normal), -float(shape.offset)))
@@ -111,7 +111,7 @@ def _shape(asked: Body, moving: bool) -> list[str]:
 
 
 def _started(asked: Body) -> list[str]:
-    """Lines that give a body its twist and its load, which stays."""
+    """Lines that give a body its twist and its constant load."""
     if asked.motion != "free" and not is_driven(asked):
         return []
     number, twist = f"bodies[{asked.name!r}][0]", asked.twist
@@ -124,7 +124,7 @@ def _started(asked: Body) -> list[str]:
 
 
 def _led(asked: Body) -> list[str]:
-    """Lines before a step that say where a driven body is at its end, and how fast it gets there."""
+    """Lines before a step that set a driven body's pose at its end, and its velocity."""
     w, x, y, z = asked.pose[3:]
     turn = literal((x, y, z, w))
     if any(asked.twist[3:]):
@@ -138,7 +138,7 @@ def _led(asked: Body) -> list[str]:
 
 
 def _state(scene: Scene) -> list[str]:
-    """Lines of the function that reads all bodies; surfaces that run and half-spaces stay where they are."""
+    """Lines of the function that reads all bodies; running surfaces and half-spaces do not move."""
     faces = [body.name for body in scene.bodies if isinstance(body.shape, HalfSpace)]
     still = [body.name for body in scene.bodies if body.motion == "fixed"]
     return [
@@ -156,14 +156,14 @@ def _state(scene: Scene) -> list[str]:
     ]
 
 
-#: Lines of a step: contacts where it begins, then positions; the state is ready for the next.
+#: Lines of a step: contacts at its start, then positions; the state is ready for the next.
 _STEP = [
     "pipeline.collide(now, touching)",
     "solver.step(now, following, control, touching, DT)",
     "warp.copy(now.body_q, following.body_q)",
     "warp.copy(now.body_qd, following.body_qd)",
 ]
-#: Lines of the function that turns what is driven (`adapters.newton.simulation.turned`).
+#: Lines of the function that rotates driven bodies (`adapters.newton.simulation.turned`).
 _TURNED = [
     "",
     "",

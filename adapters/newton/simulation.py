@@ -1,7 +1,7 @@
-"""One Newton model under XPBD and what is read from it; a step is recorded once and replayed.
+"""One Newton model with XPBD and its readings; a step is recorded once and replayed.
 
-A step of the solver is some thirty launches of kernels, which cost 1.2 ms of Python on a CPU. Warp records them into a
-graph, as it does on GPUs, and replays the same launches on the same arrays in 0.03 ms, to the same bits.
+A step of the solver has about thirty launches of kernels, which cost 1.2 ms of Python on a CPU. Warp records them into
+a graph, as on GPUs, and replays the same launches on the same arrays in 0.03 ms, bit for bit.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from adapters.means import mean, means
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
-#: Turn that takes Newton's capsules, along z, to the scene's, along x (x, y, z, w).
+#: Rotation of Newton's capsules, along z, to the scene's, along x (x, y, z, w).
 ALONG_X = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)
 
 
 @cache
 def imported() -> tuple[Any, Any]:
-    """Import Warp and Newton, which say what they do on the terminal otherwise."""
+    """Import Warp and Newton without their messages on the terminal."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -34,14 +34,14 @@ def imported() -> tuple[Any, Any]:
     import newton
     from newton._src.geometry import narrow_phase
 
-    # Every pipeline makes the same kernels anew, of the same arguments: 80 ms, and memory that is never given back.
+    # Every pipeline makes the same kernels again, from the same arguments: 80 ms, and memory that is never freed.
     for name in ("create_narrow_phase_kernel_gjk_mpr", "create_narrow_phase_primitive_kernel"):
         setattr(narrow_phase, name, cache(getattr(narrow_phase, name)))
     return warp, newton
 
 
 def _without_a_word(start: Callable[[], None]) -> None:
-    """Start Warp, which says on standard error, from C, that there is no GPU: that does not matter here."""
+    """Start Warp without its message from C on standard error about a missing GPU, which does not matter here."""
     with open(os.devnull, "w") as nothing:
         held = os.dup(2)
         os.dup2(nothing.fileno(), 2)
@@ -70,7 +70,7 @@ def turned(quaternion: tuple[float, ...], spin: tuple[float, ...], time: float) 
 
 
 class NewtonSimulation(Simulation):
-    """One model on the CPU; free and moving bodies are Newton's, shapes of fixed ones belong to its world."""
+    """One model on the CPU; free and driven bodies are Newton's, shapes of fixed ones belong to its world."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         warp, newton = imported()
@@ -78,7 +78,7 @@ class NewtonSimulation(Simulation):
         self.restitutions, self.frictions = means(scene, "restitution") or [], means(scene, "friction") or []
         builder = newton.ModelBuilder(gravity=tuple(float(g) for g in scene.gravity))
         builder.rigid_gap = settings["gap"]
-        #: Newton's number of each of the scene's bodies; -1 for what is fixed.
+        #: Newton's index of each of the scene's bodies; -1 for fixed ones.
         self.numbers = [self._made(newton, builder, index, body) for index, body in enumerate(scene.bodies)]
         self.model: Any = builder.finalize(device="cpu")
         self.solver: Any = newton.solvers.SolverXPBD(
@@ -94,7 +94,7 @@ class NewtonSimulation(Simulation):
         self.told: Any = self.solver.observables({"contact_f"}, contacts=self.touching)
         self.now, self.next = self.model.state(), self.model.state()
         self.control: Any = self.model.control()
-        # Views on the engine's own numbers: on a CPU nothing is copied.
+        # Views of the engine's own arrays: there are no copies on a CPU.
         self.place, self.speed = self.now.body_q.numpy(), self.now.body_qd.numpy()
         self._start()
         self.driven = [k for k, body in enumerate(scene.bodies) if is_driven(body)]
@@ -104,7 +104,7 @@ class NewtonSimulation(Simulation):
     # ---- making ------------------------------------------------------------------------------------------------------
 
     def _made(self, newton: Any, builder: Any, index: int, asked: Body) -> int:
-        """Body and shape of one of the scene's bodies; its number, or -1."""
+        """Make body and shape of one of the scene's bodies; its index, or -1."""
         number, place = -1, self._transform(asked)
         if asked.motion == "free":
             inertia = self.warp.mat33(*np.diag(np.asarray(asked.inertia, float)).ravel())
@@ -148,7 +148,7 @@ class NewtonSimulation(Simulation):
             builder.add_shape_box(number, xform=place, hx=x, hy=y, hz=z, cfg=config)
 
     def _start(self) -> None:
-        """Twists and loads of the scene; a state's forces stay until they are cleared."""
+        """Twists and loads of the scene; a state's forces remain until they are cleared."""
         loads = self.now.body_f.numpy()
         for asked, number in zip(self.scene.bodies, self.numbers, strict=True):
             if number < 0:
@@ -162,14 +162,14 @@ class NewtonSimulation(Simulation):
     # ---- stepping ----------------------------------------------------------------------------------------------------
 
     def _solve(self) -> None:
-        """One step of the solver: contacts where the step begins, then positions; the state is ready for the next."""
+        """One step of the solver: contacts at its start, then positions; the state is ready for the next."""
         self.pipeline.collide(self.now, self.touching)
         self.solver.step(self.now, self.next, self.control, self.touching, self.dt, observables=self.told)
         self.warp.copy(self.now.body_q, self.next.body_q)
         self.warp.copy(self.now.body_qd, self.next.body_qd)
 
     def _record(self) -> None:
-        """Load the kernels by a step, record one, which makes it as well, and go back to where the world was."""
+        """Load the kernels by a step, record one, which also executes it, and restore the state."""
         place, speed = self.place.copy(), self.speed.copy()
         self._solve()
         with self.warp.ScopedCapture(device="cpu") as capture:
@@ -178,7 +178,7 @@ class NewtonSimulation(Simulation):
         self.place[:], self.speed[:] = place, speed
 
     def advance(self, steps: int) -> None:
-        """See `Simulation.advance`; a driven body is where its step ends before others move, as they are projected."""
+        """See `Simulation.advance`; a driven body gets its final pose first, because the others are projected."""
         if not len(self.place):
             self.steps += steps
             return
@@ -192,10 +192,10 @@ class NewtonSimulation(Simulation):
             launch(self.graph)
 
     def _lead(self, k: int) -> None:
-        """Say where a driven body is at the end of the step that comes, and how fast it gets there."""
+        """Set a driven body's pose at the end of the next step, and its velocity."""
         body, number = self.scene.bodies[k], self.numbers[k]
         if body.motion == "fixed" or isinstance(body.shape, HalfSpace):
-            return  # a surface that runs along itself stays where it is
+            return  # a surface that runs along itself does not move
         time = self.steps * self.dt
         self.place[number, :3] = place_after(body, time)
         w, x, y, z = turned(body.pose[3:], body.twist[3:], time)
@@ -214,7 +214,7 @@ class NewtonSimulation(Simulation):
         return rows
 
     def twist(self) -> Array:
-        """See `Simulation.twist`; a prescribed body's is the one of the step that was made."""
+        """See `Simulation.twist`; that of a prescribed body belongs to the last step."""
         rows = np.zeros((len(self.scene.bodies), 6))
         for k, (body, number) in enumerate(zip(self.scene.bodies, self.numbers, strict=True)):
             if number >= 0 and body.motion != "fixed":
@@ -222,9 +222,9 @@ class NewtonSimulation(Simulation):
         return rows
 
     def contacts(self) -> Contacts:
-        """Contacts of the last step; impulses are those of positions, and unknown where rebounds are solved as well.
+        """Contacts of the last step; impulses are those of positions, and unknown with restitution.
 
-        Shapes are made in the order of bodies, one each, so that a shape's number is its body's in the scene.
+        Shapes are made in the order of bodies, one each, so a shape's index is its body's in the scene.
         """
         if self.graph is None:
             return Contacts.from_rows([], 3)
@@ -244,12 +244,12 @@ class NewtonSimulation(Simulation):
         rows: list[Row] = []
         for k in range(count):
             numbers = [int(bodies[shapes[side][k]]) for side in (0, 1)]
-            # Overlaps are told between points within the shapes, less what these are thick; offsets lead to surfaces.
+            # Overlaps are measured between points inside the shapes, minus their thickness; offsets lead to surfaces.
             inner = [self._world(numbers[side], local[side][k]) for side in (0, 1)]
             outer = [self._world(numbers[side], local[side][k] + offsets[side][k]) for side in (0, 1)]
             gap = float(normals[k] @ (inner[1] - inner[0])) - float(margins[k])
             place = 0.5 * (outer[0] + outer[1])
-            # The force is the one on the first body; contacts that were out of reach have none.
+            # The force acts on the first body; contacts out of range have none.
             impulse = np.full(3, np.nan) if self.settings["rebounds"] else -self.dt * force[k]
             rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], impulse, gap))
         return Contacts.by_pair(rows, 3)
@@ -263,7 +263,7 @@ class NewtonSimulation(Simulation):
         return np.asarray(self.place[number, :3].astype(float) + turned_point)
 
     def readback(self) -> dict[str, Any]:
-        """What the model and its solver hold."""
+        """Values of the model and its solver."""
         model, solver = self.model, self.solver
         mass, inertia = model.body_mass.numpy(), model.body_inertia.numpy()
         friction, restitution = model.shape_material_mu.numpy(), model.shape_material_restitution.numpy()
@@ -290,7 +290,7 @@ class NewtonSimulation(Simulation):
 
 
 def is_driven(body: Body) -> bool:
-    """Whether a body is moved, or its surface runs."""
+    """Whether a body has a prescribed motion, or its surface runs."""
     return body.motion == "prescribed" or any(body.surface_velocity)
 
 
@@ -298,12 +298,12 @@ def _mesh(newton: Any, shape: Hull) -> Any:
     vertices = np.array(shape.vertices, np.float32)
     mesh = newton.Mesh(vertices, triangles(shape).ravel(), compute_inertia=False)
     if len(mesh.vertices) != len(vertices):
-        raise EngineError(f"shape: newton keeps {len(mesh.vertices)} of {len(vertices)} vertices")
+        raise EngineError(f"shape: newton uses {len(mesh.vertices)} of {len(vertices)} vertices")
     return mesh
 
 
 def triangles(shape: Hull) -> NDArray[np.int32]:
-    """Triangles around a hull, looking outwards: numbers of their corners (n, 3)."""
+    """Triangles around a hull, facing outwards: indices of their corners (n, 3)."""
     from scipy.spatial import ConvexHull
 
     vertices = np.array(shape.vertices, float)

@@ -1,4 +1,4 @@
-"""What a recurrence of Newton's solver tells of its run: poses, twists and impulses of every step as a `Trajectory`."""
+"""Results of a recurrence of Newton's solver: poses, twists and impulses of every step as a `Trajectory`."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ def told_trajectory(
     dt: float,
     flat: bool,
 ) -> Trajectory:
-    """All bodies over time: those that a recurrence moves by its numbers, all others where the scene has them.
+    """All bodies over time: those moved by a recurrence, and all others at their places in the scene.
 
     Parameters
     ----------
     spatial
         The scene, in three dimensions.
     moving
-        Numbers of its k bodies that move.
+        Indices of its k moving bodies.
     pose, twist
         (s, k, 7) [m] and (s, k, 6) [m/s, rad/s] after each of s steps.
     contacts
-        Of each step, or None where they are not told.
+        Of each step, or None without records.
     dt
         Step [s].
     flat
-        Of a planar scene: told in its numbers.
+        Of a 2-D scene, in its own coordinates.
     """
     steps = len(pose)
     poses = np.repeat(np.array([[each.pose for each in spatial.bodies]], float), steps + 1, axis=0)
@@ -52,14 +52,14 @@ def told_trajectory(
 def told_contacts(
     pressed: np.ndarray[Any, np.dtype[Any]], pairs: Array, impulse: np.ndarray[Any, np.dtype[Any]], flat: bool
 ) -> ContactRecord:
-    """Impulses of all steps, on the body of the higher number; of a contact only the impulse is told.
+    """Impulses of all steps, on the body with the higher index; a contact has only its impulse.
 
     Parameters
     ----------
     pressed
         (s, p) whether each of p pairs pressed in a step.
     pairs
-        (p, 2) numbers of both bodies.
+        (p, 2) indices of both bodies.
     impulse
         (s, p, 3) on the second of them [N s].
     flat

@@ -1,4 +1,4 @@
-"""What Newton's XPBD solver does when nothing is set, as documented; see `adapters.unset`."""
+"""Newton's XPBD solver without any settings, as documented; see `adapters.unset`."""
 
 from __future__ import annotations
 

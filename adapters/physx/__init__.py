@@ -1,11 +1,11 @@
-"""PhysX 5 through SAPIEN's Python bindings; what stands where is told in `adapters.engine_folder`.
+"""PhysX 5 through SAPIEN's Python bindings; `adapters.engine_folder` describes the modules.
 
-shipped        numbers of the engine
-profiles       settings with their reasons
-translation    poses of half-spaces, and of what turns
+shipped        default values of the engine
+profiles       settings and their reasons
+translation    poses of half-spaces, and of turning bodies
 simulation     one world
 engine         the adapter
-laws           what it does by design
+laws           designed deviations
 """
 
 from adapters.physx.engine import PhysxEngine

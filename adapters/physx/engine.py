@@ -1,9 +1,9 @@
-"""PhysX 5 behind the plugin line: spatial, velocity-level contact with positions in the same sweeps, single precision.
+"""The adapter of PhysX 5: spatial, velocity-level contact with positions in the same iterations, single precision.
 
     tgs:  detect  ->  v += g dt  ->  n times: solve contacts and friction for dt/n, x += v dt/n  ->  velocities alone
     pgs:  detect  ->  v += g dt  ->  n sweeps over contacts and friction  ->  x += v dt  ->  velocities alone
 
-Contacts are made ahead of a touch; what would not touch within the step is left alone.
+Contacts exist before a touch; bodies that do not touch within the step get no impulse.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class PhysxEngine(CheckedEngine):
         title="PhysX 5 (SAPIEN)",
         package="sapien",
         dimensions=frozenset({3}),
-        scheme=Scheme("detect, forces, then small steps of contacts, friction and position", 1),
+        scheme=Scheme("detect, forces, then substeps of contacts, friction and position", 1),
         customary_dt=1.0 / 100.0,
         profile_schemes=MappingProxyType({"pgs": Scheme("detect, forces, contacts and friction, position", 1)}),
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
@@ -42,49 +42,50 @@ class PhysxEngine(CheckedEngine):
         abilities=frozenset({"course", "capsule", "hull"}),
         quirks=(
             Quirk(
-                "a contact has friction only if its gap at the start of the step is below 0.04 of the size the engine "
-                "is told, 4 mm as shipped: most blows are without",
-                "left alone in `default` and `pgs`; `tuned` tells a size that covers a step's way",
+                "a contact has friction only if its gap at the start of the step is below 0.04 of tolerance_length, "
+                "4 mm as shipped; most blows have none",
+                "unchanged in `default` and `pgs`; in `tuned` the length covers the motion of a step",
                 "PxSceneDesc, frictionOffsetThreshold; measured: 0.00399 m have friction, 0.00401 m have none",
             ),
             Quirk(
-                "that size is one per process",
-                "a world tells its own; two that differ cannot live at once, which is refused",
-                "sapien, PhysxEngine; measured: a second one is not heard while a world lives",
+                "a process has one tolerance_length",
+                "each world sets its own; two worlds with different lengths at the same time are refused",
+                "sapien, PhysxEngine; measured: a second value is ignored while a world exists",
             ),
             Quirk(
-                "impulses are told along the normal alone",
-                "impulses across a rough contact are not stated (NaN)",
+                "only normal impulses are reported",
+                "impulses of contacts with friction are not stated (NaN)",
                 "PxContactPairPoint.impulse; measured: a sliding box",
             ),
             Quirk(
-                "materials of a pair are means of two bodies' numbers",
-                "numbers are chosen of which these are the pairs' own; a table without such numbers is refused",
+                "materials of a pair are means of two bodies' values",
+                "values per body are chosen that give the values of the pairs; a table without such values is refused",
                 "PxCombineMode::eAVERAGE, which the bindings leave as it is; measured",
             ),
             Quirk(
-                "no approach of up to 2 m/s rebounds, spins lose 5 % a second and stay below 100 rad/s",
-                "left alone in `default` and `pgs` and declared; not in `tuned`",
+                "restitution is 0 up to 2 m/s, spins lose 5 % a second and stay below 100 rad/s",
+                "unchanged and declared in `default` and `pgs`; changed in `tuned`",
                 "sapien.physx.get_scene_config, PhysxRigidDynamicComponent",
             ),
             Quirk(
-                "nothing is swept: bodies have no flag for it in the bindings",
-                "left alone; `enable_ccd` changes nothing",
+                "there is no swept collision detection: the bindings have no flag for it",
+                "unchanged; `enable_ccd` has no effect",
                 "measured: 200 m/s at a wall of 1 cm",
             ),
             Quirk(
-                "a plane looks along x and is turned by a quaternion of singles",
-                "turns to the axes of the world are made of halves, which are exact",
+                "the normal of a plane is x, turned by a quaternion in single precision",
+                "rotations to the world's axes consist of halves, which are exact",
                 "measured: 1.2e-7 of a tilt with cosines of 45 degrees",
             ),
             Quirk(
-                "a prescribed body is told where to be, in singles: its velocity has the roundings of a place over dt",
-                "left alone",
+                "a prescribed body gets target positions in single precision: its velocity has the rounding of a "
+                "position over dt",
+                "unchanged",
                 "PxRigidDynamic::setKinematicTarget",
             ),
             Quirk(
-                "importing looks for Vulkan and warns that there is none",
-                "the warning is dropped, no renderer is made",
+                "importing warns that there is no Vulkan",
+                "the warning is suppressed, no renderer is made",
                 "sapien 3.0.3, _vulkan_tricks.py",
             ),
             Quirk("bodies sleep", "no body may", "PxRigidDynamic::setSleepThreshold"),
@@ -98,31 +99,31 @@ class PhysxEngine(CheckedEngine):
     expected = (
         Expected(
             "order",
-            "persistent manifolds keep a contact's point on the surface of one of two balls: friction across a gap has "
-            "a longer arm on the other, by 4 mm at most as shipped",
+            "persistent manifolds store a contact's point on the surface of one of two balls: friction across a gap "
+            "has a longer lever arm on the other, by up to 4 mm as shipped",
             "measured with 3.0.3: twists differ by 0.0012 with `pgs`, by 4e-6 without persistent manifolds",
         ),
     )
 
     def version(self) -> str:
         """Version of the installed bindings, which bring their own PhysX."""
-        imported()  # without the warning of its first import
+        imported()  # without the warning at its first import
         return super().version()
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse numbers that singles cannot hold, and tables that no numbers of single bodies give."""
+        """Refuse values beyond single precision, and pairs that no body values give."""
         return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """As shipped spins are damped and slow approaches do not rebound."""
+        """As shipped spins are damped and slow impacts do not rebound."""
         if profile == "tuned":
             return {}
         steps = round(1.0 / dt)
-        # A spin is scaled by a root of its moment and back in every step, each rounded to a single number.
+        # A spin is scaled by a root of its moment and back in every step, each rounded to single precision.
         left, band = (1.0 - ANGULAR_DAMPING * dt) ** steps, ROUNDINGS * self.facts.epsilon
         lost = Declared(1.0 - left, band, "5 % of a spin per second")
         declared = {"angular_damping": lost}
         if needs.regime == "impact" and REBOUND_SPEED <= BOUNCE_THRESHOLD:
-            because = f"no approach of up to {BOUNCE_THRESHOLD:g} m/s rebounds"
+            because = f"restitution is 0 up to {BOUNCE_THRESHOLD:g} m/s"
             declared["restitution"] = Declared(0.0, self.facts.round_off, because)
         return declared

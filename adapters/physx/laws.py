@@ -1,4 +1,4 @@
-"""What PhysX does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of PhysX from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
 from adapters.unswept import passing_law
 
-#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+#: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
@@ -25,19 +25,19 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
     "oblique": ("rebound_ratio",),
     "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
 }
-#: Blows that `tuned` sees so far ahead that one begins before the one before it is over.
+#: Blows that `tuned` finds so early that they overlap with the blow before.
 CROWDED = ("galperin",)
-#: Round-off of a place after a thousand steps, as a share of the way.
+#: Round-off of a place after a thousand steps, as a share of the distance.
 PLACES = 1000.0 * UNIT
 _RELEASES = ("3.0.",)
 
 
 def blow_law(metric: str, profile: str) -> Law:
-    """Blows in free space; approaches of up to a speed do not rebound."""
+    """Blows in free space; no restitution up to a threshold speed."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         least = least_rebound(needs(scene), dt) if profile == "tuned" else BOUNCE_THRESHOLD
-        # TGS leaves a share of a blow that it finds in an overlap; contacts are made from two offsets ahead.
+        # TGS solves a blow found in an overlap only in part; contacts exist from two offsets ahead.
         ahead = math.inf if profile == "pgs" else 2.0 * CONTACT_OFFSET
         return rounded_law(metric, Method(Threshold(least), ahead=ahead))(scene, dt, measure)
 
@@ -45,7 +45,7 @@ def blow_law(metric: str, profile: str) -> Law:
 
 
 def wall_law(metric: str, profile: str) -> Law:
-    """What no step finds in a thin wall passes it; what one finds rebounds as any other blow."""
+    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
     passing, blow = passing_law(metric, PLACES), blow_law(metric, profile)
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
@@ -62,7 +62,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         blow_law(metric, profile),
-        "no approach of up to 2 m/s rebounds as shipped, and numbers are singles, 2^-24 of their size",
+        "restitution is 0 up to 2 m/s as shipped; single precision, 2^-24 relative",
         "PxSceneDesc, bounceThresholdVelocity; motion in adapters/single_precision.py",
         _RELEASES,
     )
@@ -78,8 +78,8 @@ DEVIATIONS += tuple(
         "thin_wall",
         metric,
         wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
-        "nothing is swept: what is on one side of a thin body where a step ends, and on the other where the next one "
-        "does, passes",
+        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+        "other at the end of the next, passes through",
         "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
         _RELEASES,
     )
@@ -93,7 +93,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         "PxTransform, built of floats; motion in adapters/single_motions.py",
         _RELEASES,
     )
@@ -106,7 +106,7 @@ DEVIATIONS += tuple(
         scene,
         "momentum_defect",
         kept_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "PxVec3, built of floats; band in adapters/single_motions.py",
         _RELEASES,
     )
@@ -120,15 +120,15 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "PxVec3, built of floats; band in adapters/single_motions.py",
         _RELEASES,
     )
     for profile in PROFILES
 )
 
-#: Blows of edges and faces in free space after which no more than roundings leave the plane, by profile; in small
-#: steps, or where sweeps end early, more does.
+#: Blows of edges and faces in free space after which the motion is planar to round-off, by profile; not in small steps,
+#: or with too few iterations.
 PLANES: Mapping[str, tuple[str, ...]] = {
     "pgs": ("edge_drop", "flat_box"),
     "tuned": ("edge_drop",),
@@ -140,7 +140,7 @@ DEVIATIONS += tuple(
         scene,
         "out_of_plane",
         plane_law,
-        "numbers are singles: what they round is not the same on both sides of a plane",
+        "single precision rounds differently on both sides of a plane",
         "PxVec3, built of floats; band in adapters/single_precision.py",
         _RELEASES,
     )

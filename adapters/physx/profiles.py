@@ -1,8 +1,8 @@
-"""Profiles of PhysX: settings with their reasons.
+"""Profiles of PhysX: settings and their reasons.
 
-default   as SAPIEN ships it: TGS, which makes a small step of each sweep
+default   as SAPIEN ships it: TGS, whose iterations are substeps
 pgs       the same with projected Gauss-Seidel, PhysX's own default
-tuned     TGS without losses, with friction and rebounds wherever bodies touch
+tuned     TGS without losses, with friction and restitution for all contacts
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from adapters.physx.shipped import (
     VELOCITY_ITERATIONS,
 )
 
-#: What the engine can count: iterations are bytes. [PxRigidDynamic.setSolverIterationCounts]
+#: Largest iteration count: a byte. [PxRigidDynamic.setSolverIterationCounts]
 MOST_ITERATIONS = 255
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
@@ -49,25 +49,28 @@ def _shipped(solver: str, why: str, needs: Needs, dt: float) -> list[Setting]:
     said = "as shipped"
     return [
         Setting("solver", solver, why, _SCENE),
-        Setting("iterations", ITERATIONS, f"{said}: sweeps that move bodies; small steps of TGS", _BODY),
-        Setting("velocity_iterations", VELOCITY_ITERATIONS, f"{said}: sweeps over velocities alone", _BODY),
-        Setting("bounce_threshold", BOUNCE_THRESHOLD, f"{said}: slower approaches do not rebound [m/s]", _SCENE),
-        Setting("contact_offset", CONTACT_OFFSET, f"{said}: contacts are made so far ahead, of each shape", _SHAPE),
+        Setting("iterations", ITERATIONS, f"{said}: iterations that move bodies; substeps of TGS", _BODY),
+        Setting("velocity_iterations", VELOCITY_ITERATIONS, f"{said}: iterations on velocities only", _BODY),
+        Setting("bounce_threshold", BOUNCE_THRESHOLD, f"{said}: restitution is 0 below this speed [m/s]", _SCENE),
+        Setting("contact_offset", CONTACT_OFFSET, f"{said}: contacts act from this distance, of each shape", _SHAPE),
         Setting("tolerance_length", TOLERANCE_LENGTH, f"{said}: friction needs a gap below 0.04 of it", "PhysxEngine"),
-        Setting("push_out", PUSH_OUT, f"{said}: overlaps are pushed out at any speed", "PhysxRigidDynamicComponent"),
+        Setting("push_out", PUSH_OUT, f"{said}: overlaps are corrected at any speed", "PhysxRigidDynamicComponent"),
         Setting(
-            "angular_damping", ANGULAR_DAMPING, f"{said}: share of a spin per second", "PhysxRigidDynamicComponent"
+            "angular_damping",
+            ANGULAR_DAMPING,
+            f"{said}: share of the spin lost per second",
+            "PhysxRigidDynamicComponent",
         ),
-        Setting("fastest_spin", FASTEST_SPIN, f"{said}: no body turns faster [rad/s]", "PhysxRigidDynamicComponent"),
+        Setting("fastest_spin", FASTEST_SPIN, f"{said}: largest spin of a body [rad/s]", "PhysxRigidDynamicComponent"),
         Setting("friction_every_iteration", True, said, _SCENE),
         Setting("persistent_manifolds", True, f"{said}: PCM", _SCENE),
     ]
 
 
 def least_rebound(needs: Needs, dt: float) -> float:
-    """Speed of approach up to which nothing rebounds in `tuned` [m/s].
+    """Threshold speed of restitution in `tuned` [m/s].
 
-    What a step of gravity brings about is no impact: a body at rest would hop.
+    Above the speed of one step of gravity, else a body at rest would hop.
     """
     return max(2.0 * needs.gravity * dt, 1e-4)
 
@@ -77,22 +80,26 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     least = least_rebound(needs, dt)
     ahead = max(CONTACT_OFFSET, needs.top_speed * dt)
     changed = {
-        "iterations": (50, "more small steps and sweeps, for loads on light bodies", "measured: columns"),
-        "bounce_threshold": (least, "what rests does not hop: twice the speed of a step of gravity", "derived"),
-        "tolerance_length": (ahead / 0.04, "friction for every contact that a step makes", "measured: blows"),
-        "angular_damping": (0.0, "no loss that nobody asked for", "PhysxRigidDynamicComponent"),
-        "fastest_spin": (1e9, "100 rad/s as shipped: small bodies turn faster", "PhysxRigidDynamicComponent"),
+        "iterations": (50, "more substeps and iterations, for loads on light bodies", "measured: columns"),
+        "bounce_threshold": (
+            least,
+            "twice the speed that gravity adds in a step, so that resting bodies do not hop",
+            "derived",
+        ),
+        "tolerance_length": (ahead / 0.04, "every contact of a step has friction", "measured: blows"),
+        "angular_damping": (0.0, "the scene has no drag", "PhysxRigidDynamicComponent"),
+        "fastest_spin": (1e9, "small bodies turn faster than the shipped 100 rad/s", "PhysxRigidDynamicComponent"),
     }
     return [
         Setting(each.name, *changed[each.name]) if each.name in changed else each
-        for each in _shipped("tgs", "as shipped: a sweep of TGS is a small step", needs, dt)
+        for each in _shipped("tgs", "as shipped: an iteration of TGS is a substep", needs, dt)
     ]
 
 
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(
     {
-        "default": partial(_shipped, "tgs", "as SAPIEN ships it: small steps, one sweep each"),
-        "pgs": partial(_shipped, "pgs", "PhysX's own default: sweeps over one step, as in a textbook"),
+        "default": partial(_shipped, "tgs", "as SAPIEN ships it: substeps of one iteration each"),
+        "pgs": partial(_shipped, "pgs", "PhysX's own default: iterations over one step, as in textbooks"),
         "tuned": tuned_profile,
     }
 )

@@ -1,4 +1,4 @@
-"""A run on PhysX as a stand-alone script: what `adapters.physx.simulation` calls, as it is recorded."""
+"""A run on PhysX as a stand-alone script: the recorded calls of `adapters.physx.simulation`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from adapters.recording import written
 from adapters.scene import HalfSpace, Hull, Scene
 from adapters.script import constants, imports, literal, place, stepped, text
 
-#: Variables of a script, and the calls whose values they hold.
+#: Variables of a script, and the calls that return their values.
 _NAMES = {
     "engine": "PhysxEngine",
     "system": "PhysxCpuSystem",
@@ -27,7 +27,7 @@ _NAMES = {
 
 
 class _Undriven(PhysxSimulation):
-    """A world whose script says itself where what is driven goes."""
+    """A world whose script itself moves driven bodies."""
 
     def _lead(self, k: int) -> None:
         pass
@@ -53,7 +53,7 @@ def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> 
     return text([*lines, *_state(scene, dt), *stepped([*step[:-1], *led, step[-1]])])
 
 
-#: Lines of the function that turns what is driven (`adapters.physx.translation.turned`).
+#: Lines of the function that turns driven bodies (`adapters.physx.translation.turned`).
 _TURNED = [
     "",
     "",

@@ -1,4 +1,4 @@
-"""One PhysX world and what is read from it: velocities before positions; contacts are of the step's start."""
+"""One PhysX world and its readings: velocities before positions; contacts belong to the step's start."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from adapters.physx.translation import turn_to, turned
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 
-#: Worlds that live, and the size each was made for: the engine beneath them is one per process.
+#: Open worlds, and the typical size of each: there is one engine per process.
 _LIVING: weakref.WeakKeyDictionary[PhysxSimulation, float] = weakref.WeakKeyDictionary()
 
 
 @cache
 def imported() -> ModuleType:
-    """Import the engine; that it finds no Vulkan to draw with does not matter here."""
+    """Import the engine; a missing Vulkan does not matter here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import sapien
@@ -33,9 +33,9 @@ def imported() -> ModuleType:
 
 
 class PhysxSimulation(Simulation):
-    """One CPU world; bodies in the scene's order, each an entity of its own.
+    """One CPU world; bodies in the scene's order, one entity each.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
@@ -43,7 +43,7 @@ class PhysxSimulation(Simulation):
         self.scene, self.dt, self.settings = scene, dt, settings
         length = settings["tolerance_length"]
         if other := next((held for held in _LIVING.values() if held != length), None):
-            raise EngineError(f"tolerance_length: {length:g} m, while a world of this process is made for {other:g} m")
+            raise EngineError(f"tolerance_length: {length:g} m, while another world of this process uses {other:g} m")
         self.engine: Any = sapien.physx.PhysxEngine(length, 0.2)
         _LIVING[self] = length
         self.materials = {(i, j): (m.restitution, m.friction) for i, j, m in scene.contact_pairs()}
@@ -71,7 +71,7 @@ class PhysxSimulation(Simulation):
         self.steps = 0
 
     def _made(self, index: int, asked: Body) -> Any:
-        """Make one of the scene's bodies, in an entity of its own."""
+        """Make one of the scene's bodies, in its own entity."""
         sapien, physx, settings = self.sapien, self.sapien.physx, self.settings
         entity = sapien.Entity()
         entity.name = f"body {index}"
@@ -114,13 +114,13 @@ class PhysxSimulation(Simulation):
         if isinstance(shape, Hull):
             held = physx.PhysxCollisionShapeConvexMesh(np.array(shape.vertices, np.float32), (1.0, 1.0, 1.0), material)
             if len(held.vertices) != len(shape.vertices):
-                raise EngineError(f"{asked.name}.shape: physx keeps {len(held.vertices)} of its vertices")
+                raise EngineError(f"{asked.name}.shape: physx uses {len(held.vertices)} of its vertices")
             return held
         assert isinstance(shape, Box)
         return physx.PhysxCollisionShapeBox(shape.half_extents, material)
 
     def advance(self, steps: int) -> None:
-        """See `Simulation.advance`; loads are cleared by every step, and a prescribed body is told where to be."""
+        """See `Simulation.advance`; every step clears loads, and a prescribed body gets its next pose."""
         step = self.system.step
         for _ in range(steps):
             for part, force, torque in self.loads:
@@ -131,7 +131,7 @@ class PhysxSimulation(Simulation):
             step()
 
     def _lead(self, k: int) -> None:
-        """Say where a prescribed body is at the end of the step that comes."""
+        """Set the pose of a prescribed body at the end of the next step."""
         body, time = self.scene.bodies[k], self.steps * self.dt
         place = place_after(body, time)
         self.bodies[k].kinematic_target = self.sapien.Pose(
@@ -147,7 +147,7 @@ class PhysxSimulation(Simulation):
         return np.array(rows, float)
 
     def twist(self) -> Array:
-        """See `Simulation.twist`; a prescribed body's is told as soon as it has made a step."""
+        """See `Simulation.twist`; that of a prescribed body is available after its first step."""
         rows: list[tuple[float, ...]] = []
         for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
             if asked.motion == "fixed":
@@ -159,7 +159,7 @@ class PhysxSimulation(Simulation):
         return np.array(rows, float)
 
     def contacts(self) -> Contacts:
-        """Points with normal impulses, on the first body, along a normal that points to it; friction is not told."""
+        """Points with normal impulses on the first body, along a normal that points to it; without friction."""
         rows: list[Row] = []
         for contact in self.system.get_contacts():
             first, second = (self.index[part.entity.name] for part in contact.bodies)
@@ -171,7 +171,7 @@ class PhysxSimulation(Simulation):
         return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
-        """What the world, its bodies and their materials hold; the size it was made for is not told again."""
+        """Values of the world, its bodies and their materials; the typical size cannot be read."""
         config = self.system.config
         held = [part.collision_shapes[0].physical_material for part in self.bodies]
         return {
@@ -201,7 +201,7 @@ class PhysxSimulation(Simulation):
         }
 
     def close(self) -> None:
-        """Give the world back: the next one may be made for another size."""
+        """Close the world: the next one may have another typical size."""
         self.bodies, self.loads = [], []
         self.world = self.system = self.engine = None
         _LIVING.pop(self, None)

@@ -1,4 +1,4 @@
-"""A scene in PhysX's terms: poses of planes, and of what turns as prescribed."""
+"""A scene for PhysX: poses of planes, and of bodies with prescribed rotation."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from adapters.engine import Array
 
-#: Turns that take the x axis, which a plane looks along, to each axis of the world; halves, so that singles hold them
-#: exactly (w, x, y, z).
+#: Rotations of the x axis, a plane's normal, to each axis of the world; halves, which are exact in single precision (w,
+#: x, y, z).
 _ALONG = {
     (0, 1): (1.0, 0.0, 0.0, 0.0),
     (0, -1): (0.0, 0.0, 0.0, 1.0),

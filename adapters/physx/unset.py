@@ -1,4 +1,4 @@
-"""What PhysX does when nothing is set, as SAPIEN ships it; see `adapters.unset`."""
+"""PhysX without any settings, as SAPIEN ships it; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ class Bare:
     def __init__(self, asked: Asked) -> None:
         sapien: Any = imported()
         physx = sapien.physx
-        # Numbers of a world are those of the process, which the adapter sets; no arguments are what is shipped.
+        # A world's values are those of the process, which the adapter sets; calls without arguments restore the
+        # defaults.
         made = {} if asked.gravity is None else {"gravity": np.array((0.0, 0.0, -asked.gravity), np.float32)}
         physx.set_scene_config(**made)
         self._system: Any = physx.PhysxCpuSystem()
@@ -95,7 +96,7 @@ def _sees(gap: float) -> bool:
 
 
 def _rubs(gap: float) -> bool:
-    """Whether a box that covers a gap within a step, and as much again, is slowed down along the ground."""
+    """Whether a box that falls through a gap within half a step is slowed down along the ground."""
     blow = Asked("box", gap, along=SLIDE_SPEED, up=-2.0 * gap / Bare(Asked()).dt)
     return unset.ran(Bare, blow, 0.0)[0].along < SLIDE_SPEED
 
@@ -104,9 +105,9 @@ def _falls_asleep(speed: float) -> bool:
     return unset.ran(Bare, Asked(along=speed), LONG)[0].along == 0.0
 
 
-#: What a number that is found by halving an interval of `RADIUS` may miss.
+#: Error of a value found by bisection of an interval of `RADIUS`.
 _HALVED = RADIUS / 2**HALVINGS
-#: Energy over mass that keeps a body awake [m^2/s^2], and steps whose velocities are summed for it.
+#: Energy over mass above which a body stays awake [m^2/s^2], and the number of steps with summed velocities.
 _AWAKE, _SUMMED = 0.005, 20
 _MATERIAL, _SCENE = "sapien, physx_default.cpp", "sapien.physx.get_scene_config"
 _PAIR, _BODY = "PxCombineMode::eAVERAGE", "PhysxRigidDynamicComponent"

@@ -1,9 +1,9 @@
-"""Rapier through its Python bindings; what stands where is told in `adapters.engine_folder`.
+"""Rapier through its Python bindings; `adapters.engine_folder` describes the modules.
 
-profiles       settings with their reasons
+profiles       settings and their reasons
 simulation     one world
 engine         the adapter
-laws           what it does by design
+laws           designed deviations
 """
 
 from adapters.rapier.engine import RapierEngine

@@ -1,4 +1,4 @@
-"""What Rapier does by design instead of the textbook, predicted from scene and step alone."""
+"""Designed deviations of Rapier from the textbook, predicted from scene and step only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from adapters.law import Deviation, exactly
 from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import Method, rounded_law
 
-#: Metrics of blows in free space, by scene, that neither friction nor a turn within the step changes.
+#: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
     "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
     "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
@@ -36,7 +36,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         scene,
         exactly(metric),
         rounded_law(metric, Method(newton, rebound_after_friction=True)),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "rapier3d, built for f32; motion in adapters/single_precision.py",
         ("0.36.",),
     )
@@ -50,7 +50,7 @@ DEVIATIONS += tuple(
         "far_origin",
         "stopping_distance",
         standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "places are singles: a step's way below half their spacing (6 cm at 1e6 m) is lost",
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         "rapier3d, built for f32; motion in adapters/single_motions.py",
         ("0.36.",),
     )
@@ -63,7 +63,7 @@ DEVIATIONS += tuple(
         scene,
         "momentum_defect",
         kept_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size, in each blow of each pair",
+        "single precision, 2^-24 relative, in each blow of each pair",
         "rapier3d, built for f32; band in adapters/single_motions.py",
         ("0.36.",),
     )
@@ -77,7 +77,7 @@ DEVIATIONS += tuple(
         "off_centre",
         "momentum_defect",
         booked_law("momentum_defect"),
-        "numbers are singles, 2^-24 of their size",
+        "single precision, 2^-24 relative",
         "rapier3d, built for f32; band in adapters/single_motions.py",
         ("0.36.",),
     )

@@ -1,7 +1,7 @@
-"""Profiles of Rapier: settings with their reasons.
+"""Profiles of Rapier: settings and their reasons.
 
 default   as shipped
-tuned     stiffer contacts and more of the small steps that a step is made of
+tuned     stiffer contacts and more substeps
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
-#: Small steps of a step, as shipped. [`IntegrationParameters.num_solver_iterations`]
+#: Substeps of a step, as shipped. [`IntegrationParameters.num_solver_iterations`]
 SUBSTEPS = 4
-#: Small steps of `tuned`: more of them add up their roundings.
+#: Substeps of `tuned`: more of them have more round-off.
 TUNED_SUBSTEPS = 8
 #: Rates of the springs of contacts between moving bodies, and against fixed ones [1/s].
 FREQUENCY, STATIC_FREQUENCY = 30.0, 60.0
 #: Damping ratio of both.
 DAMPING = 10.0
-#: Overlap that is left alone, and distance at which contacts are seen ahead, in units of length.
+#: Overlap without correction, and prediction distance of contacts, in units of length.
 ALLOWED, PREDICTION = 0.005, 0.02
-#: Speed that no body exceeds, and at which overlaps are pushed out at most, in units of length per second.
+#: Largest speed of a body, and largest correction speed of overlaps, in units of length per second.
 FASTEST, PUSH_OUT = 400.0, 3.0
-#: A speed that is none: what moves faster is no scene of ours.
+#: A speed without effect: no scene of ours moves faster.
 NO_LIMIT = 1e9
 
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
@@ -51,19 +51,19 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
     """As shipped: what ``IntegrationParameters()`` holds."""
     said, source = "as shipped", "rapier3d, IntegrationParameters"
     return [
-        Setting("iterations", 1, f"{said}: one sweep in each small step", source),
-        Setting("substeps", SUBSTEPS, f"{said}: small steps of a step", source),
-        Setting("relaxations", 1, f"{said}: one sweep without springs in each small step", source),
+        Setting("iterations", 1, f"{said}: one iteration in each substep", source),
+        Setting("substeps", SUBSTEPS, f"{said}: substeps of a step", source),
+        Setting("relaxations", 1, f"{said}: one iteration without springs in each substep", source),
         Setting("frequency", FREQUENCY, f"{said}: contacts of moving bodies are springs of 30 Hz", source),
-        Setting("static_frequency", STATIC_FREQUENCY, f"{said}: against fixed bodies 60 Hz", source),
+        Setting("static_frequency", STATIC_FREQUENCY, f"{said}: against static bodies 60 Hz", source),
         Setting("damping_ratio", DAMPING, said, source),
-        Setting("allowed_error", ALLOWED, f"{said}: overlap that is left alone", source),
-        Setting("prediction", PREDICTION, f"{said}: contacts are seen so far ahead", source),
-        Setting("fastest", FASTEST, f"{said}: no body moves faster [m/s]", source),
-        Setting("push_out", PUSH_OUT, f"{said}: no overlap is pushed out faster [m/s]", source),
+        Setting("allowed_error", ALLOWED, f"{said}: overlap that is not corrected", source),
+        Setting("prediction", PREDICTION, f"{said}: contacts act from this distance", source),
+        Setting("fastest", FASTEST, f"{said}: largest speed of a body [m/s]", source),
+        Setting("push_out", PUSH_OUT, f"{said}: largest speed of overlap correction [m/s]", source),
         Setting("friction_model", "simplified", f"{said}: one friction constraint per manifold", source),
-        Setting("recycling", True, f"{said}: manifolds of bodies that hardly moved are kept", source),
-        Setting("clustering", True, f"{said}: manifolds of one pair that face alike become one", source),
+        Setting("recycling", True, f"{said}: manifolds of bodies that hardly moved are reused", source),
+        Setting("clustering", True, f"{said}: manifolds of a pair with like normals are merged", source),
     ]
 
 
@@ -72,23 +72,27 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     stiff = 1.0 / dt
     source = "measured: columns, unequal masses"
     return [
-        Setting("iterations", 4, "more sweeps in each small step, for loads on light bodies", source),
-        Setting("substeps", TUNED_SUBSTEPS, "twice the small steps: impulses travel farther up a column", source),
+        Setting("iterations", 4, "more iterations in each substep, for loads on light bodies", source),
+        Setting("substeps", TUNED_SUBSTEPS, "twice the substeps: impulses pass farther up a column", source),
         Setting("relaxations", 1, "as shipped", "rapier3d, IntegrationParameters"),
-        Setting("frequency", stiff, "contacts as stiff as a step resolves, so that bodies do not sink in", source),
-        Setting("static_frequency", stiff, "the same against fixed bodies", source),
-        Setting("damping_ratio", DAMPING, "as shipped: over-damped, so that nothing is thrown out", source),
-        Setting("allowed_error", 1e-5 * needs.smallest_size, "5 mm of overlap would be left alone as shipped", source),
+        Setting("frequency", stiff, "the stiffness that a step resolves, so that bodies do not sink in", source),
+        Setting("static_frequency", stiff, "the same against static bodies", source),
+        Setting(
+            "damping_ratio", DAMPING, "as shipped: over-damped, so overlapping bodies are not thrown apart", source
+        ),
+        Setting(
+            "allowed_error", 1e-5 * needs.smallest_size, "the shipped value leaves 5 mm of overlap uncorrected", source
+        ),
         Setting("prediction", PREDICTION, "as shipped", "rapier3d, IntegrationParameters"),
-        Setting("fastest", NO_LIMIT, "400 m/s as shipped: scenes in kilometres are faster", "measured: scales"),
+        Setting("fastest", NO_LIMIT, "the shipped 400 m/s is too slow for scenes in kilometres", "measured: scales"),
         Setting("push_out", PUSH_OUT, "as shipped", "rapier3d, IntegrationParameters"),
         Setting(
             "friction_model",
             "simplified",
-            "as shipped: the other one gives a box less friction along its own axes than along its diagonal",
+            "as shipped: the other model has less friction along the axes of a box than along its diagonal",
             "measured: 0.936 mu g at 0 degrees, mu g at 45",
         ),
-        Setting("recycling", False, "contacts are found anew in every step", "rapier3d, contact_recycling"),
+        Setting("recycling", False, "contacts are detected anew in every step", "rapier3d, contact_recycling"),
         Setting("clustering", True, "as shipped", "rapier3d, IntegrationParameters"),
     ]
 

@@ -1,4 +1,4 @@
-"""A run on Rapier as a stand-alone script: what `adapters.rapier.simulation` calls, as it is recorded."""
+"""A run on Rapier as a stand-alone script: the recorded calls of `adapters.rapier.simulation`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adapters.recording import written
 from adapters.scene import Scene
 from adapters.script import constants, imports, literal, materials, stepped, text
 
-#: Variables of a script, and the calls and attributes whose values they hold.
+#: Variables of a script, and the calls and attributes of their values.
 _NAMES = {
     "world": "PhysicsWorld",
     "held": "integration_parameters",

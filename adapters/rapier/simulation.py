@@ -1,7 +1,7 @@
-"""One ``PhysicsWorld`` and what is read from it.
+"""One ``PhysicsWorld`` and its readings.
 
-A step is made of small ones, each velocity first: poses, velocities and the impulses of the whole step belong together,
-points and gaps to where bodies stood before it.
+A step consists of substeps, each velocity first: poses, velocities and the impulses of the whole step belong together;
+points and gaps belong to the poses before it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Hooks:
         self.index, self.materials = index, materials
 
     def modify_solver_contacts(self, context: Any) -> None:
-        """Overwrite what the engine combines of two colliders' numbers."""
+        """Overwrite the engine's combination of two colliders' values."""
         i, j = self.index[context.collider1], self.index[context.collider2]
         context.restitution, context.friction = self.materials[min(i, j), max(i, j)]
 
@@ -34,11 +34,11 @@ class Hooks:
 class RapierSimulation(Simulation):
     """One ``PhysicsWorld``; bodies in the scene's order.
 
-    ``module`` is the engine's module, or a recorder in its place that writes down each call (`adapters.recording`).
+    ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
-        # Its type stubs would be looked at only where it is installed.
+        # Its type stubs exist only where it is installed.
         rapier3d = self.rapier3d = module or import_module("rapier3d")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.world: Any = rapier3d.PhysicsWorld(gravity=scene.gravity)
@@ -135,7 +135,7 @@ class RapierSimulation(Simulation):
         return np.array(rows, float)
 
     def contacts(self) -> Contacts:
-        """Up to four points per manifold, with their normal impulses; what friction gave to a manifold is not told."""
+        """Up to four points per manifold, with their normal impulses; friction impulses are not available."""
         rows: list[Row] = []
         for pair in self.world.narrow_phase.contact_pairs():
             i, j = self.index[pair.collider1], self.index[pair.collider2]
@@ -143,7 +143,7 @@ class RapierSimulation(Simulation):
             for manifold in pair.manifolds:
                 n = manifold.data.normal
                 normal = np.array((n.x, n.y, n.z))
-                # A solver's own point is relative to a body; in the world each body has one, as it now stands.
+                # A solver's point is relative to a body; in world axes each body has one, in its present pose.
                 bodies = self.world.rigid_bodies
                 places = {
                     each.contact_id: manifold.data.solver_contact_world_points(each, bodies)
@@ -158,7 +158,7 @@ class RapierSimulation(Simulation):
         return Contacts.by_pair(rows, 3)
 
     def readback(self) -> dict[str, Any]:
-        """What the world, its bodies and colliders hold."""
+        """Values of the world, its bodies and colliders."""
         held, bodies = self.world.integration_parameters, self.world.rigid_bodies
         g = self.world.gravity
         told: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""What Rapier does when nothing is set; see `adapters.unset`."""
+"""Rapier without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ UNSET = (
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-5),
     Unset("at 1 mm/s asleep after [s]", "0.5, below 5 cm/s and 0.5 rad/s", _ASLEEP, 0.5,
           partial(unset.sleep, Bare), 0.05),
-    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against what is fixed", _STEP, None,
+    Unset("gap at rest [m]", "an overlap: springs of 60 Hz against static bodies", _STEP, None,
           partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "not documented", _STEP, None, partial(unset.left, Bare)),
     Unset("gravity, upwards [m/s^2]", "not documented", "rapier3d, PhysicsWorld", None, partial(unset.gravity, Bare)),

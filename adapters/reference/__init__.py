@@ -1,6 +1,6 @@
-"""Our own solver (`reference_solver`); what stands where is told in `adapters.engine_folder`.
+"""Our own solver (`reference_solver`); `adapters.engine_folder` describes the modules.
 
-profiles       settings with their reasons
+profiles       settings and their reasons
 simulation     a scene as the solver's model, and one simulation of it
 engine         the adapter
 """

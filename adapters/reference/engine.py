@@ -1,9 +1,9 @@
-"""Our own sequential-impulse solver (`reference_solver`) behind the plugin line.
+"""The adapter of our own sequential-impulse solver (`reference_solver`).
 
     step:  detect at x  ->  sample u- = J v (before forces)  ->  v* = v + h M^-1 f  ->  sweep the contact rows
            (target -e u-, accumulated clamping, Coulomb with the current total)  ->  x += h v  ->  split impulses
 
-The two profiles stand in `adapters.reference.profiles`.
+The two profiles are in `adapters.reference.profiles`.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from adapters.reference.simulation import ReferenceSimulation, json_ready, solve
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
 
-#: Largest whole number that a kernel can be handed.
+#: Largest integer of a kernel.
 LARGEST = 2**63 - 1
-#: Steps cut at events, with constant accelerations between them.
-LOCATED = Scheme("detect, impacts, forces up to the next event, move; what is left of the step is the next part", 0)
+#: Steps divided at events, with constant accelerations between them.
+LOCATED = Scheme("detect, impacts, forces up to the next event, move; the rest of the step is the next part", 0)
 
 
 class ReferenceEngine(Engine):
@@ -53,13 +53,13 @@ class ReferenceEngine(Engine):
         profile_schemes=MappingProxyType({"reference": LOCATED}),
         quirks=(
             Quirk(
-                "classical advances velocity before position: free fall from rest is ahead by g t dt / 2",
-                "nothing: it is the scheme, and tolerances allow for a step; reference falls exactly",
+                "classical updates velocity before position: free fall from rest is ahead by g t dt / 2",
+                "unchanged: tolerances allow for a step; reference falls exactly",
                 SOURCE,
             ),
             Quirk(
-                "classical finds contact at the start of a step, so a bounce is found late by up to v dt",
-                "nothing: it is the scheme, and tolerances allow for a step; reference cuts its steps at events",
+                "classical detects contacts at the start of a step, so a bounce is late by up to v dt",
+                "unchanged: tolerances allow for a step; reference divides its steps at events",
                 SOURCE,
             ),
         ),
@@ -74,7 +74,7 @@ class ReferenceEngine(Engine):
         Raises
         ------
         ImportError
-            If the package `reference_solver` is not there.
+            If the package `reference_solver` is missing.
         """
         spec = find_spec("reference_solver")
         if spec is None or not spec.submodule_search_locations:
@@ -86,9 +86,9 @@ class ReferenceEngine(Engine):
         return f"{_package_version()}+{digest.hexdigest()[:8]}"
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Whatever the solver's own validation says about the model.
+        """The result of the solver's own validation.
 
-        And bodies that overlap, or lie too far away, at the start, where a profile promises a solution.
+        In a certified profile also bodies that overlap, or are too far away, at the start.
         """
         try:
             solver_model(scene)
@@ -111,7 +111,7 @@ class ReferenceEngine(Engine):
         Raises
         ------
         EngineError
-            For a model or a setting that the solver refuses, or a setting it does not have.
+            For a model or a setting that the solver refuses, or an unknown setting.
         """
         try:
             return ReferenceSimulation(scene, solver_model(scene), _checked(settings, dt))
@@ -124,7 +124,7 @@ class ReferenceEngine(Engine):
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
     ) -> dict[str, Any] | None:
-        """Full certificate (`reference_solver.certificate.truth`) of a profile that promises a solution."""
+        """Full certificate (`reference_solver.certificate.truth`) of a certified profile."""
         from reference_solver import Settings
         from reference_solver.certificate.truth import certify
 
@@ -133,7 +133,7 @@ class ReferenceEngine(Engine):
             return None
         found = certify(solver_model(as_moving(scene)), chosen, steps)
         reasons = list(found.reasons)
-        free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]  # the audit knows where others are
+        free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]  # others' motion is given
         same = np.array_equal(found.pose[-1][free], final_pose[free])
         light = found.light["converged"] and not found.light["reasons"]
         broken = {finding.name for finding in found.findings if not finding.holds}
@@ -141,10 +141,10 @@ class ReferenceEngine(Engine):
         if not determined and "shared" not in broken:  # beyond the horizon
             reasons.insert(0, next(finding.meaning for finding in found.findings if finding.name == "shared"))
         if not same:
-            reasons.append("the run that was certified does not end where the run that is judged does")
+            reasons.append("the certified run does not end where the judged run does")
         return {
             "holds": found.holds and same and determined,
-            "lawful": bool(same and light and broken <= {"shared"}),  # one of the motions that obey the laws
+            "lawful": bool(same and light and broken <= {"shared"}),  # one of several motions that satisfy the laws
             "reasons": reasons,
             "error": json_ready(found.error[-1]),
             "growth": json_ready(found.growth[-1]),
@@ -154,14 +154,14 @@ class ReferenceEngine(Engine):
         }
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
-        """Friction of a box that rebounds in space on fixed sweeps; all else is exact in both profiles.
+        """Friction of a rebounding box in 3-D with fixed sweeps; all else is exact in both profiles.
 
-        Fixed sweeps over the four corners of a face leave some 1e-8 m/s. Where e > 0 a corner that this lifts does not
-        touch: the box rocks from then on, each corner leaving with up to (1 + e) of what a step of gravity gives it. As
-        the box is no higher than wide, its corners slip aside no faster than that, and of friction along the way the
-        cosine is left. That is one step's rebound, no proof that rocking never adds up: measured with ten sweeps it is
-        0.02 to 0.24 of the share below at e = 1, 1/30 and 1/60 s, and round-off at smaller steps; in the plane, at
-        e = 0, and with twenty sweeps (tried at mu = 0.3) round-off as well.
+        Fixed sweeps over the four corners of a face have a residual of about 1e-8 m/s. For e > 0 a corner lifted by it
+        does not touch, and the box rocks: each corner leaves with up to (1 + e) times the speed that gravity gives in a
+        step. The box is no higher than wide, so its corners slip sideways no faster than that, and the friction along
+        the path is reduced by a cosine. This bounds one step's rebound, not the sum of several: measured with ten
+        sweeps it is 0.02 to 0.24 of the share below at e = 1, 1/30 and 1/60 s, and round-off at smaller steps; in 2-D,
+        at e = 0, and with twenty sweeps (tried at mu = 0.3) round-off as well.
         """
         fixed = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}["residual"] is None
         if not fixed or needs.dimension == 2 or not needs.restitution > 0.0 < needs.friction:
@@ -169,13 +169,16 @@ class ReferenceEngine(Engine):
         load = slide_load(needs.friction)
         slowest = slide_speed(needs.friction) - needs.friction * load * SLIDE_TIME
         share = 0.5 * ((1.0 + needs.restitution) * load * dt / slowest) ** 2
-        because = "a box that fixed sweeps let rock slips aside at its corners, by (1 + e) g dt: 1 - cos of friction"
+        because = (
+            "a box that rocks because of the fixed sweeps slips sideways at its corners, by (1 + e) g dt: 1 - "
+            "cos of friction"
+        )
         band = (0.5 * share + FRICTION_SHARE) * needs.friction
         told = Declared((1.0 - 0.5 * share) * needs.friction, band, because)
         return {"friction": told, "friction_impulse": told}
 
     def kernels(self) -> Path | None:
-        """Folder of the solver's kernels; None where nothing is compiled, or where no folder can keep it."""
+        """Folder of the solver's kernels; None without compilation, or without a writable folder."""
         from reference_solver import compilation
 
         return None if compilation.config.DISABLE_JIT else compilation.cache_folder()
@@ -192,7 +195,7 @@ def _checked(settings: Mapping[str, Any], dt: float) -> Any:
     Raises
     ------
     EngineError
-        For a setting that it does not have, or a whole number that a kernel cannot hold.
+        For an unknown setting, or an integer beyond the range of a kernel.
     ValueError, TypeError, OverflowError
         For a value that it refuses.
     """
@@ -203,12 +206,12 @@ def _checked(settings: Mapping[str, Any], dt: float) -> Any:
         if name not in known:
             raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
         if isinstance(value, int) and value > LARGEST:
-            raise EngineError(f"{name}: is beyond {LARGEST}, the largest whole number of a kernel")
+            raise EngineError(f"{name}: is larger than {LARGEST}, the largest integer of a kernel")
     return Settings(dt=dt, **settings)
 
 
 def _package_version() -> str:
     try:
         return version("contact-crosscheck")
-    except PackageNotFoundError:  # run from a checkout that was never installed
+    except PackageNotFoundError:  # run from a checkout without installation
         return "0"

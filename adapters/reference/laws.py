@@ -1,4 +1,4 @@
-"""What the textbook profile of our own solver does by design instead of the textbook's physics."""
+"""Designed deviations of the classical profile of our own solver from the textbook's physics."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         "thin_wall",
         metric,
         passing_law(metric),
-        "nothing is swept: no step ends with the ball in the plate, so that it is never found",
-        "docs/solver/step.md: contacts are looked for at the start of a step",
+        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
+        "docs/solver/step.md: contacts are detected at the start of a step",
         ("0.1.",),
     )
     for metric in ("rebound_ratio", "beyond")
@@ -24,9 +24,9 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         "thin_wall",
         metric,
         shoved_law(metric),
-        "nothing is swept: where the first step that ends in the plate ends beyond its middle, it leaves on the "
-        "far side as fast as it came",
-        "docs/solver/step.md: contacts are looked for at the start of a step",
+        "there is no swept collision detection: where the first step that ends in the plate ends beyond its middle, "
+        "the ball leaves on the far side at its speed",
+        "docs/solver/step.md: contacts are detected at the start of a step",
         ("0.1.",),
     )
     for metric in ("rebound_ratio", "beyond")

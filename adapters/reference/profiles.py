@@ -1,6 +1,6 @@
-"""Profiles of our own solver: its settings with their reasons.
+"""Profiles of our own solver: its settings and their reasons.
 
-classical   a fixed number of sweeps, as textbooks do
+classical   a fixed number of sweeps, as in textbooks
 reference   the same contact equations solved to a residual and certified, in steps that are cut where bodies meet
 and where slides end
 """
@@ -18,26 +18,27 @@ from adapters.needs import Needs
 from adapters.settings import LARGEST_INT, Check, either, flag, number, whole, word
 
 SOURCE = "docs/solver"
-#: Why each of the solver's settings has its value; the values themselves are the solver's own.
+#: Reasons of the solver's settings; the values themselves are the solver's own.
 REASONS = {
-    "iterations": "what textbooks and engines use: an answer at a fixed cost, whatever is left unsolved",
+    "iterations": "as in textbooks and engines: a fixed cost, with a residual of any size",
     "residual": "sweep until every contact equation holds to this share of its own speed; null: fixed sweeps",
-    "max_sweeps": "bound of the residual stop for broken problems; reaching it is reported as not converged",
+    "max_sweeps": "limit for problems that do not converge; reaching it is reported as not converged",
     "relaxation": "1 is plain projected Gauss-Seidel; null estimates the best factor from the residuals",
     "position_correction": "split: overlap is corrected through pseudo-velocities that carry no energy",
     "beta": "share of an overlap that is corrected per step",
     "slop": "gap or overlap that is left alone [m]; classical: twice what the load closes in a step, g dt^2, so that a "
     "corner that an unfinished solve lifts stays a contact and boxes do not rock",
     "warm_starting": "each contact starts from its impulse of the step before, matched by feature",
-    "solver": "scalar: row after row, the textbook; block: the rows of a manifold together, which does not stall",
-    "direct": "where sweeps turn out to be slow (mass ratios, tall columns) Newton's method ends a step; it needs a "
-    "residual stop, fixed sweeps never hand over",
-    "scheme": "fixed: impacts are found at the start of the step after, as engines do; located: steps are cut where "
-    "bodies meet and where a slide ends",
-    "accuracy": "difference of both orders of a phase whose contacts turn, as a share of the motion in it; mostly 50 "
-    "to 1000 times the error that is made (E35)",
-    "margin": "pairs with e = 0 are contacts within this share of the smallest half width, closed by at most the gap; "
-    "pairs with e > 0 only where they touch, so that nothing slows a body down before its impact",
+    "solver": "scalar: equation after equation, as in textbooks; block: those of a manifold together, which "
+    "does not stall",
+    "direct": "where sweeps converge slowly (mass ratios, tall columns) Newton's method completes the step; it needs a "
+    "residual stop, and is not used with fixed sweeps",
+    "scheme": "fixed: an impact is found at the start of the next step, as in engines; located: a step is "
+    "divided where bodies meet and where a slide ends",
+    "accuracy": "difference between the two orders of integration of a phase with turning contacts, as a share of its "
+    "motion; mostly 50 to 1000 times the true error (E35)",
+    "margin": "pairs with e = 0 are in contact within this share of the smallest half width, and close by at most the "
+    "gap; pairs with e > 0 only where they touch, so that no body is slowed before its impact",
 }
 
 
@@ -63,7 +64,7 @@ def _as_settings(chosen: Any) -> list[Setting]:
     ]
 
 
-#: What a setting may be; the solver's own `Settings` says more of each.
+#: Ranges of settings; the solver's own `Settings` describes each.
 KINDS: Mapping[str, Check] = MappingProxyType(
     {
         "iterations": whole(1, LARGEST_INT),

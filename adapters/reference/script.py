@@ -1,4 +1,4 @@
-"""A run on our solver as a script of its own: `reference_solver` alone, without the rest of the project."""
+"""A run on our solver as a stand-alone script: only `reference_solver`, without the rest of the project."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def solver_model(scene: Scene) -> Any:
     n = len(scene.bodies)
     restitution, friction = np.zeros((n, n)), np.zeros((n, n))
     materials = scene.materials()
-    if len(materials) == 1:  # without a look at every pair
+    if len(materials) == 1:  # without checks of every pair
         free = np.array([body.motion == "free" for body in scene.bodies])
         restitution[:], friction[:] = materials.pop()
         for table in (restitution, friction):
@@ -96,13 +96,13 @@ class ReferenceSimulation(Simulation):
         return _contacts(self.solver.contacts())
 
     def record(self, samples: int, stride: int, contacts: bool) -> Recorded:
-        """See `Simulation.record`: compiled code is entered once, and samples by itself."""
+        """See `Simulation.record`: one call of compiled code takes all samples."""
         found = self.solver.record(samples * stride, stride, contacts)
         counts = np.diff(found.offset)[1:]  # the first sample is the state before
         return Recorded(found.pose[1:], found.twist[1:], counts, _contacts(found.contacts) if contacts else None)
 
     def readback(self) -> dict[str, Any]:
-        """Settings and model that the solver holds, and what it left out because the scene has no use for it."""
+        """Settings and model of the solver, and settings without effect in the scene."""
         names = [body.name for body in self.scene.bodies]
         return {
             **asdict(self.settings),
@@ -123,9 +123,9 @@ class ReferenceSimulation(Simulation):
         }
 
     def certificate(self) -> dict[str, Any]:
-        """What `reference_solver.Simulation.certificate` says; ``certified`` with a residual stop, which promises it.
+        """The result of `reference_solver.Simulation.certificate`; ``certified`` with a residual stop.
 
-        A fixed number of sweeps promises nothing: what it leaves unsolved is what it is here to show.
+        A fixed number of sweeps is not certified: its residual is to be shown.
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
         return found if self.settings.residual is None else {**found, "certified": found["holds"]}
@@ -138,7 +138,7 @@ def _contacts(found: Any) -> Contacts:
 
 
 def json_ready(value: Any) -> Any:
-    """What JSON has a word for: lists for tuples, plain numbers for NumPy scalars, null for what is not finite."""
+    """A value for JSON: lists for tuples, plain numbers for NumPy scalars, null for non-finite numbers."""
     if isinstance(value, tuple):
         return list(value)
     plain = value.item() if isinstance(value, np.generic) else value

@@ -1,4 +1,4 @@
-"""What a scene must not ask of a profile that promises a solution: bodies that share space, or lie too far away."""
+"""Scenes that a certified profile refuses: bodies that overlap, or are too far away, at the start."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from adapters.scene import HalfSpace, Scene
 
 
 def too_far_at_the_start(scene: Scene) -> str | None:
-    """Say which body lies where numbers are too coarse for its size; None if there is none.
+    """Reason for a body so far away that double precision is too coarse for its size; None if there is none.
 
-    A place of 1e8 m is told in steps of 1.5e-8 m: a gap, an arm or a depth is known no better there. The certificate
-    has a limit for it, a share of the smallest half width; it is asked here, before a run that could only be INVALID.
+    At 1e8 m double precision has a spacing of 1.5e-8 m, and gaps, lever arms and depths are no more accurate. The
+    certificate limits it to a share of the smallest half width; this check comes before a run that would be INVALID.
     """
     from reference_solver.tally_summary import GATES
 
@@ -24,17 +24,17 @@ def too_far_at_the_start(scene: Scene) -> str | None:
         last = float(np.finfo(float).eps) * place
         if last > limit * 0.5 * body.shape.smallest_size:
             return (
-                f"{body.name} lies {place:.3g} m away, where numbers have steps of {last:.2g} m: "
-                "too coarse for its size to certify a solution"
+                f"{body.name} lies {place:.3g} m from the origin, where double precision has a spacing of {last:.2g} "
+                "m: too coarse for its size to certify a solution"
             )
     return None
 
 
 def overlap_at_the_start(scene: Scene) -> str | None:
-    """Say which two bodies overlap at the start, by more than a rounded input explains; None if there are none.
+    """Reason for two bodies that overlap at the start by more than round-off of the input; None if there are none.
 
-    Rigid bodies that share space have no motion that a law would give. The solver's certificate has a limit for it,
-    a share of the smaller half width; it is asked here, before a run that could only be INVALID.
+    The laws define no motion of overlapping rigid bodies. The solver's certificate limits the overlap to a share of the
+    smaller half width; this check comes before a run that would be INVALID.
     """
     from reference_solver.geometry import gap
     from reference_solver.tally_summary import GATES
@@ -46,6 +46,7 @@ def overlap_at_the_start(scene: Scene) -> str | None:
         depth = -float(np.atleast_1d(gap(first.shape, poses[0], second.shape, poses[1]))[0])
         if depth > limit * 0.5 * min(first.shape.smallest_size, second.shape.smallest_size):
             return (
-                f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid bodies have no solution"
+                f"{first.name} and {second.name} overlap by {depth:.3g} m at the start: rigid-body dynamics has no "
+                "solution"
             )
     return None

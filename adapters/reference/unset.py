@@ -1,4 +1,4 @@
-"""What our own solver does when nothing is set; see `adapters.unset`."""
+"""Our own solver without any settings; see `adapters.unset`."""
 
 from __future__ import annotations
 

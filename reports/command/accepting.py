@@ -131,12 +131,12 @@ def _rows_with_scatter(
         rows = rows_of(chosen.id, own)  # once: laws may take a while, and moved starts are not judged
         moves = slots_to_move(rows, engine, about)
         if moves:
-            console.print(f"{plural(len(moves), 'cell')} with moved starts, for the scatter of what fails")
+            console.print(f"{plural(len(moves), 'case')} with moved starts, for the scatter of failed checks")
             own += store.observations(run_plan(store, title, moves, console, jobs))
             rows = with_floors(rows, own)
         further = slots_to_move_further(rows, engine, draws_of(own), about)
         if further:
-            console.print(f"{plural(len(further), 'cell')} with further starts, where a band hides what it should show")
+            console.print(f"{plural(len(further), 'case')} with more starts, where a band is too wide to show changes")
             own += store.observations(run_plan(store, title, further, console, jobs))
         return rows, draws_of(own)
     finally:

@@ -25,14 +25,16 @@ from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.piles import show_piles
 from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, request_from, selection
+from reports.command.targets import show_targets
 from reports.progress import run_plan
 from reports.stages import stage
-from reports.terminal import terminal
-from reports.wording import at, plural
+from reports.terminal import print_roles, terminal
+from reports.wording import at, plural, profiles_called
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
 from validation.bench.units import Unit, prepared
+from validation.bench.work import certified_of
 from validation.cells import Outcome, Slot, parse_dt
 from validation.posed import primary_of
 from validation.records.store import MissingError, Run, Store
@@ -56,20 +58,33 @@ AGREEMENT = 0.9
     metavar="N",
     help="Instead, time the reference solver on piles of 20 to N bodies.",
 )
+@click.option(
+    "--targets",
+    is_flag=True,
+    help="Instead, compare the textbook step with each engine, and with the ratios that it owes.",
+)
 @click.option("--brief", is_flag=True, help="Print no tables; they are in OUT/bench and in the report.")
 @AS_JSON
 @OUT
-def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: Any) -> None:
+def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: bool, **options: Any) -> None:
     """Measure error against time, over steps and iterations.
+
+    SCENES are names, globs, scene files or models, as for run. The error on a file is the distance from the certified
+    run of our own solver at the end; where there is none, a line says why.
 
     Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
     cases are timed one at a time. --quick takes under two minutes on two cores, --full up to two hours (piles of a
     thousand boxes). With --against, exits with 1 if fewer than 90 % of the time ratios agree. With --piles, times the
-    reference solver on piles, in its exact and in its textbook profile.
+    reference solver on piles, in its exact and in its textbook profile. With --targets, times the textbook profile
+    against other engines at 10 sweeps and at equal error, in under ten minutes on one core; a ratio below its floor is
+    shown and is no failure.
     """
     console = terminal(stderr=True)
     if piles is not None:
         show_piles(console, as_json, piles, options["seed"] or 0)
+        return
+    if targets:
+        show_targets(console, as_json, out, options["scenes"], options["seed"])
         return
     if options["ulp"]:
         raise SceneError("ulp: moves the start of a run; it has no meaning for a benchmark")
@@ -108,12 +123,23 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, **options: A
     limits = QUICK if request.suite == "quick" else FULL
     with stage(console, "timing"):
         units = timed_units(wanted, store.observations(run))
+        if not _measurable(store, run, units):
+            store.close()
+            sys.exit(statuses.INCOMPLETE)
         time_units(store, run, request.scenes, units, limits, seed, console)
     store.finish(run)
     _show(store, run, out, as_json, brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(statuses.verdict(not agrees, not absent))
+
+
+def _measurable(store: Store, run: Run, units: Sequence[Unit]) -> bool:
+    """Whether there is an error to time; says in a line what has none to be measured from."""
+    for each in certified_of(store.observations(run)).values():
+        if each.reason:
+            click.echo(f"crosscheck: bench: {each.slot.scene} {each.slot.dimension}-D: {each.reason}", err=True)
+    return any(unit.purpose == "work" for unit in units)
 
 
 def _earlier(store: Store, name: str | None) -> Run | None:
@@ -176,6 +202,7 @@ def _print_tables(tables: speed.Tables, console: Console) -> None:
     for table in speed.level_tables(tables["work_points"], ranked):
         console.print(table)
     console.print(Text(speed.key(ranked), style="dim"))
+    print_roles(tables["work_points"][["engine", "profile"]].itertuples(index=False, name=None), console)
     beside = speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"])
     for table in beside:
         if table.row_count:  # a short bench may have come to none of it
@@ -221,7 +248,7 @@ def profile_(
     from reference_solver.timeline import timeline
 
     ours = registry.solver()
-    chosen = profile or registry.profile_of(ours, "solution") or ""
+    chosen = profiles_called([profile or "solution"], [ours])[0]
     slot = Slot(scene, tuple(map(parameter, param)), dim, ours, chosen, parse_dt(dt))
     engine, posed, settings, _ = prepared(slot)
     simulation: Any = engine.build(posed, slot.dt, settings)

@@ -16,8 +16,8 @@ from reports.command import statuses
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, missing
-from reports.terminal import terminal
-from reports.wording import reproduce
+from reports.terminal import print_roles, terminal
+from reports.wording import profiles_called, reproduce
 from validation.catalogue import matching
 from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
 
@@ -66,7 +66,7 @@ def frontier(
     engines = list(engine) or registry.usual()
     for name in engines:
         registry.find(name)
-    found = brackets(names, engines, profile, dim, quick)
+    found = brackets(names, engines, profiles_called(profile, engines), dim, quick)
     console, progress = terminal(), terminal(stderr=True)
     for still, _ in search(found, QUICK_RATIO if quick else FULL_RATIO, jobs):
         progress.print(f"{still} of {len(found)} searches left", style="dim", highlight=False)
@@ -103,6 +103,7 @@ def _show(found: list[Bracket], commands: bool, console: Console) -> None:
             for end, said in ((each.survives, "works"), (each.fails, "fails")):
                 if end is not None:
                     console.print(Text(f"  {said}: {reproduce(end.slot.as_dict())}"), soft_wrap=True)
+    print_roles(((each.base.engine, each.base.profile) for each in found), console)
     if not commands and found:
         console.print()
         console.print(Text("--commands prints the commands of both ends, --json everything", style="dim"))

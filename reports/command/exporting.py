@@ -17,6 +17,7 @@ from reports.command.files import folder as writable_folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
 from reports.command.selection import SET, parameter
+from reports.wording import profiles_called
 from validation.cells import MOST_ITERATIONS, Slot, parse_dt, settings_of
 from validation.posed import is_file, pinned, resolve
 from validation.records.store import Store
@@ -109,7 +110,8 @@ def _slot(scene: str, options: dict[str, Any]) -> Slot:
     dimension = options["dim"] or (own or list(canonical.dimensions))[0]
     brings = canonical.brings.get(options["engine"]) if options["set"] else None
     shipped = brings.profile if brings else engine.facts.profile("shipped")
-    profile = options["profile"] or shipped or next(iter(engine.profiles))
+    named = profiles_called(filter(None, [options["profile"]]), [options["engine"]])
+    profile = next(iter(named), "") or shipped or next(iter(engine.profiles))
     params = canonical.minimal(dict(map(parameter, options["param"])))
     brought = canonical.brought(options["engine"], profile)
     dt = parse_dt(options["dt"]) if options["dt"] else brought.dt if brought else QUICK_DT

@@ -18,6 +18,7 @@ from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
+from reports.wording import profiles_called
 from validation.questions.detection import Detected, detection, lines, only_by_receipts
 from validation.records.store import Store
 
@@ -49,7 +50,7 @@ def list_(
         if what != "checks":
             raise SceneError("sensitivity: belongs to checks, not to " + what)
         named, engine = engine is not None, engine or registry.solver()
-        profile = profile or registry.profile_of(engine, "solution")
+        profile = profiles_called([profile], [engine])[0] if profile else registry.profile_of(engine, "solution")
         if profile is None:
             raise EngineError(f"profile: {engine} has no exact profile; name one with --profile")
         best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if not named and name != engine]

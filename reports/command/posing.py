@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.registry import find
-from reports.terminal import terminal
+from reports.terminal import print_roles, terminal
 from reports.wording import number, reproduce
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
@@ -130,6 +130,7 @@ def _show(found: Sequence[tuple[Slot, list[Judged]]], console: Console) -> None:
                 break
     moves = ", ".join(map(str, MOVES))
     console.print()
+    print_roles(((slot.engine, slot.profile) for slot, _ in found), console)
     said = (
         f"A change counts if it is larger than {INVISIBLE:g} of the check's tolerance and than {FACTOR:g} times the "
         f"largest effect of moving or turning the start by {moves} units in the last place."

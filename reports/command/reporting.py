@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from adapters.engine import EngineError
+from adapters.extras import install
 from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.showing import which
@@ -119,4 +120,4 @@ def extra(command: str, name: str = "report") -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        raise EngineError(f"{command}: {error.name} is missing; pip install 'contact-crosscheck[{name}]'") from None
+        raise EngineError(f"{command}: {error.name} is missing; {install(name)}") from None

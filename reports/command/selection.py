@@ -13,6 +13,7 @@ from adapters import registry
 from adapters.own_settings import given
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
+from reports.wording import profiles_called
 from validation.canonical import SUITES, Suite
 from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
@@ -122,10 +123,11 @@ def request_from(options: dict[str, Any]) -> Request:
     for name in options["engine"]:
         registry.find(name)
     dimensions = list(options["dim"])
+    engines = list(options["engine"]) or registry.usual()
     request = Request(
         scenes=scene_names_of(options["scenes"], options.get("drop", False)),
-        engines=list(options["engine"]) or registry.usual(),
-        profiles=list(options["profile"]),
+        engines=engines,
+        profiles=profiles_called(options["profile"], engines),
         dimensions=dimensions,
         dts=[parse_dt(text) for text in options["dt"]],
         iterations=list(options["iterations"]),
@@ -165,7 +167,9 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             shell_complete=engine_names,
             help="Only this engine (repeat for more).",
         ),
-        click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
+        click.option(
+            "--profile", multiple=True, metavar="P", help="Only this profile, by its name or role (repeat for more)."
+        ),
         SET,
         click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
         click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),

@@ -38,6 +38,7 @@ from reports.wording import (
     number,
     params_text,
     plural,
+    profiles_called,
     quantity,
     reproduce,
     row_id,
@@ -244,6 +245,7 @@ def findings(
     wanted["scene"] = [
         scene_of(told, {observation.slot.scene for observation in observations}) for told in wanted["scene"]
     ]
+    wanted["profile"] = profiles_called(wanted["profile"], {o.slot.engine for o in observations})
     for name, asked in wanted.items():
         there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:
@@ -449,7 +451,7 @@ def scene_of(told: str, scenes: Collection[str]) -> str:
 def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
     """What ENGINE/PROFILE/SCENE[/METRIC] says of each; the path of a scene file has slashes itself."""
     engine, profile, *rest = name.split("/", 2)
-    found = {"engine": engine, "profile": profile}
+    found = {"engine": engine, "profile": profiles_called([profile], [engine])[0]}
     if not rest:
         return found
     ends = [k for k, letter in enumerate(rest[0]) if letter == "/"] + [len(rest[0])]

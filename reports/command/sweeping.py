@@ -17,7 +17,7 @@ from reports.command.reporting import extra
 from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
 from reports.progress import run_plan
 from reports.sweep import counted
-from reports.terminal import terminal
+from reports.terminal import print_roles, terminal
 from reports.wording import at, plural
 from validation.judging.rows import rows_of
 from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
@@ -82,6 +82,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     if as_json:
         click.echo(json.dumps(json.loads(found.to_json(orient="records", double_precision=15)), indent=1))
     console.print(counted(found))
+    print_roles(((slot.engine, slot.profile) for slot in chosen), console)
     console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
     console.print(f"what fails and why: crosscheck findings{at(out)}", markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)

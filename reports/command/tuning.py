@@ -17,6 +17,7 @@ from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
 from reports.terminal import terminal
+from reports.wording import profiles_called
 from validation.settings.decisive import measure_all, measured_of, write
 from validation.settings.tuning import Score, Search, groups, search
 
@@ -63,7 +64,7 @@ def tune(
     registry.find(engine)
     if not candidates_of(engine):
         raise EngineError(f"tune: {_missing(engine, 'stock settings', 'try')}")
-    profile = profile or profile_of(engine, "tuned")
+    profile = profiles_called([profile], [engine])[0] if profile else profile_of(engine, "tuned")
     if profile is None:
         raise EngineError(f"profile: {engine} has no tuned one; name one with --profile")
     known = load(engine).facts.dimensions

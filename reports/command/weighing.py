@@ -12,7 +12,7 @@ from rich.text import Text
 from reports.command.group import AS_JSON, main
 from reports.command.posing import cells_of
 from reports.command.selection import request_from, selection
-from reports.terminal import terminal
+from reports.terminal import print_roles, terminal
 from reports.wording import number, reproduce
 from validation.questions.residuals import LAWS, Residuals, ask
 from validation.running.apart import Apart
@@ -69,4 +69,5 @@ def _show(found: list[Residuals]) -> None:
         for line in told:
             console.print(Text(f"  {line}", style="dim"))
     console.print()
+    print_roles(((each.slot.engine, each.slot.profile) for each in found), console)
     console.print(Text("; ".join(f"{name}: {law}" for name, law in LAWS.items()), style="dim"))

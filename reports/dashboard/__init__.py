@@ -2,8 +2,8 @@
 
     store  ->  summaries (kept beside it)  ->  series  ->  steps (ruptures)  ->  panels  ->  one HTML text
 
-Small multiples: per engine, profile and scene the declared error and, where a bench has it, the ratio of times to a
-unit of the same machine. Complete without JavaScript, without a request, as strict as the report (`reports.page`).
+Small multiples: per engine, profile and scene the declared error and, from a bench, the ratio of times to a unit of the
+same machine. Complete without JavaScript and requests, as strict as the report (`reports.page`).
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from reports.wording import number, plural
 from validation.releases.notes import explanations
 
 __all__ = ["render"]
-#: What each series runs over, in words.
+#: Words for the axis of each series.
 OVER = {"runs": "runs and commits", "releases": "releases"}
-#: Newest releases or runs that a grid has a column for, and steps that are said in a sentence each.
+#: Numbers of newest releases or runs in a grid, and of steps described in a sentence.
 COLUMNS, LARGEST = 24, 10
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that is marked: where, and in words."""
+    """A marked point: its place and text."""
 
     panel: Panel
     at: int
@@ -44,7 +44,7 @@ class Event:
     text: str
     #: Factor of a step; 1 for a flip.
     factor: float = 1.0
-    #: What the notes of a release say of such a step.
+    #: Text of the release notes about such a step.
     note: str = ""
 
     @property
@@ -54,7 +54,7 @@ class Event:
 
     @property
     def title(self) -> str:
-        """Which run or release that is, in full."""
+        """Full name of the run or release."""
         return self.panel.points[self.at].title
 
     @property
@@ -68,9 +68,9 @@ class Event:
 
 @dataclass(frozen=True)
 class Grid:
-    """Share of the checks of each scene that fail, release by release; ``same`` scenes never change and have no line.
+    """Share of failed checks of each scene, release by release; ``same`` scenes never change and have no line.
 
-    A line is a scene, the anchor of its first panel, and per column the share, None where the scene did not run.
+    A line is a scene, the anchor of its first panel, and the share per column, None without a run of the scene.
     """
 
     over: str
@@ -81,7 +81,7 @@ class Grid:
 
 
 def grid(over: str, engine: str, panels: Sequence[Panel]) -> Grid:
-    """The grid of one engine over its newest `COLUMNS` releases or runs; what changes most stands first."""
+    """The grid of one engine over its newest `COLUMNS` releases or runs; largest changes first."""
     ordered = sorted(panels, key=lambda panel: -len(panel.points))
     labels = dict((point.title, point.label) for panel in ordered for point in panel.points)
     shown = list(labels)[-COLUMNS:]
@@ -154,13 +154,13 @@ def events(panel: Panel) -> list[Event]:
     out += [_step(panel, at, step, "time", f"x {panel.opponent}") for at, step in panel.time_steps]
     noted, before = [], -1
     for event in sorted(out, key=lambda event: event.at):
-        noted.append(event if event.at == before else _noted(event))  # what is said of a release is said once
+        noted.append(event if event.at == before else _noted(event))  # a text about a release is shown once
         before = event.at
     return noted
 
 
 def _noted(event: Event) -> Event:
-    """An event on a release, with what the engine's notes say of it."""
+    """An event on a release, with the engine's release notes."""
     panel = event.panel
     if panel.over != "releases" or not event.at:
         return event

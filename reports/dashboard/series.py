@@ -23,7 +23,7 @@ from validation.releases import history
 from validation.releases.timing import CALLED
 from validation.running.plan import QUICK_DT
 
-#: Places in a `reports.brief.Brief`.
+#: Indices in a `reports.brief.Brief`.
 FAILS, JUDGED, SURE = 1, 2, 3
 
 
@@ -33,14 +33,14 @@ class Point(NamedTuple):
     Parameters
     ----------
     label, title
-        Shown on the axis; said in full.
+        Label on the axis; full name.
     error
-        Largest primary error of the cells that the newest point has; None if it did not run them all.
+        Largest primary error of the newest point's cells; None if not all were run.
     fails, judged
-        Checks of those cells.
+        Numbers of checks of those cells.
     lost, mended
-        Cells in which a check began or ceased to fail since the point before that ran them, and not from a start
-        alone that was moved by the last place, where those were asked.
+        Cells in which a check began or ceased to fail since the last point with them, if moved starts do not explain
+        it.
     """
 
     label: str
@@ -81,7 +81,7 @@ class Panel:
 
     @property
     def moved(self) -> bool:
-        """Whether anything is marked."""
+        """Whether a point is marked."""
         return bool(self.error_steps or self.time_steps or self.flips)
 
 
@@ -98,7 +98,7 @@ class _Entry:
 
 
 class _Answer(NamedTuple):
-    """What an entry has of a panel: cells, none if it only timed it; ratio of times and opponent."""
+    """Data of an entry for a panel: cells, none if only timed; ratio of times and opponent."""
 
     entry: _Entry
     cells: Mapping[str, Brief]
@@ -120,7 +120,7 @@ def panels(store: Store, folder: Path, say: Callable[[str], None] = lambda line:
 
 @contextmanager
 def _nothing_thrown_away() -> Iterator[None]:
-    """No garbage is looked for: the million small tuples of 500 runs all stay, and looking took a third of the time."""
+    """Disable garbage collection: 500 runs have a million small tuples, and collection took a third of the time."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -131,7 +131,7 @@ def _nothing_thrown_away() -> Iterator[None]:
 
 
 def _runs(store: Store, kept: Kept, say: Callable[[str], None]) -> list[_Entry]:
-    """Runs by the order in which they were made; a bench brings times to the run before it, or stands for itself."""
+    """Runs in the order of their start; a bench adds times to the run before it, or is its own entry."""
     entries: list[_Entry] = []
     timed = {run.id for run in reading.bench_runs(store)}
     for run in store.runs():
@@ -175,7 +175,7 @@ def _releases(store: Store, kept: Kept, engine: str) -> list[_Entry]:
 
 
 def _times(table: pd.DataFrame) -> dict[Key, tuple[float, str]]:
-    """Ratio to its opponent of each unit at the quick step (else at its own), the opponent named."""
+    """Ratio of each unit's time to its opponent's at the quick step (else at its own), with the opponent."""
     found: dict[Key, tuple[float, str]] = {}
     for row in table.to_dict("records"):
         key = (str(row["engine"]), str(row["profile"]), str(row["scene"]), int(row["dimension"]))
@@ -185,7 +185,7 @@ def _times(table: pd.DataFrame) -> dict[Key, tuple[float, str]]:
 
 
 def _divided(entries: Sequence[_Entry], over: str) -> list[Panel]:
-    """Panels of the entries; each entry is walked through once, as looking a panel up in all of them is slow."""
+    """Panels of the entries, in one pass over each entry, because a search for each panel is slow."""
     columns: dict[Key, list[_Answer]] = defaultdict(list)
     asked: dict[Key, None] = {}
     for entry in entries:
@@ -213,7 +213,7 @@ def _panel(key: Key, over: str, present: Sequence[_Answer]) -> Panel:
 
 
 def _points(engine: str, present: Sequence[_Answer]) -> tuple[Point, ...]:
-    """A point for each answer; one that is the same as the one before it is counted as that one was."""
+    """A point for each result; one equal to the result before it reuses its counts."""
     newest = next(answer.cells for answer in reversed(present) if answer.cells)
     wanted = [slot for slot, brief in newest.items() if brief[0] is not None]
     points: list[Point] = []
@@ -233,7 +233,7 @@ def _points(engine: str, present: Sequence[_Answer]) -> tuple[Point, ...]:
 
 
 def _counted(cells: Mapping[str, Brief], wanted: Sequence[str]) -> tuple[float | None, int, int]:
-    """Largest error, if all cells that are wanted have one; checks that fail; checks that are judged."""
+    """Largest error, if all selected cells have one; failed checks; judged checks."""
     errors = [error for slot in wanted if slot in cells and (error := cells[slot][0]) is not None]
     largest = max(errors) if errors and len(errors) == len(wanted) else None
     fails = judged = 0
@@ -260,7 +260,7 @@ def _steps(values: Sequence[float | None], rule: Rule, exact: float) -> list[tup
 
 
 def by_engine(found: Sequence[Panel]) -> dict[tuple[str, str], list[Panel]]:
-    """Panels by what they run over and engine."""
+    """Panels by axis and engine."""
     groups: dict[tuple[str, str], list[Panel]] = defaultdict(list)
     for panel in found:
         groups[panel.over, panel.key[0]].append(panel)

@@ -164,8 +164,8 @@ def cite(source: Source) -> dict[str, str]:
     run, installed = source.run, package_version()
     commit = f", commit {run.commit}" if run.commit else ""
     text = (
-        f"contact-crosscheck {installed}{commit}, run {run.id} of {run.date[:10]} ({len(source.observations)} cells, "
-        f"{len(source.rows)} rows). CITATION.cff has the authors and, with crosscheck bundle, this run."
+        f"contact-crosscheck {installed}{commit}, run {run.id} of {run.date[:10]} ({len(source.observations)} cases, "
+        f"{len(source.rows)} values). CITATION.cff has the authors and, with crosscheck bundle, this run."
     )
     clean = run.commit.rstrip("+")
     lines = [

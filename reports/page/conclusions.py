@@ -147,7 +147,7 @@ def wrongs(source: Source) -> str:
     listed = [row for row in source.rows if mark_of(row) in ("known", "fail")]
     if not listed:
         if not answering(source) and not alarms:
-            return "Nothing was judged."
+            return "No check has a result."
         return said + ("Nothing else fails." if alarms else "Every failure is what the contact model predicts.")
     worst = max(listed, key=lambda row: ratio_of(row) or 0.0)
     unlisted = f" ({counts['fail']} of engines of which nothing is on record)" if counts["fail"] else ""

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from reports.answers import Answer, configured
-from reports.cures import changes_in_words, cure_paste, is_standard, known_cures, told_apart
+from reports.cures import cure_paste, is_standard, known_cures, told
 from reports.page.source import Source
-from reports.wording import mark_of, params_text
+from reports.wording import mark_of
 from validation.settings.cures import Cure
 
 
@@ -51,16 +51,15 @@ def _wrong(source: Source, answer: Answer) -> Wrong:
 
 
 def _fix(cure: Cure, where: str) -> Fix:
-    before, after, truth = told_apart(cure.before, cure.after, cure.truth)
-    unit = "" if cure.unit == "1" else f"\N{NO-BREAK SPACE}{cure.unit}"
-    at = params_text(cure.params)
+    said = told(cure)
+    unit = f"\N{NO-BREAK SPACE}{said.unit}" if said.unit else ""
     return Fix(
         where,
-        changes_in_words(cure, cure.changes),
-        f"{cure.metric}{f' at {at}' if at else ''}",
-        before + unit,
-        after + unit + (f" (true: {truth})" if truth not in ("0", after) else ""),
-        f"{cure.left} of {cure.failing} checks still fail" if cure.left else "",
-        f"{cure.times:.2g}×" if cure.times else "",
+        said.settings,
+        f"{said.check}{f' at {said.at}' if said.at else ''}",
+        said.before + unit,
+        said.after + unit + (f" (true: {said.truth})" if said.truth else ""),
+        said.left,
+        f"{said.times}×" if said.times else "",
         cure_paste(cure),
     )

@@ -82,12 +82,15 @@ def rebounds(source: Source) -> list[Plain]:
 
 
 def headline(source: Source) -> str:
-    """The finding: who does not rebound as set, and whether tuning mends it; else who fails the most checks."""
+    """The finding: who does not rebound as set, where, and whether tuning mends it; else who fails the most checks."""
     if not answering(source):
-        return "Nothing was judged."
+        return "No check has a result."
     rebound = shares(rebounds(source))
     wrong = [e for e in source.engines if rebound.get((e, "as shipped"), 0.0) > MOST]
-    return _rebounds(wrong, rebound) if wrong else _most(source)
+    if not wrong:
+        return _most(source)
+    scenes = list(dict.fromkeys(row["scene"] for row in rebounds(source)))
+    return f"{_rebounds(wrong, rebound)} ({'scene' if len(scenes) == 1 else 'scenes'} {joined(scenes)})"
 
 
 def _rebounds(wrong: Sequence[str], rebound: dict[tuple[str, str], float]) -> str:

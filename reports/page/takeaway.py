@@ -34,7 +34,7 @@ def takeaway(source: Source) -> list[File]:
     """All rows as JSON, column by column; with a bench, its tables as CSV in one archive."""
     # No time stamp inside, so that the same run gives the same page.
     rows = gzip.compress(json.dumps(columns(source), separators=(",", ":")).encode(), 9, mtime=0)
-    what = f"all {len(source.rows)} judged values, a list per column: pandas.read_json"
+    what = f"all {len(source.rows)} values and their checks, a list per column: pandas.read_json"
     files = [_file("rows.json.gz", what, "application/gzip", rows)]
     if source.bench is not None:
         files.append(

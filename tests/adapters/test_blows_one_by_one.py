@@ -145,6 +145,6 @@ def test_the_first_moment_that_singles_cannot_hold_is_named_and_none_of_what_doe
     for value in (math.nextafter(SMALLEST, 0.0), math.nextafter(LARGEST, math.inf)):
         for k in range(3):
             moments = tuple(value if i == k else 1.0 for i in range(3))
-            said = f"ball.inertia: {value:g} has no place in single precision"
+            said = f"ball.inertia: {value:g} cannot be represented in single precision"
             assert singles.without_a_place(space(body, replace(other, inertia=moments))) == said
             assert singles.without_a_place(space(replace(other, inertia=moments, motion="fixed"))) is None

@@ -49,7 +49,7 @@ def test_a_world_gets_what_was_checked():
     (SCENE, 0.01, {"skin": 1.0}, "skin: planar has no such setting, it has iterations, slop"),
     (SCENE, 0.2, {}, "dt: too long"),
     (replace(SCENE, bodies=(FLOOR, replace(BALLS[0], mass=1e-31), BALLS[1])), 0.01, {},
-     "a.mass: 1e-31 has no place in single precision"),
+     "a.mass: 1e-31 cannot be represented in single precision"),
 ])  # fmt: skip
 def test_what_is_wrong_is_refused_before_a_world_is_made(scene, dt, changes, said):
     with pytest.raises(EngineError) as refused:
@@ -92,5 +92,6 @@ def test_a_table_without_means_is_refused_by_name():
     pairs = tuple(Pair(a, b, 0.0, mu) for a, b, mu in (("floor", "a", 1.0), ("floor", "b", 0.0), ("a", "b", 0.0)))
     scene = replace(SCENE, pairs=pairs, bodies=(FLOOR, BALLS[0], replace(BALLS[1], pose=(0.0, 1.5, 0.0))))
     assert means(scene, "friction") is None
-    assert no_means(scene) == "pairs: friction of a pair is the mean of two numbers here, this table has none"
+    refusal = "pairs: friction of a pair is the mean of two values here; no values per body give this table"
+    assert no_means(scene) == refusal
     assert no_means(SCENE) is None

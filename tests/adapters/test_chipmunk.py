@@ -365,7 +365,7 @@ def test_a_box_that_exactly_fits_between_walls_stays_as_posed_and_says_so() -> N
     )
     trajectory = drive(make(*walls, unit_box("box", 0.0, 0.0), mu=0.5, gravity=(0.0, -1.0), T=DT), "tuned")
     assert trajectory.pose[0, 2].tolist() == [0.0, 0.0, 0.0]
-    assert trajectory.initial_change[0].startswith("none: no displacement lets all touching pairs overlap")
+    assert trajectory.initial_change[0].startswith("none: no displacement gives all touching pairs an overlap")
 
 
 def test_bodies_apart_or_already_overlapping_are_not_moved() -> None:

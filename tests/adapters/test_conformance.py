@@ -118,7 +118,7 @@ def test_our_adapters_conform(name):
 @pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_a_fault_that_no_receipt_sees_is_found(toy):
-    found = failing(check_adapter(toy("world shared with another")))
+    found = failing(check_adapter(toy("state shared with another world")))
     assert "fresh" in found
     assert not [name for name in found if name.startswith("receipt")]
 

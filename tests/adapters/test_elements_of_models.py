@@ -113,8 +113,8 @@ def test_what_a_scene_has_no_place_for_is_refused_with_its_reason_or_left_out_an
 
 
 def test_an_unknown_element_is_refused_and_a_default_of_one_is_no_matter():
-    assert refused(clean, "<odd/>") == "model: line 1: <odd>: there is no place for it in a scene"
-    assert clean("<odd/>", drop=True)[1] == ["line 1: <odd>: there is no place for it in a scene"]
+    assert refused(clean, "<odd/>") == "model: line 1: <odd>: a scene has no such element"
+    assert clean("<odd/>", drop=True)[1] == ["line 1: <odd>: a scene has no such element"]
     root, dropped = clean(
         "<default><odd/><tendon/><geom/><pair/><joint/><mesh/><default><odd/><geom/></default></default>"
     )
@@ -187,7 +187,7 @@ def test_of_another_language_the_kept_stay_the_silent_go_and_others_are_refused_
     assert refused(rid, False) == "model: line 1: <joint>: nothing is held"
     root, dropped = rid(True)
     assert tags(root) == ["robot", "link", "collision"]
-    odd = "line 1: <odd>: there is no place for it in a scene"
+    odd = "line 1: <odd>: a scene has no such element"
     assert dropped == ["line 1: <joint>: nothing is held", odd, odd]
 
 

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from adapters import registry
+from adapters import extras, registry
 from adapters.engine import Engine, EngineFacts, Scheme
 from adapters.foreign import Found
 from adapters.plain import NAME
@@ -117,10 +117,16 @@ def test_what_an_engine_of_others_lacks_is_its_own_package_or_what_registered_it
         assert found.reason == f"no libodd.so; it is an engine of {who}, which must be installed with all it needs"
 
 
-def test_what_an_engine_of_ours_lacks_is_an_extra_and_no_trace_of_it(monkeypatch):
+def test_what_an_engine_of_ours_lacks_is_the_packages_of_its_extra_and_no_trace_of_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "adapters.odd", ModuleType("adapters.odd"))
+    listed = [
+        "click>=8",
+        'odd<2,>=1.5; (python_version > "3") and extra == "odd"',
+        'gone; os_name == "no" and extra == "odd"',
+    ]
+    monkeypatch.setattr(extras, "requires", lambda project: listed)
     found = loaded(monkeypatch, Lacking, module="adapters.odd")
-    assert found.reason == "no libodd.so; pip install 'contact-crosscheck[odd]' (odd\x07package)"
+    assert found.reason == "no libodd.so; pip install 'odd<2,>=1.5'"
     assert found.facts is Lacking.facts and found.trace == ""
     found = loaded(monkeypatch, Late, module="adapters.odd")
     assert found.engine is not None and isinstance(found.facts, property), "ours are taken as they stand"

@@ -9,7 +9,7 @@ from adapters.conformance import CHECKS
 from adapters.conformance.faults import FAULTS
 
 #: Faults of the engine and not of a profile, or told by the count that tells profiles apart here.
-OF_ALL = {"role that is none", "unknown settings ignored", "count below 1 taken"}
+OF_ALL = {"role that does not exist", "unknown settings ignored", "count below 1 is accepted"}
 OF_ONE = [name for name, fault in FAULTS.items()
           if name not in OF_ALL and fault.check in CHECKS and fault.check not in ("memory", "process")]  # fmt: skip
 
@@ -25,4 +25,6 @@ def test_a_fault_of_the_second_profile_is_found_as_its_own(name):
 
 def test_a_setting_that_nobody_knows_is_asked_of_the_first_profile():
     assert CHECKS["refusals"](Listening("unknown settings ignored", at="first")) == "an unknown setting is accepted"
-    assert CHECKS["bad_numbers"](Listening("count below 1 taken", at="first")) == "first: iterations = 0 is accepted"
+    assert (
+        CHECKS["bad_numbers"](Listening("count below 1 is accepted", at="first")) == "first: iterations = 0 is accepted"
+    )

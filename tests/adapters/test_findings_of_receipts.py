@@ -110,7 +110,9 @@ def test_the_self_test_tells_what_a_receipt_says_and_what_goes_unnoticed(monkeyp
     wrong = {"mass": slip("mass", 0.9, False)}
     monkeypatch.setattr(self_test, "receipts", lambda *asked: [*wrong.values(), slip("turn")])
     monkeypatch.setattr(self_test, "check_adapter", lambda engine: [Finding("spin", "refused", "not today")])
-    few = {name: self_test.FAULTS[name] for name in ("mass too small", "torque the wrong way", "nothing read back")}
+    few = {
+        name: self_test.FAULTS[name] for name in ("mass too small", "torque with the wrong sign", "nothing read back")
+    }
     monkeypatch.setattr(self_test, "FAULTS", few)
     healthy, *rows = self_test.self_test()
     assert (healthy.caught, healthy.message, healthy.check) == (False, "refused   spin: not today", "all")

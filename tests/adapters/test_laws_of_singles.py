@@ -135,7 +135,7 @@ def test_a_mass_that_singles_cannot_hold_is_named():
     for name in ("mass", "inertia"):
         for value in (1e-31, 1e31):
             said = without_a_place(replace(scene, bodies=(floor, replace(ball, **{name: value}))))
-            assert said == f"{ball.name}.{name}: {value:g} has no place in single precision"
+            assert said == f"{ball.name}.{name}: {value:g} cannot be represented in single precision"
     assert math.isclose(UNIT, 2.0**-24)
 
 

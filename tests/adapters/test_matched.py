@@ -227,7 +227,7 @@ def test_a_secant_makes_few_rounds_of_many() -> None:
 def test_a_run_in_which_shifts_do_not_settle_says_so_and_is_not_certified() -> None:
     scene = scene_of(FLOOR, slab((1.0, 0.0, 0.0)), mu=0.5, g=DOWN, T=0.05)
     cut = drive(scene, rounds=1)
-    assert cut.certificate["certified"] is False and "do not settle" in cut.certificate["reasons"][0]
+    assert cut.certificate["certified"] is False and "do not converge" in cut.certificate["reasons"][0]
     assert settled(drive(scene))
 
 
@@ -313,11 +313,11 @@ def test_steps_of_which_the_rounds_do_not_settle_are_counted_and_said(monkeypatc
     for unsolved, most, apart in ((0, 2, 0.0), (0, 9, 1e-6), (0, 9, 0.9 * SETTLED), (1, 9, 1.1 * SETTLED)):
         made.step2()
         assert (made.unsolved, made.most, made.apart) == (unsolved, most, apart)
-    assert made.told()["reasons"] == ["in 1 step the shifts of references do not settle: 0.0011 apart"]
+    assert made.told()["reasons"] == ["in 1 step the shifts of references do not converge: 0.0011 apart"]
     made.step2()
     told = made.told()
     assert told["certified"] is False and told["rounds"] == 9 and told["shifts_apart"] == made.apart
-    assert told["reasons"][0].startswith("in 2 steps the shifts of references do not settle: ")
+    assert told["reasons"][0].startswith("in 2 steps the shifts of references do not converge: ")
     fine = matched.Matched(None, scene, own | {"rounds": 9, "agreed": 1e-7}, None, None)
     assert fine.told() == {"rounds": 0, "shifts_apart": 0.0}
     monkeypatch.setattr(matched, "matched_step2", lambda *asked: (9, 1e-6))

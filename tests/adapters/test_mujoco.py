@@ -550,7 +550,7 @@ def test_moments_that_no_body_has_are_refused() -> None:
 def test_masses_that_count_as_none_are_refused_by_name(mass: float, said: str) -> None:
     """A ball of radius .5: its moments are a tenth of its mass. At 2e-14 kg it falls like any other."""
     scene = make(FLOOR, ball("ball", 1.0, 0.0, mass, inertia=(0.1 * mass,) * 3))
-    assert ENGINE.refuses(scene, "default") == f"ball.{said} is less than 1e-15, which a moving body must have"
+    assert ENGINE.refuses(scene, "default") == f"ball.{said} is less than 1e-15, the minimum of a moving body"
     with pytest.raises(EngineError, match=rf"^ball\.{said}"):
         drive(scene)
     assert drive(make(FLOOR, ball("ball", 1.0, 0.0, 2e-14, inertia=(2e-15,) * 3)))

@@ -167,7 +167,7 @@ def test_values_of_all_pairs_are_those_of_each_pair_looked_at_alone():
         expected = by_hand(pairs, free)
         if isinstance(expected, str):
             refused += 1
-            with pytest.raises(SceneError, match=r"^pair \w-\w: \d entries say different things"):
+            with pytest.raises(SceneError, match=r"^pair \w-\w: \d entries contradict each other"):
                 Materials(pairs).materials(free)
         else:
             agreed += 1
@@ -178,7 +178,7 @@ def test_values_of_all_pairs_are_those_of_each_pair_looked_at_alone():
 def test_two_entries_for_no_one_in_particular_must_agree():
     free = {"a": True, "b": False}
     assert Materials((Pair(friction=0.5), Pair(friction=0.5))).materials(free) == {(0.0, 0.5)}
-    with pytest.raises(SceneError, match="pair a-b: 2 entries say different things; name both bodies in one"):
+    with pytest.raises(SceneError, match="pair a-b: 2 entries contradict each other; give an entry that names both"):
         Materials((Pair(friction=0.5), Pair(friction=0.25))).materials(free)
     named = (Pair(friction=0.5), Pair(friction=0.25), Pair("b", "a", 0.75, 0.0))
     assert Materials(named).materials(free) == {(0.75, 0.0)}

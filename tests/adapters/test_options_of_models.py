@@ -69,7 +69,7 @@ def test_a_flag_that_is_switched_off_is_silent_handed_on_or_refused(flag):
         if "does not compile" in str(error):
             pytest.skip("this release has another word for it")
         assert flag not in SILENT | CARRIED
-        assert str(error) == f"model: line 1: <option>: {flag}: without it nothing touches"
+        assert str(error) == f"model: line 1: <option>: {flag}: without it there are no contacts"
         return
     assert found.pop("disabled", ()) == ((flag,) if flag in CARRIED else ())
     assert flag in SILENT | CARRIED and found == told()
@@ -85,7 +85,7 @@ def test_a_flag_that_is_switched_on_measures_or_is_refused(flag):
         if "does not compile" in str(error):
             pytest.skip("this release has another word for it")
         assert flag not in MEASURING
-        assert str(error) == f"model: line 1: <option>: {flag}: a scene has no word for what it changes"
+        assert str(error) == f"model: line 1: <option>: {flag}: a scene cannot express what it changes"
         return
     assert flag in MEASURING and found == told()
 
@@ -93,5 +93,5 @@ def test_a_flag_that_is_switched_on_measures_or_is_refused(flag):
 def test_several_flags_are_told_in_order_and_of_several_wrong_ones_the_first():
     both = sorted(CARRIED & set(DISABLED))[:2]
     assert told("", " ".join(f'{flag}="disable"' for flag in both[::-1]))["disabled"] == tuple(both)
-    with pytest.raises(SceneError, match=r"<option>: constraint: without it nothing touches$"):
+    with pytest.raises(SceneError, match=r"<option>: constraint: without it there are no contacts$"):
         read("", 'contact="disable" constraint="disable" warmstart="disable"')

@@ -103,7 +103,7 @@ def test_an_engine_made_by_the_recipe_works_at_the_first_try_with_a_law_and_a_fi
     call(folder, *pip, "install", "--no-deps", "--no-build-isolation", "--editable", folder / "lossy")
     call(folder / "lossy", python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "0", "tests")
     small = ("--engine", "lossy", "--dim", "2", "--jobs", "1", "--param", "e=0.8", "--out", folder / "out")
-    assert "Every row that is judged passes" in call(folder, crosscheck, "run", "bounce", *small)
+    assert "Every check passes" in call(folder, crosscheck, "run", "bounce", *small)
 
     text = (package / "__init__.py").read_text()
     old = text[text.index("    def declares") : text.index("    def build")]

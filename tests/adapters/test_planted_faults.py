@@ -76,11 +76,11 @@ ALONE = {
     "friction reported too low": {"friction_impulse"},
     "state read late": {"sampling", "friction"},  # the last step of a slide is missing, its weight is not
     "inertia of a disc given to a ball": {"inertia"},
-    "angles the wrong way": {"turn"},
+    "angles with the wrong sign": {"turn"},
     "mass too small": {"mass", "impulse"},  # impulses are compared with what the stated mass gains
     "spin that dies down": {"inertia", "angular_damping"},
     "impulse of the wrong body": {"impulse"},
-    "world shared with another": set(),
+    "state shared with another world": set(),
 }
 
 

@@ -254,12 +254,12 @@ def test_bands_of_what_is_as_asked():
     said = {
         "turn": (0.0, "a sign"),
         "size": (1.8 * 0.25 * DT / 0.3 + 1e-12, "one step of motion, and a predicted rebound"),
-        "impulse": (1e-6, "impulses are bookkeeping: they add up to m dv but for a solver's tolerance"),
+        "impulse": (1e-6, "reported impulses must sum to m dv, up to the solver's tolerance"),
         "friction": (0.5e-4 + 1e-12, "a sliding box is solved to a share of 1e-4 of its friction"),
     }
     said["friction_impulse"] = said["friction"]
     for quantity, slip in slips.items():
-        band, because = said.get(quantity, (1e-12, "exact but for round-off"))
+        band, because = said.get(quantity, (1e-12, "exact up to round-off"))
         assert (slip.band, slip.because) == (pytest.approx(band, rel=1e-12), because), quantity
 
 
@@ -298,7 +298,7 @@ def test_sweeps_asked_for_leave_a_share_of_friction_and_two_steps_of_it(sweeps, 
     assert slips["friction"].band == pytest.approx(0.5e-4 + wider)
     impulse = slips["friction_impulse"]
     assert (impulse.asked, impulse.declared, impulse.band) == (0.5, 0.45, pytest.approx(0.125 + wider))
-    assert impulse.because == f"it is so; {sweeps} iterations were asked for, and a load may be off by 1/{sweeps}"
+    assert impulse.because == f"it is so; {sweeps} iterations are set, and a load may be off by 1/{sweeps}"
     assert slips["impulse"].band == 1e-6  # of an engine that is moved by its impulses
 
 
@@ -306,7 +306,7 @@ def test_a_sum_of_impulses_that_is_declared_is_not_told_when_the_solve_is_cut_of
     engine = declaring(impulse=Declared(0.98, 0.01, "left by its solver"))
     slip = by_quantity(receipts(engine, "default", IMPACT, DT, 5))["impulse"]
     assert (slip.asked, slip.declared, slip.band, slip.holds) == (1.0, 0.98, 1e9, True)
-    assert slip.because == "left by its solver; 5 iterations were asked for: not told"
+    assert slip.because == "left by its solver; 5 iterations are set: no prediction"
     own = by_quantity(receipts(engine, "default", IMPACT, DT))["impulse"]
     assert (own.declared, own.band, own.because, own.holds) == (0.98, 0.01, "left by its solver", False)
 
@@ -569,7 +569,7 @@ def test_what_is_told_of_one_sweep_says_what_else_it_may_cost():
     case, told = Case(2, 0.8, 0.0, DT, 1), Declared(1.0, 0.01, "a landing")
     found = _starved("size", told, case, 1, False)
     assert found.value == 1.0 and found.band == pytest.approx(0.01 + LANDING_SPEED * case.dt / HALF_EXTENTS[0])
-    assert found.because == "a landing; 1 iteration was asked for: a step of motion more"
+    assert found.because == "a landing; with 1 iteration: a step of motion more"
     assert _starved("size", told, case, 2, False) == told
 
 
@@ -583,10 +583,10 @@ def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
     assert slips["inertia"].band == pytest.approx(rate(0.2) * window * fastest + 1e-12)
     assert slips["sampling"].band == pytest.approx(8 * share + 1e-12)
     assert slips["impulse"].band == pytest.approx(rate(0.05) * 12 * DT + 1e-6)  # 5.5 steps down, 5.5 up, one of contact
-    assert slips["gravity"].because == "exact but for round-off; and declared drag"
+    assert slips["gravity"].because == "exact up to round-off; and declared drag"
     assert slips["turn"].band == 0.0 and slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + 1e-12)
     for untouched in ("step", "restitution"):
-        assert (slips[untouched].band, slips[untouched].because) == (1e-12, "exact but for round-off")
+        assert (slips[untouched].band, slips[untouched].because) == (1e-12, "exact up to round-off")
     assert slips["friction"].band == slips["friction_impulse"].band == 0.5e-4 + 1e-12
     for damping in ("linear_damping", "angular_damping"):
         assert slips[damping].band == told[damping].band

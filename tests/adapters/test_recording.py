@@ -132,8 +132,8 @@ def test_lines_make_the_world_that_the_adapter_made():
 
 
 @pytest.mark.parametrize(("names", "said"), [
-    ({**NAMES, "world": ""}, "World(DT, gravity=(0.0, -9.81)) is used twice: it needs a name"),
-    ({**NAMES, "": ""}, "are used nowhere: each needs a name"),
+    ({**NAMES, "world": ""}, "World(DT, gravity=(0.0, -9.81)) is used twice and needs a name"),
+    ({**NAMES, "": ""}, "are not used, and each needs a name"),
 ])  # fmt: skip
 def test_a_call_that_would_be_made_twice_or_never_needs_a_name(names, said):
     del names[""]

@@ -92,7 +92,7 @@ FAULTS: list[tuple[Callable[[], object], str]] = [
     (lambda: spatial(Body("cube", Box((1.0, 1.0, 1.0)), 1.0, 1.0)), "cube.inertia"),
     (lambda: spatial(Body("cube", Box((1.0, 1.0, 1.0)), 1.0, (1.0, 1.0))), "cube.inertia"),  # type: ignore[arg-type]
     (lambda: spatial(Body("b", Sphere(1.0), 1.0, (1.0, 1.0, 1.0), (0.0,) * 3 + (2.0, 0.0, 0.0, 0.0))), "b.pose"),
-    (lambda: spatial(Body("b", Disc(1.0), 1.0, (1.0, 1.0, 1.0))), "b.shape: a Disc has no place in 3-D"),
+    (lambda: spatial(Body("b", Disc(1.0), 1.0, (1.0, 1.0, 1.0))), "b.shape: a Disc cannot be used in 3-D"),
     (lambda: scene(replace(BALL, inertia=(1.0, 1.0))), "ball.inertia: needs one number"),
     (lambda: spatial(Body("b", Sphere(1.0), 1.0, 1.0)), "b.inertia: needs three principal moments"),
     (lambda: scene(replace(BALL, name="n" * 81)), f"bodies: '{'n' * 70}"),
@@ -232,7 +232,7 @@ def test_two_entries_that_say_different_things_of_a_pair_that_never_meets_are_na
     wall = Body("wall", HalfSpace((1.0, 0.0), 0.0), motion="fixed")
     doubtful = (Pair("wall", "*", 0.5, 0.1), Pair("*", "floor", 0.2, 0.1), Pair("ball", "floor"), Pair("ball", "wall"))
     posed = scene(FLOOR, wall, BALL, pairs=doubtful)
-    with pytest.raises(SceneError, match=r"^pair wall-floor: 2 entries say different things"):
+    with pytest.raises(SceneError, match=r"^pair wall-floor: 2 entries contradict each other"):
         posed.material("wall", "floor")
 
 

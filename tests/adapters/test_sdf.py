@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-pytest.importorskip("pydrake", reason="Drake is set apart: pip install 'contact-crosscheck[drake]'")
+pytest.importorskip("pydrake", reason="Drake is set apart: pip install -e '.[drake]'")
 
 from adapters import registry
 from adapters.drake.engine import DrakeEngine
@@ -246,13 +246,13 @@ def test_models_that_are_refused_run_with_what_is_left(name):
     left = read(text, True)
     assert [body.motion for body in left.scene.bodies] == ["free"] and left.dropped
     assert (left.scene.bodies[0].mass, left.scene.bodies[0].inertia) == (1.0, (1.0, 1.0, 1.0))
-    assert sum("SDF's own, the model states none" in note for note in left.notes) >= 2
+    assert sum("the default of SDF, the model states none" in note for note in left.notes) >= 2
 
 
 def test_links_of_a_model_touch_where_one_of_them_says_so():
     both = link("l") + link("k", INERTIAL + BALL + COLLIDE)
     assert len(read(model(both), False).scene.bodies) == 2
-    with pytest.raises(SceneError, match="pass through each other"):
+    with pytest.raises(SceneError, match="do not collide with each other"):
         read(model(both + link("i")), False)
     # What is fixed need not touch what is fixed.
     read(model(link("l") + link("k") + link("i", INERTIAL + BALL + COLLIDE),

@@ -150,8 +150,8 @@ def test_a_tetrahedron_rests_on_its_face():
         (Polygon(((0.5, 0.2, 0.1), (-0.5, 0.25), (-0.5, -0.25))), "components"),
         (Capsule(0.0, 1.0), "half_length"),
         (Capsule(1.0, math.inf), "radius"),
-        (Cylinder(1.0, 1.0), "has no place in 2-D"),
-        (BRICK, "has no place in 2-D"),
+        (Cylinder(1.0, 1.0), "cannot be used in 2-D"),
+        (BRICK, "cannot be used in 2-D"),
     ],
 )
 def test_what_is_no_shape_is_refused_by_its_field(shape, said):
@@ -164,11 +164,11 @@ def test_what_is_no_shape_is_refused_by_its_field(shape, said):
     ("shape", "said"),
     [
         (Hull(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0))), "in one plane"),
-        (Hull(BRICK.vertices + BRICK.vertices[:1]), "stands there twice"),
+        (Hull(BRICK.vertices + BRICK.vertices[:1]), "is given twice"),
         (Hull(BRICK.vertices[:3]), "4 to 64"),
         (Cylinder(-1.0, 1.0), "half_length"),
-        (RECTANGLE, "has no place in 3-D"),
-        (Disc(1.0), "has no place in 3-D"),
+        (RECTANGLE, "cannot be used in 3-D"),
+        (Disc(1.0), "cannot be used in 3-D"),
     ],
 )
 def test_nor_is_what_is_none_in_space(shape, said):
@@ -215,7 +215,7 @@ def test_a_star_that_goes_round_twice_is_no_polygon_and_one_with_64_corners_is()
     five = [2.0 * math.pi * k / 5 for k in range(5)]
     corners = [(math.cos(a), math.sin(a)) for a in five]
     Polygon(tuple(corners)).validate("b")
-    with pytest.raises(SceneError, match=r"^b.shape.vertices: go round more than once$"):
+    with pytest.raises(SceneError, match=r"^b.shape.vertices: go round the centre more than once$"):
         Polygon(tuple(corners[2 * k % 5] for k in range(5))).validate("b")
     many = tuple((math.cos(2.0 * math.pi * k / 64), math.sin(2.0 * math.pi * k / 64)) for k in range(64))
     Polygon(many).validate("b")
@@ -229,7 +229,7 @@ def test_a_star_that_goes_round_twice_is_no_polygon_and_one_with_64_corners_is()
         (Cylinder(0.5, -1.0), "b.shape.radius: "),
         (HalfSpace((0.0, math.nan)), "b.shape.normal: "),
         (Hull(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0))), "b.shape.vertices"),
-        (Polygon(((1.0, 0.0), (0.0, 1.0), "c")), "b.shape.vertices.2: 'c' is no point"),
+        (Polygon(((1.0, 0.0), (0.0, 1.0), "c")), "b.shape.vertices.2: 'c' is not a point"),
     ],
     ids=str,
 )

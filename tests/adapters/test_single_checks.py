@@ -31,8 +31,8 @@ def touching(**changed):
     ("changed", "said"),
     [
         ({}, ""),
-        ({"a": [1], "b": [0]}, "not in order"),
-        ({"a": [0], "b": [0]}, "not in order"),
+        ({"a": [1], "b": [0]}, "not in the scene's order"),
+        ({"a": [0], "b": [0]}, "not in the scene's order"),
         ({"a": [1], "b": [2]}, "far apart"),
         ({"normal": [[0.0, 1.0 + 2e-9]]}, "length 1"),
         ({"normal": [[0.0, 1.0 - 2e-9]]}, "length 1"),
@@ -40,11 +40,11 @@ def touching(**changed):
         ({"normal": [[0.0, -1.0]]}, "from the first to the second"),
         ({"normal": [[1e-3, math.sqrt(1.0 - 1e-6)]]}, "from the first to the second"),
         ({"point": [[9.0, 0.049]]}, ""),
-        ({"point": [[0.0, 0.051]]}, "not where bodies touch"),
-        ({"point": [[0.0, -0.051]]}, "not where bodies touch"),
+        ({"point": [[0.0, 0.051]]}, "does not fit the surfaces"),
+        ({"point": [[0.0, -0.051]]}, "does not fit the surfaces"),
         ({"gap": [0.049]}, ""),
-        ({"gap": [-0.051]}, "not where bodies touch"),
-        ({"gap": [0.051]}, "not where bodies touch"),
+        ({"gap": [-0.051]}, "does not fit the surfaces"),
+        ({"gap": [0.051]}, "does not fit the surfaces"),
         ({"impulse": [[5.0, -5e-10]]}, ""),
         ({"impulse": [[5.0, -2e-9]]}, "pulls"),
     ],
@@ -79,7 +79,7 @@ def test_the_floor_may_stand_last_and_the_plane_be_lifted():
     assert mechanics._wrong_contact(scenes.lift(scenes.resting()), spatial, 1e-9) == ""
 
 
-@pytest.mark.parametrize(("part", "wrong"), [("normal", "of length 1"), ("point", "not where bodies touch"),
+@pytest.mark.parametrize(("part", "wrong"), [("normal", "of length 1"), ("point", "does not fit the surfaces"),
                                              ("impulse", ""), ("gap", "")])  # fmt: skip
 def test_normals_and_places_of_contacts_are_numbers_and_what_need_not_be_told_may_be_none(
     toy, monkeypatch, part, wrong
@@ -139,7 +139,7 @@ def test_balls_that_pass_through_each_other_are_said():
 
 @pytest.mark.parametrize(
     ("fault", "seen"),
-    [("", []), ("impulse of the wrong body", ["impulse", "sampling"]), ("world shared with another", ["fresh"])],
+    [("", []), ("impulse of the wrong body", ["impulse", "sampling"]), ("state shared with another world", ["fresh"])],
 )
 def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
     engine = Dull(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Dull()
@@ -196,7 +196,7 @@ def share(rate):
 )  # fmt: skip
 def test_a_fall_may_miss_its_law_by_what_a_profile_declares_and_no_more(made, declared, said):
     told = CHECKS["free_fall"](Dragged(**made, **declared))
-    assert told.startswith(f"second: {said} misses the law") if said else told == ""
+    assert told.startswith(f"second: {said} differs from free fall") if said else told == ""
 
 
 def test_drag_takes_its_share_of_the_largest_speed_and_twice_of_the_spin():
@@ -273,12 +273,12 @@ def test_a_fall_may_be_off_by_this_band_and_no_more(what, off, declared, band):
     # Angles are off already by what they are bent: the half of what is allowed, if anything.
     for times, said in ((0.4, False), (1.6, True)):
         told = CHECKS["free_fall"](Aside(**{part: times * band * np.array(direction)}, **declared))
-        assert told.startswith(f"second: {what} misses") is said
+        assert told.startswith(f"second: {what} differs") is said
     assert told.endswith(f", {band:.2g} is allowed")
 
 
 @pytest.mark.parametrize(
-    ("check", "fault"), [("impulse", "recoil felt too little"), ("impulse", "impulse of the wrong body"),
+    ("check", "fault"), [("impulse", "recoil too small"), ("impulse", "impulse of the wrong body"),
                          ("sampling", "impulse of the step before")],
 )  # fmt: skip
 def test_impulses_and_momenta_agree_to_a_solver_s_tolerance_and_to_what_drag_takes(check, fault):
@@ -296,8 +296,8 @@ def test_impulses_and_momenta_agree_to_a_solver_s_tolerance_and_to_what_drag_tak
 
 
 def test_momentum_and_spin_may_change_by_round_off_a_gap_as_an_arm_and_what_is_declared():
-    assert CHECKS["momentum"](Listening("momentum out of nothing", 0.1)).endswith(", 1e-09 is allowed")
-    plain = CHECKS["spin"](Listening("spin out of nothing", 1.0))
+    assert CHECKS["momentum"](Listening("momentum without a cause", 0.1)).endswith(", 1e-09 is allowed")
+    plain = CHECKS["spin"](Listening("spin without a cause", 1.0))
     assert plain.startswith("second: 2-D: angular momentum changes by 0.1, ") and plain.endswith(" 0.00051 is allowed")
 
     class Slowed(Listening):
@@ -305,9 +305,9 @@ def test_momentum_and_spin_may_change_by_round_off_a_gap_as_an_arm_and_what_is_d
             return {"linear_damping": share(0.1), "angular_damping": share(0.05)} if profile == "second" else {}
 
     lost = -math.log(0.9) * 72 / 240  # the larger of both
-    told = CHECKS["momentum"](Slowed("momentum along one axis for that along another", 1.0))
+    told = CHECKS["momentum"](Slowed("momentum moved from one axis to another", 1.0))
     assert told.startswith("second: 2-D: momentum changes by 3, ") and told.endswith(f" {lost:.2g} is allowed")
-    told = CHECKS["spin"](Slowed("spin out of nothing", 1.0))
+    told = CHECKS["spin"](Slowed("spin without a cause", 1.0))
     assert told.endswith(f" {lost + 0.00051:.2g} is allowed")
 
 

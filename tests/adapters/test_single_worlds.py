@@ -134,7 +134,7 @@ def _changed(told, world, changed):
 def test_a_record_is_compared_part_by_part_and_ends_where_single_steps_do(changed, said):
     engine = record_with(**changed)
     told = CHECKS["stride"](engine)
-    where = f"second: {said} recorded at once (24 of 1 steps) are others than one by one"
+    where = f"second: {said} recorded at once (24 of 1 steps) differ from those of single steps"
     assert told == (where if said else "")
     assert all(world.closed == 1 for world in engine.built)
     if not said:
@@ -203,9 +203,9 @@ def test_bits_of_another_process_are_compared_profile_by_profile(child, monkeypa
     monkeypatch.setattr(worlds, "_hashes", lambda engine: {"first": here, "second": here})
     for there, said in (
         ({"first": here, "second": here}, ""),
-        ({"first": here, "second": "ff"}, "second: comes out otherwise in a fresh process"),
-        ({"second": here}, "first: comes out otherwise in a fresh process"),
-        ({}, "first, second: comes out otherwise in a fresh process"),
+        ({"first": here, "second": "ff"}, "second: the result differs in a new process"),
+        ({"second": here}, "first: the result differs in a new process"),
+        ({}, "first, second: the result differs in a new process"),
     ):
         heard = child(there)
         assert CHECKS["process"](ToyEngine()) == said
@@ -222,13 +222,13 @@ def test_a_process_that_ends_is_a_fault_and_one_that_cannot_be_is_not_asked(chil
     with pytest.raises(NotAsked, match=r"^process: cannot start one: no memory$"):
         CHECKS["process"](ToyEngine())
     child({"not there": "ImportError: no toy"})
-    with pytest.raises(NotAsked, match=r"^the engine cannot be had in another process: ImportError: no toy$"):
+    with pytest.raises(NotAsked, match=r"^the engine cannot be loaded in another process: ImportError: no toy$"):
         CHECKS["process"](ToyEngine())
 
     class Local(ToyEngine):
         pass
 
-    with pytest.raises(NotAsked, match=r"^the engine cannot be named to another process: "):
+    with pytest.raises(NotAsked, match=r"^the engine cannot be sent to another process: "):
         CHECKS["process"](Local())
 
 
@@ -250,7 +250,9 @@ def test_what_a_check_says_is_a_finding_of_its_name():
     toy.expected = (Expected("other", "no", "none"), Expected("name", "it is old", "its manual"))
     assert found("name", check, toy) == Finding("name", "expected", "it is old (its manual): wrong")
     toy.said = ""
-    assert found("name", check, toy) == Finding("name", "unexpected pass", "it holds, but is listed: it is old")
+    assert found("name", check, toy) == Finding(
+        "name", "unexpected pass", "it passes, but is listed as failing: it is old"
+    )
 
     def refusing(engine):
         raise NotAsked("no scene\nfor it")

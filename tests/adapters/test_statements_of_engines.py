@@ -35,8 +35,8 @@ def engine_with(**changed):
         ({"scheme": Scheme("position first", -1)}, ""),
         ({"profile_schemes": {"second": Scheme("odd", 2.0)}}, "scheme.position_offset: 2.0 must lie in [-1, 1]"),
         ({"roles": {"first": "shipped", "second": "tuned"}}, ""),
-        ({"roles": {"third": "shipped"}}, "facts.roles: 'third' cannot be 'shipped': no such profile, or none of the"),
-        ({"roles": {"first": "best"}}, "facts.roles: 'first' cannot be 'best': no such profile, or none of the roles"),
+        ({"roles": {"third": "shipped"}}, "facts.roles: 'third' cannot be 'shipped': no such profile, or no such"),
+        ({"roles": {"first": "best"}}, "facts.roles: 'first' cannot be 'best': no such profile, or no such"),
         ({"customary_dt": 0.0}, "facts.customary_dt: 0.0 must be a positive number of seconds"),
         ({"customary_dt": -0.1}, "facts.customary_dt: -0.1 must be a positive number of seconds"),
         ({"customary_dt": math.inf}, "facts.customary_dt: inf must be a positive number of seconds"),
@@ -55,7 +55,7 @@ def test_facts_are_facts_and_a_version_is_a_word():
     for version in ("", None, 3):
         engine = Listening()
         engine.version = lambda version=version: version
-        assert CHECKS["facts"](engine) == "version() must say which"
+        assert CHECKS["facts"](engine) == "version() must return the version"
 
 
 def rules(**profiles):
@@ -209,7 +209,7 @@ def test_a_dimension_that_is_not_in_the_facts_is_refused_and_what_is_refused_is_
                 raise EngineError("no room")
             return super().build(scene, dt, settings)
 
-    assert CHECKS["capabilities"](Failing()) == "second: check_flying, 3-D: not refused, but no room"
+    assert CHECKS["capabilities"](Failing()) == "second: check_flying, 3-D: not refused, but stopped by no room"
 
 
 def test_a_world_that_ends_early_is_told_and_so_is_a_body_that_is_fixed_and_moves():
@@ -223,7 +223,7 @@ def test_a_world_that_ends_early_is_told_and_so_is_a_body_that_is_fixed_and_move
 
     # A floor that is nowhere moves neither so nor otherwise: what ended the run is said.
     assert "the state is not finite" in CHECKS["capabilities"](Ending())
-    for size, said in ((0.5, ""), (2.0, "second: check_resting, 2-D: floor is fixed and does not move so")):
+    for size, said in ((0.5, ""), (2.0, "second: check_resting, 2-D: floor is fixed but does not move like that")):
 
         class Sinking(Listening):
             def build(self, scene, dt, settings, size=size):
@@ -312,12 +312,12 @@ def test_an_engine_that_refuses_all_has_shown_nothing():
         def refuses(self, scene, profile):
             return "not today"
 
-    with pytest.raises(NotAsked, match=r"^every scene is refused, check_striking as well$"):
+    with pytest.raises(NotAsked, match=r"^every scene is refused, even check_striking$"):
         CHECKS["capabilities"](Nothing())
 
 
 def test_a_fixed_body_is_asked_for_where_it_is_at_the_end():
-    for after, said in ((0, "second: check_resting, 2-D: floor is fixed and does not move so"), (-1, "")):
+    for after, said in ((0, "second: check_resting, 2-D: floor is fixed but does not move like that"), (-1, "")):
 
         class Late(Listening):
             def build(self, scene, dt, settings, after=after):

@@ -42,7 +42,7 @@ def out(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "findings_folder", lambda engine: folder / engine)
         result = call("accept", "--engine", "chipmunk", "--jobs", 1, "--out", folder)
-    assert "4 cells with moved starts" in result.stderr, result.output
+    assert "4 cases with moved starts" in result.stderr, result.output
     return folder
 
 
@@ -271,6 +271,6 @@ def test_a_fault_of_two_per_cent_fails_the_run_and_nothing_of_it_can_be_listed(w
     assert {row["outcome"] for row in json.loads(ran.stdout)} == {"invalid"}
     blessed = call("accept", "--family", "starved", *own)
     assert blessed.exit_code == 1, blessed.output
-    assert "its receipts or its certificate do not hold" in blessed.stderr
+    assert "its property checks or its certificate fail" in blessed.stderr
     assert not (findings / files.MEMBERS).exists() or members(findings) == []
     assert call(*run).exit_code == 1

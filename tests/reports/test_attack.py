@@ -97,7 +97,7 @@ def test_a_fault_of_two_per_cent_cannot_be_accepted(attacked, request):
         for family in FAMILY_SCENES:
             accept += ["--family", family]
         answered = call(main, accept)
-        told += [line for line in answered.stderr.splitlines() if "its receipts or its certificate do not hold" in line]
+        told += [line for line in answered.stderr.splitlines() if "its property checks or its certificate fail" in line]
         assert scene in sound or answered.exit_code == 1, answered.output
         assert scene in sound or call(main, ["run", scene, *params, *common]).exit_code == 1
     assert told

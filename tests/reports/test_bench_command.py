@@ -139,7 +139,7 @@ def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_pat
     asked.clear()
     words = ["bench", "incline", *who, "--dt", "1/120", "--dt", "1/240", "--seed", 1, "--brief", "--out", out]
     done = call(*words)
-    assert done.exit_code == 0 and "as run" in done.stderr, done.stderr
+    assert done.exit_code == 0 and "reusing 4 of 8 results" in done.stderr, done.stderr
     store = Store(out, create=False)
     judged, benched = store.runs()
     wanted = set(benched.plan)

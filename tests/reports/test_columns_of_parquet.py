@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-pytest.importorskip("pyarrow", reason="pip install 'contact-crosscheck[parquet]'")
+pytest.importorskip("pyarrow", reason="pip install -e '.[parquet]'")
 
 import pyarrow.parquet as pq
 

@@ -193,7 +193,7 @@ def test_tables_of_a_page_are_the_rows_and_the_bench_s_without_time_stamps(monke
     head = "data:application/gzip;base64,"
     packed = base64.b64decode(first.href.removeprefix(head))
     assert first.name == "rows.json.gz" and first.href.startswith(head) and len(packed) == first.size
-    assert first.what == "all 2 judged values, a list per column: pandas.read_json"
+    assert first.what == "all 2 values and their checks, a list per column: pandas.read_json"
     assert gzip.decompress(packed) == b'{"a":[1,2],"b":[0.5,null]}' and packed[4:8] == b"\0\0\0\0"
     assert packed == gzip.compress(
         json.dumps({"a": [1, 2], "b": [0.5, None]}, separators=(",", ":")).encode(), 9, mtime=0

@@ -11,7 +11,7 @@ from adapters.trajectory import load_trajectory
 from reports.command import main
 from validation.records.store import Store
 
-pytest.importorskip("pyarrow", reason="pip install 'contact-crosscheck[parquet]'")
+pytest.importorskip("pyarrow", reason="pip install -e '.[parquet]'")
 pytest.importorskip("pymunk")
 
 

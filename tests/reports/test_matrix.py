@@ -75,6 +75,18 @@ def test_a_wide_terminal_shows_it_in_full():
     ]
 
 
+def test_what_a_profile_is_stands_beside_its_first_line_where_its_name_does_not_say_so():
+    rows = [
+        ROWS[0] | {"engine": "mujoco", "profile": profile, "dimension": d, "physics": said, "standing": None}
+        for profile in ("default", "tuned")
+        for d, said in ((2, "pass"), (3, "fail"))
+    ]
+    (table,) = tables_of(matrix_of(rows), {}, 100, roles=True)
+    assert [str(text).strip() for text in table.columns[0].cells] == [
+        "mujoco", "default 2-D (as shipped)", "default 3-D", "tuned 2-D", "tuned 3-D"
+    ]  # fmt: skip
+
+
 def test_scenes_that_do_not_fit_beside_each_other_make_further_tables():
     assert [len(tables_of(matrix_of(ROWS), VERSIONS, width)) for width in (46, 45)] == [1, 2]
     apart = tables_of(matrix_of(ROWS), VERSIONS, 40)

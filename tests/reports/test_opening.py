@@ -42,15 +42,16 @@ def dead(e):
 @pytest.mark.parametrize(
     ("laws", "said"),
     [
-        ({("a", "default"): dead, ("a", "tuned"): right}, "As shipped, a does not rebound as set; tuned, it does"),
+        ({("a", "default"): dead, ("a", "tuned"): right},
+         "As shipped, a does not rebound as set; tuned, it does (scene impact)"),
         ({("a", "default"): dead, ("a", "tuned"): right, ("b", "default"): dead, ("b", "tuned"): right,
           ("c", "default"): right, ("c", "tuned"): right},
-         "As shipped, a and b do not rebound as set; tuned, both do"),
+         "As shipped, a and b do not rebound as set; tuned, both do (scene impact)"),
         ({("a", "default"): dead, ("a", "tuned"): right, ("b", "default"): dead, ("b", "tuned"): dead},
-         "As shipped, a and b do not rebound as set; tuned, a does"),
+         "As shipped, a and b do not rebound as set; tuned, a does (scene impact)"),
         ({("a", "default"): dead, ("a", "tuned"): dead, ("b", "default"): dead, ("b", "tuned"): dead},
-         "a and b do not rebound as set, neither as shipped nor tuned"),
-        ({("a", "default"): dead, ("b", "default"): right}, "As shipped, a does not rebound as set"),
+         "a and b do not rebound as set, neither as shipped nor tuned (scene impact)"),
+        ({("a", "default"): dead, ("b", "default"): right}, "As shipped, a does not rebound as set (scene impact)"),
         ({("a", "default"): right, ("b", "default"): right}, "As shipped, every engine passes every check"),
         ({("a", "default"): right, ("a", "tuned"): right}, "As shipped, a passes every check"),
         ({("a", "of mine"): dead}, "a (of mine) fails 100 % of its checks"),
@@ -67,7 +68,7 @@ def test_without_a_restitution_the_headline_says_who_fails_the_most_checks():
     source = made(laws, scene="incline", metric="speed")
     assert not rebounds(source)
     assert headline(source) == "As shipped, a fails 100 % of its checks, the most of all engines; tuned, 20 %"
-    assert headline(Source(source.run, [], [])) == "Nothing was judged."
+    assert headline(Source(source.run, [], [])) == "No check has a result."
 
 
 def test_the_first_matrix_has_an_engine_as_shipped_beside_tuned_whatever_else_ran():

@@ -170,7 +170,7 @@ def test_the_plugin_takes_its_cells_from_words_with_commas_and_says_how_many(mon
     plugin = Plugin(Config(**options))
     assert (plugin.engine, plugin.version, plugin.slots) == ("chipmunk", "7.3", [SLOT, SLOT])
     assert (plugin.rows, plugin.ran, plugin.mended) == ({}, set(), [])
-    assert plugin.pytest_report_header() == "crosscheck: chipmunk 7.3, 2 cells"
+    assert plugin.pytest_report_header() == "crosscheck: chipmunk 7.3, 2 cases"
     (request,) = asked
     assert (request.scenes, request.engines, request.profiles) == (
         ["impact", "bounce"], ["chipmunk"], ["tuned", "default"]

@@ -73,6 +73,9 @@ def test_the_matrix_of_the_whole_catalogue_stands_in_the_first_thirty_lines_and_
     assert re.search(r"mujoco/default bounce: rebounds [^;]*; profile tuned fixes it", rest)
     # What is matched is shown with what it is, and recommended nowhere.
     assert "mujoco/matched: the textbook law instead of the engine's own" in rest
+    # What profiles are stands once: beside them where that is no wider than the terminal, else below.
+    beside, below = "  default (as shipped)" in head, "; default: as shipped" in rest
+    assert beside is (width == 100) and below is (width == 80)
     assert not re.search(r"mujoco/matched[ ,(]|profile matched", rest)
     assert "crosscheck show --all" in rest
 

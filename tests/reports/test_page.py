@@ -495,7 +495,7 @@ def test_a_page_is_made_of_whatever_there_is(page_source, missing):
     said = {
         "bench": "no bench in this store yet",
         "replays": "kept no recordings",
-        "everything": "Nothing was judged",
+        "everything": "No check has a result",
     }
     assert said[missing] in page
 
@@ -535,7 +535,7 @@ def test_the_page_of_a_run_in_which_nothing_could_be_asked_claims_nothing(tmp_pa
     store.finish(run)
     store.close()
     page = render(load_source(tmp_path))
-    assert "Nothing was judged" in page
+    assert "No check has a result" in page
     for wrong in (
         "is within its tolerance",
         "passes every check of",

@@ -1,5 +1,6 @@
 """Tables and marks of the page, from rows made up for one thing each."""
 
+import re
 from collections import Counter
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from reports.matrix import Field
 from reports.page import cost, fairness
 from reports.page.charts import log_scale
 from reports.page.conclusions import NAMED, scenes_text
+from reports.page.source import Bench
 from reports.page.styling import heat_style
 from reports.page.verdicts import family_mark
 from reports.palette import PAPER, heat
@@ -163,3 +165,23 @@ def test_the_shade_of_a_field_is_the_share_that_fails_and_never_paper_where_one_
     assert (heat("light", length) == PAPER["light"]) is (missed == 0)
     said = {(0, 8): "0 %", (1, 289): "<1 %", (1, 20): "5 %", (26, 283): "9 %", (8, 8): "100 %"}
     assert found.percent == said[missed, judged]
+
+
+def test_time_steps_stand_above_their_points_and_within_the_panel():
+    """Below a point lies the axis of cost, to the left of the first one that of the error."""
+    points = [(1e-4, 1e-1, 1 / 60), (3e-4, 1e-3, 1 / 240), (1e-3, 1e-18, 1 / 960)]
+    table = pd.DataFrame([
+        {"scene": "bounce", "dimension": 2, "engine": "chipmunk", "profile": "tuned", "dt": dt, "iterations": None,
+         "cost": price, "cost_low": price / 1.1, "cost_high": price * 1.1, "error": error, "on_front": True,
+         "best": True}
+        for price, error, dt in points
+    ])  # fmt: skip
+    (figure,) = cost._multiples(Bench(None, {}, {"work_points": table}, [], []))
+    place = r"translate\(([-\d.]+),([-\d.]+)\)"
+    numbers = re.findall(rf"<text[^>]*{place}[^>]*>(1/\d+)<", figure.picture)
+    labels = {text: (float(x), float(y)) for x, y, text in numbers}
+    numbers = re.findall(rf'data-is="[^"]*dt (1/\d+): error[^"]*" transform="{place}', figure.picture)
+    marks = {text: (float(x), float(y)) for text, x, y in numbers}
+    assert set(labels) == set(marks) == {"1/60", "1/240", "1/960"}
+    assert all(labels[text][1] < marks[text][1] for text in labels)
+    assert {text: labels[text][0] > marks[text][0] for text in labels} == {"1/60": True, "1/240": True, "1/960": False}

@@ -363,7 +363,7 @@ def test_a_page_says_how_it_is_cited_and_made_again(monkeypatch, title, again):
 
     found = told("abc123+", bench)
     assert found["text"].startswith(
-        "contact-crosscheck 1.2.3, commit abc123+, run 20260101-000000 of 2026-01-01 (2 cells, 1 rows)."
+        "contact-crosscheck 1.2.3, commit abc123+, run 20260101-000000 of 2026-01-01 (2 cases, 1 values)."
     )
     lines = [
         'pip install -e ".[all]" -c constraints.txt', f"crosscheck run {again} --out again",

@@ -162,7 +162,7 @@ def test_a_scene_file_runs_with_settings(tmp_path):
     ("words", "said"),
     [
         (["run", "bounce", "--set", "dampin=0.5"],
-         "set: no engine that is here has a setting 'dampin'; near it: damping"),
+         "set: no installed engine has a setting 'dampin'; near it: damping"),
         (["run", "bounce", "--engine", "chipmunk", "--set", "dampin=0.5"], "set: chipmunk has no setting 'dampin'"),
         (["bench", "bounce", "--engine", "chipmunk", "--set", "damping=7"],
          "set: damping=7: must be a number from 0 to 1"),

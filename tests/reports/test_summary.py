@@ -526,11 +526,28 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
         (0.9e-6, "does not rebound"),
         (-0.9e-6, "does not rebound"),
         (1e-6, "rebounds at 1.0e-6 instead of 1"),
-        (-1e-6, "goes on at 1.0e-6 of its speed; true: rebounds at 1"),
+        (-1e-6, "moves on with 1.0e-6 of its speed; true: rebounds at 1"),
     ],
 )
 def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):
     (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
+    assert answer.wrong == f"{words} (e=1 v=1)"
+
+
+@pytest.mark.parametrize(
+    ("scene", "metric", "value", "truth", "words"),
+    [
+        ("impact", "rebound_ratio", 1.0 + 2e-10, 1.0, "rebounds at 2.0e-10 more than 1"),
+        ("impact", "rebound_ratio", 0.8 - 3e-7, 0.8, "rebounds at 3.0e-7 less than 0.8"),
+        ("impact", "rebound_ratio", 0.80012, 0.8, "rebounds at 0.8001 instead of 0.8"),
+        ("edge_drop", "rise", -2.0 - 4e-9, -2.0, "falls with 4.0e-9 more than 2"),
+        ("thin_wall", "rebound_ratio", -0.5 - 4e-9, -0.5,
+         "comes back at 4.0e-9 less than -0.5 of its speed (below 0: it has passed)"),
+    ],
+)  # fmt: skip
+def test_of_numbers_that_are_alike_at_a_glance_the_difference_is_told(scene, metric, value, truth, words):
+    known = row("impact", 2, "bullet", "default", "known", value, truth, e=1.0, v=1.0)
+    (answer,) = answers([known | {"scene": scene, "metric": metric}])
     assert answer.wrong == f"{words} (e=1 v=1)"
 
 

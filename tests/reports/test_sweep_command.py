@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from adapters.extras import install
 from reports.command import main
 from validation.questions.sweeping import MOST_CELLS, Range, Study, grid, listed, points, study_slots
 from validation.records.store import Store
@@ -79,7 +80,7 @@ def test_whole_numbers_are_rounded():
     (("--random", "e=0:1", "--samples", "0"), "samples: 0 must be"),
     (("--random", "e=0:1", "--list", "e=1"), "e is varied twice"),
     (("--random", "e=0:1", "--sobol", "e=0:1"), "e is varied twice"),
-    (("--list", "e=1", "--param", "e=0.5"), "e is fixed and varied"),
+    (("--list", "e=1", "--param", "e=0.5"), "e is both fixed and varied"),
     (("--grid", "e=0:1:1000", "--grid", "v=1:2:1000"), f"are more than the {MOST_CELLS} of one sweep"),
 ])  # fmt: skip
 def test_a_wrong_call_is_one_line_and_runs_nothing(words, said, tmp_path):
@@ -149,4 +150,4 @@ def test_parquet_has_the_same_table(tmp_path):
 def test_sobol_without_scipy_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "scipy.stats", None)
     done = call(*CELL, "--sobol", "e=0:1", "--out", tmp_path, status=2)
-    assert "pip install 'contact-crosscheck[report]'" in done.output
+    assert install("report") in done.output

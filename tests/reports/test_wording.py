@@ -6,7 +6,22 @@ import shlex
 
 import pytest
 
-from reports.wording import cell, mark_of, markdown, measured, number, params_text, plural, quantity, reproduce, row_id
+from adapters import registry
+from reports.wording import (
+    ROLE_WORDS,
+    cell,
+    mark_of,
+    markdown,
+    measured,
+    number,
+    params_text,
+    plural,
+    profiles_called,
+    quantity,
+    reproduce,
+    roles_line,
+    row_id,
+)  # fmt: skip
 from validation.catalogue import CATALOGUE
 
 SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engine": "chipmunk", "profile": "tuned",
@@ -108,3 +123,26 @@ def test_the_id_of_a_row_is_eight_digits_of_what_was_asked_and_of_nothing_else()
 )  # fmt: skip
 def test_nouns_are_counted(count, noun, text):
     assert plural(count, noun) == text
+
+
+# ---- profiles by role ------------------------------------------------------------------------------------------------
+
+
+def test_a_profile_is_named_by_its_name_or_by_its_role():
+    ours, engines = registry.solver(), registry.names()
+    for engine in engines:
+        for name, role in registry.facts(engine).roles.items():
+            for word in (name, role, ROLE_WORDS[role]):
+                assert name in profiles_called([word], [engine])
+    assert profiles_called(["exact", "textbook"], [ours]) == ["reference", "classical"]
+    assert profiles_called(["as shipped", "default"], ["mujoco", "bullet"]) == ["default"]
+    assert profiles_called(["compromise"], ["mujoco", "bullet"]) == ["one"]
+    assert profiles_called(["of nobody"], engines) == ["of nobody"]
+    assert profiles_called([], engines) == []
+
+
+def test_a_line_says_what_profiles_are_where_their_names_do_not():
+    columns = [("mujoco", "default"), ("mujoco", "tuned"), ("bullet", "default"), ("bullet", "one"), ("nobody", "x"),
+               ("mujoco", "default+cone=elliptic")]  # fmt: skip
+    assert roles_line(columns) == "Profiles: default: as shipped; one: compromise."
+    assert roles_line([("mujoco", "tuned"), ("nobody", "x")]) == ""

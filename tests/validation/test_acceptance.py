@@ -145,7 +145,7 @@ def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
     )
     monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     (why,) = refusals(propose(rows(), "nameless", listed(FAMILY)))
-    assert "a deviation law speaks about it and misses" in why
+    assert "a contact law predicts another value" in why
     # What the law predicts is explained and needs no entry.
     assert not propose(rows(creep=0.405), "nameless", listed(FAMILY)).refused
 
@@ -171,7 +171,7 @@ def test_a_law_speaks_of_iterations_that_are_asked_for_only_where_it_follows_the
 
 def test_rows_whose_receipts_do_not_hold_are_refused():
     (why,) = refusals(propose(rows(outcome=Outcome.INVALID), "nameless", listed(FAMILY)))
-    assert "receipts" in why
+    assert "property checks" in why
 
 
 def test_rows_of_the_profile_that_promises_a_solution_are_refused():
@@ -179,7 +179,7 @@ def test_rows_of_the_profile_that_promises_a_solution_are_refused():
     family = replace(FAMILY, profiles=("reference",))
     findings = Findings("reference", {"creeps": family}, (), {})
     (why,) = refusals(propose(rows(slot), "reference", findings))
-    assert "mended, not listed" in why
+    assert "fixed, not listed" in why
 
 
 def test_a_row_of_another_release_than_its_family_holds_for_is_refused():
@@ -189,7 +189,7 @@ def test_a_row_of_another_release_than_its_family_holds_for_is_refused():
 
 def test_a_row_whose_scatter_is_not_known_is_refused():
     (why,) = refusals(propose(rows(moved=0.0), "nameless", listed(FAMILY)))
-    assert "its scatter is not known" in why
+    assert "its scatter is unknown" in why
 
 
 # ---- bands ---------------------------------------------------------------------------------------------------------
@@ -354,7 +354,7 @@ def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law
     monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
     assert not proposal.left_out
-    assert all("misses" in why for _, why in proposal.refused) and proposal.refused
+    assert all("predicts another" in why for _, why in proposal.refused) and proposal.refused
 
 
 def test_of_what_is_not_asked_about_all_that_is_new_or_drifted_is_told_and_nothing_else():
@@ -514,9 +514,9 @@ def row_of(**fields):
         ({"standing": "explained"}, ("", None)),
         ({"value": None, "physics": None}, ("", (None, 0.0, False, None))),
         ({"outcome": "diverged", "value": None}, ("", (None, 0.0, True, None))),
-        ({"floor": None}, ("its scatter is not known: the cell has not been run from moved starts", None)),
+        ({"floor": None}, ("its scatter is unknown: the case was not run from moved starts", None)),
         ({"engine": "reference", "profile": "reference"},
-         ("its profile promises a solution: what fails there is mended, not listed", None)),
+         ("its profile is exact: a failure there must be fixed, not listed", None)),
     ],
 )  # fmt: skip
 def test_what_a_row_would_be_listed_as_or_why_it_is_refused(fields, entry):
@@ -531,7 +531,7 @@ def test_what_a_row_would_be_listed_as_or_why_it_is_refused(fields, entry):
 
 def test_the_reasons_of_refusals_in_full(monkeypatch):
     ((_, why),) = propose(rows(outcome=Outcome.INVALID), "nameless", listed(FAMILY)).refused
-    assert why == "its receipts or its certificate do not hold"
+    assert why == "its property checks or its certificate fail"
     ((_, why),) = propose(rows(version="2.0"), "nameless", listed(FAMILY)).refused
     assert why == "family creeps holds for >=1,<2, not for 2.0"
     law = Deviation(
@@ -539,7 +539,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
     )
     monkeypatch.setattr("validation.judging.predicting.covering", lambda *where: iter([law]))
     ((_, why),) = propose(rows(), "nameless", listed(FAMILY)).refused
-    assert why == "a deviation law speaks about it and misses: the law or the engine has changed"
+    assert why == "a contact law predicts another value: the law or the engine has changed"
 
 
 def test_a_study_has_no_scatter_and_the_least_of_bands():

@@ -154,7 +154,7 @@ from validation.bench import lane
 lane.load_engines_here = lambda: print(os.getpid(), flush=True)  # the first that comes after its own arrangements
 parent = os.getpid()
 if os.fork() == 0:
-    lane._child(Connection(int(sys.argv[1])), parent)
+    lane._child(Connection(int(sys.argv[1])), parent, {})
 signal.pause()
 """
 
@@ -295,9 +295,9 @@ def test_a_work_point_is_timed_with_states_read_too_at_one_step_and_the_profile_
     slot = Slot("impact", (), 2, "chipmunk", "tuned", dt, iterations)
     members = [SimpleNamespace(slot=slot, cell="its cell")]
     point = {"reason": "", "slot": slot.as_dict(), "error": 0.25}
-    monkeypatch.setattr(sweep, "accuracy", lambda asked: point)
-    found = list(sweep._work_units(members))
+    monkeypatch.setattr(sweep, "accuracy", lambda asked, certified: point)
+    found = list(sweep._work_units(members, {}))
     assert [unit.sampled for unit in found] == [False, True][: 1 + (dt == SAMPLED_DT and iterations is None)]
     assert {(unit.slot, unit.cell, unit.error, unit.purpose) for unit in found} == {(slot, "its cell", 0.25, "work")}
-    monkeypatch.setattr(sweep, "accuracy", lambda asked: point | {"reason": "it has no error"})
-    assert list(sweep._work_units(members)) == []
+    monkeypatch.setattr(sweep, "accuracy", lambda asked, certified: point | {"reason": "it has no error"})
+    assert list(sweep._work_units(members, {})) == []

@@ -1,12 +1,15 @@
 """The declared error of each scene: zero for the truth, and in the stated unit for a planted error."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from adapters.scene import SceneError
+from adapters.scene import Body, Disc, Pair, Scene, SceneError
+from validation import posed
 from validation.canonical import GRAVITY
 from validation.catalogue import CATALOGUE
+from validation.files.distance import CERTIFIED, DISTANCE
 from validation.posed import primary_of, resolve
 
 DT = 1 / 240
@@ -86,11 +89,23 @@ def test_creep_and_acceleration_that_lead_equally_far_astray_are_equally_wrong()
     assert creep == pytest.approx(slide, rel=1e-9)
 
 
-def test_a_scene_without_a_declared_error_is_refused(tmp_path):
-    file = tmp_path / "my-scene.toml"
-    file.write_text(
-        'name = "mine"\ndimension = 2\ngravity = [0.0, 0.0]\nduration = 1.0\n'
-        '[[bodies]]\nname = "ball"\nshape = { type = "disc", radius = 1.0 }\n'
-    )
-    with pytest.raises(SceneError, match="no primary error"):
-        primary_of(str(file))
+def test_a_scene_without_a_declared_error_is_refused(monkeypatch):
+    monkeypatch.setattr(posed, "resolve", lambda name: replace(CATALOGUE["bounce"], name=name, primary=None))
+    with pytest.raises(SceneError, match="no primary error is declared for 'mine', only for "):
+        primary_of("mine")
+
+
+def test_the_error_of_a_file_is_a_distance():
+    """Of the centre that is farthest off; one whose place is no number has no error."""
+    bodies = tuple(Body(name, Disc(1.0), 1.0, 1.0, pose=(0.0, 0.0, 0.0)) for name in "ab")
+    scene = Scene("mine", 1, 2, bodies, (Pair(),), (0.0, 0.0), 1.0, {})
+    places = {"final[a.x]": 1.0, "final[a.y]": 2.0, "final[b.x]": 0.0, "final[b.y]": 0.0}
+    exact = {CERTIFIED + name: (value, "") for name, value in places.items()}
+
+    def distance(**changed):
+        moved = places | {f"final[{name.replace('_', '.')}]": value for name, value in changed.items()}
+        return DISTANCE.error(scene, 0.1, {**exact, **{name: (value, "it is lost") for name, value in moved.items()}})
+
+    assert distance() == (0.0, "")
+    assert distance(a_x=4.0, a_y=6.0, b_x=0.5) == (5.0, "")
+    assert distance(b_y=None) == (None, "it is lost")

@@ -94,10 +94,10 @@ def test_what_holds_again_leaves_the_list_and_what_was_not_asked_stays(folder):
 
 def test_of_a_profile_that_promises_a_solution_nothing_is_listed(tmp_path):
     (tmp_path / "breaks.toml").write_text(FAMILY.replace('"default"', '"reference"'))
-    with pytest.raises(FindingsError, match="promises a solution"):
+    with pytest.raises(FindingsError, match="is an exact profile"):
         read("reference", tmp_path)
     (tmp_path / "breaks.toml").write_text(FAMILY.replace('"default"', '"*"'))
-    with pytest.raises(FindingsError, match="promises a solution"):
+    with pytest.raises(FindingsError, match="is an exact profile"):
         read("reference", tmp_path)
 
 
@@ -107,8 +107,12 @@ def test_of_a_profile_that_promises_a_solution_nothing_is_listed(tmp_path):
         ('reason = "contacts are solved in the order of the bodies"', "", "reason is missing"),
         ('["renumbered"]', '"renumbered"', "relations must be a list"),
         ('">=1,<2"', '"one"', "no version specifier"),
-        (FAMILY, FAMILY + FAMILY, "stands twice"),
-        ('scenes = ["head_on", "impact"]\nrelations = ["renumbered"]', 'scenes = ["*"]\nrelations = ["*"]', "name one"),
+        (FAMILY, FAMILY + FAMILY, "is listed twice"),
+        (
+            'scenes = ["head_on", "impact"]\nrelations = ["renumbered"]',
+            'scenes = ["*"]\nrelations = ["*"]',
+            "name scenes or relations",
+        ),
     ],
 )
 def test_files_that_are_wrong_are_named(tmp_path, old, new, said):

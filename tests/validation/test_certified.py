@@ -204,4 +204,4 @@ def test_a_puck_slides_outwards_on_a_face_that_turns(tmp_path, world):
     assert judged == dict.fromkeys(("penetration", "final[puck.x]", f"final[puck.{world['up']}]"), ("pass", ""))
     assert [change.refused for change in compare(slot, ["mirrored"]) if not change.holds or change.refused] == []
     (moved,) = compare(slot, ["moved"])
-    assert moved.refused.startswith("a face turns about the origin")
+    assert moved.refused.startswith("a half-space that turns about the origin")

@@ -14,7 +14,7 @@ from validation.cells import Observation, Outcome, Slot, prepare
 from validation.workers import LimitError, batch, cluster
 from validation.workers.cluster import LEAST, MOST, MOST_LOST, _batches, _client, _Driver, checked, run_cells_on
 
-pytest.importorskip("distributed", reason="pip install 'contact-crosscheck[dask]'")
+pytest.importorskip("distributed", reason="pip install -e '.[dask]'")
 pytest.importorskip("pymunk")
 
 
@@ -241,7 +241,7 @@ def test_what_a_batch_leaves_is_told_with_its_reason_and_is_in_the_journal():
 
 
 def test_a_scheduler_that_goes_ends_the_run_in_one_line(monkeypatch):
-    gone = "cluster: the scheduler is gone; what finished is kept, the same command resumes"
+    gone = "cluster: the scheduler is gone; finished cases are kept, the same command resumes"
     with pytest.raises(LimitError) as ended:
         driven(Busy([lambda slots: Future(status="cancelled")]), cells(1))
     assert str(ended.value) == gone
@@ -282,7 +282,7 @@ def test_other_code_on_a_worker_is_told_with_both_versions_and_each_worker_is_as
     here = prepare(slots[0]).cell.engine_version
     said = f"chipmunk 7.0 there, {here} here"
     assert (
-        str(refused.value) == f"cluster: tcp://w:1 has other code than this machine ({said}); its rows would be others"
+        str(refused.value) == f"cluster: tcp://w:1 has other code than this machine ({said}); its results would differ"
     )
     asked = []
     monkeypatch.setattr(cluster, "prepare", lambda slot: asked.append(slot) or prepare(slot))

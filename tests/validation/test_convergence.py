@@ -164,7 +164,7 @@ def test_an_order_is_told_with_its_error_and_judged_at_two_of_them():
     assert said([0.025, 0.1, 0.4]) == (Limit.NOT, "the error grows as the step shrinks, order -2.00 +- 0.00")
     fit, limit, because = limit_of(DTS[:4], [0.1, 0.9, 0.05, 0.8])
     assert (limit, because) == (
-        Limit.NOISY, f"order {fit.order:.2f} +- {fit.standard_error:.2f}: neither falling nor level")  # fmt: skip
+        Limit.NOISY, f"order {fit.order:.2f} +- {fit.standard_error:.2f}: neither falling nor constant")  # fmt: skip
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -314,7 +314,7 @@ def test_cells_beside_the_declared_ones_and_moved_ones_have_no_part_in_an_error(
 
 def test_an_order_of_nothing_over_few_steps_falls_nor_grows():
     """Errors of exactly one have the order 0 with no scatter; the steps are too near each other for a level."""
-    assert said([1.0] * 3, [0.1, 0.06, 0.05]) == (Limit.NOISY, "order 0.00 +- 0.00: neither falling nor level")
+    assert said([1.0] * 3, [0.1, 0.06, 0.05]) == (Limit.NOISY, "order 0.00 +- 0.00: neither falling nor constant")
 
 
 def test_differences_that_are_the_same_do_not_grow():

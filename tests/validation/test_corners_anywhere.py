@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from adapters.extras import install
 from adapters.scene import SceneError
 from validation.files.centring import ALIGNED, centre
 
@@ -33,7 +34,7 @@ def test_what_lies_elsewhere_is_moved_to_its_centroid_and_said(kind, points, by,
     assert all(type(x) is float for p in given["shape"]["vertices"] for x in p)
     assert len(notes) == 2 and notes[0] == "before"
     words = notes[1].replace("-0,", "0,")
-    assert words.startswith("b.shape.vertices: their centroid (") and words.endswith(") was made the body's centre")
+    assert words.startswith("b.shape.vertices: their centroid (") and words.endswith(") is now the body's centre")
     told = [float(x) for x in notes[1].partition("(")[2].partition(")")[0].split(", ")]
     assert told == pytest.approx([float(x) for x in said[1:-1].split(", ")], abs=1e-9)
 
@@ -87,5 +88,5 @@ def test_without_the_library_of_hulls_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setattr("validation.files.centring.hull_properties", missing)
     with pytest.raises(SceneError) as error:
         centre(body("hull", BRICK), [])
-    assert str(error.value) == "b.shape.vertices: a hull needs scipy, pip install 'contact-crosscheck[shapes]'"
+    assert str(error.value) == f"b.shape.vertices: a hull needs scipy: {install('shapes')}"
     centre(body("polygon", SQUARE), [])  # needs none

@@ -390,7 +390,7 @@ def test_what_passes_and_what_cannot_be_asked_are_told_apart():
 def test_an_engine_or_a_scene_that_has_nothing_to_search_says_so(monkeypatch):
     monkeypatch.setattr(cures, "asked_of", lambda scene, dimension: ())
     assert search("chipmunk", "incline", 2) == Unsearched(
-        False, "incline has no standard cell in 2-D at a profile's own iterations"
+        False, "incline has no standard case in 2-D at a profile's own iterations"
     )
     monkeypatch.setattr(cures, "profile_of", lambda engine, role: None)
     assert search("chipmunk", "incline", 2) == Unsearched(False, "chipmunk has no profile as shipped")

@@ -110,7 +110,7 @@ def test_what_is_listed_comes_out_again(engine, scene):
 
 def test_what_passes_as_shipped_has_no_cure():
     pytest.importorskip("pymunk")
-    with pytest.raises(ValueError, match="no cure"):
+    with pytest.raises(ValueError, match="no fix"):
         measure("chipmunk", Cured("default", "tuned", "incline", ({},)))
 
 

@@ -145,9 +145,11 @@ def test_experiments_that_are_data_stand_beside_those_in_python_and_its_tuning_t
 def test_a_tuning_file_that_is_wrong_is_named_by_the_doctor_and_by_the_command_that_wants_it(site):
     (site / TUNING).write_text(TUNED.replace("cells", "cell"))
     forget()
-    said = f"{site / TUNING}: cured 1: cell is no field; there are shipped, better, scene, cells, metrics, dimension"
+    said = (
+        f"{site / TUNING}: cured 1: cell is not a field; fields are shipped, better, scene, cells, metrics, dimension"
+    )
     assert candidates_of("toy") == {} == belongs_of("toy") and cured_of("toy") == () and len(experiments_of("toy")) == 1
-    assert engine_folder.problems() == [f"toy: its {TUNING} cannot be had: {said}"]
+    assert engine_folder.problems() == [f"toy: its {TUNING} cannot be loaded: {said}"]
     for call in (["tune", "toy"], ["tune", "toy", "--decisive"]):
         done = CliRunner().invoke(main, call)
         assert (done.exit_code, done.stderr) == (2, f"crosscheck: tune: toy: {said}\n")
@@ -196,8 +198,8 @@ BROKEN_LAWS = [
     ("import os; os.abort()", "SIGABRT"),
     ("def (", "SyntaxError"),
     ("DEVIATIONS = 7", "not iterable"),
-    ("DEVIATIONS = ('a law',)", "no Deviation of toy"),
-    (LAWS.replace('engine="toy"', 'engine="bullet"'), "no Deviation of toy"),
+    ("DEVIATIONS = ('a law',)", "not a Deviation of toy"),
+    (LAWS.replace('engine="toy"', 'engine="bullet"'), "not a Deviation of toy"),
 ]
 
 
@@ -209,10 +211,10 @@ def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_wit
     before = len(laws_of("chipmunk"))
     assert laws_of("toy") == () and len(laws_of("chipmunk")) == before > 0
     assert len(experiments_of("toy")) == 1
-    assert any("toy: its laws cannot be had" in line and said in line for line in doctor()["problems"])
+    assert any("toy: its laws cannot be loaded" in line and said in line for line in doctor()["problems"])
     done, rows = run(tmp_path, "stack", "--param", "n=1")
     (row,) = [line for line in rows.splitlines() if ",penetration," in line]
-    assert ",fail,new," in row and "its laws cannot be had" in row and said in row, done.output
+    assert ",fail,new," in row and "its laws cannot be loaded" in row and said in row, done.output
 
 
 @pytest.mark.few(2)
@@ -237,14 +239,14 @@ DEVIATIONS = (Deviation("toy", ("default",), "stack", "penetration", lambda *ask
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("code", "said"),
-    [("raise RuntimeError('torn')", "torn"), ("EXPERIMENTS = ('one',)", "no Experiment"),
-     ("CURED = (1,)", "no Cured"), ("CANDIDATES = [1]", "no mapping")],
+    [("raise RuntimeError('torn')", "torn"), ("EXPERIMENTS = ('one',)", "not of type Experiment"),
+     ("CURED = (1,)", "not of type Cured"), ("CANDIDATES = [1]", "not a mapping")],
 )  # fmt: skip
 def test_experiments_that_cannot_be_had_are_named_and_there_are_none(site, code, said):
     (site / "experiments.py").write_text(code)
     forget()
     assert experiments_of("toy") == () == cured_of("toy") and candidates_of("toy") == {} == belongs_of("toy")
-    assert any("toy: its experiments cannot be had" in line and said in line for line in doctor()["problems"])
+    assert any("toy: its experiments cannot be loaded" in line and said in line for line in doctor()["problems"])
     assert len(laws_of("toy")) > 0
 
 

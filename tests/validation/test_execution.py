@@ -34,7 +34,7 @@ def test_steps_that_are_too_long_for_a_scene_are_a_refusal_and_no_crash(monkeypa
     slot = Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 20)  # 2.3 m a step
     observation = execute(slot)
     assert observation.outcome is Outcome.UNSUPPORTED
-    assert observation.reason == "dt: at 46.3 m/s a body passes 2 m of ground in one step unseen"
+    assert observation.reason == "dt: at 46.3 m/s a body passes 2 m of ground in one step, undetected"
     engine, scene = find("chipmunk").engine, resolve("bounce").scene(2, {})
     assert engine.refusal(scene, "tuned", 1 / 60) is None
 

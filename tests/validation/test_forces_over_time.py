@@ -97,7 +97,7 @@ def test_each_contact_and_their_number():
     assert of(trajectory, "floor/ball.contacts", "spread") == (0.0, "")
     assert [of(trajectory, f"{name}.contacts", "mean")[0] for name in ("floor/ball", "ball", "top")] == [2.0, 3.0, 1.0]
     assert of(trajectory, "floor/top.contacts", "greatest") == (0.0, "")
-    assert of(trajectory, "floor/top.contact_fy", "least") == (None, "there is no contact whose force could be told")
+    assert of(trajectory, "floor/top.contact_fy", "least") == (None, "there is no contact with a known force")
     assert (unit("a/b.contact_fy"), unit("a/b.contacts"), unit("a/b.overlap_without_force")) == ("N", "1", "m")
 
 

@@ -73,7 +73,7 @@ def test_whole_numbers_end_at_neighbours_from_either_side():
 def test_what_never_fails_and_what_never_survives_is_said_and_asked_no_further():
     safe, lost = bracket("thin_wall", "impact speed"), bracket("thin_wall", "impact speed")
     assert asked(safe, lambda v: True, QUICK_RATIO, BACK, THROUGH) == [1.0, 1e3]
-    assert safe.text == "1000 m/s survives, the hardest that was asked"
+    assert safe.text == "1000 m/s works, the hardest value that was tried"
     assert asked(lost, lambda v: False, QUICK_RATIO, BACK, THROUGH) == [1.0]
     assert lost.text == "already 1 m/s tunnelled"
 

@@ -185,7 +185,7 @@ def test_a_change_is_judged_by_what_moved_starts_change():
     lost = judged("mirrored", BASE, {"speed": (None, "gone"), "count": (0.0, "")}, Allowances(floors))
     assert not lost.holds and math.isinf(lost.change)
     assert not judged("mirrored", BASE, "it crashed", Allowances(floors)).holds
-    assert Change("boosted", refused="something in it is fixed").holds
+    assert Change("boosted", refused="it has fixed or driven bodies").holds
 
 
 def test_a_defect_of_nothing_may_change_by_what_no_check_could_see():

@@ -231,17 +231,17 @@ def test_both_checks_say_what_they_judge_in_which_unit_and_why():
         "energy_growth", "J", 0.0, invariants.energy_bound(scene, STEP))  # fmt: skip
     assert (depth.metric, depth.unit, depth.truth, depth.bound) == (
         "penetration", "m", 0.0, invariants.overlap_bound(scene, STEP))  # fmt: skip
-    assert energy.source == "contacts only take energy (e <= 1)" and depth.source == "bodies are impenetrable"
-    assert energy.because.startswith("a step order shows a conserved energy with half a step of its loads' work")
-    assert depth.because.startswith("a contact is found one step late at most")
+    assert energy.source == "contacts do not add energy (e <= 1)" and depth.source == "bodies are impenetrable"
+    assert energy.because.startswith("velocity and position are half a step apart, which changes a conserved energy")
+    assert depth.because.startswith("a contact is found at most one step late")
 
 
 def test_energy_that_something_may_feed_is_shown_without_a_truth_and_says_what_feeds_it():
     pusher = Body("pusher", Disc(0.5), pose=(5.0, 5.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
     energy, depth = invariants.checks(over_floor(ball(), pusher), STEP)
     assert (energy.truth, energy.bound) == (None, None)
-    assert energy.because == "shown: a prescribed body may feed energy in"
-    assert invariants.fed_by(over_floor(pusher)) == "a prescribed body may feed energy in"
+    assert energy.because == "shown: a prescribed body may add energy"
+    assert invariants.fed_by(over_floor(pusher)) == "a prescribed body may add energy"
     assert depth.truth == 0.0
     assert invariants.fed_by(over_floor(ball())) == ""
 

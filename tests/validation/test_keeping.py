@@ -109,7 +109,7 @@ def test_a_run_that_both_have_is_completed_and_ours_stays_where_they_differ(tmp_
 def test_what_cannot_be_merged_is_one_line_and_changes_nothing(tmp_path, monkeypatch):
     ours = filled(tmp_path / "a", "one", monkeypatch)
     before = contents(ours)
-    with pytest.raises(StoreError, match="is the store itself"):
+    with pytest.raises(StoreError, match="is the same store"):
         merge(ours, tmp_path / "a")
     with pytest.raises(StoreError, match="no results"):
         merge(ours, tmp_path / "nothing")
@@ -142,7 +142,7 @@ def test_a_run_of_another_machine_gets_an_id_from_what_it_is_and_a_third_is_refu
     db = sqlite3.connect(ours.path)
     db.execute("UPDATE runs SET date = '2019-01-01T00:00:00+00:00' WHERE id != ?", (long,))
     db.commit()
-    with pytest.raises(StoreError, match=f"^merge: two runs are called {long} and are not the same$"):
+    with pytest.raises(StoreError, match=f"^merge: two runs are called {long} but differ$"):
         merge(ours, tmp_path / "b1")
 
 
@@ -159,7 +159,7 @@ def test_a_name_of_any_length_is_refused_in_a_line(tmp_path, monkeypatch):
     db.commit()
     with pytest.raises(StoreError) as caught:
         merge(ours, tmp_path / "b")
-    assert len(str(caught.value)) == len("merge: two runs are called  and are not the same") + 80
+    assert len(str(caught.value)) == len("merge: two runs are called  but differ") + 80
 
 
 def test_a_finished_run_stays_finished_and_one_that_only_the_other_finished_is_finished_here(tmp_path, monkeypatch):

@@ -414,7 +414,7 @@ def test_a_crossing_is_the_first_on_the_way_up_and_none_where_the_level_is_not_r
     assert time == pytest.approx(2.0 * math.pi + math.asin(0.5), abs=1e-8)
     nothing = (None, metrics.NOT_PASSED)
     assert metrics.crossing(t, np.sin(t), np.cos(t), 1.5) == (nothing, nothing)
-    assert metrics.NOT_PASSED == "it never gets there"
+    assert metrics.NOT_PASSED == "it never arrives there"
 
 
 def test_a_crossing_at_a_sample_is_that_sample():

@@ -112,7 +112,9 @@ def test_a_null_says_its_value_and_why_it_has_none():
     assert found["did nothing"] == Null("did nothing", 0.0, 0.5, "")
     none = nulls_of("stack", 2, {}, DT, "interface_impulse[1]", 1.0)
     assert {(null.value, null.error) for null in none} == {(None, None)} and all(null.reason for null in none)
-    assert {null.reason for null in nulls_of("impact", 2, {}, DT, "nothing", 1.0)} == {"a null has no such metric"}
+    assert {null.reason for null in nulls_of("impact", 2, {}, DT, "nothing", 1.0)} == {
+        "a trivial answer has no such metric"
+    }
 
 
 def test_a_body_in_space_keeps_turning_about_its_axis():
@@ -181,7 +183,7 @@ def test_skill_is_measured_against_the_best_null(error, worth):
 def test_where_there_is_no_skill_it_is_said_why():
     assert skill(None, [Null("a", 0.0, 1.0)])[0] is None
     assert skill(0.1, [Null("a", 0.0, 0.0), Null("b", 1.0, 1.0)]) == (None, "a is exact here")
-    assert "no null has this number" in skill(0.1, [Null("a", None, None)])[1]
+    assert "no trivial answer has this value" in skill(0.1, [Null("a", None, None)])[1]
 
 
 def test_the_skill_of_a_row_is_that_of_its_cell():
@@ -190,7 +192,7 @@ def test_the_skill_of_a_row_is_that_of_its_cell():
     assert skill_of(row) == (pytest.approx(1.0 - 0.395 / 0.5), "did nothing")
     assert skill_of(row | {"value": None})[0] is None
     across = {"metric": "out_of_plane", "truth": 0.0, "value": 0.1}
-    assert skill_of(row | across) == (None, "a null is computed in the plane and cannot leave it")
+    assert skill_of(row | across) == (None, "a trivial answer is computed in 2-D and cannot leave its plane")
 
 
 def judged(*slots):

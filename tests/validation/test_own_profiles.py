@@ -86,7 +86,7 @@ def test_an_iteration_count_is_asked_for_once():
     slot = found[0]
     values = {s.name: s.value for s in settings_of(registry.load("chipmunk"), slot, prepare(slot).scene)}
     assert values["iterations"] == 7
-    with pytest.raises(EngineError, match="set: iterations are asked for by --iterations as well"):
+    with pytest.raises(EngineError, match="set: --iterations sets iterations as well"):
         asked("chipmunk", ("iterations", 7), iterations=[8])
 
 
@@ -98,7 +98,7 @@ def test_engines_that_know_all_settings_are_asked_where_none_is_named():
     with pytest.raises(EngineError, match="set: collision_slop=deep: must be a number of at least 0"):
         knowing(replace(request, sets=(("collision_slop", "deep"),)))
     with pytest.raises(
-        EngineError, match="no engine that is here has a setting 'collision_slot'; near it: collision_slop"
+        EngineError, match="no installed engine has a setting 'collision_slot'; near it: collision_slop"
     ):
         knowing(replace(request, sets=(("iterations", 3), ("collision_slot", 1))))
     if "mujoco" in names:
@@ -128,7 +128,7 @@ def test_a_cell_runs_with_the_settings_and_what_they_make_of_the_engine_is_measu
     found = execute(OWN)
     assert found.outcome is Outcome.OK
     told = {setting["name"]: setting for setting in found.settings}
-    assert told["damping"]["value"] == 0.5 and told["collision_slop"]["because"] == "set by whoever asked"
+    assert told["damping"]["value"] == 0.5 and told["collision_slop"]["because"] == "set by the user"
     assert found.readback["damping"] == 0.5 and found.readback["collision_slop"] == 0.01
     slips = {slip["quantity"]: slip for slip in found.receipts}
     # The share of a speed that is lost in a second: half, as it was asked for.

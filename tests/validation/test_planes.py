@@ -59,7 +59,7 @@ def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_hu
     assert bounds.planar(scene, DT, 9e8).bound == pytest.approx(9e-4 * 5.5)  # a hundredth of the radius is 5e-3
     for growth, said in ((1e9, "1e+09"), (4e10, "4e+10")):
         beyond = bounds.planar(scene, DT, growth)
-        assert (beyond.truth, beyond.bound) == (None, None) and f"grown {said} times" in beyond.because
+        assert (beyond.truth, beyond.bound) == (None, None) and f"amplified {said} times" in beyond.because
 
 
 def test_a_plane_far_out_is_owed_by_bodies_that_are_large_beside_its_round_off():
@@ -268,7 +268,7 @@ def test_a_plane_that_is_not_judged_is_a_check_all_the_same():
     assert (found.metric, found.unit, found.truth, found.bound, found.source) == ("out_of_plane", "m", None, None, "")
     judged = bounds.planar(scene, DT)
     assert (judged.metric, judged.unit, judged.truth) == ("out_of_plane", "m", 0.0)
-    assert judged.source == "what is lifted is its own mirror image in its plane"
+    assert judged.source == "a 2-D scene embedded in 3-D is symmetric about its plane"
 
 
 def test_where_nobody_is_free_no_load_is_granted_and_the_scene_itself_is_the_smallest():
@@ -282,7 +282,7 @@ def test_where_nobody_is_free_no_load_is_granted_and_the_scene_itself_is_the_sma
 def test_what_a_motion_multiplies_by_is_told_in_full_below_a_hundred_thousand():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1), (0.0, 0.0))
     for growth, said in ((1.0, "1000"), (99999.4, "99999"), (100000.0, "1e+05"), (123456.0, "1.2e+05")):
-        assert f"grown {said} times" in bounds.planar(scene, DT, growth).because
+        assert f"amplified {said} times" in bounds.planar(scene, DT, growth).because
 
 
 def test_a_saddle_beyond_all_numbers_is_told_as_the_last_that_has_one():

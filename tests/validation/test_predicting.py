@@ -70,7 +70,7 @@ def test_processes_that_die_leave_their_rows_to_this_one(few, monkeypatch):
 
 def test_laws_that_cannot_be_had_are_left_to_where_they_are_missed(monkeypatch):
     def gone(*row):
-        raise EngineError("mujoco: its laws cannot be had: no such file")
+        raise EngineError("mujoco: its laws cannot be loaded: no such file")
 
     monkeypatch.setattr(predicting, "covering", gone)
     assert predicting._said(ASKED[:2]) == [None, None]

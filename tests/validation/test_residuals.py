@@ -81,7 +81,7 @@ def test_what_is_not_reported_has_its_reason_and_no_number():
     silent = Trajectory(found.t, found.pose, found.twist, None, DT, "completed")
     assert residuals(scene, silent)[0]["pull"] == (None, "the engine reports no contacts")
     found.contacts.rows.impulse[0] = math.nan
-    assert "does not say" in residuals(scene, found)[0]["cone"][1]
+    assert "does not report" in residuals(scene, found)[0]["cone"][1]
 
 
 def test_a_bounce_obeys_newtons_law_and_half_of_it_does_not():
@@ -173,7 +173,7 @@ def test_why_there_is_nothing_is_said_of_every_law():
     empty = ContactRecord(np.array([1]), np.array([0, 0]), Contacts.from_rows([], 2))
     assert residuals(scene, replace(found, contacts=empty)) == (nothing("nothing touched"), 0)
     found.contacts.rows.impulse[:] = 0.0
-    assert residuals(scene, found) == (nothing("no contact carried anything"), 5)
+    assert residuals(scene, found) == (nothing("no contact carried a load"), 5)
 
 
 class Silent:

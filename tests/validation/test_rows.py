@@ -67,14 +67,14 @@ def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatc
 
     real = rows.resolve
     monkeypatch.setattr(rows, "resolve", lambda scene: Brought() if scene == "incline" else real(scene))
-    why = "as soft as its author made it: a model's own profile is no engine's"
+    why = "as soft as the model: the profile is the model's own, not the engine's"
     assert rows._known(SEEN, SLOT, CHECK) == rows.Known(None, False, why)
 
 
 def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     monkeypatch.setattr(rows, "findings_of", lambda engine: None)
-    said = "has no value, and is not listed as having none; it never touched"
+    said = "has no value, which is not listed; it never touched"
     assert judged(metrics={"creep": (None, "it never touched")}).reason == said
     assert judged(metrics={}).reason.endswith("; it was not measured")
 
@@ -103,7 +103,7 @@ def test_an_unsupported_cell_of_a_listed_engine_says_why_as_well(monkeypatch):
 
 def test_a_missing_cell_is_shown_with_nothing_that_it_has_not():
     (row,) = rows_of("run1", [], [SLOT])
-    said = "the plan has this cell, the run has no observation of it"
+    said = "the run has no observation of this planned case"
     assert (row.run, row.outcome, row.engine_version, row.cells, row.reason) == ("run1", "missing", "", [""], said)
     assert (row.value, row.steps, row.physics, row.standing, row.alarming) == (None, 0, None, None, True)
     assert [row.outcome for row in rows_of("run1", [SEEN], [SLOT])] == ["ok"]
@@ -263,11 +263,11 @@ def test_of_your_own_model_nothing_is_listed_and_only_a_cell_that_is_lost_is_an_
 
 def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
     def gone(*row):
-        raise EngineError("nameless: its laws cannot be had: no such file")
+        raise EngineError("nameless: its laws cannot be loaded: no such file")
 
     monkeypatch.setattr(predicting, "covering", gone)
     row = judged(slot=OWN)
-    said = "read late; the engine has no list of findings; nameless: its laws cannot be had: no such file"
+    said = "read late; the engine has no list of findings; nameless: its laws cannot be loaded: no such file"
     assert (row.physics, row.reason) == ("fail", said)
     assert predictions_of(row) == []
 
@@ -330,7 +330,7 @@ def test_a_study_without_a_value_says_why(monkeypatch):
     result = next(iter(rows.results([replace(SEEN, slot=replace(OWN, params=(("ratio", r),))) for r in (0.9, 1.1)])))
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     row = rows._study_row("run1", replace(result, value=None, reason="it never ran"))
-    assert row.reason == "has no value, and is not listed as having none; it never ran"
+    assert row.reason == "has no value, which is not listed; it never ran"
 
 
 # ---- as a table ----------------------------------------------------------------------------------------------------

@@ -198,7 +198,7 @@ def test_places_angles_velocities_and_forces_are_shown(tmp_path):
     assert shown["final[ball.fy]"] == "N" and shown["final[ball.angle]"] == "rad"
     checks = canonical.checks(canonical.scene(2), 0.01)
     assert {c.source for c in checks if c.truth is None} == {""}  # nobody stated it
-    assert "the file states no number for it" in next(c.because for c in checks if c.metric == "final[ball.fy]")
+    assert "the file states no value for it" in next(c.because for c in checks if c.metric == "final[ball.fy]")
 
 
 @pytest.mark.parametrize(
@@ -207,13 +207,13 @@ def test_places_angles_velocities_and_forces_are_shown(tmp_path):
         ("mass = 1.0", "mass = 1.0\ndensity = 2.0", "ball.density"),
         ("mass = 1.0", "density = -2.0", "ball.density"),
         ("normal = [0.0, 1.0]", "normal = [0.0, 0.0]", "floor.shape.normal"),
-        ("normal = [0.0, 1.0]", "normal = [0.0, 1.0], angle = 0.1", "its normal or by its angle"),
-        (", normal = [0.0, 1.0]", "", "its normal or by its angle"),
+        ("normal = [0.0, 1.0]", "normal = [0.0, 1.0], angle = 0.1", "either a normal or an angle"),
+        (", normal = [0.0, 1.0]", "", "either a normal or an angle"),
         ("ball.vy", "cube.vy", "checks.0.quantity: 'cube.vy' names no body"),
         ("ball.vy", "ball.vz", "checks.0.quantity: 'vz' is not one of"),
-        ("ball.vy", "floor/ball.vy", "only a force and its like is between two bodies"),
-        ("ball.vy", "ball.overlap_without_force", "an overlap is of two bodies"),
-        ("at = 0.1", 'over = "least"', "checks.0.over: only a force and its like is told over time"),
+        ("ball.vy", "floor/ball.vy", "between two bodies there are only forces, impulses and the like"),
+        ("ball.vy", "ball.overlap_without_force", "an overlap needs two bodies"),
+        ("at = 0.1", 'over = "least"', "checks.0.over: only for forces, impulses and the like"),
         ("at = 0.1", 'over = "median"', "checks.0.over"),
         ('ball.vy"', 'ball.fy"\nover = "least"', "checks.0.over: at an instant there is one number"),
         (
@@ -340,7 +340,7 @@ def test_a_spatial_scene_has_no_plane_to_leave(tmp_path):
         'name = "ball"\ndimension = 3\ngravity = [0.0, 0.0, -10.0]\nduration = 1.0\ngrowth = 10.0\n'
         '[[bodies]]\nname = "ball"\nshape = { type = "sphere", radius = 0.5 }\n'
     )
-    with pytest.raises(SceneError, match="growth: a spatial scene has no plane"):
+    with pytest.raises(SceneError, match="growth: a 3-D scene has no plane"):
         load_stated(path)
 
 
@@ -363,7 +363,7 @@ def pairs_notes(tmp_path, pairs):
         ("[[pairs]]\nfriction = 0.1\n", ["pairs: restitution 0 of all pairs, none was given"]),
         ("[[pairs]]\nfriction = 0.0\nrestitution = 0.0\n", []),
         ('[[pairs]]\na = "floor"\nb = "ball"\nfriction = 0.1\nrestitution = 0.2\n',
-         ["pairs: restitution 0 and friction 0 of pairs that no entry names, none was given"]),
+         ["pairs: restitution 0 and friction 0 of pairs without an entry, none was given"]),
         ('[[pairs]]\na = "ball"\nfriction = 0.1\nrestitution = 0.2\n'
          '[[pairs]]\na = "top"\nb = "floor"\nfriction = 0.3\n',
          ["pairs: restitution 0 of top-floor, none was given"]),

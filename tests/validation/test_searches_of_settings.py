@@ -332,12 +332,12 @@ def test_a_setting_that_belongs_to_another_is_switched_with_it_and_has_no_part(m
 @pytest.mark.parametrize(
     ("enough", "metrics", "said"),
     [
-        ([set()], (), "toy impact: 0.5 tolerances as shipped, 0.5 with every change: no cure"),
-        ([], (), "toy impact: 3 tolerances as shipped, 2.25 with every change: no cure"),
+        ([set()], (), "toy impact: 0.5 tolerances as shipped, 0.5 with every change, so this is no fix"),
+        ([], (), "toy impact: 3 tolerances as shipped, 2.25 with every change, so this is no fix"),
     ],
 )
 def test_what_passes_as_shipped_or_fails_with_every_change_is_no_cure(monkeypatch, enough, metrics, said):
-    with pytest.raises(ValueError, match="no cure") as refused:
+    with pytest.raises(ValueError, match="no fix") as refused:
         measured(monkeypatch, enough, metrics=metrics)
     assert str(refused.value) == said
 
@@ -359,7 +359,7 @@ def test_a_cure_that_changes_nothing_in_the_cell_that_is_told_says_what_it_chang
     found, _, _ = cured(monkeypatch, off, {"b": (3,)})
     assert (found.failing, found.helps) == (1, False)  # it breaks what passed
     monkeypatch.setattr(cures, "readings", lambda found: [])
-    assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its cells is judged")
+    assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its cases is judged")
 
 
 def test_what_is_left_a_little_above_its_tolerance_is_not_mended(monkeypatch):

@@ -149,7 +149,7 @@ def test_a_file_s_corners_are_moved_about_their_centroid_and_said(tmp_path):
     body = found.scene.bodies[0]
     assert body.mass == pytest.approx(9.0) and body.shape.vertices[0] == pytest.approx((-1.0, -1.0))
     assert body.inertia == pytest.approx(9.0 * 18.0 / 18.0)  # m (a^2 + b^2) / 18
-    assert any("centroid (1, 1) was made the body's centre" in note for note in found.notes)
+    assert any("centroid (1, 1) is now the body's centre" in note for note in found.notes)
     corners = str([list(np.add(v, (2.0, 0.0, 1.0)).tolist()) for v in BRICK.vertices])
     solid = read("hull", f"vertices = {corners}", 3, tmp_path).scene.bodies[0]
     assert solid.mass == pytest.approx(0.96)
@@ -163,7 +163,7 @@ def test_a_file_s_corners_are_moved_about_their_centroid_and_said(tmp_path):
     ("hull", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]", 3, "odd.shape.vertices: lie in one plane"),
     ("hull", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]", 3, "the main axes of inertia are not"),
     ("capsule", "radius = 1", 2, "half_length"),
-    ("cylinder", "radius = 1, half_length = 1", 2, "odd.shape: a Cylinder has no place in 2-D"),
+    ("cylinder", "radius = 1, half_length = 1", 2, "odd.shape: a Cylinder cannot be used in 2-D"),
 ])  # fmt: skip
 def test_corners_that_are_none_are_refused_by_their_field(kind, sizes, d, said, tmp_path):
     with pytest.raises(SceneError, match=said.replace("(", r"\(")) as refusal:

@@ -197,7 +197,7 @@ def test_a_study_whose_cells_have_no_answer_is_read_as_its_check_without_a_value
     monkeypatch.setattr(proofs, "study_of", lambda scene, metric: "a study")
     monkeypatch.setattr(proofs, "readings", lambda seen: [Reading(slot, check, 0.5, "")])
     monkeypatch.setattr(proofs, "results_of", lambda *asked: iter(()))
-    said = "the study's cells have no answer"
+    said = "the cases of the study have no result"
     assert proofs._read(slot, "threshold", {slot: observation}) == Reading(slot, check, None, said)
     monkeypatch.setattr(proofs, "results_of", lambda *asked: iter([Reading(slot, check, 0.25, "told")]))
     assert proofs._read(slot, "threshold", {slot: observation}) == Reading(slot, check, 0.25, "told")

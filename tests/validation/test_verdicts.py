@@ -146,24 +146,29 @@ def test_the_band_of_a_finding_holds_at_its_edge(value, standing):
     ("value", "predictions", "known", "said"),
     [
         (1.505, LAWFUL, NEW, "it does so by design (predicted 1.5 +- 0.01)"),
-        (1.6, LAWFUL, NEW, "left the band of its law, 1.5 +- 0.01: it does so by design"),
-        (1.2, [], NEW, "neither listed nor explained by a law"),
-        (1.2, [], Known(None, True, "another release"), "neither listed nor explained by a law; another release"),
+        (1.6, LAWFUL, NEW, "outside the band of its contact law, 1.5 +- 0.01: it does so by design"),
+        (1.2, [], NEW, "neither listed nor explained by a contact law"),
+        (
+            1.2,
+            [],
+            Known(None, True, "another release"),
+            "neither listed nor explained by a contact law; another release",
+        ),
         (1.2, [], UNLISTED, "the engine has no list"),
         (1.21, [], FAILS, "a reason"),
         (1.23, [], FAILS, "is listed with 1.2 +- 0.02: a reason"),
         (1.05, [], FAILS, "passes, but is listed with 1.2 +- 0.02: a reason"),
-        (1.09, [], MARGINAL, "passes within the band of what is listed as failing: a reason"),
+        (1.09, [], MARGINAL, "passes within the band of the listed failure: a reason"),
         (1.12, [], MARGINAL, "a reason"),
         (1.2, [], NO_VALUE, "is listed as having no value: a reason"),
         (1.2, [], EXPLODES, "is listed as diverging: a reason"),
         (1.05, [], NO_VALUE, "passes, but is listed as having no value: a reason"),
         (1.05, [], NEW, ""),
-        (None, [], NEW, "has no value, and is not listed as having none"),
+        (None, [], NEW, "has no value, which is not listed"),
         (None, [], UNLISTED, "the engine has no list"),
         (None, [], NO_VALUE, "a reason"),
-        (None, [], FAILS, "has no value any more; is listed with 1.2 +- 0.02: a reason"),
-        (None, [], EXPLODES, "has no value any more; is listed as diverging: a reason"),
+        (None, [], FAILS, "has no value now; is listed with 1.2 +- 0.02: a reason"),
+        (None, [], EXPLODES, "has no value now; is listed as diverging: a reason"),
     ],
 )
 def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
@@ -172,7 +177,7 @@ def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
 
 def test_a_missing_value_says_why_after_what_is_wrong_with_that():
     verdict = judge(None, CHECK, (), NEW, "there is no apex")
-    assert verdict.reason == "has no value, and is not listed as having none; there is no apex"
+    assert verdict.reason == "has no value, which is not listed; there is no apex"
 
 
 @pytest.mark.parametrize(
@@ -193,7 +198,8 @@ def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from
     other = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: (2.0, 0.1), "another mechanism", "its manual")
     both = [*LAWFUL, (other, 2.0, 0.1)]
     assert judge(2.05, CHECK, both, NEW).reason == "another mechanism (predicted 2 +- 0.1)"
-    assert judge(3.0, CHECK, both, NEW).reason == "left the band of its law, 1.5 +- 0.01: it does so by design"
+    said = judge(3.0, CHECK, both, NEW).reason
+    assert said == "outside the band of its contact law, 1.5 +- 0.01: it does so by design"
 
 
 def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_are_left_out():

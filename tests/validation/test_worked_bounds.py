@@ -65,7 +65,7 @@ def test_the_first_bounce_in_numbers():
     """e = 1/2 from 1 m under 8 m/s^2 at 1/256 s: 4 m/s, a cost of 9/8 v dt, and 8/65536/8 m of the first parabola."""
     first = checks_of("bounce", dt=1 / 256, e=0.5, height=1.0, g=8.0)["apex[1]"]
     assert first.bound == pytest.approx(9 / 8 * 4 / 256 + 1 / 65536, rel=1e-14)
-    assert first.source == "energy balance of a bounce found late by <= dt"
+    assert first.source == "energy balance of a bounce that is found late by up to dt"
 
 
 def test_an_arc_counts_only_if_it_starts_faster_than_twenty_steps_of_gravity():
@@ -194,12 +194,12 @@ STATED = {
     "bookkeeping": (
         (4.0,),
         4e-12,
-        "impulses are bookkeeping: they must add up to m dv to round-off, whatever the law",
+        "impulses must sum to m dv up to round-off, whatever the contact law",
     ),
     "slips": (
         (3, 9.0, 0.25),
         1.6875,
-        "each of n interfaces may slip by what one step of free fall adds, and slips add up: n g dt^2",
+        "each of n interfaces may slip by one step of free fall, and slips add up: n g dt^2",
     ),
     "found_late": (
         (9.0, 0.25, 7e9),
@@ -214,7 +214,7 @@ STATED = {
     "still_energy": (
         (3.0, 9.0, 0.25),
         1.5 * (0.01 * 2.25) ** 2,
-        "n bodies below the speed that counts as motion, v1/100 = g dt/100",
+        "n bodies slower than the limit of motion, v1/100 = g dt/100",
     ),
     "settled": (
         (2, 0.001, 10.0),
@@ -231,7 +231,7 @@ STATED = {
     "stuck": (
         (9.0, 0.25, 2.0),
         0.28125,
-        "a sticking box may move by what one step of free fall adds, g dt^2, over the whole run",
+        "a sticking box may move by one step of free fall, g dt^2, over the whole run",
     ),
     "driven": (
         (9.0, 0.25, 2.0),

@@ -70,7 +70,7 @@ def test_a_cell_is_told_with_its_recording_and_the_look_that_the_next_one_is_com
 def test_an_engine_that_is_there_and_not_in_the_worker_is_a_crash_and_one_that_is_nowhere_is_as_it_answers(answer):
     told, _, _ = answer(engine=None)
     assert told["observation"]["outcome"] == "crashed"
-    assert told["observation"]["reason"] == "it can be loaded elsewhere, but not in its worker: no wheel"
+    assert told["observation"]["reason"] == "it can be loaded, but not in its worker process: no wheel"
     told, _, _ = answer(engine=None, installed=False)
     assert told["observation"]["outcome"] == "ok"
 

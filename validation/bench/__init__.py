@@ -11,6 +11,13 @@
     statistics.py  median, bootstrap interval, drift, lower envelope, exponent
     reading.py     tables of a bench run: work points, time at equal error, scaling, overhead, ratios
 
+Beside it, with the same lane:
+
+    targets.py     the textbook step against other engines at 10 sweeps and at equal error (targets.toml, errors.py)
+    scenes.py      scenes that only a bench has
+    piles.py       what it costs to cut steps at events, in piles
+    guard.py       whether the textbook step became slower than it was (guard.toml)
+
 Protocol
     * Accuracy is measured before anything is timed, and a cell whose physics is invalid is never timed.
     * Timed is one call ``simulation.advance(n)`` of a simulation that was built, and brought into the state that

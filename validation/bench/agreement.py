@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
 from validation.bench.reading import POINT, identity, table_of
-from validation.bench.statistics import spread
+from validation.bench.statistics import Spread, spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
 from validation.records.store import Run, Store
@@ -33,17 +34,24 @@ def ratios(store: Store, run: Run) -> pd.DataFrame:
     rows = []
     for (purpose, slot), own in by_unit.items():
         partner = by_unit.get((purpose, opponent_slot(next(iter(own.values())))))
-        rounds = sorted(set(own) & set(partner or {}))
-        if partner is None or len(rounds) < 2 or partner is own:
+        found = None if partner is own else ratio(own, partner or {})
+        if partner is None or found is None:
             continue
-        logs = [math.log(_rate(own[k]) / _rate(partner[k])) for k in rounds]
-        found = spread(logs)
-        first, other = own[rounds[0]], partner[rounds[0]]
-        row = {"purpose": purpose, **identity(slot), "opponent": first.opponent, "rounds": len(rounds)}
+        first, other = next(iter(own.values())), next(iter(partner.values()))
+        row = {"purpose": purpose, **identity(slot), "opponent": first.opponent, "rounds": found.n}
         row |= {"engine_version": first.engine_version, "opponent_version": other.engine_version}
-        row |= {"ratio": math.exp(found.median), "ratio_low": math.exp(found.low), "ratio_high": math.exp(found.high)}
+        row |= {"ratio": found.median, "ratio_low": found.low, "ratio_high": found.high}
         rows.append(row)
     return table_of(rows)
+
+
+def ratio(own: Mapping[int, Timing], other: Mapping[int, Timing]) -> Spread | None:
+    """Median over rounds of the time of a step over ``other``'s in the same round; None for fewer than two rounds."""
+    rounds = sorted(set(own) & set(other))
+    if len(rounds) < 2:
+        return None
+    found = spread([math.log(_rate(own[k]) / _rate(other[k])) for k in rounds])
+    return Spread(found.n, *(math.exp(x) for x in (found.minimum, found.median, found.low, found.high)))
 
 
 def opponent_slot(timing: Timing) -> Slot:

@@ -1,6 +1,6 @@
 """The timing lane: one process that times one thing at a time, driven in rounds from outside.
 
-    parent --(unit)--> lane process: stopwatch --(lap)--> parent
+    parent --(call)--> lane process: stopwatch --(lap)--> parent
        each round: groups in random order; in a group, every open unit once, in random order
        a unit closes when the interval of its median is narrow enough, or its rounds or its time are used up
 
@@ -15,19 +15,22 @@ import os
 import random
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, TypeVar
 
 from adapters.isolation import end_with
 from adapters.registry import load_engines_here
+from validation import posed
 from validation.bench.statistics import spread
-from validation.bench.stopwatch import Lap, serve
+from validation.bench.stopwatch import Lap, lap, serve
 from validation.bench.timing import Timing
 from validation.bench.units import Unit
 
+T = TypeVar("T")
 #: Libraries must not start threads of their own: a thread that helps one engine is time that is not counted alike.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -106,25 +109,29 @@ class Lane:
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         with _one_thread():
-            self._process = context.Process(target=_child, args=(theirs, os.getpid()), daemon=True)
+            self._process = context.Process(target=_child, args=(theirs, os.getpid(), posed.known_texts()), daemon=True)
             self._process.start()
         theirs.close()
         self.count += 1
 
     def time(self, unit: Unit) -> Lap:
         """Lap of ``unit``; void if the process died or hung over it."""
+        answer, reason = self.ask(partial(lap, unit))
+        return answer or Lap("", 0.0, 0.0, self.patience, "", None, void=reason)
+
+    def ask(self, call: Callable[[], T]) -> tuple[T | None, str]:
+        """What ``call`` returns in the lane's process; None, and why, if that died or hung over it."""
         assert self._connection is not None
         reason = f"no answer after {self.patience:g} s"
         try:
-            self._connection.send(unit)
+            self._connection.send(call)
             if self._connection.poll(self.patience):
-                answer: Lap = self._connection.recv()
-                return answer
+                return self._connection.recv(), ""
         except (EOFError, OSError):
             self._process.join(5.0)
             reason = f"the process ended with exit code {self._process.exitcode}"
         self.start()
-        return Lap("", 0.0, 0.0, self.patience, "", None, void=reason)
+        return None, reason
 
     def stop(self) -> None:
         """End the process."""
@@ -135,8 +142,9 @@ class Lane:
             self._process = None
 
 
-def _child(connection: Connection, parent: int) -> None:
+def _child(connection: Connection, parent: int, scenes: dict[str, str]) -> None:
     end_with(parent)
+    posed.remember(scenes)  # a model was read by an engine in a process of its own, and this one may start none
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     load_engines_here()
     serve(connection)

@@ -58,7 +58,7 @@ def _void(unit: Unit, error: float | None) -> str:
     return ""
 
 
-class _Lowered:
+class Lowered:
     """Reads a lifted simulation as a planar one, state by state: what a user who looks after each step pays."""
 
     def __init__(self, inner: Simulation) -> None:
@@ -82,7 +82,7 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
         twin.close()
     simulation = engine.build(scene, dt, settings)
     try:
-        view = _Lowered(simulation) if lifted else simulation
+        view = Lowered(simulation) if lifted else simulation
         start = np.array(view.pose())
         if unit.warm_up:
             simulation.advance(unit.warm_up)
@@ -128,7 +128,7 @@ CLOCK_COST = _clock_cost()
 
 
 def serve(connection: Connection) -> None:
-    """Answer units with laps until the other end closes; what engines print is thrown away."""
+    """Call what is sent and send back what it returns until the other end closes; what engines print is thrown away."""
     import os
 
     null = os.open(os.devnull, os.O_WRONLY)
@@ -136,6 +136,6 @@ def serve(connection: Connection) -> None:
     os.dup2(null, 2)
     while True:
         try:
-            connection.send(lap(connection.recv()))
+            connection.send(connection.recv()())
         except EOFError:
             return

@@ -17,12 +17,13 @@ from typing import Any
 from adapters.registry import find, is_ranked
 from validation.bench.reading import POINT
 from validation.bench.units import Unit, iteration_units, overhead_units, size_units, work_unit
-from validation.bench.work import accuracy
+from validation.bench.work import accuracy, certified_of, measured
 from validation.canonical import Suite
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
+from validation.files.distance import CertifiedRuns, certified_slot
 from validation.identity import machine
-from validation.posed import primary_of, resolve
+from validation.posed import is_file, primary_of, resolve
 from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Store
 from validation.running.plan import Request, slots
 
@@ -76,7 +77,7 @@ def benched(suite: Suite) -> list[str]:
 
 
 def accuracy_slots(sweep: Sweep) -> list[Slot]:
-    """Return all cells whose errors are needed.
+    """Return all cells whose errors are needed; of scenes from files also the runs that they are measured from.
 
     Raises
     ------
@@ -84,8 +85,9 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
         For a scene without a declared error, unknown engines, profiles or parameters.
     """
     found: dict[Slot, None] = {}
+    apart: dict[Slot, None] = {}
     for scene in sweep.request.scenes:
-        primary = primary_of(scene)
+        primary, before = primary_of(scene), len(found)
         for dt in sweep.steps(scene):
             for variation in primary.variations(dt):
                 params = {**variation, **sweep.params}
@@ -93,7 +95,10 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
                 found.update(dict.fromkeys(slots(wanted)))
                 for count in sweep.counts(scene):
                     found.update(dict.fromkeys(slots(replace(wanted, iterations=[count]))))
-    return [slot for slot in found if _is_benched(sweep.request, slot.engine, slot.base)]
+        if is_file(scene):
+            finest = min(sweep.steps(scene))
+            apart.update(dict.fromkeys(certified_slot(slot, 0.5 * finest) for slot in list(found)[before:]))
+    return [*(slot for slot in found if _is_benched(sweep.request, slot.engine, slot.base)), *apart]
 
 
 def _is_benched(request: Request, engine: str, profile: str) -> bool:
@@ -121,9 +126,11 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     """Everything to time after the errors are known; work points without a valid error are not among it."""
     suite, request = sweep.request.suite, sweep.request
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
+    certified = certified_of(observations)
+    observations = list(measured(observations, certified))
     for observation in observations:
         groups[tuple(getattr(observation.slot, name) for name in POINT)].append(observation)
-    units = [unit for members in groups.values() for unit in _work_units(members)]
+    units = [unit for members in groups.values() for unit in _work_units(members, certified)]
     engines = [
         (name, profile)
         for name in request.engines
@@ -147,8 +154,8 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     return units + piles
 
 
-def _work_units(members: Sequence[Observation]) -> Iterator[Unit]:
-    point = accuracy(members)
+def _work_units(members: Sequence[Observation], certified: CertifiedRuns) -> Iterator[Unit]:
+    point = accuracy(members, certified)
     if point["reason"]:
         return
     slot = slot_from_dict(point["slot"])

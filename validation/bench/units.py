@@ -1,7 +1,4 @@
-r"""What is timed: scenes of the catalogue, at any size where they have one, and the bench's own scenes.
-
-empty      only the floor: what a step costs before there is any physics
-flight     one free body that meets nothing
+"""What is timed: scenes of the catalogue, at any size where they have one, and the bench's own scenes (`scenes`).
 
 Piles are scenes of the catalogue: columns of n bodies, and the wall of r rows of boxes.
 """
@@ -9,7 +6,7 @@ Piles are scenes of the catalogue: columns of n bodies, and the wall of r rows o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -19,15 +16,13 @@ import numpy as np
 from adapters.engine import Array, Engine
 from adapters.needs import needs
 from adapters.registry import find, load
-from adapters.scene import Body, Pair, Scene
+from adapters.scene import Scene
 from adapters.stepping import posed_for, step_count
+from validation.bench.scenes import OWN
 from validation.bench.timing import Purpose
-from validation.canonical import GRAVITY
 from validation.cells import Slot, settings_of
 from validation.posed import primary_of, resolve
-from validation.scenes.parts import ball, floor, upward
 
-SIDE = 1.0
 #: A pile is timed after this much time in contact, for as long again [s]: 24 steps of 1/240 s.
 SETTLING = 0.1
 #: A body that has moved by half a side no longer stands where it stood: the pile has collapsed, or was pushed apart.
@@ -139,17 +134,8 @@ def runs(slot: Slot) -> bool:
 @lru_cache(maxsize=64)
 def scene_of(slot: Slot) -> Scene:
     """Scene of a slot: one of the bench's own, else the catalogue's."""
-    params = dict(slot.params)
-    if slot.scene == "empty":
-        return _scene(slot, (floor(slot.dimension),), {})
-    if slot.scene == "flight":
-        return _scene(slot, (ball("ball", slot.dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), {})
-    return resolve(slot.scene).scene(slot.dimension, params)
-
-
-def _scene(slot: Slot, bodies: tuple[Body, ...], params: Mapping[str, float]) -> Scene:
-    pairs = (Pair(restitution=0.0, friction=0.5),)
-    return Scene(slot.scene, 1, slot.dimension, bodies, pairs, upward(slot.dimension, -GRAVITY), 1.0, params)
+    make = OWN.get(slot.scene) or resolve(slot.scene).scene
+    return make(slot.dimension, dict(slot.params))
 
 
 def _free(scene: Scene) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from adapters.registry import is_ranked
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot
-from validation.posed import primary_of, resolve
+from validation.files.distance import CertifiedRuns, certified_runs, posed
+from validation.posed import is_file, primary_of, resolve
 from validation.records.store import Run, Store
 
 #: Errors at which costs are compared.
@@ -41,9 +42,11 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
     ``observations`` are those of the run, where they were read already.
     """
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
-    for observation in store.observations(run) if observations is None else observations:
+    everything = list(store.observations(run) if observations is None else observations)
+    certified = certified_of(everything)
+    for observation in measured(everything, certified):
         slot = observation.slot
-        if resolve(slot.scene).primary:
+        if is_file(slot.scene) or resolve(slot.scene).primary:
             groups[tuple(getattr(slot, name) for name in POINT)].append(observation)
     summary = timings_summary(store, run)
     work = summary[summary["purpose"] == "work"] if len(summary) else summary
@@ -51,7 +54,7 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
     empty = _empty_per_step(summary)
     rows = []
     for key, members in groups.items():
-        row = accuracy(members)
+        row = accuracy(members, certified)
         row |= _cost_columns(costs.get((key, False)), costs.get((key, True)))
         row["cost_corrected"] = row["cost"] - empty.get(key[1:4], math.nan) / row["dt"]
         row["reason"] = row["reason"] or ("" if math.isfinite(row["cost"]) else "not timed")
@@ -59,11 +62,25 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
     return with_fronts(table_of(rows))
 
 
-def accuracy(members: Sequence[Observation]) -> dict[str, Any]:
-    """Identity, primary error and outcome of one work point from the observations of its cells."""
+def certified_of(observations: Sequence[Observation]) -> CertifiedRuns:
+    """The certified runs of those scenes that are files."""
+    return certified_runs(o for o in observations if is_file(o.slot.scene))
+
+
+def measured(observations: Iterable[Observation], certified: CertifiedRuns) -> Iterator[Observation]:
+    """Observations but those that others are measured from."""
+    apart = {run.slot for run in certified.values()}
+    return (observation for observation in observations if observation.slot not in apart)
+
+
+def accuracy(members: Sequence[Observation], certified: CertifiedRuns | None = None) -> dict[str, Any]:
+    """Identity, primary error and outcome of one work point from the observations of its cells.
+
+    ``certified`` are the runs that scenes from files are measured from.
+    """
     first = min(members, key=lambda observation: _position(observation.slot))
     primary = primary_of(first.slot.scene)
-    errors = [_error(observation) for observation in members]
+    errors = [_error(observation, certified or {}) for observation in members]
     bad = [o for o in members if o.outcome is not Outcome.OK]
     missing = [reason for value, reason in errors if value is None]
     values = [-1.0 if value is None else value for value, _ in errors]
@@ -92,12 +109,17 @@ def _position(slot: Slot) -> int:
     return 10**6
 
 
-def _error(observation: Observation) -> tuple[float | None, str]:
+def _error(observation: Observation, certified: CertifiedRuns) -> tuple[float | None, str]:
     if observation.outcome is not Outcome.OK:
         return None, observation.reason
-    slot = observation.slot
+    slot, metrics = observation.slot, observation.metrics
+    if is_file(slot.scene):
+        run = certified.get(posed(slot))
+        if run is None or run.reason:
+            return None, run.reason if run else "no certified run to measure from: it has no result"
+        metrics = {**metrics, **run.metrics}
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return primary_of(slot.scene).error(scene, slot.dt, observation.metrics)
+    return primary_of(slot.scene).error(scene, slot.dt, metrics)
 
 
 def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:

@@ -1,14 +1,14 @@
-"""Field notes: what people asked or reported in public, each with a cell that shows it, and what our run says.
+"""Known reports: public questions and reports, each with a cell that shows it, and the result of our run.
 
-``notes.toml`` has the questions: repository and number as source, the symptom in our own words, the cell and the check
-that show it, what cures it. What a run says is never written there but ``said``, which a test keeps true:
+``notes.toml`` has the reports: repository and number as source, the symptom in our words, the cell and check that show
+it, and the fix. ``said`` is the result of a run, which a test keeps up to date:
 
     reproduced       the check fails
-    not seen         it passes on the release that is installed
+    not seen         it passes on the installed release
     cured            it fails, and passes with the cure
 
-A question that was asked about an engine which is not among ours (``about``) is asked of one of ours that decides alike
-or otherwise: the note says which.
+A report about an engine that is not among ours (``about``) runs on one of ours with the same or another approach, which
+the note names.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from validation.posed import resolve
 from validation.running.plan import QUICK_DT
 from validation.settings.switching import Reading, observe, reading, switched
 
-#: What a run can say of a note.
+#: Results of a run for a note.
 REPRODUCED, NOT_SEEN, CURED = "reproduced", "not seen", "cured"
 ABSENT = "not installed"
 
@@ -40,15 +40,15 @@ class Note:
     source
         ``owner/repository#number``.
     about
-        Engine that it was asked about.
+        Engine of the report.
     symptom
-        What was seen, in our own words.
+        What was seen, in our words.
     engine, profile, scene, dimension, params, dt, metric
         The check that shows it.
     cure
-        Settings that mend it (``profile`` stands for all of that profile's); empty if nobody knows any.
+        Settings that fix it (``profile`` means all of that profile's); empty if none are known.
     said
-        What a run says of it: `REPRODUCED`, `NOT_SEEN` or `CURED`.
+        Result of a run: `REPRODUCED`, `NOT_SEEN` or `CURED`.
     """
 
     source: str
@@ -72,7 +72,7 @@ class Note:
 
     @property
     def cured_slot(self) -> Slot | None:
-        """The cell with the cure."""
+        """The cell with the fix."""
         if not self.cure:
             return None
         settings = {name: tuple(v) if isinstance(v, list) else v for name, v in self.cure.items() if name != "profile"}
@@ -81,7 +81,7 @@ class Note:
 
     @property
     def cure_text(self) -> str:
-        """The cure in words."""
+        """The fix in words."""
         words = [f"profile {v}" if name == "profile" else f"{name}={_said(v)}" for name, v in self.cure.items()]
         return ", ".join(words)
 
@@ -92,7 +92,7 @@ def _said(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a run says of a note; ``now`` is empty of an engine that is not here."""
+    """Result of a run for a note; ``now`` is empty for an engine that is not installed."""
 
     note: Note
     now: str
@@ -101,7 +101,7 @@ class Finding:
 
     @property
     def as_said(self) -> bool:
-        """Whether the note is still true, as far as it can be asked here."""
+        """Whether the note is still true, as far as it can run here."""
         return self.now in (ABSENT, self.note.said)
 
 
@@ -145,6 +145,6 @@ def _finding(note: Note, seen: Mapping[Slot, Any]) -> Finding:
 
 
 def matching(words: Sequence[str]) -> list[Note]:
-    """Notes of which source, engines or scene have one of the words; all if none is given."""
+    """Notes whose source, engines or scene contain one of the words; all if none is given."""
     texts = {note: f"{note.source} {note.about} {note.engine} {note.scene}".lower() for note in notes()}
     return [note for note, text in texts.items() if not words or any(word.lower() in text for word in words)]

@@ -1,17 +1,17 @@
-"""What was measured of an engine without our adapter, and the row of ours that shows it, or contradicts it.
+"""Measurements of an engine without our adapter, and our rows that confirm or contradict them.
 
 ``measured.toml`` in an engine's folder has the facts, each in one of three ways:
 
     ``scene``     a cell, a metric, ``low`` and ``high`` as measured, ``found`` by our cell: it is as measured, or
                   contradicted, with why (``because``)
-    ``test``      a test that asserts it, where no scene asks it
-    ``unasked``   why nothing of ours can show it
+    ``test``      a test that asserts it, where no scene shows it
+    ``unasked``   why no scene or test can show it
 
-Where a sheet does not state all of what it did (a step, a radius, when it was read), a cell of ours that answered
-otherwise was asked again under others until one agreed. That is no test of the fact: ``chosen`` names what was chosen
-so, and it is told. So were the conditions looked for that a ``because`` names.
+Where a source leaves conditions open (a step, a radius, a time of reading) and our cell disagreed, other conditions
+were tried until one agreed. That is no test of the fact: ``chosen`` names them, and it is shown. The conditions in a
+``because`` were found in the same way.
 
-`crosscheck describe ENGINE` tells them; a test runs the cells and holds each ``found`` against what they answer.
+`crosscheck describe ENGINE` shows them; a test runs the cells and compares each ``found`` with the results.
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ from validation.running.plan import QUICK_DT
 from validation.settings.switching import switched
 
 FILE = "measured.toml"
-#: What our cells say of a fact.
+#: Results of our cells for a fact.
 SHOWN, CONTRADICTED, TESTED, UNASKED = "as measured", "contradicted", "tested", "not checked"
 
 
 @dataclass(frozen=True)
 class Fact:
-    """One thing that was measured of an engine without our adapter.
+    """One measurement of an engine without our adapter.
 
     Parameters
     ----------
     says
         What was measured, in one line.
     scene, profile, dimension, params, dt, iterations, settings
-        The cell that shows it; ``settings`` are switched.
+        The cell that shows it, with ``settings`` switched.
     metric, low, high
-        Between what its metric lies if the cell shows what was measured; of ``error``, how far it is from the truth.
+        Range of the metric if the cell confirms the measurement; with ``error``, of its distance from the truth.
     found
-        What our cell answers.
+        Result of our cell.
     because
-        Why our cell answers otherwise, where it does.
+        Why our cell disagrees, if it does.
     test, unasked
         See this module.
     chosen
-        What the sheet leaves open and was chosen after another choice had contradicted it; see this module.
+        Conditions that the source leaves open, chosen after another choice had disagreed; see this module.
     """
 
     says: str
@@ -75,13 +75,13 @@ class Fact:
 
     @property
     def standing(self) -> str:
-        """Which of the three ways this is, and whether our cell agrees."""
+        """Which of the three ways it is, and whether our cell agrees."""
         if not self.scene:
             return TESTED if self.test else UNASKED
         return SHOWN if self.holds(self.found) else CONTRADICTED
 
     def holds(self, value: float) -> bool:
-        """Whether a value is what was measured."""
+        """Whether a value confirms the measurement."""
         return self.low <= value <= self.high
 
     def slot(self, engine: str) -> Slot:
@@ -92,7 +92,7 @@ class Fact:
         return switched(slot, settings) if settings else slot
 
     def number_of(self, metrics: Mapping[str, tuple[float | None, str]]) -> float | None:
-        """The number that this fact is about, from the metrics of its cell."""
+        """The value of this fact, from the metrics of its cell."""
         value = metrics[self.metric][0] if self.metric in metrics else None
         if value is None or not self.error:
             return value
@@ -103,7 +103,7 @@ class Fact:
 
 @cache
 def facts_of(engine: str) -> tuple[Fact, ...]:
-    """Facts of ``engine`` in their order; none if nobody has written any.
+    """Facts of ``engine`` in order; none if it has no file.
 
     Raises
     ------
@@ -122,9 +122,9 @@ def _fact(raw: Mapping[str, Any]) -> Fact:
         values["dt"] = parse_dt(str(values["dt"]))
     fact = Fact(**values)
     if sum(map(bool, (fact.scene, fact.test, fact.unasked))) != 1:
-        raise ValueError(f"{fact.says}: one of a cell, a test and why it is not asked")
+        raise ValueError(f"{fact.says}: needs one of a case, a test and a reason why it is not tested")
     if (fact.standing == CONTRADICTED) != bool(fact.because):
-        raise ValueError(f"{fact.says}: what a cell contradicts has a reason, and nothing else has")
+        raise ValueError(f"{fact.says}: a contradiction by a case needs a reason, and only that has one")
     if fact.chosen and fact.standing not in (SHOWN, TESTED):
-        raise ValueError(f"{fact.says}: a choice is told of what agrees by it")
+        raise ValueError(f"{fact.says}: a choice made afterwards is stated only for agreement")
     return fact

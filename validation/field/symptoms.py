@@ -1,4 +1,4 @@
-"""Finds the scene that shows a symptom: words of a user against what scenes and known reports say."""
+"""Finds the scene that shows a symptom: a user's words in scenes and known reports."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from validation.catalogue import CATALOGUE
 from validation.field import Note, notes
 
-#: Words that say nothing about contact.
+#: Words without meaning for contact.
 IDLE = frozenset(re.findall(r"\w+", """
     a an and are as at be by can do does don every for from have how i in is it its just keep my not of off on one or
     should so some than that the them they thing this to too up we what when which why with
 """))  # fmt: skip
 ENDINGS = re.compile(r"(?:ions?|ing|ed|es|er|s|e|y)$")
-#: Symptoms that no scene shows, and what helps.
+#: Symptoms that no scene shows, with the command that helps.
 COMMANDS = {
     "results changed with a release, version, upgrade or update of the engine":
         "crosscheck bisect ENGINE OLD..NEW SCENE names the release that changed them",
@@ -33,13 +33,13 @@ class Match:
     scene
         Its name; empty for a symptom that no scene shows.
     score
-        Sum of the weights of the words found there: the rarer a word among all scenes, the more it weighs.
+        Sum of the weights of the words found; rarer words weigh more.
     words
         Words of the question that were found.
     report
-        Known report about the scene that has most of these words, if one has any.
+        Known report about the scene with most of these words, if any.
     command
-        What helps where no scene shows it.
+        Command that helps where no scene shows it.
     """
 
     scene: str
@@ -59,7 +59,7 @@ def stem(word: str) -> str:
 
 
 def stems(text: str) -> dict[str, str]:
-    """Words of a text that mean something, by their stem."""
+    """Meaningful words of a text, by their stem."""
     words = re.findall(r"[a-z0-9#]+", text.lower())
     return {stem(word): word for word in words if word not in IDLE}
 
@@ -70,9 +70,9 @@ def matches(words: str, engines: Sequence[str] = ()) -> list[Match]:
     Parameters
     ----------
     words
-        What a user says, or the end of the source of a known report (``repository#number``).
+        A user's words, or the end of the source of a known report (``repository#number``).
     engines
-        Engines that the question names: reports about others count less.
+        Engines in the question: reports about others count less.
 
     Notes
     -----

@@ -1,1 +1,1 @@
-"""Scenes that people write: text -> fields -> a canonical scene, and what of it is judged; models as well."""
+"""Scene files and models of users: text -> fields -> a canonical scene and its checks."""

@@ -1,8 +1,8 @@
-"""Numbers that a scene file states as a formula: ``"v0 * t - 0.5 * mu * g * t ** 2"``.
+"""Numbers given as formulas in a scene file: ``"v0 * t - 0.5 * mu * g * t ** 2"``.
 
-The grammar is arithmetic alone: numbers, names, ``+ - * / **``, parentheses and a few functions, each of real
-numbers. It is read by Python's own parser and evaluated node by node; whatever is not listed here is refused, so that a
-file cannot reach anything, and what is no finite number is an error.
+The grammar is arithmetic: numbers, names, ``+ - * / **``, parentheses and a few functions, all of real numbers.
+Python's parser reads it, and it is evaluated node by node; everything else is refused, so that a file cannot run code,
+and a value that is not finite is an error.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from adapters.plain import one_line
 
 #: Longest formula [characters].
 LONGEST = 300
-#: Functions and how many arguments they take.
+#: Functions and their numbers of arguments.
 FUNCTIONS: Mapping[str, tuple[Callable[..., float], tuple[int, int]]] = {
     "sqrt": (math.sqrt, (1, 1)),
     "exp": (math.exp, (1, 1)),
@@ -45,7 +45,7 @@ _ONE: Mapping[type, Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USu
 
 
 class FormulaError(ValueError):
-    """A formula is none, or has no finite value; one line."""
+    """A formula is malformed, or has no finite value; one line."""
 
 
 def value_of(formula: float | str, names: Mapping[str, float]) -> float:
@@ -54,7 +54,7 @@ def value_of(formula: float | str, names: Mapping[str, float]) -> float:
     Raises
     ------
     FormulaError
-        Saying what of it is no arithmetic, which name is not known, or why it has no finite value.
+        Naming what is no arithmetic, an unknown name, or why it has no finite value.
     """
     if not isinstance(formula, str):
         return float(formula)
@@ -69,7 +69,7 @@ def value_of(formula: float | str, names: Mapping[str, float]) -> float:
         why = "is no formula" if isinstance(error, SyntaxError | RecursionError | MemoryError) else one_line(error)
         raise FormulaError(f"{shown}: {why}") from None
     if not math.isfinite(found):
-        raise FormulaError(f"{shown}: is {found}, no finite number")
+        raise FormulaError(f"{shown}: is {found}, not a finite number")
     return found
 
 
@@ -94,4 +94,4 @@ def _value(node: ast.expr, names: Mapping[str, float]) -> float:
         if not least <= len(node.args) <= most:
             raise FormulaError(f"{node.func.id} takes {least if least == most else f'{least} to {most}'} numbers")
         return float(function(*(_value(part, names) for part in node.args)))
-    raise FormulaError("only numbers, names, + - * / **, parentheses and functions stand in a formula")
+    raise FormulaError("a formula has only numbers, names, + - * / **, parentheses and functions")

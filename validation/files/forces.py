@@ -1,10 +1,10 @@
-"""Quantities of contacts over time that a scene file may state: forces, step by step, how many contacts, and whether.
+"""Quantities of contacts over time for checks of a scene file: forces, numbers of contacts, overlaps without force.
 
-    step by step:   |impulse of a step| / dt        a force is known no finer than that
-    window:         the end of the run, or the one step that an instant lies in
+    step by step:   |impulse of a step| / dt        the finest resolution of a force
+    window:         the end of the run, or the step that contains an instant
     told by:        mean, least, greatest, spread   (`validation.metrics.OVER_TIME`)
 
-An engine that tells a mean that is right may still push and let go by turns: only what it tells step by step shows it.
+The mean can be right where contacts alternate between load and none; only values of each step show that.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from validation.geometry import overlap
 
 #: Force between two bodies, or of all contacts on one, by component [N].
 SUMS = {2: ("fx", "fy"), 3: ("fx", "fy", "fz")}
-#: Beside them: the force of each single contact [N], how many contacts there are, and how deep two bodies overlap
-#: throughout a step in which no force is told [m].
+#: Others: the force of each single contact [N], the number of contacts, and the overlap of two bodies throughout a step
+#: without a force [m].
 OTHERS = {
     2: ("contact_fx", "contact_fy", "contacts", "overlap_without_force"),
     3: ("contact_fx", "contact_fy", "contact_fz", "contacts", "overlap_without_force"),
@@ -34,7 +34,7 @@ OTHERS = {
 
 
 def is_over_time(what: str) -> bool:
-    """Whether a quantity is one of contacts, known step by step."""
+    """Whether a quantity belongs to contacts, with a value for each step."""
     return what in (*SUMS[3], *OTHERS[3])
 
 
@@ -56,7 +56,7 @@ def told(
     by
         One of `validation.metrics.OVER_TIME`.
     within
-        Steps that end within these times [s] are meant, the first time left out.
+        Steps that end within (first, second] [s].
     """
     contacts, others = trajectory.contacts, range(len(scene.bodies)) if partner is None else [partner]
     if contacts is None or not (chosen := metrics.steps_between(trajectory, *within)).any():
@@ -73,7 +73,7 @@ def told(
         if what == "contacts":
             series = np.bincount(step, minlength=len(chosen))[chosen].astype(float)
         elif len(step) == 0:
-            return None, "there is no contact whose force could be told"
+            return None, "there is no contact with a known force"
         else:
             sign = np.where(rows.b == body, 1.0, -1.0)
             series = sign * rows.impulse[:, _axis(what)] / trajectory.dt
@@ -81,7 +81,7 @@ def told(
 
 
 def _meets_in_points(scene: Scene, body: int, others: Sequence[int]) -> bool:
-    """Whether all contacts of a body are single points in space as they are in the plane: one of each two is round."""
+    """Whether all contacts of a body are single points in 3-D as in 2-D: one body of each pair is round."""
     round_ones = [isinstance(each.shape, ROUND) for each in scene.bodies]
     return round_ones[body] or all(round_ones[other] for other in others if other != body)
 
@@ -104,9 +104,9 @@ def _axis(what: str) -> int:
 def _touching(
     trajectory: Trajectory, body: int, others: Sequence[int], steps: NDArray[np.bool_]
 ) -> tuple[Contacts, NDArray[np.int64]]:
-    """Contacts of ``body`` with ``others`` in the chosen ones of the recorded ``steps``, and the step of each.
+    """Contacts of ``body`` with ``others`` in the selected ones of the recorded ``steps``, and the step of each.
 
-    Engines also list what is near: a contact touches, or pushes; what an engine does not say of it may be either.
+    Engines also list near pairs: a contact counts if it touches or has an impulse; unreported values count as either.
     """
     contacts = trajectory.contacts
     assert contacts is not None
@@ -121,10 +121,10 @@ def _touching(
 
 
 def _unloaded(scene: Scene, trajectory: Trajectory, body: int, partner: int) -> Array:
-    """Depth of the overlap throughout each recorded step in which the two do not push each other, else 0, (s,) [m].
+    """Overlap throughout each recorded step without a force between the two, else 0, (s,) [m].
 
-    It is the lesser of the depths at both ends: what first touches within a step may be found at its end. NaN where the
-    engine does not tell forces, and they overlap.
+    It is the smaller of the depths at both ends: a first contact within a step may be found at its end. NaN where the
+    engine reports no forces and they overlap.
     """
     contacts = trajectory.contacts
     assert contacts is not None

@@ -1,11 +1,11 @@
-"""What holds in any scene, judged without a closed form: contacts add no energy, bodies do not pass into each other.
+"""Checks without a closed form, for any scene: contacts add no energy, bodies do not overlap.
 
 Both are measured against the motion itself, and bounded by what one step of the scene's loads can do:
 
-    energy      grows by no more than what a step order shows of a conserved energy, at the speed of that sample
+    energy      grows by no more than the error of the scheme in a conserved energy, at the speed of that sample
     overlap     is no deeper than one step of the pair's own approach: a contact is found at most one step late
 
-so that neither a long run nor a fast one widens a bound. A body that sinks slowly is seen after two steps of fall.
+so that neither a long nor a fast run widens a bound. A body that sinks slowly is noticed after two steps of fall.
 """
 
 from __future__ import annotations
@@ -26,29 +26,30 @@ from validation import metrics
 from validation.bounds import ROUND_OFF
 from validation.canonical import Check, Measured
 
-#: What is judged of any motion that obeys the laws, be it the only one or not.
+#: Metrics that are judged even if the lawful motion is not unique.
 LAWS = ("energy_growth", "penetration", "deepest_overlap")
 
 
 def checks(scene: Scene, dt: float) -> list[Check]:
-    """Both checks; energy is shown without a truth where a prescribed body or the impact law may feed it in."""
+    """Both checks; energy is shown without a truth where a prescribed body or the impact law may add it."""
     energy = Check(
         "energy_growth",
         "J",
         0.0,
         energy_bound(scene, dt),
-        "a step order shows a conserved energy with half a step of its loads' work (taken off at each sample's own "
-        "speed), and what two bodies that start in each other get for parting is taken off: left is the work of a load "
-        "over the step that it starts in, F^2 dt^2/m, and round-off",
-        "contacts only take energy (e <= 1)",
+        "velocity and position are half a step apart, which changes a conserved energy by half a step of the loads' "
+        "work (subtracted at the speed of each sample), and the energy that separates bodies overlapping at the "
+        "start is subtracted; what remains is the work of a load in the step in which it starts, F^2 dt^2/m, and "
+        "round-off",
+        "contacts do not add energy (e <= 1)",
     )
     depth = Check(
         "penetration",
         "m",
         0.0,
         overlap_bound(scene, dt),
-        "a contact is found one step late at most: beyond one step of the pair's approach (taken off) only what the "
-        "loads add in that step, (a_1 + a_2) dt^2, and round-off",
+        "a contact is found at most one step late: beyond one step of the pair's approach (subtracted) only the "
+        "motion by loads in that step, (a_1 + a_2) dt^2, and round-off",
         "bodies are impenetrable",
     )
     why = fed_by(scene)
@@ -56,19 +57,19 @@ def checks(scene: Scene, dt: float) -> list[Check]:
 
 
 def fed_by(scene: Scene) -> str:
-    """What may add energy to a scene although every e <= 1; empty if nothing may.
+    """What may add energy to a scene although every e <= 1; empty if nothing.
 
-    Newton's law of restitution, which scenes ask for, relates normal speeds only. Where the normal misses a centre of
-    mass the friction of the same impact turns the body, and energy can grow [T. R. Kane, D. A. Levinson, *Dynamics:
-    Theory and Applications*, 1985, on a rod that hits the floor]. Round bodies have their centres on every normal.
+    Newton's law of restitution relates normal speeds only. Where the normal misses a centre of mass, friction of the
+    same impact turns the body, and energy can grow [T. R. Kane, D. A. Levinson, *Dynamics: Theory and Applications*,
+    1985, on a rod that hits the floor]. The normals of round bodies pass through their centres.
     """
     if any(body.motion == "prescribed" for body in scene.bodies):
-        return "a prescribed body may feed energy in"
+        return "a prescribed body may add energy"
     if any(any(body.surface_velocity) for body in scene.bodies):
-        return "a surface that runs may feed energy in"
+        return "a surface with a velocity may add energy"
     boxes = [body.motion == "free" and not isinstance(body.shape, ROUND) for body in scene.bodies]
     if not any(boxes) or not any(e > 0.0 and mu > 0.0 for e, mu in scene.materials()):
-        return ""  # without a look at every pair
+        return ""  # without a loop over all pairs
     for i, j, material in scene.contact_pairs():
         if (boxes[i] or boxes[j]) and material.restitution > 0.0 and material.friction > 0.0:
             return (
@@ -81,7 +82,7 @@ def fed_by(scene: Scene) -> str:
 
 
 def _load(scene: Scene, body: Body) -> Array:
-    """Constant load on a body, m g + F, (d,) [N]; infinite where a scene file's numbers are beyond all others."""
+    """Constant load on a body, m g + F, (d,) [N]; infinite where a scene file's numbers overflow."""
     return np.array([body.mass * pull + push for pull, push in zip(scene.gravity, body.force, strict=True)])
 
 
@@ -92,7 +93,7 @@ def _least_moment(body: Body) -> float:
 def mechanical_energy(scene: Scene, trajectory: Trajectory) -> Array:
     """Kinetic plus potential energy in gravity and constant loads, (s,) [J].
 
-    Work of constant torques is added up over the samples by the trapezoid rule, exact for a constant acceleration.
+    Work of constant torques is integrated by the trapezoid rule, exact for a constant acceleration.
     """
     energy = metrics.kinetic_energy(scene, trajectory)
     d = scene.dimension
@@ -113,12 +114,12 @@ Overlaps = Mapping[tuple[int, int], Array]
 def energy_growth(scene: Scene, trajectory: Trajectory, overlaps: Overlaps = MappingProxyType({})) -> Measured:
     """Largest growth of the mechanical energy since the start, less half a step of the loads' power [J].
 
-    Semi-implicit steps conserve the energy with potentials taken half a step of the present velocity away, and a
-    mid-point step the plain one: what is sampled differs by at most ``|L . v| dt/2``, now and at the start. Round-off
-    of the energies that are compared is taken off as well, sample by sample.
+    Semi-implicit steps conserve the energy with potentials half a step of the present velocity away, a mid-point step
+    the usual one: samples differ by at most ``|L . v| dt/2``, now and at the start. Round-off of the energies is
+    subtracted too, sample by sample.
 
-    An overlap d that a scene starts with is its author's: it is worked off against the load, ``|L| d``, and whoever
-    undoes it in a step moves its bodies at d/dt. So much is granted to each body of a pair of ``overlaps``.
+    An overlap d at the start may be corrected: against the load with the work ``|L| d``, and in one step with the speed
+    d/dt. Both are allowed to each body of a pair of ``overlaps``.
     """
     d = scene.dimension
     energy = mechanical_energy(scene, trajectory)
@@ -130,12 +131,12 @@ def energy_growth(scene: Scene, trajectory: Trajectory, overlaps: Overlaps = Map
         path = np.linalg.norm(trajectory.pose[:, i, :d] - trajectory.pose[0, i, :d], axis=1)
         ripple += 0.5 * trajectory.dt * (power + power[0])
         ripple += ROUND_OFF * math.hypot(*_load(scene, body)) * path
-    # Not Python's max: what is no number must stay none, or energies beyond all numbers would read as no growth.
+    # Python's max would skip NaN, and energies that overflow would count as no growth.
     return float(np.maximum(0.0, energy - energy[0] - ripple).max()), ""
 
 
 def _parting(scene: Scene, trajectory: Trajectory, overlaps: Overlaps) -> float:
-    """What bodies may gain that start in each other: lifted out, and moved at overlap/dt [J]."""
+    """Allowed energy of bodies that overlap at the start: lifted out, and moved at overlap/dt [J]."""
     gain = 0.0
     for pair, depth in overlaps.items():
         for body in (scene.bodies[k] for k in pair):
@@ -146,7 +147,7 @@ def _parting(scene: Scene, trajectory: Trajectory, overlaps: Overlaps) -> float:
 
 
 def energy_bound(scene: Scene, dt: float) -> float:
-    """Work of every load over the motion of the step that it starts in, and round-off of the energies at play [J]."""
+    """Work of every load in its first step, and round-off of the energies [J]."""
     free = [body for body in scene.bodies if body.motion == "free"]
     bound, scale = 0.0, 0.0
     for body in free:
@@ -154,10 +155,10 @@ def energy_bound(scene: Scene, dt: float) -> float:
         speed, spin = math.hypot(*body.twist[: scene.dimension]), math.hypot(*body.twist[scene.dimension :])
         moment = body.inertia if isinstance(body.inertia, float | int) else max(body.inertia)
         bound += (load * load / body.mass + torque * torque / _least_moment(body)) * dt * dt
-        # Energies that are subtracted: at the start, and what the place's distance from the origin rounds.
+        # Energies that are subtracted: at the start, and rounding by the distance from the origin.
         place = math.hypot(*body.pose[: scene.dimension])
         scale += 0.5 * body.mass * speed * speed + 0.5 * moment * spin * spin + load * place
-        # A body that rests without load still has a size, known to round-off, of which a step makes a speed.
+        # A body at rest without load has a size with round-off, which a step turns into a speed.
         scale += 0.5 * body.mass * ROUND_OFF * (reach(body.shape) / dt) ** 2
     return bound + ROUND_OFF * scale
 
@@ -168,7 +169,7 @@ def energy_bound(scene: Scene, dt: float) -> float:
 def deepest(scene: Scene, trajectory: Trajectory, overlaps: Overlaps | None = None) -> tuple[Measured, Measured]:
     """Deepest overlap beyond one step of the pair's approach, and deepest overlap of all, each >= 0 [m].
 
-    ``overlaps`` are measured here where they are not handed in.
+    ``overlaps`` are measured here if not given.
     """
     beyond, depth = 0.0, 0.0
     for (i, j), overlap in (metrics.overlaps(scene, trajectory) if overlaps is None else overlaps).items():
@@ -179,9 +180,9 @@ def deepest(scene: Scene, trajectory: Trajectory, overlaps: Overlaps | None = No
 
 
 def _granted(overlap: Array, step: Array) -> Array:
-    """Depth that each sample of an overlap may have, (s,) [m]: the longest step since the sample before it began.
+    """Allowed depth of each sample of an overlap, (s,) [m]: the longest step since the sample before it began.
 
-    An overlap that a scene starts with is its author's.
+    An overlap at the start is allowed.
     """
     granted = np.zeros(len(overlap))
     longest = start = 0.0
@@ -199,8 +200,8 @@ def _granted(overlap: Array, step: Array) -> Array:
 def approach(scene: Scene, trajectory: Trajectory, i: int, j: int) -> Array:
     """Upper bound of the speed with which two bodies' surfaces may close, (s,) [m/s]: centres and spin.
 
-    Against a half-space only motion along its normal closes, unless it turns: then it is met as far from the place that
-    it turns about as the other body reaches. Round bodies turn within their own outline.
+    For a half-space only motion along its normal counts, and rotation out to the reach of the other body. Round bodies
+    rotate within their outline.
     """
     d = scene.dimension
     linear = trajectory.twist[:, j, :d] - trajectory.twist[:, i, :d]
@@ -219,7 +220,7 @@ def approach(scene: Scene, trajectory: Trajectory, i: int, j: int) -> Array:
 
 
 def overlap_bound(scene: Scene, dt: float) -> float:
-    """What the loads of the two bodies that they move most add to an overlap in one step, and round-off [m]."""
+    """Overlap by the loads of the two bodies with the largest accelerations in one step, and round-off [m]."""
     pulls = []
     for body in scene.bodies:
         if body.motion == "free":
@@ -227,6 +228,6 @@ def overlap_bound(scene: Scene, dt: float) -> float:
             turning = 0.0 if isinstance(body.shape, ROUND) else reach(body.shape) / _least_moment(body)
             pulls.append(load / body.mass + torque * turning)
     place = max(math.hypot(*body.pose[: scene.dimension]) + reach(body.shape) for body in scene.bodies)
-    # A face that turns curves away from the speed that its points have, by as much as they are pulled to its centre.
+    # Points of a rotating face accelerate towards its centre, so a step of constant velocity misses that.
     pulls += [math.hypot(*body.twist[scene.dimension :]) ** 2 * place for body in scene.bodies if turns(body)]
     return sum(sorted(pulls)[-2:]) * dt * dt + ROUND_OFF * place

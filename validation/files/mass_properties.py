@@ -10,7 +10,7 @@ from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygo
 from adapters.shapes import area_and_centroid
 from validation.solids import hull_properties
 
-#: What is said of moments that were computed here.
+#: Words for moments that were computed here.
 HOW: dict[type, str] = {
     Disc: "disc",
     Sphere: "ball",

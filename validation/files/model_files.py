@@ -1,10 +1,10 @@
-"""Models of an engine (MJCF) as scenes: what a model's file becomes once, and what of it is judged.
+"""Models of an engine (MJCF) as scenes, and their checks.
 
     model.xml --(adapters.model: its own engine's compiler, in a process of its own)--> JSON --> CanonicalScene
 
-The JSON takes the place of the file's text in slots and stores: whoever reads results needs neither file nor engine. A
-model that lies in the plane y = 0 is a planar scene as well. It runs on its own engine as its author made it, as
-profile ``model``; everywhere else as rigid bodies.
+The JSON replaces the file's text in slots and stores, so that reading results needs neither file nor engine. A model in
+the plane y = 0 is a 2-D scene as well. On its own engine it runs with its own settings, as profile ``model``; on others
+as rigid bodies.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from validation.canonical import Brought, CanonicalScene, Check, Measured, Param
 from validation.files import stated
 from validation.files.stated import Stated
 
-#: Longest time that a model is run [s]: contacts of every step are kept.
+#: Longest run of a model [s]: contacts of every step are stored.
 LONGEST = 60.0
-#: Most characters of a model as JSON: a thousand bodies and the pairs that differ.
+#: Most characters of a model as JSON: a thousand bodies and their pairs.
 MOST = 2**24
 
 
 def is_model(path: Path) -> bool:
-    """Whether an engine of ours reads files with this ending as models."""
+    """Whether one of our engines reads model files with this ending."""
     return path.suffix.lower() not in (".toml", ".json") and model.reader_of(path.suffix) is not None
 
 
 @cache
 def text_of(text: str, suffix: str, drop: bool) -> str:
-    """The model in ``text`` as the JSON that stands for it; see `adapters.model.read`."""
+    """The model in ``text`` as JSON; see `adapters.model.read`."""
     engine = model.reader_of(suffix)
     if engine is None:
         raise SceneError(f"model: no engine reads files ending in {suffix}")
@@ -55,7 +55,7 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     Raises
     ------
     SceneError
-        If it is not what `text_of` makes.
+        If it is not from `text_of`.
     """
     if len(text) > MOST:
         raise SceneError(f"{one_line(path)}: is larger than {MOST} characters, the most that is read")
@@ -65,7 +65,7 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
     except SceneError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise SceneError(f"{one_line(path)}: is not a model as it is kept: {one_line(error)}") from None
+        raise SceneError(f"{one_line(path)}: is not a stored model: {one_line(error)}") from None
 
 
 def _canonical(engine: str, read: Model, title: str) -> CanonicalScene:
@@ -74,15 +74,17 @@ def _canonical(engine: str, read: Model, title: str) -> CanonicalScene:
     dimensions = tuple(sorted(posed))
     notes = [f"{one_line(line)}: left out" for line in read.dropped] + list(read.notes)
     if flat is not None:
-        notes.append("it lies in the plane y = 0 and runs in two dimensions as well")
-    notes.append(f"{engine}/{PROFILE} runs it with its own contacts, solver and step; all others as rigid bodies")
-    notes.append("failures of a model are shown and do not fail the command: no known failures are listed for it")
+        notes.append("it lies in the plane y = 0 and also runs in 2-D")
+    notes.append(
+        f"{engine}/{PROFILE} runs it with the model's own contacts, solver and step; all others run it as rigid bodies"
+    )
+    notes.append("failures of a model do not fail the command, as no known failures are listed for it")
     whole = stated.canonical_of(Stated(read.scene, (), ()), title)
     return replace(
         whole,
-        law="no closed form; energy never grows, bodies do not pass into each other, momentum is kept",
+        law="no closed form; energy never grows, bodies do not overlap, momentum is conserved",
         dimensions=dimensions,
-        parameters=(Parameter("duration", read.scene.duration, "s", "simulated time; a model states none", 0.0, LONGEST,
+        parameters=(Parameter("duration", read.scene.duration, "s", "simulated time; the model has none", 0.0, LONGEST,
                               positive=True),),
         make=lambda dimension, params: replace(posed[dimension], duration=params["duration"], params=dict(params)),
         exact=lambda scene: {"energy_growth": 0.0, "penetration": 0.0, "momentum_drift": 0.0},
@@ -132,15 +134,13 @@ def momentum_drift(scene: Scene, trajectory: Trajectory) -> Measured:
 
 
 def _momentum_check(scene: Scene, dt: float) -> Check:
-    """Judged where nothing but free bodies touch; elsewhere it is as good as the impulses that are reported."""
+    """Judged if only free bodies can touch; otherwise it depends on the reported impulses."""
     bodies = [body for body in scene.bodies if body.motion == "free"]
     if len(bodies) < len(scene.bodies):
-        because = "shown: it is as good as the impulses that the engine reports of its contacts"
+        because = "shown: as accurate as the contact impulses that the engine reports"
         return Check("momentum_drift", "N s", None, None, because, "")
     pull = sum(float(np.linalg.norm(b.mass * np.array(scene.gravity) + np.array(b.force))) for b in bodies)
     scale = sum(b.mass * float(np.linalg.norm(b.twist[: scene.dimension])) for b in bodies) + pull * scene.duration
     steps = max(1.0, scene.duration / dt / 1000.0)
-    because = (
-        "impulses between free bodies cancel: what is left is round-off of the momenta, a thousand steps each 1e-12"
-    )
+    because = "impulses between free bodies cancel; the round-off of the momenta remains, a thousand steps of 1e-12"
     return Check("momentum_drift", "N s", 0.0, ROUND_OFF * steps * scale, because, "Newton's third law")

@@ -1,4 +1,4 @@
-"""Quantities that a scene file shows and may state: place, angle and velocity of a body, forces of its contacts."""
+"""Quantities of a scene file: position, angle and velocity of a body, forces of its contacts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from validation.canonical import Measured
 from validation.files import forces
 from validation.metrics import UNAVAILABLE
 
-#: Quantities of one body that a check may name, by dimension; forces are those of all its contacts.
+#: Quantities of a body in checks, by dimension; forces are those of all its contacts.
 QUANTITIES = {
     2: ("x", "y", "angle", "vx", "vy", "omega", "fx", "fy"),
     3: ("x", "y", "z", "angle", "vx", "vy", "vz", "wx", "wy", "wz", "fx", "fy", "fz"),
@@ -48,7 +48,7 @@ def quantity(
 ) -> Measured:
     """Value of ``BODY.QUANTITY`` at time ``at`` [s], at the end if None.
 
-    What is known step by step (`forces.is_over_time`) is told by its mean over `force_window`, or by ``over``.
+    Quantities with step values (`forces.is_over_time`) have their mean over `force_window`, or the statistic ``over``.
     """
     partner, body, what = parts_of(name, scene.places.keys())
     if what.startswith("f") and at is None and over in (None, "mean"):
@@ -82,7 +82,7 @@ def _axis(letter: str, dimension: int) -> int:
 
 
 def _turned(pose: Array) -> Array:
-    """Angle since the start [rad]: all turns in the plane; in space that of the rotation, from 0 to pi."""
+    """Angle since the start [rad]: with full turns in 2-D; in 3-D the rotation angle, from 0 to pi."""
     if pose.shape[1] == 3:
         return np.unwrap(pose[:, 2]) - pose[0, 2]
     turn = rotation(pose)

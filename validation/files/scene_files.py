@@ -1,6 +1,6 @@
-"""Scene files (TOML or JSON): checked completely before anything else sees them.
+"""Scene files (TOML or JSON), checked completely when read.
 
-Their format is `scene_format`; what a file states becomes a canonical scene in `stated`.
+Their format is in `scene_format`; `stated` turns them into canonical scenes.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from validation.files.scene_format import SceneModel, stated
 from validation.files.scene_text import parsed, read_text, said
 from validation.files.stated import Stated, canonical_of
 
-#: Names of the schema's own language and of itself; the number is that of `SceneModel.format`.
+#: Identifiers of the schema language and of the schema; the number is that of `SceneModel.format`.
 DIALECT, SCHEMA_ID = "https://json-schema.org/draft/2020-12/schema", "urn:contact-crosscheck:scene:1"
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON Schema of a scene file, for editors and whoever writes such files."""
+    """JSON Schema of a scene file, for editors."""
     return {"$schema": DIALECT, "$id": SCHEMA_ID, **SceneModel.model_json_schema()}
 
 
@@ -33,18 +33,18 @@ def load_scene(path: Path) -> Scene:
 
 
 def load_stated(path: Path) -> Stated:
-    """Read and check a scene file, with what was filled in and what its author knows.
+    """Read and check a scene file, with notes and the author's checks.
 
     Raises
     ------
     SceneError
-        One line that names the file and every field that is wrong.
+        One line with the file and every wrong field.
     """
     return stated_from_text(read_text(path), path)
 
 
 def stated_from_text(text: str, path: Path) -> Stated:
-    """Check the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    """Check the text of the scene file from ``path``; raises as `load_stated`."""
     shown = one_line(path)
     try:
         model = SceneModel.model_validate(parsed(text, path))
@@ -52,7 +52,7 @@ def stated_from_text(text: str, path: Path) -> Stated:
         raise SceneError(f"{shown}: {said(errors)}") from None
     try:
         return stated(model)
-    except (SceneError, ArithmeticError) as error:  # arithmetic: numbers too large for masses and moments
+    except (SceneError, ArithmeticError) as error:  # overflow: numbers too large for masses and moments
         raise SceneError(f"{shown}: {one_line(error)}") from None
 
 
@@ -62,7 +62,7 @@ def canonical_from_file(path: Path) -> CanonicalScene:
 
 
 def canonical_from_text(text: str, path: Path) -> CanonicalScene:
-    """Wrap the text of the scene file that lies, or lay, at ``path``; raises as `load_stated`."""
+    """Wrap the text of the scene file from ``path``; raises as `load_stated`."""
     if path.suffix.lower() not in (".toml", ".json"):
         return model_files.canonical_from_text(text, path)
     return canonical_of(stated_from_text(text, path), f"Scene file {path.name}")

@@ -1,8 +1,8 @@
-"""Format of a scene file: its fields, and how what a user states becomes a scene.
+"""Format of a scene file: its fields, and their conversion to a scene.
 
-Types are checked here by pydantic, physics by `adapters.scene.Scene`. Four things are filled in or put right, and each
-is said in a note that goes with the scene: the mass and the moments of inertia of a free body that gives none, the
-restitution and friction of pairs that nobody gives, and the length of a half-space's normal.
+Types are checked here by pydantic, physics by `adapters.scene.Scene`. Some values are filled in or corrected, each with
+a note of the scene: missing mass and moments of inertia of a free body, missing restitution and friction of pairs, and
+the length of a half-space's normal.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from validation.metrics import OVER_TIME
 
 
 class SceneErrors(SceneError):
-    """Several fields are wrong: one line with all of them, of many the first few."""
+    """Several fields are wrong: one line with all of them, or the first few."""
 
     def __init__(self, wrong: list[str]) -> None:
         super().__init__(listed(wrong))
 
 
-#: A number as it stands in a file: neither ``true`` nor digits in quotes, which are somebody's mistake.
+#: A number of a file: neither ``true`` nor digits in quotes, which would be mistakes.
 Number = Annotated[float, Strict()]
 Whole = Annotated[int, Strict()]
 
@@ -151,7 +151,7 @@ class PairModel(_Strict):
 
 
 class CheckModel(_Strict):
-    """A number that the scene's author knows: PASS if |measured - value| <= tolerance.
+    """A check of the scene's author: PASS if |measured - value| <= tolerance.
 
     Value and tolerance are numbers or formulas (`validation.files.expressions`) in ``pi``, ``g`` (size of the gravity),
     ``t`` (time of the check [s]) and the file's constants; a tolerance in the step ``dt`` [s] as well.
@@ -162,17 +162,17 @@ class CheckModel(_Strict):
         ``BODY.QUANTITY`` such as ``ball.y`` [m], ``box.angle`` [rad, turned since the start], ``ball.vx`` [m/s],
         ``box.omega`` [rad/s], ``box.fy`` [N, force of all contacts on the body]; ``floor/box.fy`` is the force of the
         contacts with ``floor`` alone. ``floor/box.contact_fy`` [N] is the force of each single contact,
-        ``floor/box.contacts`` their number, and ``floor/box.overlap_without_force`` [m] how deep the two overlap
-        throughout a step in which they do not push each other. These are known step by step.
+        ``floor/box.contacts`` their number, and ``floor/box.overlap_without_force`` [m] the overlap of the two
+        throughout a step without a force between them. These have values for each step.
     at
-        When [s]; the end if it is missing. Between two samples a place, angle or velocity is interpolated. A force is
-        that of the step which the instant lies in, the impulse of the step over its length.
+        Time [s]; the end if missing. Positions, angles and velocities are interpolated between samples. A force is that
+        of the step that contains the instant, its impulse over its length.
     over
-        By what a force and its like are told over the last second, or the last half of a shorter run: ``mean``,
-        ``least``, ``greatest`` or ``spread`` (standard deviation from step to step). Without it the value must hold all
-        the time: mean, least and greatest within the tolerance of it, and the spread within the tolerance of 0.
+        Statistic of a force or the like over the last second, or the last half of a shorter run: ``mean``, ``least``,
+        ``greatest`` or ``spread`` (standard deviation from step to step). Without it the value must hold all the time:
+        mean, least and greatest within the tolerance, and the spread within the tolerance of 0.
     because
-        Where the number comes from; shown with the verdict.
+        Source of the value; shown with the verdict.
     """
 
     quantity: str
@@ -186,10 +186,10 @@ class CheckModel(_Strict):
 class SceneModel(_Strict):
     """A scene file.
 
-    ``format`` is the version of this description; ``constants`` are names for formulas of checks. ``growth``, of planar
-    scenes, is by how much the scene's own motion multiplies until its end what is off its plane, a number of at least 1
-    or a formula: engines that live in space owe the plane, and what round-off leaves of it grows by that. At most a
-    thousand times is granted without it.
+    ``format`` is the version of this description; ``constants`` are names for formulas of checks. ``growth``, for
+    planar scenes, is the factor by which the motion amplifies a distance from the plane until the end, a number of at
+    least 1 or a formula: 3-D engines must stay in the plane, and round-off grows by it. Without it a factor of a
+    thousand is allowed.
     """
 
     format: Literal[1] = 1
@@ -208,7 +208,7 @@ class SceneModel(_Strict):
     @field_validator("format", "dimension", mode="before")
     @classmethod
     def _whole(cls, value: Any) -> Any:
-        """``true`` equals 1 and 2.0 equals 2, which is all that a choice of values asks."""
+        """Refuse ``true`` and 2.0, which a choice of values would accept as 1 and 2."""
         if isinstance(value, bool | float):
             raise ValueError("must be a whole number")
         return value
@@ -220,7 +220,7 @@ def stated(model: SceneModel) -> Stated:
     Raises
     ------
     SceneErrors
-        With every field that is no physics, and every check that names nothing.
+        With every unphysical field, and every check of an unknown quantity.
     """
     notes: list[str] = []
     wrong: list[str] = []
@@ -234,7 +234,7 @@ def stated(model: SceneModel) -> Stated:
             _mass(body, model.dimension, notes)
             check_body(body_from_dict(body), model.dimension)
         except (SceneError, ArithmeticError) as error:
-            # A body that has no name is told by its place.
+            # A body without a name is named by its position in the list.
             wrong.append(("" if body["name"] else f"bodies.{k}") + _why(error, f"{body['name']}.shape"))
             data["bodies"][k] = _stand_in(body["name"], model.dimension)
     try:
@@ -257,17 +257,17 @@ def stated(model: SceneModel) -> Stated:
 
 
 def _overs(check: CheckModel, scene: Scene) -> tuple[str | None, ...]:
-    """By what the quantity of a check is told: what holds of a force at all times holds of each of these."""
+    """Statistics of a check's quantity: a force that is constant has the same value in each of these."""
     _, _, what = parts_of(check.quantity, scene.places.keys())
     if check.over is not None:
         return (check.over,)
-    # At one instant a force between two bodies is one number; single contacts may differ.
+    # A force between two bodies at an instant is one number; single contacts may differ.
     is_many = forces.is_over_time(what) and (check.at is None or what.startswith("contact_"))
     return tuple(OVER_TIME) if is_many else (None,)
 
 
 def _materials(model: SceneModel, scene: Scene) -> Iterator[str]:
-    """What is filled in of pairs: numbers that an entry leaves out, and pairs that no entry is about."""
+    """Notes on pairs: values that an entry leaves out, and pairs without an entry."""
     for pair in model.pairs:
         left = [name for name in ("restitution", "friction") if name not in pair.model_fields_set]
         which = "all pairs" if (pair.a, pair.b) == (Pair.a, Pair.b) else f"{pair.a}-{pair.b}"
@@ -275,51 +275,51 @@ def _materials(model: SceneModel, scene: Scene) -> Iterator[str]:
             yield f"pairs: {name} {getattr(Pair, name):g} of {which}, none was given"
     if any((pair.a, pair.b) == (Pair.a, Pair.b) for pair in scene.pairs):
         return
-    untold = Pair(restitution=-1.0, friction=-1.0)  # no scene has such numbers
+    untold = Pair(restitution=-1.0, friction=-1.0)  # such numbers do not occur
     free = {body.name: body.motion == "free" for body in scene.bodies}
     if (-1.0, -1.0) in Materials((*scene.pairs, untold)).materials(free):
-        which = "pairs that no entry names" if scene.pairs else "all pairs"
+        which = "pairs without an entry" if scene.pairs else "all pairs"
         yield f"pairs: restitution {Pair.restitution:g} and friction {Pair.friction:g} of {which}, none was given"
 
 
 def _growth(model: SceneModel, scene: Scene, names: dict[str, float], wrong: list[str]) -> float:
-    """By how much what is off the plane grows, as stated; what is wrong with it is added to ``wrong``."""
+    """Stated growth of a distance from the plane; errors are added to ``wrong``."""
     try:
         growth = value_of(model.growth, {**names, "t": scene.duration})
     except FormulaError as error:
         wrong.append(f"growth: {error}")
         return 1.0
     if not growth >= 1.0:
-        wrong.append(f"growth: {growth:g} is less than 1, which means that nothing grows")
+        wrong.append(f"growth: {growth:g} is less than 1; 1 means no growth")
     if scene.dimension == 3 and growth != 1.0:
-        wrong.append("growth: a spatial scene has no plane to leave")
+        wrong.append("growth: a 3-D scene has no plane that it could leave")
     return growth
 
 
 def _why(error: Exception, field: str) -> str:
-    """What an error says; of arithmetic that overflows, which says nothing of where, with its field."""
+    """Text of an error; for an overflow, which has no location, with its field."""
     if isinstance(error, SceneError):
         return one_line(error)
     return one_line(f"{field}: its numbers are too large or too small to compute with")
 
 
 def _stand_in(name: str, dimension: int) -> dict[str, Any]:
-    """A body in place of one that is wrong, so that the rest of the scene can be looked at."""
+    """A body in the place of a wrong one, so that the rest of the scene can be checked."""
     kind, inertia = ("disc", 1.0) if dimension == 2 else ("sphere", (1.0, 1.0, 1.0))
     return {"name": name, "shape": {"type": kind, "radius": 1.0}, "mass": 1.0, "inertia": inertia}
 
 
 def told(model: SceneModel, scene: Scene, wrong: list[str]) -> Iterator[tuple[str, float]]:
-    """Names that a formula may use, and their values: pi, g, the file's constants in their order.
+    """Names and values for formulas: pi, g, the file's constants in order.
 
-    What is wrong with a constant is added to ``wrong``.
+    Errors of constants are added to ``wrong``.
     """
     names = {"pi": math.pi, "g": math.hypot(*scene.gravity)}
     yield from names.items()
     for name, formula in model.constants.items():
         label = f"constants.{one_line(name, 40)}"
         if not name.isidentifier() or name in (*names, *FUNCTIONS, "t", "dt"):
-            wrong.append(f"{label}: cannot be the name of a constant, or has a meaning already")
+            wrong.append(f"{label}: cannot be the name of a constant, or is already defined")
             continue
         try:
             names[name] = value_of(formula, names)
@@ -332,7 +332,7 @@ def told(model: SceneModel, scene: Scene, wrong: list[str]) -> Iterator[tuple[st
 def _stated(
     label: str, check: CheckModel, scene: Scene, names: dict[str, float], wrong: list[str]
 ) -> Iterator[StatedCheck]:
-    """The check with its value, for each number it is told by; its tolerance is tried at steps of 1 s and 1 ns."""
+    """The check with its value, for each of its statistics; its tolerance is tried at steps of 1 s and 1 ns."""
     when = scene.duration if check.at is None else check.at
     here = {**names, "t": when}
     field = "value"
@@ -347,7 +347,7 @@ def _stated(
         return
     used = here if isinstance(check.tolerance, str) else {}
     for over in _overs(check, scene):
-        # What is the same at all times has no spread.
+        # A constant has no spread.
         own = 0.0 if over == "spread" and check.over is None else value
         yield StatedCheck(check.quantity, own, check.tolerance, check.at, check.because, used, over)
 
@@ -359,7 +359,7 @@ def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
         return
     label, normal, angle = f"{body['name']}.shape", shape["normal"], shape.pop("angle")
     if (normal is None) == (angle is None):
-        raise SceneError(f"{label}: a half-space is given by its normal or by its angle, one of them")
+        raise SceneError(f"{label}: a half-space needs either a normal or an angle")
     if angle is not None:
         flat = (0.0,) * (dimension - 2)
         shape["normal"] = (-math.sin(angle) + 0.0, *flat, math.cos(angle))
@@ -367,17 +367,17 @@ def _face(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
     length = math.hypot(*normal)
     if not (math.isfinite(length) and length > 0.0):
         raise SceneError(f"{label}.normal: {normal!r} has no direction")
-    if abs(length - 1.0) > 1e-15:  # what is 1 to round-off keeps its bits
+    if abs(length - 1.0) > 1e-15:  # a length of 1 to round-off is not changed
         shape["normal"] = tuple(component / length for component in normal)
     if abs(length - 1.0) > 1e-9:
-        notes.append(f"{label}.normal: its length {length:.6g} was made 1; the offset stays a distance [m]")
+        notes.append(f"{label}.normal: its length {length:.6g} was set to 1; the offset is still a distance [m]")
 
 
 def _mass(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
-    """Give a body its mass and inertia, and say what was not given."""
+    """Give a body its mass and inertia, with notes on what was not given."""
     name, density = body["name"], body.pop("density")
     if density is not None and body["mass"] is not None:
-        raise SceneError(f"{name}.density: give the mass or the density, not both")
+        raise SceneError(f"{name}.density: give either mass or density")
     if density is not None and not density > 0.0:
         raise SceneError(f"{name}.density: {density!r} must be greater than 0")
     if body["motion"] != "free" or body["shape"]["type"] == "half_space":
@@ -398,7 +398,7 @@ def _mass(body: dict[str, Any], dimension: int, notes: list[str]) -> None:
         numbers = ", ".join(f"{moment:.6g}" for moment in told)
         notes.append(f"{name}.inertia: {numbers} {unit}, of a uniform {HOW[type(shape)]}; none was given")
     elif body["inertia"] is None:
-        body["inertia"] = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)  # the mass is refused next, by its own name
+        body["inertia"] = 1.0 if dimension == 2 else (1.0, 1.0, 1.0)  # the mass is refused next, with its name
 
 
 def _content(dimension: int) -> str:
@@ -406,7 +406,7 @@ def _content(dimension: int) -> str:
 
 
 def _shape(raw: dict[str, Any], owner: str, dimension: int) -> Shape:
-    """Return a checked shape: its mass needs sizes that are sizes."""
+    """Return a checked shape, as its mass needs valid sizes."""
     from adapters.scene import SHAPES
 
     shape: Shape = SHAPES[raw["type"]](**{key: value for key, value in raw.items() if key != "type"})
@@ -417,7 +417,7 @@ def _shape(raw: dict[str, Any], owner: str, dimension: int) -> Shape:
 
 
 def _is_right(label: str, check: CheckModel, scene: Scene, wrong: list[str]) -> bool:
-    """Whether a check names what is there; if not, why is added to ``wrong``."""
+    """Whether a check's quantity exists; otherwise the reason is added to ``wrong``."""
     before = len(wrong)
     names = [b.name for b in scene.bodies]
     partner, body, what = parts_of(check.quantity, names)
@@ -429,13 +429,15 @@ def _is_right(label: str, check: CheckModel, scene: Scene, wrong: list[str]) -> 
         wrong.append(f"{label}.quantity: {what!r} is not one of {', '.join(known)}")
     is_over_time = forces.is_over_time(what)
     if partner is not None and not is_over_time:
-        wrong.append(f"{label}.quantity: {check.quantity!r}: only a force and its like is between two bodies")
+        wrong.append(
+            f"{label}.quantity: {check.quantity!r}: between two bodies there are only forces, impulses and the like"
+        )
     if partner is None and what == "overlap_without_force":
-        wrong.append(f"{label}.quantity: {check.quantity!r}: an overlap is of two bodies: BODY/BODY.{what}")
+        wrong.append(f"{label}.quantity: {check.quantity!r}: an overlap needs two bodies: BODY/BODY.{what}")
     if check.over is not None and not is_over_time:
-        wrong.append(f"{label}.over: only a force and its like is told over time")
+        wrong.append(f"{label}.over: only for forces, impulses and the like")
     elif check.over is not None and check.at is not None and not what.startswith("contact_"):
-        wrong.append(f"{label}.over: at an instant there is one number, without mean, least or greatest")
+        wrong.append(f"{label}.over: at an instant there is one number, not a mean, least or greatest")
     if check.at is not None and check.at > scene.duration:
         wrong.append(f"{label}.at: {check.at!r} s is after the end, {scene.duration!r} s")
     return len(wrong) == before

@@ -1,7 +1,7 @@
-"""Text of a scene file: read within limits, and parsed into plain data.
+"""Reads the text of a scene file within limits, and parses it into plain data.
 
-What is wrong is one line that names the file, whatever is found at its place: a pipe, a device, a file of gigabytes,
-nesting without end, an integer of thousands of digits.
+Errors are one line with the file's name, whatever the file is: a pipe, a device, gigabytes, endless nesting, an integer
+of thousands of digits.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pydantic import ValidationError
 from adapters.plain import one_line
 from adapters.scene import SceneError
 
-#: Largest file that is read [bytes]: some 10 000 bodies, parsed in about a second.
+#: Largest file [bytes]: some 10 000 bodies, parsed in about a second.
 MOST_BYTES = 2**21
-#: Most bodies: what is ours of a cell of columns takes 2 to 3 ms a body, so that these cost half a minute.
+#: Most bodies: our part of a cell of columns takes 2 to 3 ms a body, half a minute for these.
 MOST_BODIES = 10_000
-#: Wrong fields that are named before the rest is counted.
+#: Wrong fields that are named; the rest are counted.
 MOST_ERRORS = 10
 
 
@@ -36,7 +36,7 @@ def read_text(path: Path) -> str:
     data = None
     try:
         there = path.exists()
-        if path.is_file():  # opening a pipe would wait for whoever writes to it
+        if path.is_file():  # opening a pipe would wait for a writer
             with path.open("rb") as stream:
                 data = stream.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
@@ -53,7 +53,7 @@ def read_text(path: Path) -> str:
 
 
 def parsed(text: str, path: Path) -> Any:
-    """Plain data in the text of the scene file that lies, or lay, at ``path``.
+    """Plain data in the text of the scene file from ``path``.
 
     Raises
     ------
@@ -74,13 +74,13 @@ def parsed(text: str, path: Path) -> Any:
 
 
 def said(errors: ValidationError) -> str:
-    """All fields that are wrong, in one line; of many the first few."""
+    """All wrong fields in one line, or the first few."""
     found = errors.errors(include_url=False, include_context=False, include_input=False)
     fields = [".".join(map(str, e["loc"])) or "file" for e in found]
     return listed([one_line(f"{name}: {e['msg']}") for name, e in zip(fields, found, strict=True)])
 
 
 def listed(wrong: list[str]) -> str:
-    """What is wrong in one line; of much the first, and how much more there is."""
+    """Errors in one line; of many the first, and the number of others."""
     told = "; ".join(wrong[:MOST_ERRORS])
     return told if len(wrong) <= MOST_ERRORS else f"{told}; and {len(wrong) - MOST_ERRORS} more"

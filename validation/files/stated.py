@@ -1,8 +1,8 @@
-"""A scene that somebody states, in a file: what it is once its file has been read and checked.
+"""A scene from a file, after reading and checking.
 
-It has no closed form: its final places, angles, velocities and forces are shown without a truth, unless its author
-states a number for one; what must hold in any scene (`validation.files.invariants`) is judged. Nothing here reads
-files, so that a scene can be handed as plain data (`Stated.as_dict`) to where nothing is installed that checks them.
+It has no closed form: final positions, angles, velocities and forces are shown without a truth, unless its author
+states a value; the invariants of any scene (`validation.files.invariants`) are judged. Nothing here reads files, so a
+scene can be sent as plain data (`Stated.as_dict`) to processes without the packages that check files.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from adapters.extras import install
 from adapters.scene import Scene, scene_from_dict
 from adapters.trajectory import Sampling, Trajectory
 from validation import metrics
@@ -21,16 +22,16 @@ from validation.files.expressions import value_of
 from validation.files.forces import is_over_time
 from validation.files.quantities import force_window, parts_of, quantity, shown_quantities, unit
 
-#: Source of the numbers that the author of a scene states.
+#: Source of values stated by a scene's author.
 STATED = "the scene file's [[checks]]"
 
 
 @dataclass(frozen=True)
 class StatedCheck:
-    """A number that the author of a scene knows; see `validation.files.scene_format.CheckModel`.
+    """A check by the scene's author; see `validation.files.scene_format.CheckModel`.
 
-    A tolerance may be a formula in the step `dt`; ``names`` holds what else it may name. ``over`` is by what a quantity
-    of many steps is told (`validation.metrics.OVER_TIME`); None is its mean.
+    A tolerance may be a formula in the step `dt`; ``names`` has its other names. ``over`` is the statistic of a
+    quantity with step values (`validation.metrics.OVER_TIME`); None is its mean.
     """
 
     quantity: str
@@ -44,7 +45,7 @@ class StatedCheck:
     @property
     def metric(self) -> str:
         """Name of the metric that it judges."""
-        return _metric(self.quantity, self.at, self.over)
+        return metric_of(self.quantity, self.at, self.over)
 
     def bound(self, dt: float) -> float:
         """Tolerance at step ``dt`` [s], in the quantity's unit."""
@@ -53,7 +54,7 @@ class StatedCheck:
 
 @dataclass(frozen=True)
 class Stated:
-    """What a file states: a scene, notes about what was filled in, checks with a number, and how its motion multiplies.
+    """Content of a file: a scene, notes about filled-in values, checks, and the growth of its motion.
 
     ``growth`` is that of `validation.canonical.CanonicalScene`.
     """
@@ -72,7 +73,7 @@ class Stated:
 def stated_from_dict(data: Mapping[str, Any]) -> Stated:
     """Inverse of `Stated.as_dict`."""
     checks = tuple(StatedCheck(**check) for check in data["checks"])
-    # Scenes that were handed on before growth could be stated have none.
+    # Older scenes have no growth.
     return Stated(scene_from_dict(data["scene"]), tuple(data["notes"]), checks, data.get("growth", 1.0))
 
 
@@ -84,7 +85,7 @@ def canonical_of(read: Stated, title: str) -> CanonicalScene:
         version=scene.version,
         title=title,
         figure="",
-        law="no closed form; energy never grows, bodies do not pass into each other",
+        law="no closed form; energy never grows, bodies do not overlap",
         dimensions=(scene.dimension,),
         parameters=(),
         make=lambda dimension, params: scene,
@@ -98,7 +99,7 @@ def canonical_of(read: Stated, title: str) -> CanonicalScene:
 
 
 def _contacts_from(read: Stated) -> float:
-    """Time from which contacts are recorded [s]: that of forces at the end, or the first instant stated of one."""
+    """Time from which contacts are recorded [s]: for forces at the end, or the first instant of one."""
     names = [body.name for body in read.scene.bodies]
     over_time = [check for check in read.checks if is_over_time(parts_of(check.quantity, names)[2])]
     instants = [check.at for check in over_time if check.at is not None]
@@ -109,7 +110,7 @@ def _exact(read: Stated) -> dict[str, float]:
     return {"energy_growth": 0.0, "penetration": 0.0, **{check.metric: check.value for check in read.checks}}
 
 
-def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
+def metric_of(name: str, at: float | None = None, over: str | None = None) -> str:
     """Name of a quantity's metric: ``final[ball.y]``, ``at[0.25 s][ball.y]``, ``least[floor/ball.fy]``."""
     when = "final" if at is None else f"at[{at:.12g} s]"
     if over in (None, "mean"):
@@ -118,7 +119,7 @@ def _metric(name: str, at: float | None = None, over: str | None = None) -> str:
 
 
 def instant_of(metric: str) -> float | None:
-    """Time [s] of a metric that knows the motion until then only; None of others, and of forces of steps around it."""
+    """Time [s] of a metric of the motion until then; None for others, and for forces of steps around it."""
     found = re.match(r"at\[([^ ]+) s\]\[.*\.(\w+)\]$", metric)
     return float(found[1]) if found and not is_over_time(found[2]) else None
 
@@ -129,14 +130,14 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
         overlaps = metrics.overlaps(read.scene, trajectory)
         beyond, depth = invariants.deepest(read.scene, trajectory, overlaps)
     except ModuleNotFoundError:
-        beyond = depth = None, "overlaps of cylinders and hulls need coal: pip install 'contact-crosscheck[shapes]'"
+        beyond = depth = None, f"overlaps of cylinders and hulls need coal: {install('shapes')}"
     measured: dict[str, Measured] = {
         "energy_growth": invariants.energy_growth(read.scene, trajectory, overlaps),
         "penetration": beyond,
         "deepest_overlap": depth,
     }
     for name in shown_quantities(read.scene):
-        measured[_metric(name)] = quantity(read.scene, trajectory, name)
+        measured[metric_of(name)] = quantity(read.scene, trajectory, name)
     for check in read.checks:
         measured[check.metric] = quantity(read.scene, trajectory, check.quantity, check.at, check.over)
     return measured
@@ -144,10 +145,10 @@ def _measure(read: Stated, trajectory: Trajectory) -> dict[str, Measured]:
 
 def _checks(read: Stated, dt: float) -> list[Check]:
     told = {check.metric: check for check in read.checks}
-    final = "shown for comparison between engines: the file states no number for it"
-    names = {_metric(name): name for name in shown_quantities(read.scene)}
+    final = "shown to compare engines: the file states no value for it"
+    names = {metric_of(name): name for name in shown_quantities(read.scene)}
     shown = [Check(metric, unit(name), None, None, final, "") for metric, name in names.items() if metric not in told]
-    depth = Check("deepest_overlap", "m", None, None, "shown: what `penetration` grants is taken off there", "")
+    depth = Check("deepest_overlap", "m", None, None, "shown: its tolerance is subtracted in `penetration`", "")
     return [*invariants.checks(read.scene, dt), *(_stated_check(m, c, dt) for m, c in told.items()), depth, *shown]
 
 

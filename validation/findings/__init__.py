@@ -1,16 +1,16 @@
-"""Known findings: families of rows that do not pass, each member with its value and band, each family with a reason.
+"""Known failures: families of failing rows, each member with its value and band, each family with its cause.
 
-    family    one engine, one scene, the profiles and metrics it speaks about, reason, source, releases it holds for
-    proof     of a family: a row that passes once settings switch the mechanism off (`validation.findings.proofs`)
-    member    one row of the standard suite: the value that was found, and the band within which it is the same finding
+    family    one engine, one scene, its profiles and metrics, reason, source, releases for which it holds
+    proof     of a family: a row that passes when settings switch the mechanism off (`validation.findings.proofs`)
+    member    one row of the standard suite: the value found, and the band within which it is the same finding
 
-A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and
-whether it passes or fails. A band is a half width, or two ends about the value where it is not as wide on both sides
-(`validation.judging.acceptance` says how both are measured, and when a band is too wide to see anything drift). A
-member without a value says that the check has none on this row, and its family why.
-Rows outside the standard suite have no members: a family says what they are like, it gives them no standing.
+A row is *known* while its value lies within the band of its member; outside it is *drifted*, on either side and whether
+it passes or fails. A band is a half width, or two ends where it is not symmetric (`validation.judging.acceptance`
+measures both, and tests whether a band is too wide to show drift). A member without a value means that the check has
+none on this row, for the reason of its family. Rows outside the standard suite have no members: a family describes
+them, but they have no standing.
 
-They stand in the engine's folder (`validation.findings.files` reads them). An engine without findings is *unlisted*:
+Findings are in the engine's folder (`validation.findings.files` reads them). An engine without findings is *unlisted*:
 its FAILs have no standing and do not fail the command.
 """
 
@@ -38,16 +38,16 @@ class FindingsError(ValueError):
 
 @dataclass(frozen=True)
 class Family:
-    """Rows that fail for one reason.
+    """Rows that fail for the same reason.
 
     Parameters
     ----------
     profiles, metrics
         Names; ``("*",)`` is all of them, but never for both. A metric with an index is named without it.
     reason, source
-        The mechanism in one sentence, and where it is documented, read or measured.
+        The mechanism in one to three sentences, and where it is documented, read or measured.
     releases
-        Versions of the engine it holds for, as a version specifier (``>=3.2.7,<3.3``).
+        Versions of the engine for which it holds, as a version specifier (``>=3.2.7,<3.3``).
     proofs
         Experiments that show the mechanism (`validation.findings.proofs`).
     """
@@ -62,7 +62,7 @@ class Family:
     proofs: tuple[Experiment, ...] = field(default=(), compare=False, repr=False)
 
     def covers(self, key: Key) -> bool:
-        """Whether this family speaks about a row of its engine."""
+        """Whether this family covers a row of its engine."""
         profile, scene, metric = key[0], key[1], key[6].partition("[")[0]
         return scene == self.scene and _among(profile, self.profiles) and _among(metric, self.metrics)
 
@@ -76,9 +76,9 @@ class Family:
 
 @dataclass(frozen=True)
 class Unsupported:
-    """Cells that an engine cannot be asked, and why; ``"*"`` and 0 mean any scene and any dimension.
+    """Cells that an engine cannot run, and why; ``"*"`` and 0 mean any scene and any dimension.
 
-    ``params`` are values that a cell must have, of those that differ from the scene's defaults.
+    ``params`` are required values, of those that differ from the scene's defaults.
     """
 
     id: str
@@ -90,7 +90,7 @@ class Unsupported:
     params: tuple[tuple[str, float], ...] = ()
 
     def covers(self, slot: Slot) -> bool:
-        """Whether the engine cannot be asked this slot."""
+        """Whether the engine cannot run this slot."""
         return (
             _among(slot.profile, self.profiles)
             and self.scene in ("*", slot.scene)
@@ -101,7 +101,7 @@ class Unsupported:
 
 @cache
 def solutions_of(engine: str) -> frozenset[str]:
-    """Profiles that promise a solution: what fails there is a defect, and no reason makes it known."""
+    """Exact profiles: a failure there is a defect and never listed as known."""
     facts = registry.facts(engine)
     return frozenset(name for name, role in facts.roles.items() if role == "solution") if facts else frozenset()
 
@@ -119,13 +119,13 @@ class Finding:
     value
         In the metric's unit; None where the row has no value.
     band
-        It is the same finding as long as it is this close.
+        Half width within which it is the same finding.
     diverged
-        The cell ended in numbers that are none.
+        The cell ended with numbers that are not finite.
     ends
         Least and largest value of the same finding, where that is not ``band`` on both sides.
     text
-        Value and band as they stand in the file, which writing it again must not change.
+        Value and band as written in the file, which writing again must not change.
     """
 
     family: Family
@@ -136,7 +136,7 @@ class Finding:
     text: tuple[str, str] | None = field(default=None, compare=False)
 
     def holds(self, value: float) -> bool:
-        """Whether a value is the same finding; none is where nothing was found."""
+        """Whether a value is the same finding; False for a member without a value."""
         if self.value is None:
             return False
         return abs(value - self.value) <= self.band if self.ends is None else self.ends[0] <= value <= self.ends[1]
@@ -151,7 +151,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Findings:
-    """All that is known about one engine."""
+    """All known failures of one engine."""
 
     engine: str
     families: Mapping[str, Family]
@@ -159,11 +159,11 @@ class Findings:
     members: Mapping[Key, Finding]
 
     def family_of(self, key: Key) -> Family | None:
-        """First family that speaks about a row."""
+        """First family that covers a row."""
         return next((family for family in self.families.values() if family.covers(key)), None)
 
     def unsupported_by(self, slot: Slot) -> Unsupported | None:
-        """Why this slot cannot be asked, if that is known."""
+        """Why the engine cannot run this slot, if that is listed."""
         return next((entry for entry in self.unsupported if entry.covers(slot)), None)
 
 
@@ -183,10 +183,10 @@ class Known:
     finding
         Its entry, if there is one that holds for the release that ran.
     expected
-        Whether a row that does not pass must have an entry: its engine has findings, and no family says of a row
-        outside the standard suite what it is like.
+        Whether a failing row must have an entry: its engine has findings, and no family covers it outside the standard
+        suite.
     remark
-        What else is to be said: the family of a row outside the suite, or an entry of other releases.
+        A remark: the family of a row outside the suite, or an entry of other releases.
     """
 
     finding: Finding | None

@@ -1,7 +1,7 @@
 """Files of findings: ``families.toml`` (reasons and their proofs) and ``members.csv`` (rows) in one folder per engine.
 
-They stand in the engine's folder (`adapters.engine_folder`), ours and those of other packages alike; nothing of an
-engine is imported for them.
+They are in the engine's folder (`adapters.engine_folder`), for our engines and others alike; no engine is imported to
+read them.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from validation.findings.proofs import proof_of
 
 FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
-#: What stands in the column ``value`` of a cell that ended in numbers that are none.
+#: Entry in the column ``value`` for a cell that ended with numbers that are not finite.
 DIVERGED = "diverged"
-#: Between the two ends of a band that is not as wide on both sides.
+#: Separator of the two ends of an asymmetric band.
 TO = ".."
 
 
 @cache
 def findings_of(engine: str) -> Findings | None:
-    """All that is known about ``engine``; None if nobody has written findings for it.
+    """All known failures of ``engine``; None if it has no findings.
 
     Raises
     ------
@@ -58,9 +58,9 @@ def brought_by_ours(engine: str) -> bool:
     return entry is not None and registry.is_ours(entry)
 
 
-#: Whether a value fits, and what it must be.
+#: A test of a value, and what it must be.
 _NAMES: Kind = (lambda value: bool(value) and is_list_of(is_word)(value), "a list of names")
-#: Fields of families and of what is unsupported that are no names.
+#: Fields of families and unsupported entries that are not names.
 _BOTH: Kind = (lambda value: value in (0, 2, 3), "2 or 3, or missing for both")
 _TEXT: Kind = (is_word, "a text")
 _KINDS: Fields = {"profiles": _NAMES, "metrics": _NAMES, "dimension": _BOTH, "reason": _TEXT, "source": _TEXT}
@@ -72,7 +72,7 @@ def read(engine: str, folder: Path) -> Findings:
     Raises
     ------
     FindingsError
-        Naming file and entry of what is missing, unknown, doubled or not covered by its family.
+        Naming file and entry that is missing, unknown, listed twice or not covered by its family.
     """
     path = folder / FAMILIES
     try:
@@ -83,7 +83,7 @@ def read(engine: str, folder: Path) -> Findings:
     for entry in data.get("family", []):
         family = _family(engine, path, entry)
         if family.id in families:
-            raise FindingsError(f"{path}: family {family.id} stands twice")
+            raise FindingsError(f"{path}: family {family.id} is listed twice")
         families[family.id] = family
     unsupported = tuple(_unsupported(path, entry) for entry in data.get("unsupported", []))
     return Findings(engine, families, unsupported, _members(engine, folder / MEMBERS, families))
@@ -108,12 +108,14 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
     fields = _fields(path, "family", told, ("id", "profiles", "scene", "metrics", "reason", "source", "releases"))
     family, label = Family(**fields), f"{path}: family {entry['id']}"
     if "*" in family.profiles and "*" in family.metrics:
-        raise FindingsError(f"{label}: a reason for every profile and every metric is none; name one of them")
+        raise FindingsError(
+            f"{label}: a reason cannot hold for every profile and every metric; name profiles or metrics"
+        )
     if "*" in family.scene:
         raise FindingsError(f"{label}: scene must be the name of one scene")
     for profile in family.profiles:
         if profile in solutions_of(engine):
-            raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
+            raise FindingsError(f"{label}: {engine}/{profile} is an exact profile; its failures are never listed")
     try:
         SpecifierSet(family.releases)
     except InvalidSpecifier:
@@ -153,7 +155,7 @@ def _members(engine: str, path: Path, families: Mapping[str, Family]) -> dict[Ke
             raise FindingsError(f"{label}: has {len(row)} fields, not {len(COLUMNS)}")
         key, finding = _member(engine, label, row, families)
         if key in members:
-            raise FindingsError(f"{label}: {' '.join(key)} stands twice")
+            raise FindingsError(f"{label}: {' '.join(key)} is listed twice")
         members[key] = finding
     return members
 
@@ -165,9 +167,9 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
         raise FindingsError(f"{label}: there is no family {name!r}")
     key = (profile, family.scene, dimension, params, dt, iterations, metric)
     if not family.covers(key):
-        raise FindingsError(f"{label}: family {name} does not speak about {profile} {metric}")
+        raise FindingsError(f"{label}: family {name} does not cover {profile} {metric}")
     if profile in solutions_of(engine):
-        raise FindingsError(f"{label}: {engine}/{profile} promises a solution; what fails there is never listed")
+        raise FindingsError(f"{label}: {engine}/{profile} is an exact profile; its failures are never listed")
     if value in ("", DIVERGED):
         return key, Finding(family, None, diverged=value == DIVERGED, text=(value, band))
     try:
@@ -202,7 +204,7 @@ def _line(key: Key, finding: Finding) -> tuple[str, ...]:
 
 
 def _texts(value: float, finding: Finding) -> tuple[str, str]:
-    """Value and band; ends are rounded outwards, by a twentieth of what lies between them at most."""
+    """Value and band; ends are rounded outwards, by at most a twentieth of their distance."""
     if finding.ends is None:
         return _digits(value, finding.band), f"{finding.band:.1e}"
     low, high = finding.ends
@@ -212,7 +214,7 @@ def _texts(value: float, finding: Finding) -> tuple[str, str]:
 
 
 def _outwards(value: float, way: int, room: float) -> str:
-    """Shortest decimal that is ``value`` or lies on its side ``way``, no farther away than ``room``."""
+    """Shortest decimal equal to ``value`` or beyond it in direction ``way``, at most ``room`` away."""
     shifted = value + 0.5 * way * room
     texts = (f"{number:.{n}g}" for n in range(1, 18) for number in (value, shifted))
     return next((text for text in texts if 0.0 <= (float(text) - value) * way <= room), repr(value))
@@ -224,7 +226,7 @@ def _digits(value: float, band: float) -> str:
 
 
 def add_families(folder: Path, families: Iterable[Family]) -> None:
-    """Append families to the file of reasons, which people write and read."""
+    """Append families to the file of reasons, which people edit."""
     text = "".join(_entry(family) for family in families)
     if text:
         folder.mkdir(parents=True, exist_ok=True)

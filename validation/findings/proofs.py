@@ -1,12 +1,12 @@
 """Proofs of families: ``[[family.proof]]`` under a family of ``families.toml``.
 
-    cell      the row that fails: profile, dimension, metric; params, iterations and dt where they are not those of the
+    cell      the failing row: profile, dimension, metric; params, iterations and dt where they are not those of the
               scene, the profile and the quick suite
     set       settings that switch the mechanism off
-    not       settings that another explanation would blame, each alone in vain; may be missing
-    within    how near the truth counts as a PASS, in the metric's unit; may be missing
+    not       settings of other explanations, each of which alone must not help; optional
+    within    distance from the truth that counts as a PASS, in the metric's unit; optional
 
-`adapters.experiment.Experiment` says what each of them means, `validation.settings.proofs` runs them.
+`adapters.experiment.Experiment` defines each of them, `validation.settings.proofs` runs them.
 """
 
 from __future__ import annotations
@@ -58,15 +58,15 @@ def proof_of(family: Family, entry: Any) -> Experiment:
     Raises
     ------
     ValueError
-        In one line that names the field.
+        Naming the field, in one line.
     """
     proof = checked("proof", entry, _PROOF, ("cell", "set"))
     cell = checked("proof: cell", proof["cell"], _CELL, ("profile", "dimension", "metric"))
     if not family.covers((cell["profile"], family.scene, "", "", "", "", cell["metric"])):
-        raise ValueError(f"proof: cell: the family does not speak about {cell['profile']} {cell['metric']}")
+        raise ValueError(f"proof: cell: the family does not cover {cell['profile']} {cell['metric']}")
     off, idle = settings_of(proof["set"]), tuple(map(settings_of, proof.get("not", [])))
     if off in idle:
-        raise ValueError("proof: not: what is set is not what is blamed in vain")
+        raise ValueError("proof: not: the same settings as in set")
     try:
         dt = parse_dt(cell["dt"]) if "dt" in cell else None
     except SceneError as error:

@@ -1,1 +1,1 @@
-"""From observations to rows: truth and bound, verdict and standing, what is listed, what changed between two runs."""
+"""From observations to rows: truth and bound, verdict and standing, listed failures, changes between two runs."""

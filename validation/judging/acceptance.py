@@ -1,27 +1,26 @@
-"""Lists rows that do not pass as findings: what may be listed, what never is, and how wide a finding's band is.
+"""Lists failing rows as findings: which rows may be listed, and how wide a finding's band is.
 
     rows of a run  ->  propose  ->  families with what is new, drifted or gone, and refusals  ->  accepted
 
-A proposal changes nothing. A family is written only once somebody has said, or said again, why its rows are as they
-are; the entries of all others, and of every cell that did not run to its end, stay as they stand.
+A proposal changes nothing. A family is written only after a person has stated or confirmed its cause; all other
+entries, and those of cells that did not finish, stay unchanged.
 
 How wide a band is
-    An engine does the same again, bit by bit; on another machine it rounds otherwise. What that makes of a value is
-    drawn by starts moved by some units in the last place (`MOVES`): four times the largest change that four of them
-    make. Of normal values one in 380 leaves such a band, for the largest of four changes is a draw itself (1.94
-    standard deviations in the mean, but with a spread of a third).
-    That is so wide that it may hide what it is there to show: a value that scatters by a fifth of itself has a band
-    of 1.6 times itself, which holds zero, and a finding that comes ten times nearer to the truth, or passes, is still
-    the same. Where a band reaches the tolerance of its own check, or hides a change to a third (`hides`), twelve more
-    starts are asked (`MORE_MOVES`), and the band is what Student's t expects of one more draw, at one in a thousand, of
-    values and of the logarithms of their distances from the truth, if all lie on one side of it: the logarithm's end
-    towards the truth, which distances that are multiplied by what a rounding grows to cannot reach, and the values' end
-    away from it, for a logarithm's runs away (two kinds of draws a thousandfold apart: beyond the size of the scene).
-    Of values multiplied by e^.4, one standard deviation, one in 110 leaves it; of the band of four, which holds the
-    truth, one in 150. The logarithm of four moves would not do: it holds a nineteenth and nineteen times the value.
-    What then still reaches the tolerance is a row that some starts on the same machine pass or come near to passing, or
-    whose draws lie on both sides of the truth: no single run can see it drift. Of 86 rows of columns, piles and
-    grips with such bands 8 saw that they pass, and with bands of sixteen starts 40 do; 24 pass from some of them.
+    An engine repeats its results bit by bit; on another machine it rounds differently. The effect on a value is sampled
+    by starts moved by some units in the last place (`MOVES`): the band is four times the largest change by four of
+    them. One in 380 normal values leaves such a band, because the largest of four changes scatters itself (1.94
+    standard deviations in the mean, with a spread of a third). That band may be too wide to show changes: a value that
+    scatters by a fifth of itself has a band of 1.6 times itself, which contains zero, so a finding that comes ten times
+    nearer to the truth, or passes, stays the same. Where a band reaches the tolerance of its check, or hides a change
+    to a third (`hides`), twelve more starts run (`MORE_MOVES`). The band is then the prediction interval of Student's t
+    for one more draw, at one in a thousand, of values and, if all lie on one side of the truth, of the logarithms of
+    their distances from it. Towards the truth the end of the logarithms is used, because round-off multiplies these
+    distances; away from it the end of the values, because that of the logarithms can lie beyond the size of the scene.
+    Of values multiplied by e^.4, one standard deviation, one in 110 leaves it; of the band of four, which contains the
+    truth, one in 150. Logarithms of four moves are not enough: their band reaches from a nineteenth to nineteen times
+    the value. A band that still reaches the tolerance belongs to a row that passes, or nearly, from some starts, or
+    whose draws lie on both sides of the truth: a single run cannot show its drift. Of 86 rows of columns, piles and
+    grips with such bands 8 showed a PASS as a change, with bands of sixteen starts 40 do; 24 pass from some starts.
 """
 
 from __future__ import annotations
@@ -39,18 +38,18 @@ from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
 from validation.running.plan import is_standard
 
-#: Starts moved by so many units in the last place show how far a value scatters.
+#: Moves of the start, in units in the last place, that sample the scatter of a value.
 MOVES = (1, -1, 2, -2)
-#: Further starts where the band from those hides what it is there to show.
+#: Further moves where the band from those is too wide to show changes.
 MORE_MOVES = tuple(sign * move for move in range(3, 9) for sign in (1, -1))
-#: The band of a scattering value, in units of the largest change that the four moves made.
+#: Band of a scattering value, in units of the largest change by the four moves.
 SCATTER_FACTOR = 4.0
-#: Two-sided quantile .001 of Student's t by degrees of freedom: starts that left no value are missing.
+#: Two-sided quantile .001 of Student's t by degrees of freedom: starts without a value are missing.
 STUDENT = {12: 4.3178, 13: 4.2208, 14: 4.1405, 15: 4.0728, 16: 4.0150}
-#: A band hides what comes nearer to the truth by this share of its distance.
+#: A band is too wide if it contains a value nearer to the truth by this share of the distance.
 HIDDEN = 2.0 / 3.0
-#: Least band: a hundredth of the check's tolerance, below which nobody cares, and a millionth of the value, which is
-#: what a residual at which an iteration stops one sweep sooner or later on another machine makes of it.
+#: Least band: a hundredth of the check's tolerance, which is negligible, and a millionth of the value, the effect of an
+#: iteration that stops one sweep earlier or later on another machine.
 TOLERANCE_SHARE, VALUE_SHARE = 0.01, 1e-6
 
 
@@ -61,15 +60,15 @@ class Change:
     Parameters
     ----------
     family
-        As it stands; for rows that no family covers yet a draft without reason and source.
+        The listed family; for rows without one a draft without reason and source.
     same, new
-        Members as listed, and those that are not listed yet.
+        Members as listed, and new ones.
     drifted
-        Members that left their band: what is listed, and what is found now.
+        Members outside their band: the listed and the new finding.
     gone
-        Listed rows that pass now, or whose check is no longer stated.
+        Listed rows that pass now, or whose check no longer exists.
     bands
-        Members as listed, with a band that hides what it should show; and with one from more starts.
+        Members with too wide a band, as listed and with a band from more starts.
     """
 
     family: Family
@@ -81,18 +80,18 @@ class Change:
 
     @property
     def is_draft(self) -> bool:
-        """Whether nobody has said yet why these rows fail."""
+        """Whether the family has no cause yet."""
         return not self.family.reason
 
     @property
     def asks(self) -> bool:
-        """Whether accepting it would change what is listed."""
+        """Whether accepting it would change the list."""
         return bool(self.new or self.drifted or self.gone or self.bands)
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """What listing a run would change for one engine, and the rows that are refused, each with why."""
+    """Changes of the list of one engine by a run, and refused rows with their reasons."""
 
     engine: str
     changes: tuple[Change, ...]
@@ -101,14 +100,14 @@ class Proposal:
     left_out: tuple[Row, ...] = ()
 
 
-#: Values of a row: of the cell as it is, then of its moved starts.
+#: Values of a row: of the unmoved cell, then of its moved starts.
 Draws = tuple[float, ...]
 
 
 def slots_to_move(rows: Iterable[Row], engine: str, about: Callable[[Key], bool] = lambda key: True) -> list[Slot]:
-    """Slots whose scatter must be known: each cell of the standard suite that fails, or nearly, once per move.
+    """Slots for the scatter: each cell of the standard suite that fails, or nearly, once per move.
 
-    ``about``: which rows are to be listed.
+    ``about`` selects the rows to list.
     """
     return _moved(rows, engine, about, MOVES, lambda row: row.floor is None)
 
@@ -116,7 +115,7 @@ def slots_to_move(rows: Iterable[Row], engine: str, about: Callable[[Key], bool]
 def slots_to_move_further(
     rows: Iterable[Row], engine: str, draws: Mapping[Key, Draws], about: Callable[[Key], bool] = lambda key: True
 ) -> list[Slot]:
-    """Slots of cells with a row whose band, from `MOVES` alone, hides what it should show; once per further move."""
+    """Slots of cells with a row whose band from `MOVES` is too wide; once per further move."""
 
     def is_hidden(row: Row) -> bool:
         known = draws.get(row_key(slot_from_dict(row.slot), row.metric), ())
@@ -138,7 +137,7 @@ def _moved(
 
 
 def draws_of(observations: Iterable[Observation]) -> dict[Key, Draws]:
-    """Values of every row of ``observations``: the unmoved start first, then moved ones by how far; of sound cells."""
+    """Values of every row of ``observations``, unmoved start first, then by size of the move; valid cells only."""
     found: dict[Key, dict[int, float]] = {}
     for observation in observations:
         if observation.outcome is Outcome.OK:
@@ -166,10 +165,9 @@ def propose(
 ) -> Proposal:
     """Compare ``rows`` of a run with what is listed for ``engine``; see `Change` and `Proposal`.
 
-    ``rows`` carry their scatter (`Row.floor`), so the run's cells have been run from moved starts as well; ``draws``
-    are the values of those that were asked for more of them. What
-    ``about`` does not hold for stays as it is listed; what must not be listed is refused there as well, and rows that
-    are new or drifted are told as left out.
+    ``rows`` have their scatter (`Row.floor`), from moved starts; ``draws`` are the values of rows with further starts.
+    Rows that ``about`` does not select stay as listed; among them, rows that must not be listed are refused too, and
+    new or drifted ones are reported as left out.
     """
     findings = findings or Findings(engine, {}, (), {})
     changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
@@ -180,9 +178,9 @@ def propose(
             continue
         key = row_key(slot, row.metric)
         if row.outcome not in ("ok", "diverged"):
-            # What gave no answer says nothing about a finding: its entries stay.
+            # A cell without a result does not change a finding: its entries stay.
             if row.outcome == "invalid":
-                refused.append((row, "its receipts or its certificate do not hold"))
+                refused.append((row, "its property checks or its certificate fail"))
             continue
         judged.add(key)
         if not about(key) and not _must_not_be_listed(row):
@@ -225,15 +223,15 @@ def _place(change: Change, key: Key, found: Finding, kept: dict[Key, Finding], r
 
 
 def _no_longer_stated(kept: Mapping[Key, Finding], judged: set[Key]) -> list[Key]:
-    """Entries of cells that ran to their end, of checks that those cells did not have."""
+    """Entries of finished cells whose check does not exist any more."""
     cells = {key[:6] for key in judged}
     return [key for key in kept if key[:6] in cells and key not in judged]
 
 
 def _must_not_be_listed(row: Row) -> str:
-    """Why nobody may list a row, whatever its scatter; nothing if one may."""
+    """Why a row must not be listed, whatever its scatter; empty if it may."""
     if _never(row) and row.physics == "fail":
-        return "its profile promises a solution: what fails there is mended, not listed"
+        return "its profile is exact: a failure there must be fixed, not listed"
     covered = row.truth is not None and row.tolerance is not None and row.value is not None
     if (
         covered
@@ -242,16 +240,16 @@ def _must_not_be_listed(row: Row) -> str:
         and row.physics == "fail"
         and predictions_of(row)
     ):
-        return "a deviation law speaks about it and misses: the law or the engine has changed"
+        return "a contact law predicts another value: the law or the engine has changed"
     return ""
 
 
-#: Value, band, whether it diverged, and the ends of a band that is not as wide on both sides.
+#: Value, band, whether it diverged, and the ends of an asymmetric band.
 Entry = tuple[float | None, float, bool, tuple[float, float] | None]
 
 
 def _entry(row: Row, draws: Draws = ()) -> tuple[str, Entry | None]:
-    """Why a row is refused, or what is listed of it; neither where there is nothing to list."""
+    """Why a row is refused, or its entry; neither where there is nothing to list."""
     if why := _must_not_be_listed(row):
         return why, None
     if row.outcome == "diverged":
@@ -263,7 +261,7 @@ def _entry(row: Row, draws: Draws = ()) -> tuple[str, Entry | None]:
     if row.physics == "pass" and not is_marginal(row.value, _check(row)):
         return "", None
     if row.floor is None and not _is_study(row):
-        return "its scatter is not known: the cell has not been run from moved starts", None
+        return "its scatter is unknown: the case was not run from moved starts", None
     ends = _ends(row, draws)
     if row.physics == "pass" and max(abs(end - row.truth) for end in ends) <= row.tolerance:
         return "", None
@@ -278,7 +276,7 @@ def band(value: float, tolerance: float, scatter: float) -> float:
 
 
 def _width(row: Row, draws: Draws) -> float:
-    """Half width from four moved starts; rows of a cell that was moved further for another one have more."""
+    """Half width from four moved starts; rows of a cell with further starts for another row have more."""
     value, tolerance = row.value or 0.0, row.tolerance or 0.0
     few = draws[: 1 + len(MOVES)]
     scatter = max((abs(each - value) for each in few), default=0.0) if len(few) > 1 else row.floor or 0.0
@@ -300,9 +298,9 @@ def _about(value: float, width: float) -> tuple[float, float]:
 
 
 def one_more(draws: Draws, truth: float) -> tuple[float, float]:
-    """Ends between which one more draw lies; never narrower than all draws (see above).
+    """Prediction interval of one more draw; never narrower than all draws (see above).
 
-    Where draws lie on both sides of the truth, or on it, their distances have no logarithms, and values alone count.
+    Where draws lie on both sides of the truth, or on it, only values are used, not logarithms of distances.
     """
     side = math.copysign(1.0, draws[0] - truth)
     away = [(each - truth) * side for each in draws]
@@ -314,14 +312,14 @@ def one_more(draws: Draws, truth: float) -> tuple[float, float]:
 
 
 def _student(points: Sequence[float]) -> tuple[float, float]:
-    """Ends between which one more of normal points lies, in all but one of a thousand cases."""
+    """Interval that contains one more normal point in all but one of a thousand cases."""
     half = STUDENT[len(points) - 1] * math.sqrt(1.0 + 1.0 / len(points)) * statistics.stdev(points)
     mean = statistics.fmean(points)
     return mean - half, mean + half
 
 
 def hides(row: Row, ends: tuple[float, float]) -> bool:
-    """Whether a band holds values that pass, of a row that fails, or any as near as a third of its distance."""
+    """Whether the band of a failing row contains values that pass, or any at a third of its distance."""
     if row.value is None or row.truth is None or row.tolerance is None:
         return False
     distance = abs(row.value - row.truth)
@@ -335,7 +333,7 @@ def _never(row: Row) -> bool:
 
 
 def _is_study(row: Row) -> bool:
-    """What several cells say together is one of few values; it does not scatter with the last bits of a start."""
+    """A study has one of few values, which do not scatter with the last bits of a start."""
     return study_of(row.scene, row.metric) is not None
 
 
@@ -344,7 +342,7 @@ def _check(row: Row) -> Check:
 
 
 def _draft(row: Row) -> Family:
-    """Family of rows that nobody has given a reason for: one profile, scene and kind of metric."""
+    """Family of rows without a cause yet: one profile, scene and kind of metric."""
     metric = row.metric.partition("[")[0]
     release = ".".join(row.engine_version.partition("+")[0].split(".")[:2])
     name = f"{row.profile}-{row.scene}-{metric}".replace("_", "-")
@@ -352,7 +350,7 @@ def _draft(row: Row) -> Family:
 
 
 def accepted(proposal: Proposal, families: Collection[str]) -> dict[Key, Finding]:
-    """Members that are listed once the ``families`` (ids) are accepted; all others stand as before."""
+    """Members of the list after the ``families`` (ids) are accepted; all others are unchanged."""
     members = dict(proposal.kept)
     for change in proposal.changes:
         members |= change.same

@@ -2,8 +2,8 @@
 
 Deterministic values are equal to the last bit or they changed; a change counts only if it is larger than the noise
 floor of its cell, measured by moving the start by one and two units in the last place, and larger than a hundredth of
-its tolerance: what is smaller decides nothing. Verdict flips come first, then errors, then speed. Rows that one side
-has and the other has not were not asked the same: they are told, and are neither better nor worse.
+its tolerance: smaller changes are ignored. Verdict flips come first, then errors, then speed. Rows on one side only are
+reported, and are neither better nor worse.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ COUNTS = 0.01
 
 
 class Kind(Enum):
-    """What kind of change a row shows, most serious first."""
+    """Kinds of changes, most serious first."""
 
     FLIP = "verdict flipped"
     OUTCOME = "outcome changed"
@@ -40,8 +40,8 @@ class Change:
     Parameters
     ----------
     regressed
-        True if B is worse: it fails where A passed, its error or time grew, or it has no answer any more. What was
-        not run is neither.
+        True if B is worse: it fails where A passed, its error or time grew, or it has no result any more. Rows that
+        were not run are neither.
     size
         Of a value: change of the error in units of the tolerance. Of a time: ratio B / A.
     """
@@ -66,7 +66,7 @@ class Change:
 
 
 def _identity(row: Plain) -> tuple[str, str]:
-    """Rows are the same question if slot and metric agree; the run, versions and hashes are the answer."""
+    """Rows correspond if slot and metric agree; run, versions and hashes may differ."""
     return json.dumps(row["slot"], sort_keys=True), row["metric"]
 
 
@@ -162,7 +162,7 @@ class Family:
 
 
 def families(changes: Iterable[Change]) -> list[Family]:
-    """Changes that belong together, in the order of their most serious ones."""
+    """Groups of changes, ordered by their most serious ones."""
     found: dict[tuple[Any, ...], list[Change]] = {}
     for change in sorted(changes, key=by_seriousness):
         where = change.engine, change.profile, change.scene, change.metric.partition("[")[0]
@@ -170,17 +170,17 @@ def families(changes: Iterable[Change]) -> list[Family]:
     return [Family(tuple(own)) for own in found.values()]
 
 
-#: A change of speed counts if its whole interval lies beyond this factor: ten per cent is what a user might notice, and
-#: more than what two runs of the same code differ by on a shared machine.
+#: A change of speed counts if its whole interval lies beyond this factor: ten per cent is noticeable, and more than the
+#: difference of two runs of the same code on a shared machine.
 PRACTICAL = 1.1
 
 
 def compare_speeds(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
     """Changes of speed between two bench runs.
 
-    Each side lists ratios of a unit's time to its opponent's, taken in the same rounds (columns of
-    `validation.bench.agreement.ratios`): a busier or slower machine moves both. The interval of the quotient is made
-    from the bootstrap intervals of both sides.
+    Each side lists ratios of a unit's time to its opponent's in the same rounds (columns of
+    `validation.bench.agreement.ratios`), so a busier or slower machine changes both. The interval of the quotient
+    follows from the bootstrap intervals of both sides.
     """
     a = {_unit(row): row for row in before}
     b = {_unit(row): row for row in after}
@@ -218,7 +218,7 @@ def _unit(row: Plain) -> tuple[str, str, str]:
     return row["purpose"], json.dumps(row["slot"], sort_keys=True), row["opponent"]
 
 
-#: What ``--fail-on`` may name, and the changes that it means.
+#: Values of ``--fail-on``, and the changes that each selects.
 FAIL_ON = {
     "never": lambda change: False,
     "flips": lambda change: change.kind in (Kind.FLIP, Kind.OUTCOME) and change.regressed,
@@ -228,5 +228,5 @@ FAIL_ON = {
 
 
 def failing(changes: Sequence[Change], fail_on: str) -> bool:
-    """Whether ``changes`` hold one that ``fail_on`` (a key of `FAIL_ON`) names."""
+    """Whether ``changes`` contain one that ``fail_on`` (a key of `FAIL_ON`) selects."""
     return any(map(FAIL_ON[fail_on], changes))

@@ -1,4 +1,4 @@
-"""What laws say about many failing rows, asked in processes side by side: most of the time that judging takes."""
+"""Predictions of contact laws for many failing rows, in parallel processes: most of the time of judging."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from validation.judging.verdicts import Prediction, predicted
 from validation.posed import resolve
 from validation.workers.limits import cores
 
-#: A row about which laws are asked: its cell, the engine's version, its metric.
+#: A row for predictions: its cell, the engine's version, its metric.
 Asked = tuple[Slot, str, str]
-#: What a law said, without the law, which cannot leave its process: its place among its engine's, centre and band.
+#: A prediction without its law, which cannot be pickled: index of the law, centre and band.
 Said = tuple[int, float, float]
-#: Rows below which no process is started: each imports for about two seconds, a law takes some 4 ms on average.
+#: Fewest rows for which processes are started: each imports for about two seconds, a law takes some 4 ms on average.
 MANY = 2000
-#: Rows of one task: a row of a column takes a second, and neighbouring rows share the march that they are read from.
+#: Rows of one task: a row of a column takes a second, and neighbouring rows share one recurrence.
 TOGETHER = 64
 
 
 def predictions(slot: Slot, version: str, metric: str, scene: Scene) -> list[Prediction]:
-    """What the deviation laws of an engine say about a row.
+    """Predictions of an engine's contact laws for a row.
 
     Raises
     ------
     EngineError
-        If the engine has laws that cannot be had.
+        If the engine has laws that cannot be loaded.
     """
     laws = covering(slot.engine, version, slot.profile, scene.name, metric)
     return predicted(laws, scene, slot, resolve(slot.scene).measure)
 
 
 def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[Prediction]]:
-    """Predictions of rows that are too many to be asked one after the other; nothing of few, or where no process lives.
+    """Predictions of many rows, made in parallel; empty for few rows, or where processes fail.
 
     Parameters
     ----------
     rows
-        Failing rows of scenes of the catalogue, those of a cell one after the other.
+        Failing rows of catalogue scenes, ordered by cell.
     processes
-        How many processes; 0: one per core.
+        Number of processes; 0: one per core.
     """
     if len(rows) < MANY:
         return {}
@@ -63,7 +63,7 @@ def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[P
                         laws = laws_of(row[0].engine)
                         found[row] = [(laws[place], centre, band) for place, centre, band in said]
     except BrokenProcessPool:
-        pass  # what is missing is asked where it is needed
+        pass  # missing predictions are made where they are needed
     return found
 
 
@@ -73,7 +73,7 @@ def _begin(parent: int) -> None:
 
 
 def _said(rows: Sequence[Asked]) -> list[list[Said] | None]:
-    """In a process of its own: what the laws say about each row, None where they cannot be had."""
+    """In a separate process: predictions for each row, None where the laws cannot be loaded."""
     return [_said_of(*row) for row in rows]
 
 

@@ -1,4 +1,4 @@
-"""Rows: every engine x profile x scene x check, judged. What people see is made from these and nothing else."""
+"""Rows: every engine x profile x scene x check, judged. All output is made from these."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from validation.posed import is_file, is_model, resolve
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
 ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
-#: Why a row of a model has no standing.
+#: Reason of rows of a model, which have no standing.
 OWN_MODEL = "not listed: your own model"
-#: Why a row of a profile with settings of a user's own has none.
+#: Reason of rows with settings of a user, which have none.
 OWN_SETTINGS = "not listed: with settings of your own"
 #: What laws say about rows, asked ahead of the others.
 Ready = Mapping[Asked, list[Prediction]]
@@ -91,7 +91,7 @@ class Row:
 
     @property
     def failing(self) -> bool:
-        """Whether this row makes a strict command fail: whatever has no PASS and was asked, listed or not."""
+        """Whether this row makes a strict command fail: every row that ran without a PASS, listed or not."""
         return self.alarming or self.physics == Physics.FAIL.value or self.outcome in ALARMING_OUTCOMES
 
     def as_dict(self) -> dict[str, Any]:
@@ -102,9 +102,9 @@ class Row:
 def is_alarming(row: Mapping[str, Any]) -> bool:
     """Whether a row, as plain data, makes the command fail.
 
-    Cells that crash, take too long or are missing do so whoever ran them. So do rows that should be listed and are not,
-    and numbers that the author of a scene file states (`_known` gives both their standing). Of models, and of engines
-    without a list, INVALID is as little of an alarm as a FAIL.
+    Alarms are cells that crash, time out or are missing, rows that should be listed and are not, and values stated in a
+    scene file (`_known` gives both their standing). For models, and for engines without a list, neither INVALID nor
+    FAIL is an alarm.
     """
     if row["outcome"] == Outcome.INVALID.value and not is_listed(row["engine"], row["scene"]):
         return False
@@ -112,16 +112,15 @@ def is_alarming(row: Mapping[str, Any]) -> bool:
 
 
 def is_listed(engine: str, scene: str) -> bool:
-    """Whether what is wrong with an engine in a scene has a list that it could stand on."""
+    """Whether failures of an engine in a scene can be listed."""
     return not is_model(scene) and _findings(engine)[0] is not None
 
 
 def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] = ()) -> list[Row]:
-    """Judge all checks of all observations, and the studies that they feed.
+    """Judge all checks of all observations, and their studies.
 
-    Every slot of ``plan`` gets its rows: a cell that left no observation is *missing*, which is an alarm. Cells
-    whose start was moved by units in the last place are not judged: they give the row of the unmoved cell its noise
-    floor.
+    Every slot of ``plan`` gets rows: a cell without observation is *missing*, which is an alarm. Cells with a moved
+    start are not judged: they give the noise floor of the unmoved cell's row.
     """
     observations = list(observations)
     seen = {observation.slot for observation in observations}
@@ -133,7 +132,7 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
 
 
 def with_floors(rows: Iterable[Row], observations: Iterable[Observation]) -> list[Row]:
-    """Judged rows with the noise floors that cells with moved starts give; what several cells say together has none."""
+    """Judged rows with noise floors from cells with moved starts; studies have none."""
     moved: dict[Slot, list[Observation]] = defaultdict(list)
     for observation in observations:
         if observation.slot.ulp:
@@ -147,12 +146,12 @@ def with_floors(rows: Iterable[Row], observations: Iterable[Observation]) -> lis
 
 
 def _missing(slot: Slot) -> Observation:
-    """Stand-in for a cell of the plan that has left nothing; it is shown, never stored."""
-    return Observation(slot, "", 0, "", Outcome.MISSING, "the plan has this cell, the run has no observation of it")
+    """Observation for a planned cell without a result; it is shown, never stored."""
+    return Observation(slot, "", 0, "", Outcome.MISSING, "the run has no observation of this planned case")
 
 
 def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
-    """Largest change of a value when its start moves by some units in the last place; INVALID runs say nothing."""
+    """Largest change of a value when its start moves by some units in the last place; INVALID runs do not count."""
     sound = [observation for observation in moved if observation.outcome is not Outcome.INVALID]
     values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in sound]
     changes = [_difference(value, row.value) for value in values]
@@ -174,7 +173,8 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
     if doubt:
         observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
     if value is None and why in UNTOLD and observation.outcome is Outcome.OK and is_file(observation.slot.scene):
-        # What an engine does not tell is no fault of its motion; in the catalogue it is listed which engines do not.
+        # A value that an engine does not report is no failure of its motion; for catalogue scenes such engines are
+        # listed.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = _verdict(observation, scene, check, value, why, ready)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
@@ -184,13 +184,13 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
 def _verdict(
     observation: Observation, scene: Scene, check: Check, value: float | None, why: str, ready: Ready
 ) -> Verdict:
-    """What was observed, judged; cells without an answer have no physics, and unsupported ones must be known ones."""
+    """Verdict of an observation; cells without a result have no physics, and unsupported ones must be listed."""
     slot, outcome = observation.slot, observation.outcome
     if outcome is Outcome.OK:
         known, said = _known(observation, slot, check), []
         try:
             said = _predictions(observation, scene, check, ready)
-        except EngineError as error:  # laws of another package, which say nothing then
+        except EngineError as error:  # laws of another package fail: no predictions
             known = replace(known, remark="; ".join(filter(None, (known.remark, str(error)))))
         return judge(value, check, said, known, why)
     if outcome is Outcome.DIVERGED:
@@ -204,13 +204,13 @@ def _verdict(
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     off = _not_as_asked(observation) if slot.is_own else []
-    if check.source == STATED:  # its author knows the number: neither a list nor settings of one's own excuse an engine
+    if check.source == STATED:  # stated by the file's author: neither a list nor a user's settings excuse it
         return Known(None, True, "; ".join(off))
     if slot.is_own:
         return Known(None, False, "; ".join([OWN_SETTINGS, *off]))
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
-        return Known(None, False, "as soft as its author made it: a model's own profile is no engine's")
-    if is_model(slot.scene):  # nothing can be listed of it
+        return Known(None, False, "as soft as the model: the profile is the model's own, not the engine's")
+    if is_model(slot.scene):  # its failures cannot be listed
         return Known(None, False, OWN_MODEL)
     findings, why_not = _findings(slot.engine)
     if why_not:
@@ -219,13 +219,13 @@ def _known(observation: Observation, slot: Slot, check: Check) -> Known:
 
 
 def _not_as_asked(observation: Observation) -> list[str]:
-    """What probes measured of settings of a user's own that is not what the scene asks for."""
+    """Properties under a user's settings that differ from the scene's values."""
     off = [slip for slip in observation.receipts if not slip["holds"] and slip["measured"] is not None]
     return [f"{s['quantity']} asked {s['asked']:.4g}, measured {s['measured']:.4g}" for s in off]
 
 
 def _findings(engine: str) -> tuple[Findings | None, str]:
-    """What is known about an engine; where the files of another package are wrong, nothing and why."""
+    """Findings of an engine; where the files of another package are wrong, none and the reason."""
     try:
         return findings_of(engine), ""
     except FindingsError as error:
@@ -235,11 +235,11 @@ def _findings(engine: str) -> tuple[Findings | None, str]:
 
 
 def _is_lawful(observation: Observation, check: Check) -> bool:
-    """Whether a certificate refuses a motion that is not determined, and the check is about any that obeys the laws.
+    """Whether the certificate fails because the motion is not unique, while the check holds for every lawful motion.
 
-    Where contacts can share a load in more than one way there are many such motions, and the run is one of them: no
-    truth for where bodies go, but its energy and its overlaps are judged as those of any engine. Until then it is the
-    only one, for checks that know nothing of what comes later.
+    Where contacts can share a load in several ways there are many lawful motions, and the run is one of them: it is no
+    truth for positions, but its energy and overlaps are judged like those of any engine. Before that time the motion is
+    unique, for checks that end there.
     """
     if observation.outcome is not Outcome.INVALID or not is_file(observation.slot.scene):
         return False
@@ -251,7 +251,7 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
 
 
 def _doubt(observation: Observation, check: Check) -> str:
-    """Why a certified run cannot be truth for this check: its error for the step is not small beside the tolerance."""
+    """Why a certified run cannot be the truth of this check: its step error is not small against the tolerance."""
     errors = observation.certificate.get("metric_errors")
     if observation.outcome is not Outcome.OK or errors is None or check.bound is None:
         return ""
@@ -263,7 +263,7 @@ def _doubt(observation: Observation, check: Check) -> str:
 
 
 def _certificate(observation: Observation, check: Check) -> str:
-    """Which certificate ran, and to what the value is certified."""
+    """Which certificate ran, and the certified error of the value."""
     found = observation.certificate
     if "certified" not in found:
         return ""
@@ -274,10 +274,10 @@ def _certificate(observation: Observation, check: Check) -> str:
 
 
 def _is_asked(observation: Observation, check: Check) -> bool:
-    """Whether laws are asked about a row: a FAIL of a cell of the catalogue.
+    """Whether contact laws apply to a row: a FAIL of a catalogue cell.
 
-    A file that has the name of a scene is another scene, and laws know the settings of profiles only. At iterations
-    asked for those laws alone answer that follow an engine's sweeps.
+    A file with the name of a scene is another scene, and laws hold for settings of profiles only. At iteration counts
+    set by the user only laws apply that model the iterations.
     """
     if observation.outcome is not Outcome.OK or is_file(observation.slot.scene) or observation.slot.switched:
         return False
@@ -289,7 +289,7 @@ def _asked(observation: Observation, check: Check) -> Asked:
 
 
 def _predictions(observation: Observation, scene: Scene, check: Check, ready: Ready) -> list[Prediction]:
-    """What laws say about a FAIL, asked now where it is not ready."""
+    """Predictions for a FAIL, made now if not available."""
     if not _is_asked(observation, check):
         return []
     asked = _asked(observation, check)
@@ -297,7 +297,7 @@ def _predictions(observation: Observation, scene: Scene, check: Check, ready: Re
 
 
 def predictions_of(row: Row) -> list[Prediction]:
-    """What deviation laws say about a failing row, whether or not it is so; nothing about a study."""
+    """Predictions of contact laws for a failing row, right or wrong; none for a study."""
     if row.physics != Physics.FAIL.value or len(row.cells) > 1 or is_file(row.scene):
         return []
     slot = slot_from_dict(row.slot)
@@ -306,7 +306,7 @@ def predictions_of(row: Row) -> list[Prediction]:
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     try:
         return predictions(slot, row.engine_version, row.metric, scene)
-    except EngineError:  # laws of another package; their row says what is wrong
+    except EngineError:  # laws of another package; their row has the error
         return []
 
 

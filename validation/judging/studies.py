@@ -1,6 +1,6 @@
-"""Studies: what several cells of a scene say together (thresholds, suprema); judged like an observation.
+"""Studies: results of several cells of a scene together (thresholds, suprema), judged like an observation.
 
-A scene declares its studies (`CanonicalScene.studies`); here they are run.
+A scene declares its studies (`CanonicalScene.studies`); they run here.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Verdicts: pure functions of what was measured. Physics and standing are never mixed.
+"""Verdicts: pure functions of measurements. Physics and standing are never mixed.
 
 physics
-    PASS or FAIL against the truth under the engine-blind tolerance. Nothing an engine is known for changes it.
+    PASS or FAIL against the truth, with the same tolerance for all engines, whatever is known of an engine.
 standing
-    of a row that does not pass: *explained* by a deviation law, *known* (a finding lists it, and its value lies within
-    the finding's band), *new*, or *drifted*: it left the band of its law or of its finding, on either side.
+    of a failing row: *explained* by a contact law, *known* (a finding lists it, and its value lies within the finding's
+    band), *new*, or *drifted*: outside the band of its law or finding, on either side.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from validation.canonical import Check
 from validation.cells import Slot
 from validation.findings import Finding, Known
 
-#: A law, the value it predicts, and the band it allows.
+#: A law, its predicted value and its band.
 Prediction = tuple[Deviation, float, float]
 
 
@@ -32,7 +32,7 @@ class Physics(Enum):
 
 
 class Standing(Enum):
-    """Against what is known."""
+    """Against laws and findings."""
 
     EXPLAINED = "explained"
     KNOWN = "known"
@@ -65,9 +65,9 @@ def is_marginal(value: float, check: Check) -> bool:
 
 
 def predicted(laws: Iterable[Deviation], scene: Scene, slot: Slot, measure: Measure) -> list[Prediction]:
-    """Laws that say something about this scene and step, with value and band.
+    """Laws with a prediction for this scene and step, with value and band.
 
-    ``measure`` is the scene's own: a law predicts a motion, and what a row shows is read from it.
+    ``measure`` is the scene's: a law predicts a motion, from which the row's value is measured.
     """
     said = ((law, law.says(scene, slot.dt, measure, slot.iterations)) for law in laws)
     return [(law, *prediction) for law, prediction in said if prediction is not None]
@@ -79,9 +79,9 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
     Parameters
     ----------
     predictions
-        What the engine's deviation laws predict for it.
+        Predictions of the engine's contact laws.
     known
-        What is known about its row.
+        The findings about its row.
     why
         Why there is no value, if there is none.
     """
@@ -94,33 +94,33 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
     for law, centre, band in predictions:
         if abs(value - centre) <= band:
             return Verdict(physics, Standing.EXPLAINED, f"{law.because} (predicted {centre:.6g} +- {band:.1g})")
-    if predictions:  # a row that a law speaks about is its law's: no list excuses it
+    if predictions:  # a row with a law is judged by the law: no list excuses it
         law, centre, band = predictions[0]
         return Verdict(
-            physics, Standing.DRIFTED, f"left the band of its law, {centre:.6g} +- {band:.1g}: {law.because}"
+            physics, Standing.DRIFTED, f"outside the band of its contact law, {centre:.6g} +- {band:.1g}: {law.because}"
         )
     if known.finding is not None:
         return _against_finding(physics, value, known.finding)
     if physics is Physics.PASS:
         return Verdict(physics, None)
-    return _unlisted(physics, known, "neither listed nor explained by a law")
+    return _unlisted(physics, known, "neither listed nor explained by a contact law")
 
 
 def _without_value(known: Known, why: str) -> Verdict:
     """A judged check must have a value, unless it is listed with the reason why there is none."""
     finding = known.finding
     if finding is None:
-        return _unlisted(None, known, "; ".join(filter(None, ("has no value, and is not listed as having none", why))))
+        return _unlisted(None, known, "; ".join(filter(None, ("has no value, which is not listed", why))))
     if finding.value is None and not finding.diverged:
         return Verdict(None, Standing.KNOWN, finding.family.reason)
-    return Verdict(None, Standing.DRIFTED, f"has no value any more; {_listed_as(finding)}")
+    return Verdict(None, Standing.DRIFTED, f"has no value now; {_listed_as(finding)}")
 
 
 def _against_finding(physics: Physics | None, value: float, finding: Finding) -> Verdict:
     if not finding.holds(value):
         passes = "passes, but " if physics is Physics.PASS else ""
         return Verdict(physics, Standing.DRIFTED, f"{passes}{_listed_as(finding)}")
-    marginal = "passes within the band of what is listed as failing: " if physics is Physics.PASS else ""
+    marginal = "passes within the band of the listed failure: " if physics is Physics.PASS else ""
     return Verdict(physics, Standing.KNOWN, f"{marginal}{finding.family.reason}")
 
 
@@ -136,7 +136,7 @@ def _unlisted(physics: Physics | None, known: Known, why: str) -> Verdict:
 
 
 def judge_divergence(known: Known, why: str) -> Verdict:
-    """A cell that ended in numbers that are none fails every check; *known* if it is listed as doing so."""
+    """A cell that ended with numbers that are not finite fails every check; *known* if listed as diverging."""
     if known.finding is None:
         said = "; ".join(filter(None, (why, known.remark)))
         return Verdict(Physics.FAIL, Standing.NEW if known.expected else None, said)

@@ -1,1 +1,1 @@
-"""What is asked of an engine beyond single cells: order, limits, symmetries, nulls, parameters, what checks can see."""
+"""Studies beyond single cells: convergence, breaking points, metamorphic tests, trivial answers, sweeps, faults."""

@@ -1,12 +1,12 @@
-"""Known breaks of invariance: what an engine's answer depends on and must not, each with its reason.
+"""Known violations of metamorphic tests: dependences of an engine's results that should not exist, with reasons.
 
     breaks.toml    families: the profiles and relations they speak about, the scenes (or "*"), reason, source, releases
     breaks.csv     members: profile, scene, dimension, relation, the metric that changed most, and how far beyond what
                    it may, as a power of ten
 
-They stand beside an engine's other findings. A break is *known* while the same metric breaks by about as much,
-*drifted* where it breaks otherwise or no longer, *new* where nothing is listed. Of a profile that promises a solution
-nothing is listed: there every break is new.
+They are beside an engine's other findings. A break is *known* while the same metric breaks by about as much, *drifted*
+where it breaks differently or not any more, *new* where it is not listed. For an exact profile nothing is listed: every
+break is new.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from validation.running.plan import QUICK_DT
 
 FAMILIES, MEMBERS = "breaks.toml", "breaks.csv"
 COLUMNS = ("family", "profile", "scene", "dimension", "relation", "metric", "decades")
-#: A break is the same within so many powers of ten: what may change is the largest of ten changes from moved starts,
-#: and the largest of ten of a wide scatter (some decades, in a chaotic scene) is one decade off at most in 99 %.
+#: A break is the same within this many powers of ten: the allowed change is the largest of ten from moved starts, which
+#: in a wide scatter (some decades, in a chaotic scene) is right to one decade in 99 %.
 BAND = 1.0
-#: Stands for how far where the engine gives no answer to the scene posed otherwise, or loses a metric.
+#: Entry for the size of a break where the engine has no result in the other pose, or loses a metric.
 LOST = "lost"
 
 #: Profile, scene, dimension, relation.
@@ -44,7 +44,7 @@ Key = tuple[str, str, int, str]
 
 @dataclass(frozen=True)
 class Family:
-    """Breaks that have one reason; see `validation.findings.Family` for its words."""
+    """Breaks with one reason; see `validation.findings.Family` for its fields."""
 
     id: str
     profiles: tuple[str, ...]
@@ -55,7 +55,7 @@ class Family:
     releases: str
 
     def covers(self, key: Key, version: str) -> bool:
-        """Whether this family speaks about a break of this release."""
+        """Whether this family covers a break of this release."""
         named = zip((key[0], key[1], key[3]), (self.profiles, self.scenes, self.relations), strict=True)
         return all(name in names or "*" in names for name, names in named) and SpecifierSet(self.releases).contains(
             version, prereleases=True
@@ -83,15 +83,15 @@ NOTHING: Breaks = Breaks({}, {})
 
 
 def key_of(slot: Slot, change: Change) -> Key:
-    """Where a break is listed."""
+    """Key of a break in the list."""
     return slot.profile, slot.scene, slot.dimension, change.relation
 
 
 def decades_of(change: Change) -> float | None:
-    """How far beyond what it may a metric changed, as a power of ten; None where there is no answer at all."""
+    """Change over allowed change of a metric, as a power of ten; None where there is no result."""
     if change.lost or not math.isfinite(change.change):
         return None
-    # Where nothing may change, a change is measured in the smallest number that a double has.
+    # Where no change is allowed, a change is measured in the smallest double.
     return math.log10(change.change) - math.log10(change.allowed or math.ulp(0.0))
 
 
@@ -103,14 +103,14 @@ def is_listed_cell(slot: Slot) -> bool:
 
 
 def standing_of(slot: Slot, version: str, change: Change) -> tuple[Standing | None, str]:
-    """Standing of one answer, and why; None where it holds and is not listed, or is of a cell without a list."""
+    """Standing of one result, and why; None where it holds and is not listed, or for a cell without a list."""
     if not is_listed_cell(slot) or (change.refused and not change.lost):
         return None, ""
     member = breaks_of(slot.engine).members.get(key_of(slot, change))
     if member is None or not member.family.covers(key_of(slot, change), version):
         return (None, "") if change.holds else (Standing.NEW, "")
     if change.holds:
-        return Standing.DRIFTED, f"listed as {member.family.id}, and holds now"
+        return Standing.DRIFTED, f"listed as {member.family.id}, but holds now"
     found = decades_of(change)
     same = found is None if member.decades is None else found is not None and abs(found - member.decades) <= BAND
     if same and (change.lost or change.metric == member.metric):
@@ -119,12 +119,12 @@ def standing_of(slot: Slot, version: str, change: Change) -> tuple[Standing | No
 
 
 def _text(decades: float | None) -> str:
-    return LOST if decades is None else f"10^{decades:.1f} of what it may"
+    return LOST if decades is None else f"10^{decades:.1f} of the allowed change"
 
 
 @cache
 def breaks_of(engine: str) -> Breaks:
-    """Known breaks of ``engine``; none if nobody has listed any.
+    """Known breaks of ``engine``; none if none are listed.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def read(engine: str, folder: Path) -> Breaks:
     for entry in entries:
         family = _family(engine, path, entry)
         if family.id in families:
-            raise FindingsError(f"{path}: family {family.id} stands twice")
+            raise FindingsError(f"{path}: family {family.id} is listed twice")
         families[family.id] = family
     return Breaks(families, _members(folder / MEMBERS, families))
 
@@ -165,9 +165,11 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
         values[name] = value
     family = Family(**values)
     if "*" in family.scenes and "*" in family.relations:
-        raise FindingsError(f"{label}: a reason for every scene and every relation is none; name one of them")
+        raise FindingsError(
+            f"{label}: a reason cannot hold for every scene and every relation; name scenes or relations"
+        )
     if promised := solutions_of(engine) & {*family.profiles} or ("*" in family.profiles and solutions_of(engine)):
-        raise FindingsError(f"{label}: {engine}/{min(promised)} promises a solution; what breaks there is never listed")
+        raise FindingsError(f"{label}: {engine}/{min(promised)} is an exact profile; its violations are never listed")
     try:
         SpecifierSet(family.releases)
     except InvalidSpecifier:
@@ -188,15 +190,15 @@ def _members(path: Path, families: Mapping[str, Family]) -> dict[Key, Break]:
             key = (profile, scene, int(dimension), relation)
             found = Break(families[name], metric, None if decades == LOST else float(decades))
         except (ValueError, KeyError) as error:
-            raise FindingsError(f"{path}:{number}: {error} is no entry of this table") from None
+            raise FindingsError(f"{path}:{number}: {error} is not an entry of this table") from None
         if key in members:
-            raise FindingsError(f"{path}:{number}: {profile} {scene} {dimension} {relation} stands twice")
+            raise FindingsError(f"{path}:{number}: {profile} {scene} {dimension} {relation} is listed twice")
         members[key] = found
     return members
 
 
 def listed(engine: str, version: str, found: Iterable[tuple[Slot, Change]]) -> dict[Key, Break]:
-    """Members once these answers are listed: breaks that a family speaks about; cells that were not asked stay."""
+    """Members after these results are listed: breaks with a family; entries of cells that did not run stay."""
     known = breaks_of(engine)
     members = dict(known.members)
     for slot, change in found:

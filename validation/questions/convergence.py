@@ -1,4 +1,4 @@
-"""Whether an engine comes nearer to the truth as its step shrinks, and how fast.
+"""Whether and how fast an engine converges to the truth as its step shrinks.
 
 Two questions, two methods
     * The declared error of a scene (`validation.canonical.Primary`, a supremum over the phases of its impacts) against
@@ -29,8 +29,8 @@ from validation.bounds import ROUND_OFF
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import resolve
 
-#: Three finest errors within this factor of each other, over steps at least a factor of four apart, have levelled off:
-#: even order 1/4 would part them by 4^(1/4) = 1.41.
+#: Three finest errors within this factor, over steps at least a factor of four apart, are constant: even order 1/4
+#: would change them by 4^(1/4) = 1.41.
 LEVEL = 1.35
 #: Safety factor of the grid convergence index for three grids (Roache 1994).
 SAFETY = 1.25
@@ -39,13 +39,13 @@ HIGHEST_ORDER = 6.0
 
 
 class Limit(Enum):
-    """Where an engine goes as its step shrinks."""
+    """Result of a convergence study."""
 
     TRUTH = "converges to the truth"
     ELSEWHERE = "converges elsewhere"
     NOT = "does not converge"
-    NOISY = "too noisy to say"
-    FEW = "too few steps to say"
+    NOISY = "too noisy for an order"
+    FEW = "too few steps for an order"
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,9 @@ def limit_of(
 ) -> tuple[Order | None, Limit, str]:
     """Order, verdict and reason from errors at descending steps.
 
-    Errors at or below ``floor`` are round-off and carry no order. Falling to round-off is convergence only if the
-    errors fell on the way (a rise by more than `LEVEL` is noise). If the finest step alone is there, the fall to it
-    must be one that an order of at most `HIGHEST_ORDER` makes: else it may be a lucky phase.
+    Errors at or below ``floor`` are round-off and have no order. Falling to round-off is convergence only if the errors
+    fell before (a rise by more than `LEVEL` is noise). If only the finest step is at round-off, the fall to it must fit
+    an order of at most `HIGHEST_ORDER`; otherwise it may be a chance phase.
     """
     if not errors:
         return None, Limit.FEW, "no step has a measured error"
@@ -135,7 +135,7 @@ def limit_of(
         return fit, Limit.TRUTH, f"{said} over {len(above)} steps"
     if fit.order + 2.0 * fit.standard_error < 0.0:
         return fit, Limit.NOT, f"the error grows as the step shrinks, {said}"
-    return fit, Limit.NOISY, f"{said}: neither falling nor level"
+    return fit, Limit.NOISY, f"{said}: neither falling nor constant"
 
 
 def _round_off_limit(dts: Sequence[float], errors: Sequence[float], floor: float) -> tuple[Limit, str]:

@@ -1,11 +1,11 @@
-"""Detection power: faults of three sizes are planted in a healthy engine, and whatever sees them is written down.
+"""Detection power: faults of three sizes are planted in a correct engine, and the checks that notice them are listed.
 
     healthy engine --fault, size--> Planted --receipts--> broken?
                                        |
                                        +--the scenes' cells--> checks that pass on the healthy engine and fail now
 
-What no check of a scene sees must be seen by a receipt: that is what receipts are for. A scene's primary quantity that
-is blind to one per cent of what it hangs on is a `BlindSpot`, with what the fault changes beside what the check allows.
+A fault that no check of a scene notices must be noticed by a property check. A scene's primary quantity that does not
+notice one per cent of a parameter on which it depends is a `BlindSpot`, with the effect of the fault and the tolerance.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from validation.running.plan import QUICK_DT
 
 #: Ten per cent, one, and one in a thousand.
 SIZES = (0.1, 0.01, 0.001)
-#: What a scene asks of contacts and bodies: no primary quantity may miss one per cent of these without a word why.
+#: Parameters of contacts and bodies: a primary quantity that does not notice one per cent of them must have a reason.
 ASKED = ("restitution", "friction", "gravity", "mass", "inertia")
 ONE_PER_CENT = 0.01
-#: A quantity hangs on a parameter if one per cent of it changes it by this share of what its check allows: what moves
-#: less would have to be off by more than all of itself.
+#: A quantity depends on a parameter if one per cent changes it by this share of its tolerance: with less, only an error
+#: beyond 100 % would be noticed.
 HANGS_ON = 0.01
-#: Shortest step at which a blind spot is asked again, as a share of the step at which it is one. What changes a
-#: quantity by a hundredth of what is allowed (`HANGS_ON`) is seen at a hundredth of the step; 128 is the next half.
+#: Shortest step of a rerun of a blind spot, as a share of its step. An effect of a hundredth of the tolerance
+#: (`HANGS_ON`) is noticed at a hundredth of the step; 1/128 is the next power of two.
 FINEST = 1.0 / 128.0
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A check or receipt that sees a fault, and the smallest of `SIZES` at which it does; None: it is blind to it."""
+    """A check or property check and the smallest of `SIZES` of a fault that it notices; None: it does not."""
 
     scene: str
     watcher: str
@@ -51,12 +51,12 @@ class Seen:
 
 @dataclass(frozen=True)
 class BlindSpot:
-    """A primary quantity that does not see one per cent of a parameter: the fault changes it by ``moved``.
+    """A primary quantity that does not notice one per cent of a parameter: the fault changes it by ``moved``.
 
-    ``allowed`` is what its check allows, in the same unit: by how far one step of ``dt`` may miss. ``seen_by`` are
-    checks of the same scene that do see it. ``seen_at`` is the longest step [s], by halves of ``dt``, at which the same
-    check sees it: planted once more, and run there; None if no step down to `FINEST` of ``dt`` does. It is the proof
-    that what hides the fault is the step's own error, and no room that the check has beyond that.
+    ``allowed`` is its tolerance in the same unit, for one step of ``dt``. ``seen_by`` are checks of the same scene that
+    notice the fault. ``seen_at`` is the longest step [s], by halves of ``dt``, at which the same check notices it,
+    planted and run there; None if no step down to `FINEST` of ``dt`` does. It proves that the error of the step hides
+    the fault, not a tolerance beyond that.
     """
 
     scene: str
@@ -69,13 +69,13 @@ class BlindSpot:
 
     @property
     def seen_from(self) -> float:
-        """Size of the fault that would change the quantity by what is allowed [%], were the two proportional."""
+        """Size of the fault [%] that would change the quantity by its tolerance, if both are proportional."""
         return 100.0 * ONE_PER_CENT * self.allowed / self.moved
 
 
 @dataclass(frozen=True)
 class Detected:
-    """What sees which fault, and what does not although it hangs on it."""
+    """Which checks notice which faults, and blind spots."""
 
     seen: list[Seen]
     blind: list[BlindSpot]
@@ -83,14 +83,14 @@ class Detected:
 
 @dataclass(frozen=True)
 class Watched:
-    """Whether a receipt or check holds; of a check also what was measured, and what is allowed."""
+    """Whether a property check or check holds; for a check also its value and tolerance."""
 
     holds: bool
     value: float | None = None
     allowed: float | None = None
 
 
-#: Receipts and checks of one cell, by name.
+#: Property checks and checks of one cell, by name.
 Watchers = dict[str, Watched]
 
 
@@ -102,21 +102,21 @@ def detection(
     others: Iterable[tuple[Engine, str]] = (),
     scenes: Collection[str] | None = None,
 ) -> Detected:
-    """Plant every fault in ``engine``, and say what sees it from which size on.
+    """Plant every fault in ``engine``; for each the checks that notice it, and from which size on.
 
     Parameters
     ----------
     engine, profile
-        Healthy: whatever it fails without a fault sees nothing, and is left out.
+        A correct engine: checks that fail without a fault are left out.
     others
-        Engines with their profiles: the first that can pose it takes a scene that ``engine`` cannot. What none of them
-        can is left out.
+        Engines with profiles: the first that supports a scene replaces ``engine`` where that does not. Scenes that none
+        supports are left out.
     scenes
-        Names of the canonical scenes to ask; None: all.
+        Names of canonical scenes; None: all.
 
     Returns
     -------
-    One entry per scene, check or receipt (``receipt mass``, of ``any`` scene), and fault; and the blind spots.
+    One entry per scene, check or property check (``receipt mass``, of ``any`` scene), and fault; and the blind spots.
     """
     seen: dict[tuple[str, str, str], float | None] = {}
     missed: dict[tuple[str, str, str], _Missed] = {}
@@ -164,12 +164,12 @@ class _Missed:
 
     @property
     def share(self) -> float:
-        """What the fault changes, of what is allowed."""
+        """Effect of the fault over the tolerance."""
         return self.moved / self.allowed
 
 
 def _can_pose(engine: Engine, scene: Scene) -> bool:
-    """Whether the engine has what the scene asks."""
+    """Whether the engine supports the scene."""
     try:
         posed_for(engine, scene)
     except EngineError:
@@ -178,7 +178,7 @@ def _can_pose(engine: Engine, scene: Scene) -> bool:
 
 
 def _missed(primary: Iterable[str], healthy: Watchers, faulty: Watchers) -> Iterator[tuple[str, float, float]]:
-    """Primary quantities that hold with the fault and without it though it changes them: by how much, and the bound."""
+    """Primary quantities that pass with and without the fault although it changes them: by how much, and the bound."""
     for name in primary:
         own, other = healthy[name], faulty[name]
         if own.holds and other.holds and own.value is not None and other.value is not None and own.allowed:
@@ -193,7 +193,7 @@ def _blind(
     dimension: int,
     dt: float,
 ) -> Iterator[BlindSpot]:
-    """Quantities that no cell of their scene sees by one per cent, each with the checks of the scene that do."""
+    """Quantities that notice one per cent in no cell of their scene, each with the checks that do."""
     sharp = {key for key, size in seen.items() if size is not None and size <= ONE_PER_CENT}
     for (scene, metric, fault), found in missed.items():
         if (scene, metric, fault) not in sharp:
@@ -205,10 +205,9 @@ def _blind(
 
 
 def _seen_at(found: _Missed, scene: str, fault: str, dimension: int, dt: float) -> float | None:
-    """Longest half, quarter, ... of ``dt`` at which the check sees one per cent of the fault; None: none of them.
+    """Longest half, quarter, ... of ``dt`` at which the check notices one per cent of the fault; None: none of them.
 
-    What the fault changes is the law's, of an engine without an error of its own: only steps at which the check allows
-    less than that are run.
+    The effect of the fault follows from the law; only steps with a smaller tolerance than that are run.
     """
     canonical = CATALOGUE[scene]
     made, shorter = canonical.scene(dimension, found.params), 0.5 * dt
@@ -224,7 +223,7 @@ def _seen_at(found: _Missed, scene: str, fault: str, dimension: int, dt: float) 
 
 
 def _primary(scene: str, params: Params, dimension: int, dt: float, healthy: Watchers) -> list[str]:
-    """Judged quantities that the scene's primary error is made of: those that it asks for."""
+    """Judged quantities that the scene's primary error uses."""
     canonical = CATALOGUE[scene]
     if canonical.primary is None:
         return []
@@ -234,7 +233,7 @@ def _primary(scene: str, params: Params, dimension: int, dt: float, healthy: Wat
 
 
 class _Asked(dict[str, Measured]):
-    """Metrics that remember which of them were asked for."""
+    """Metrics that record which of them were read."""
 
     def __init__(self, metrics: Mapping[str, Measured]) -> None:
         super().__init__(metrics)
@@ -250,7 +249,7 @@ class _Asked(dict[str, Measured]):
 
 
 def _watchers(engine: Engine, profile: str, scene: str, params: Params, dimension: int, dt: float) -> Watchers:
-    """Every receipt and every check of one cell."""
+    """All property checks and checks of one cell."""
     wanted = needs(CATALOGUE[scene].scene(dimension, params))
     found = {f"receipt {slip.quantity}": Watched(slip.holds) for slip in receipts(engine, profile, wanted, dt)}
     return found | _checks(engine, profile, scene, params, dimension, dt)
@@ -271,7 +270,7 @@ def _checks(engine: Engine, profile: str, scene: str, params: Params, dimension:
 
 
 def lines(found: list[Seen]) -> Iterator[dict[str, str]]:
-    """One line per check or receipt: its name, and for each fault the smallest size seen (empty: it is blind)."""
+    """One line per check or property check: its name, and for each fault the smallest size noticed (empty: none)."""
     for scene, watcher in sorted(dict.fromkeys((entry.scene, entry.watcher) for entry in found), key=_receipts_last):
         own = {entry.fault: entry.size for entry in found if (entry.scene, entry.watcher) == (scene, watcher)}
         shown = {fault: "" if size is None else f"{100.0 * size:g} %" for fault, size in own.items()}
@@ -279,7 +278,7 @@ def lines(found: list[Seen]) -> Iterator[dict[str, str]]:
 
 
 def only_by_receipts(found: list[Seen]) -> dict[str, list[str]]:
-    """Faults that no check of a scene sees, each with the receipts that do."""
+    """Faults that no check of a scene notices, each with the property checks that do."""
     faults: dict[str, list[Seen]] = {}
     for entry in found:
         if entry.size is not None:

@@ -1,12 +1,12 @@
-"""How far can an engine be driven? Largest step, stack, mass ratio, spin, speed; fewest iterations: by bisection.
+"""Breaking points by bisection: largest step, stack, mass ratio, spin, speed; fewest iterations.
 
     easy ----------- survives | fails --------------- hard
                        the bracket; each end is a cell that anyone can run
 
-Scenes say what is driven and what surviving means (`validation.canonical.Frontier`); the question is whether the scene
-still happens, not whether it is exact. Between the two ends of a bracket an engine may fail and survive again: what is
-told is one pair of neighbours of which one survives and the other does not, found from far apart by halving, on a
-logarithmic scale. All searches go on side by side: every round asks one cell of each.
+Scenes declare the driven parameter and the criterion of survival (`validation.canonical.Frontier`): whether the scene
+still works, not whether it is exact. Between the two ends of a bracket an engine may fail and survive again: the result
+is one pair of neighbours, one of which survives, found by halving on a logarithmic scale. All searches run in parallel:
+each round runs one cell of each.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from validation.workers import TIMEOUT
 
 #: Ratio of the two ends of a bracket at which a search stops, quick and full.
 QUICK_RATIO, FULL_RATIO = 1.3, 1.03
-#: What became of a cell that is no answer: the word for it.
+#: Words for outcomes without a result.
 FATES = {
     Outcome.DIVERGED: "NaN or exploded",
     Outcome.CRASHED: "crashed",
@@ -46,7 +46,7 @@ Observe = Callable[[Sequence[Slot]], Mapping[Slot, Observation]]
 
 @dataclass(frozen=True)
 class End:
-    """One end of a bracket: the value that was asked, its cell, and how it ended (empty: it survived)."""
+    """One end of a bracket: value, cell, and how it failed (empty: it survived)."""
 
     value: float
     slot: Slot
@@ -57,8 +57,8 @@ class End:
 class Bracket:
     """One search: an engine's profile on one axis of one scene.
 
-    ``survives`` and ``fails`` close in on each other; one of them stays None where all that was asked survived, or
-    nothing did. ``refused`` says why there is no answer at all.
+    ``survives`` and ``fails`` approach each other; one of them stays None where all values survived, or none did.
+    ``refused`` is the reason where there is no result.
     """
 
     base: Slot
@@ -76,7 +76,7 @@ class Bracket:
             return self.refused
         low = "" if self.survives is None else value_text(self.frontier, self.survives.value)
         if self.fails is None:
-            return f"{low} survives, the hardest that was asked"
+            return f"{low} works, the hardest value that was tried"
         failed = f"{value_text(self.frontier, self.fails.value)} {self.fails.fate}"
         return f"{low} survives, {failed}" if low else f"already {failed}"
 
@@ -88,14 +88,14 @@ def value_text(frontier: Frontier, value: float) -> str:
 
 
 def axes(scenes: Sequence[str] = ()) -> list[tuple[str, Frontier]]:
-    """What can be driven, scene by scene; of all scenes if none is named."""
+    """Driven parameters, scene by scene; of all scenes if none is named."""
     return [(name, each) for name in scenes or CATALOGUE for each in resolve(name).frontiers]
 
 
 def brackets(
     scenes: Sequence[str], engines: Sequence[str], profiles: Sequence[str], dimensions: Sequence[int], quick: bool
 ) -> list[Bracket]:
-    """Searches to be made. A quick one asks each axis in one dimension, the plane if the scene has it."""
+    """Searches to run. A quick one runs each axis in one dimension, 2-D if the scene has it."""
     found = []
     for name, frontier in axes(scenes):
         own = [d for d in resolve(name).dimensions if not dimensions or d in dimensions]
@@ -125,7 +125,7 @@ def slot_at(bracket: Bracket, value: float) -> Slot:
 def search(
     found: Sequence[Bracket], ratio: float, jobs: int = 1, look: Observe | None = None
 ) -> Iterator[tuple[int, Sequence[Bracket]]]:
-    """Close in on all brackets; yields after each round how many are still open, and all of them."""
+    """Narrow all brackets; yields after each round the number of open ones, and all of them."""
     if look is None:
         with Looking(jobs) as looking:
             yield from search(found, ratio, jobs, looking.look)
@@ -142,9 +142,9 @@ def search(
 
 
 class Looking:
-    """Runs cells without what a verdict needs (receipts, certificates): here only what becomes of a scene is asked.
+    """Runs cells without property checks and certificates: only survival matters here.
 
-    Each of ``jobs`` processes answers one cell at a time; one that hangs or dies costs its cell.
+    Each of ``jobs`` processes runs one cell at a time; one that hangs or dies loses its cell.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -163,7 +163,7 @@ class Looking:
 
         def work(apart: Apart) -> None:
             while waiting:
-                with suppress(IndexError):  # another one was faster
+                with suppress(IndexError):  # another process was faster
                     slot = waiting.popleft()
                     found[slot] = _looked(slot, apart)
 
@@ -181,7 +181,7 @@ def _looked(slot: Slot, apart: Apart) -> Observation:
 
 
 def run_only(slot: Slot) -> Observation:
-    """Run and measure a cell in this process, and nothing else."""
+    """Only run and measure a cell, in this process."""
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     blank = Observation(slot, "", canonical.version, find(slot.engine).version, Outcome.CRASHED)
@@ -195,12 +195,12 @@ def run_only(slot: Slot) -> Observation:
         if found.finish == "diverged":
             return replace(blank, outcome=Outcome.DIVERGED, reason=found.reason)
         return replace(blank, outcome=Outcome.OK, metrics=dict(canonical.measure(scene, found)))
-    except BaseException as error:  # whatever an engine raises costs this cell only
+    except BaseException as error:  # an engine may raise anything; only this cell is lost
         return replace(blank, reason=said_by(error))
 
 
 def following(bracket: Bracket, ratio: float) -> float | None:
-    """The next value to ask; None when the bracket is closed."""
+    """The next value; None when the bracket is closed."""
     if bracket.refused:
         return None
     if bracket.survives is None:
@@ -212,7 +212,7 @@ def following(bracket: Bracket, ratio: float) -> float | None:
         return None
     middle = math.sqrt(good * bad)
     if bracket.frontier.axis == "dt":
-        middle = 1.0 / round(1.0 / middle) if middle < 0.5 else middle  # a step that people write
+        middle = 1.0 / round(1.0 / middle) if middle < 0.5 else middle  # a step that can be written
     if bracket.frontier.whole:
         middle = float(round(middle))
         if middle in (good, bad):
@@ -221,7 +221,7 @@ def following(bracket: Bracket, ratio: float) -> float | None:
 
 
 def tell(bracket: Bracket, value: float, observation: Observation) -> None:
-    """Enter an answer."""
+    """Enter a result."""
     bracket.cells += 1
     if observation.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED):
         bracket.refused = observation.reason

@@ -1,17 +1,17 @@
-"""What must not change an answer: names, places, headings, company, time of day. Asked of every scene and engine.
+"""Metamorphic tests: order, place, heading and distant bodies must not change a result. For every scene and engine.
 
     scene --map--> the same physics, posed otherwise --run--> trajectory --back--> measured like the scene itself
 
-Bodies renumbered, world turned about the vertical or mirrored, moved far away or carried along, a bystander out of
-reach, the same again in the same process and in a fresh one. The largest change of each metric is judged against ten
-times the largest change from starts moved, and turned, by 1 to 16 units in the last place, and a thousandth of its
-check's tolerance: what a chaotic scene makes of round-off is no fault of its engine, and nobody sees what no check
-could. Where the map itself rounds coarser (far away), the moved starts are rounded as coarsely.
+Bodies renumbered, world turned about the vertical or mirrored, moved far away or in uniform motion, a distant body
+added, the same again in the same process and in a new one. The largest change of each metric is compared with ten times
+the largest change from starts moved and turned by 1 to 16 units in the last place, and with a thousandth of the check's
+tolerance: the growth of round-off in a chaotic scene is no fault of the engine, and smaller changes do not matter.
+Where the map itself rounds more (far away), the moved starts are rounded in the same way.
 
-A map that only swaps numbers and signs rounds nothing: an engine that does not see it scatters as much in the other
-pose as in the scene's own, from starts that are the same numbers. Scatter of the other pose alone is the break itself.
-Where the map or every step rounds otherwise (a turn, whose attitudes in space are no swaps even at a right angle; a
-speed; a place far away), it counts as well.
+A map that only swaps numbers and signs does not round: an engine that does not depend on it scatters equally in both
+poses, and a larger scatter in the other pose is itself a break. Where the map or each step rounds differently (a
+rotation, whose 3-D attitudes are no swaps even at a right angle; a velocity; a place far away), the scatter of the
+other pose counts too.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ from validation.running.apart import Apart
 
 #: Units in the last place by which starts are moved, up and down.
 MOVES = (1, 2, 4, 8, 16)
-#: How many times the largest change from moved starts a map may change a metric by.
+#: Allowed change by a map, in units of the largest change from moved starts.
 FACTOR = 10.0
-#: What is left where moved starts change nothing: last digits of the value itself, or of what it is a small difference
-#: of (`scales`), in units of the engine's numbers.
+#: Allowed change where moved starts change nothing: last digits of the value, or of the numbers of which it is a small
+#: difference (`scales`), in units of the engine's precision.
 LAST_DIGITS = 64.0
-#: Share of a check's tolerance below which a change is not seen: a defect of exactly nothing has no last digits.
+#: Share of a check's tolerance below which a change does not count: a defect of exactly 0 has no last digits.
 INVISIBLE = 1e-3
-#: How far a scene is moved, in its own sizes.
+#: Distance by which a scene is moved, in its sizes.
 FAR = 1e3
 
 Metrics = Mapping[str, Measured]
 
 
 class Refusal(str):
-    """Why an engine cannot be asked a scene: it says so itself, and has failed at nothing."""
+    """Why an engine refuses a scene, which is no failure."""
 
 
 @dataclass(frozen=True)
 class Posed:
-    """A scene posed otherwise, and the way back; ``shift`` is the largest coordinate that the map added [m]."""
+    """A mapped scene, and the inverse map of results; ``shift`` is the largest coordinate that the map added [m]."""
 
     scene: Scene
     back: Callable[[Trajectory], Trajectory]
@@ -67,9 +67,9 @@ class Posed:
 
 @dataclass(frozen=True)
 class Relation:
-    """One thing that must not matter; ``pose`` gives the scene posed so, or says why it cannot be.
+    """One metamorphic relation; ``pose`` gives the mapped scene, or why there is none.
 
-    ``rounds`` says that the map, or each step of the scene posed so, rounds otherwise than the scene itself.
+    ``rounds``: the map, or each step of the mapped scene, rounds differently from the scene itself.
     """
 
     name: str
@@ -81,17 +81,17 @@ class Relation:
 
 @dataclass(frozen=True)
 class Change:
-    """What a relation changed in one cell.
+    """Effect of a relation in one cell.
 
     Parameters
     ----------
     metric, change, allowed
-        The metric that changed most for what it may; empty where nothing could be compared.
+        The metric with the largest change over its allowed one; empty where nothing could be compared.
     refused
-        Why the relation cannot be asked here, or what the engine said instead of an answer.
+        Why the relation does not apply, or the engine's reason for having no result.
     lost
-        Whether the engine answers the scene itself and fails on the scene posed otherwise: that is a change, too. That
-        it refuses it, or does not tell a force there, is none.
+        Whether the engine runs the scene but fails on the mapped one, which is a change too. A refusal, or a force that
+        it does not report there, is none.
     """
 
     relation: str
@@ -103,7 +103,7 @@ class Change:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing changed that should not have."""
+        """Whether no change exceeds the allowed one."""
         return not self.lost and self.change <= self.allowed
 
 
@@ -111,7 +111,7 @@ class Change:
 
 
 def size_of(scene: Scene) -> float:
-    """Largest extent of what can move: where the bodies are, and how large they are [m]."""
+    """Largest extent of moving bodies, places and sizes [m]."""
     free = [body for body in scene.bodies if body.motion == "free"]
     d = scene.dimension
     places = np.array([body.pose[:d] for body in free])
@@ -119,7 +119,7 @@ def size_of(scene: Scene) -> float:
 
 
 def itself(scene: Scene) -> Posed | str:
-    """Nothing is changed: whatever differs, the engine or its process remembered."""
+    """The unchanged scene: a difference shows state kept by the engine or its process."""
     return Posed(scene, lambda found: found)
 
 
@@ -142,7 +142,7 @@ def turned(degrees: float) -> Callable[[Scene], Posed | str]:
 
     def pose(scene: Scene) -> Posed | str:
         if scene.dimension == 2:
-            return "the plane has no vertical axis to turn about"
+            return "a 2-D scene has no vertical axis to turn about"
         matrix, half = _about_z(math.radians(degrees)), math.radians(0.5 * degrees)
         spin = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
         moved = _posed(scene, lambda x: matrix @ x, lambda q: _product(spin, q), lambda w: matrix @ w)
@@ -158,7 +158,7 @@ def mirrored(scene: Scene) -> Posed | str:
     """Left and right swapped."""
     d = scene.dimension
     flip = np.diag([-1.0, *[1.0] * (d - 1)])
-    # Spins are axial: what a mirror in x leaves of them is the part about x.
+    # Spins are axial vectors: a mirror in x keeps the component about x.
     spins = -np.ones(1) if d == 2 else np.array([1.0, -1.0, -1.0])
     quaternion = np.array([1.0, 1.0, -1.0, -1.0])
 
@@ -181,7 +181,7 @@ def _mirrored(shape: Shape) -> Shape:
 def moved_away(scene: Scene) -> Posed | str:
     """A thousand of its sizes to the side."""
     if any(map(turns, scene.bodies)):
-        return "a face turns about the origin, which stays where it is"
+        return "a half-space that turns about the origin cannot be moved"
     shift = np.zeros(scene.dimension)
     shift[0] = FAR * size_of(scene)
 
@@ -208,9 +208,9 @@ def moved_away(scene: Scene) -> Posed | str:
 
 
 def boosted(scene: Scene) -> Posed | str:
-    """Carried along at a constant speed: one of its sizes a second."""
+    """In uniform motion: one of its sizes a second."""
     if any(body.motion != "free" for body in scene.bodies):
-        return "something in it is fixed or driven, and would be left behind"
+        return "it has fixed or driven bodies, which would be left behind"
     d = scene.dimension
     speed = np.zeros(d)
     speed[0] = size_of(scene)
@@ -234,16 +234,16 @@ def boosted(scene: Scene) -> Posed | str:
 
 
 def with_a_bystander(scene: Scene) -> Posed | str:
-    """One more body, like the first free one, so far away that it never meets anything."""
+    """One more body, like the first free one, so far away that it never touches anything."""
     free = next(body for body in scene.bodies if body.motion == "free")
     d, name = scene.dimension, "bystander"
-    # Up as far as it falls in twice the time, and beside all half-spaces' reach: it only flies.
+    # As high as it falls in twice the time, and beyond all half-spaces: it only flies.
     fall = 2.0 * math.hypot(*scene.gravity) * scene.duration**2
     up = -np.array(scene.gravity) / (math.hypot(*scene.gravity) or 1.0)
     normals = [np.array(body.shape.normal) for body in scene.bodies if isinstance(body.shape, HalfSpace)]
     away = _away(normals, d)
     if away is None:
-        return "its walls leave no place that is out of reach"
+        return "its walls leave no place out of reach"
     place = np.array(free.pose[:d]) + up * fall + 50.0 * size_of(scene) * away
     far = Body(name, free.shape, free.mass, free.inertia, (*_plain(place), *free.pose[d:]))
     pairs = (*scene.pairs, Pair(name, "*", 0.0, 0.0))
@@ -255,7 +255,7 @@ def with_a_bystander(scene: Scene) -> Posed | str:
 
 
 def _away(normals: Sequence[Array], dimension: int) -> Array | None:
-    """A direction that leads into no half-space, (d,): off all of them, or along those that face each other."""
+    """A direction that leads into no half-space, (d,): away from all, or along those that face each other."""
     upright = np.eye(dimension)[-1]
     away: Array = np.sum(normals, axis=0) if normals else upright
     if np.linalg.norm(away) < 1e-9:
@@ -266,12 +266,12 @@ def _away(normals: Sequence[Array], dimension: int) -> Array | None:
 
 RELATIONS = (
     Relation("again", "run again in the same process", itself),
-    Relation("fresh process", "run in a process that has run nothing else", itself, fresh=True),
+    Relation("fresh process", "run in a new process", itself, fresh=True),
     Relation("renumbered", "bodies in the opposite order", renumbered),
     Relation("turned 33", "world turned by 33 degrees about the vertical", turned(33.0), rounds=True),
     Relation("turned 90", "world turned by 90 degrees about the vertical", turned(90.0), rounds=True),
     Relation("mirrored", "left and right swapped", mirrored),
-    Relation("boosted", "everything carried along at one size a second", boosted, rounds=True),
+    Relation("boosted", "everything in a frame that moves by one size a second", boosted, rounds=True),
     Relation("moved", "a thousand of its sizes to the side", moved_away, rounds=True),
     Relation("bystander", "one more body, out of reach", with_a_bystander),
 )
@@ -283,7 +283,7 @@ def _plain(values: Array) -> tuple[float, ...]:
 
 def _about_z(angle: float) -> Array:
     quarter = round(angle / (0.5 * math.pi))
-    if math.isclose(angle, quarter * 0.5 * math.pi):  # a quarter turn rounds nothing
+    if math.isclose(angle, quarter * 0.5 * math.pi):  # a quarter turn does not round
         c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
     else:
         c, s = math.cos(angle), math.sin(angle)
@@ -291,7 +291,7 @@ def _about_z(angle: float) -> Array:
 
 
 def _product(p: Array, q: Array) -> Array:
-    """Product of quaternions w, x, y, z; the first turns by itself after the second has."""
+    """Product of quaternions w, x, y, z: the rotation of the second, then of the first."""
     w, v, u, r = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
     return np.concatenate([w * u - (v * r).sum(-1, keepdims=True), w * r + u * v + np.cross(v, r)], axis=-1)
 
@@ -359,10 +359,10 @@ def _mapped(
 
 
 def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) -> Metrics | str:
-    """Metrics of a cell posed as ``relation`` says, or why there are none; runs in this process.
+    """Metrics of a cell mapped by ``relation``, or why there are none; runs in this process.
 
-    ``moves`` [m] is how far each free body is moved along all axes, one up and the next down; ``turns`` [rad], how far
-    it is turned about all axes.
+    Free bodies are moved by ``moves`` [m] along all axes, alternately up and down, and turned by ``turns`` [rad] about
+    all axes.
     """
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
@@ -375,7 +375,8 @@ def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) 
         refusal = checked_refusal(engine.refusal(posed_for(engine, posed.scene), slot.base, slot.dt))
         if refusal:
             return Refusal(refusal)
-        # The profile sees the scene as it is: what a profile makes of another pose is no question to the engine.
+        # The settings are those of the unmapped scene: the test is of the engine, not of the profile's choice of
+        # settings.
         settings = {setting.name: setting.value for setting in settings_of(engine, slot, scene)}
         found = run(engine, _nudged(posed.scene, moves, turns), slot.dt, settings, canonical.sampling(scene))
         if found.finish == "diverged":
@@ -386,9 +387,9 @@ def measured(slot: Slot, relation: str, moves: float = 0.0, turns: float = 0.0) 
 
 
 def _nudged(scene: Scene, by: float, turn: float = 0.0) -> Scene:
-    """Every free body moved along and turned about all axes, each against the one before.
+    """Every free body moved along and turned about all axes, in the direction opposite to the one before.
 
-    What lies between any two is changed, and which of a body's corners is the lowest.
+    That changes all distances, and which corner of a body is the lowest.
     """
     if by == 0.0 and turn == 0.0:
         return scene
@@ -406,16 +407,16 @@ def _nudged(scene: Scene, by: float, turn: float = 0.0) -> Scene:
 
 
 def unit_of(scene: Scene, shift: float, numbers: type[np.floating[Any]] = np.float64) -> float:
-    """Unit in the last place of the scene's largest coordinate, or of where a map has moved it to [m].
+    """Unit in the last place of the scene's largest coordinate, also after a map [m].
 
-    ``numbers`` are the engine's: moved by less an engine of singles starts at the same place, and nothing scatters.
+    ``numbers`` is the engine's precision: smaller moves would not change the start of a single-precision engine.
     """
     places = [abs(x) for body in scene.bodies for x in body.pose[: scene.dimension]]
     return float(np.spacing(numbers(max([shift, size_of(scene), *places]))))
 
 
 def compare(slot: Slot, relations: Sequence[str] = ()) -> list[Change]:
-    """Ask one cell everything, in processes of their own: an engine that aborts costs one answer."""
+    """All relations of one cell, in separate processes: an engine that aborts loses one result."""
     wanted = [each for each in RELATIONS if not relations or each.name in relations]
     with Apart() as apart:
         return _changes(slot, wanted, apart)
@@ -448,7 +449,7 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
         answer = apart.ask(measured, slot, relation.name, fresh=relation.fresh)
         allowances = Allowances(moved[unit], tolerances, sizes, unit / finest, float(np.finfo(numbers).eps))
         change = judged(relation.name, base, answer, allowances)
-        # Starts are moved first; what no scatter can mend, or need, is not asked of further ones.
+        # Moved starts run first; a few are enough where more scatter cannot change the verdict.
         if not change.holds and not isinstance(answer, str):
             if unit not in turned:
                 turned[unit] = scatter(base, "again", 0.0, unit / size_of(scene))
@@ -461,15 +462,15 @@ def _changes(slot: Slot, wanted: Sequence[Relation], apart: Apart) -> list[Chang
 
 
 def scales(canonical: CanonicalScene, scene: Scene, dt: float) -> dict[str, float]:
-    """What each metric is a small difference of, in its own unit: by how large the scene is, and how fast it moves.
+    """Sizes of the numbers of which each metric is a small difference, in its unit: from the scene's size and speeds.
 
-    A defect of nothing, or the place of what stays at the origin, has no last digits of its own; lengths, speeds and
-    times that it is computed from have. Units are those of the checks that the scene states in any of its cells.
+    A defect of 0, or a position at the origin, has no last digits itself, but the lengths, speeds and times from which
+    it is computed have. Units are those of the scene's checks in any cell.
     """
     d = scene.dimension
     free = [body for body in scene.bodies if body.motion == "free"]
     length, gravity = size_of(scene), math.hypot(*scene.gravity)
-    # What falls through its own size is as fast, wherever nothing else moves.
+    # Where nothing moves, the speed of a fall through the scene's size.
     speed = max(math.sqrt(gravity * length), *(math.hypot(*body.twist[:d]) for body in scene.bodies), 0.0)
     mass = max(body.mass for body in free)
     by_unit = {
@@ -485,7 +486,7 @@ def scales(canonical: CanonicalScene, scene: Scene, dt: float) -> dict[str, floa
 
 
 def floor(base: Metrics, moved: Sequence[Metrics | str]) -> dict[str, float]:
-    """Largest change of each metric from moved starts; infinite where a moved start loses it."""
+    """Largest change of each metric from moved starts; infinite where a moved start has no value."""
     changes = dict.fromkeys(base, 0.0)
     for found in moved:
         for name, (value, _) in base.items():
@@ -497,7 +498,7 @@ def floor(base: Metrics, moved: Sequence[Metrics | str]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Allowances:
-    """What may change a metric without being a break.
+    """Allowed changes of metrics.
 
     Parameters
     ----------
@@ -506,10 +507,10 @@ class Allowances:
     tolerances
         Tolerances of the checks, where there are any.
     sizes
-        What each metric is a small difference of (`scales`).
+        Sizes of the numbers behind each metric (`scales`).
     coarser
-        How much coarser places are rounded by the map: an arm is a difference of places, and has fewer digits where
-        they are large, which no moved start shows.
+        Factor by which the map rounds positions more: a lever arm is a difference of positions and has fewer digits
+        where they are large, which moved starts do not show.
     last
         Unit in the last place of one, in the engine's numbers.
     """
@@ -525,13 +526,13 @@ class Allowances:
         return replace(self, floors={name: max(by, floors.get(name, 0.0)) for name, by in self.floors.items()})
 
     def of(self, name: str, value: float) -> float:
-        """How much a metric of this value may change by."""
+        """Allowed change of a metric with this value."""
         digits = LAST_DIGITS * self.last * self.coarser * max(abs(value), self.sizes.get(name, 0.0))
         return FACTOR * self.floors[name] + digits + INVISIBLE * self.tolerances.get(name, 0.0)
 
 
 def judged(relation: str, base: Metrics, answer: Metrics | str, allowances: Allowances) -> Change:
-    """The metric that changed most for what it may."""
+    """The metric with the largest change over its allowed one."""
     if isinstance(answer, str):
         return Change(relation, refused=answer, lost=not isinstance(answer, Refusal))
     worst = Change(relation)
@@ -542,7 +543,7 @@ def judged(relation: str, base: Metrics, answer: Metrics | str, allowances: Allo
         allowed = allowances.of(name, value)
         change = math.inf if other is None else abs(other - value)
         if not worst.metric or _share(change, allowed) > _share(worst.change, worst.allowed):
-            # Plain numbers: a metric, or the bound of a check, may be one of numpy's, and no comparison of it is JSON.
+            # Python numbers: metrics and bounds may be numpy numbers, whose comparisons are not JSON.
             worst = Change(relation, name, float(change), float(allowed))
     return worst
 

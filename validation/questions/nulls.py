@@ -1,14 +1,14 @@
-"""Null baselines: three answers that need no physics engine, and how much better than the best of them an engine is.
+"""Trivial answers: three results without a physics engine, and the skill of an engine against the best of them.
 
     did nothing            every body stays where it starts
-    free flight            nothing ever touches: bodies keep their spin and follow their loads
+    free flight            no contact: bodies keep their spin and follow their loads
     perfectly inelastic    free flight until bodies touch; what touches moves on as one, and stops at what is fixed
 
-They are measured by the scene's own metrics and judged by its own checks, like any engine. An error says how wrong a
-number is, the skill ``1 - error/error of the best null`` what an engine's physics is worth for it: 1 is exact, 0 no
-better than guessing, below 0 worse. Where a null is exact (a column that should just stand) there is no skill to show.
+They are measured by the scene's metrics and judged by its checks, like any engine. The skill of an engine is ``1 -
+error/error of the best null``: 1 is exact, 0 no better than the trivial answer, below 0 worse. Where a trivial answer
+is exact (a column that should stand) there is no skill.
 
-They are rows like those of engines (`null_rows`), with no standing: nobody is alarmed by a guess that fails.
+They are rows like those of engines (`null_rows`), without standing.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from validation.judging.verdicts import judge_physics
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 
-#: Bodies that are nearer than this share of the scene's size touch: starts are exact to round-off only.
+#: Bodies nearer than this share of the scene's size touch, as starts are exact to round-off only.
 TOUCH = 1e-9
-#: More bodies than that are not asked: pairs are looked at one by one.
+#: Largest number of bodies: pairs are tested one by one.
 MOST_BODIES = 30
-#: Of more cells (a sweep) nulls are not asked unless somebody names the row: a cell takes 7 ms in the mean (measured
+#: For more cells (a sweep) trivial answers are computed only for a named row: a cell takes 7 ms in the mean (measured
 #: over the quick suite).
 MOST_CELLS = 1000
-#: Stands where a row names its engine.
+#: Name in the place of an engine.
 NO_ENGINE = "none"
 
 
 @dataclass(frozen=True)
 class Null:
-    """A null's error in one check; ``error`` is None where its trajectory does not have the number, with the reason."""
+    """Error of a trivial answer in one check; ``error`` is None where its trajectory has no value, with the reason."""
 
     name: str
     value: float | None
@@ -62,14 +62,14 @@ def did_nothing(scene: Scene, dt: float) -> Trajectory:
 
 
 def free_flight(scene: Scene, dt: float) -> Trajectory:
-    """Nothing ever touches."""
+    """No contact."""
     t, pose, twist = _blank(scene, dt)
     _fly(scene, t, pose, twist, _loads(scene), 0)
     return Trajectory(t, pose, twist, None, dt, "completed")
 
 
 def perfectly_inelastic(scene: Scene, dt: float) -> Trajectory:
-    """What touches moves on as one."""
+    """Bodies that touch move on together."""
     t, pose, twist = _blank(scene, dt)
     d, n = scene.dimension, len(scene.bodies)
     free = np.array([body.motion == "free" for body in scene.bodies])
@@ -92,7 +92,7 @@ def perfectly_inelastic(scene: Scene, dt: float) -> Trajectory:
         at = hit
 
 
-#: Every null by its name, from the one that knows least.
+#: All trivial answers by name, the simplest first.
 NULLS: Mapping[str, Callable[[Scene, float], Trajectory]] = {
     "did nothing": did_nothing,
     "free flight": free_flight,
@@ -101,7 +101,7 @@ NULLS: Mapping[str, Callable[[Scene, float], Trajectory]] = {
 
 
 def _blank(scene: Scene, dt: float) -> tuple[Array, Array, Array]:
-    """Times, and poses and twists that are those of the start."""
+    """Times, with the poses and twists of the start."""
     count = step_count(scene.duration, dt) + 1
     pose, twist = np.array([b.pose for b in scene.bodies]), np.array([b.twist for b in scene.bodies])
     return (
@@ -134,7 +134,7 @@ def _fly(scene: Scene, t: Array, pose: Array, twist: Array, loads: Array, at: in
 
 
 def _spun(attitude: Array, spin: Array, after: Array) -> Array:
-    """Attitudes (s, n, 4) of bodies that turn about a fixed axis of the world."""
+    """Attitudes (s, n, 4) of bodies that rotate about a fixed axis."""
     rate = np.linalg.norm(spin, axis=-1, keepdims=True)
     axis = np.divide(spin, rate, out=np.zeros_like(spin), where=rate > 0.0)
     half = 0.5 * rate * after
@@ -144,17 +144,17 @@ def _spun(attitude: Array, spin: Array, after: Array) -> Array:
 
 
 def _first_touch(scene: Scene, pose: Array, i: int, j: int, at: int, close: float) -> int:
-    """First sample from ``at`` on at which two bodies touch or overlap; beyond the last one if they never do."""
+    """First sample from ``at`` on at which two bodies touch or overlap; beyond the last one if none do."""
     a, b = scene.bodies[i].shape, scene.bodies[j].shape
     near = np.flatnonzero(least_gap(a, pose[at:, i], b, pose[at:, j]) <= close)
-    for k in near:  # the lower bound is exact for most pairs, so that the first is the one
+    for k in near:  # the lower bound is exact for most pairs, so the first is usually the answer
         if float(separation(a, pose[at + k : at + k + 1, i], b, pose[at + k : at + k + 1, j])[0]) <= close:
             return int(at + k)
     return len(pose)
 
 
 def _join(members: NDArray[np.int64], mass: Array, loads: Array, twist: Array, d: int) -> None:
-    """Bodies that move on as one: with their common momentum and load, or with what is fixed among them."""
+    """Bodies that move on together: with their common momentum and load, or with a fixed one among them."""
     held = members[~np.isfinite(mass[members])]
     if len(held):
         speed, load = twist[held[0], :d].copy(), np.zeros(d)
@@ -178,7 +178,7 @@ def _measured(
 def _metrics(
     canonical: CanonicalScene, scene: Scene, null: Callable[[Scene, float], Trajectory], dt: float
 ) -> Mapping[str, Measured]:
-    """Metrics of a null; a scene may divide by a motion that a null does not have, and then has nothing of it."""
+    """Metrics of a trivial answer; none where the scene divides by a motion that it does not have."""
     try:
         with np.errstate(all="ignore"):
             return canonical.measure(scene, null(scene, dt))
@@ -189,11 +189,11 @@ def _metrics(
 def nulls_of(
     scene: str, dimension: int, params: Mapping[str, float], dt: float, metric: str, truth: float
 ) -> list[Null]:
-    """What each null makes of one check of a cell."""
+    """Trivial answers for one check of a cell."""
     canonical = resolve(scene)
     found = []
     for name, metrics in _measured(scene, dimension, canonical.minimal(params), dt).items():
-        value, reason = metrics.get(metric, (None, "a null has no such metric"))
+        value, reason = metrics.get(metric, (None, "a trivial answer has no such metric"))
         error = abs(value - truth) if value is not None and math.isfinite(value) else None
         found.append(Null(name, value if error is not None else None, error, reason))
     return found
@@ -204,13 +204,13 @@ def skill_of(row: Mapping[str, Any]) -> tuple[float | None, str]:
     if row["truth"] is None or row["value"] is None:
         return None, "there is no error to compare"
     if row["metric"] == OUT_OF_PLANE:
-        return None, "a null is computed in the plane and cannot leave it"
+        return None, "a trivial answer is computed in 2-D and cannot leave its plane"
     asked = row["scene"], row["dimension"], row["slot"]["params"], row["dt"], row["metric"], row["truth"]
     return skill(row["value"] - row["truth"], nulls_of(*asked))
 
 
 def with_skill(rows: Sequence[Row]) -> list[Row]:
-    """The rows with the skill of each beside its error, and the null that it is measured against."""
+    """The rows with skill, and the trivial answer that it refers to."""
     if len(_cells(rows)) > MOST_CELLS:
         return list(rows)
     found = []
@@ -221,7 +221,7 @@ def with_skill(rows: Sequence[Row]) -> list[Row]:
 
 
 def null_rows(rows: Sequence[Row]) -> list[Row]:
-    """What each null makes of every check that ``rows`` judge: a row each, once for all engines and iterations."""
+    """One row for each trivial answer and check in ``rows``, once for all engines and iterations."""
     if len(_cells(rows)) > MOST_CELLS:
         return []
     asked = {(*_cell(row), row.metric): row for row in reversed(rows) if row.truth is not None and len(row.cells) < 2}
@@ -234,7 +234,7 @@ def null_rows(rows: Sequence[Row]) -> list[Row]:
 
 
 def _row_of(row: Row, truth: float, null: Null, answers: list[Null]) -> Row:
-    """The row of one null, from that of an engine that was asked the same."""
+    """The row of a trivial answer, from an engine's row of the same check."""
     physics = judge_physics(null.value, Check(row.metric, row.unit, truth, row.tolerance, row.because, row.source))
     error = None if null.value is None else null.value - truth
     worth, against = skill(error, answers)
@@ -256,12 +256,12 @@ def _cells(rows: Iterable[Row]) -> set[tuple[Any, ...]]:
 
 
 def skill(error: float | None, nulls: list[Null]) -> tuple[float | None, str]:
-    """Skill of an error, and the null that it is measured against; or None and why there is none."""
+    """Skill of an error, and the trivial answer that it refers to; or None and the reason."""
     known = [(null.error, null.name) for null in nulls if null.error is not None]
     if error is None:
         return None, "there is no error to compare"
     if not known:
-        return None, "no null has this number: they report no contacts, or the scene is too large for them"
+        return None, "no trivial answer has this value: they report no contacts, or the scene is too large for them"
     least, name = min(known)
     if least == 0.0:
         return None, f"{name} is exact here"

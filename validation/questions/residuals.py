@@ -1,17 +1,17 @@
-r"""Does a black box keep the laws of contact? Read off the impulses that it reports, contact by contact, step by step.
+r"""Residuals of the contact laws, from the impulses that an engine reports, contact by contact, step by step.
 
     pull          p_n >= 0                 contacts push
     cone          |p_t| <= mu p_n          Coulomb's disc
-    separation    p_n (u_n + e u_n-) = 0   what carries does not part, what parts does not carry (Newton's law)
-    slip          p_t . (u_t + u_t-)/2 <= 0    friction takes energy
-    momentum      m (v - v-) = F dt + sum p    what is reported is what acts
+    separation    p_n (u_n + e u_n-) = 0   loaded contacts do not separate, separating ones carry no load (Newton's law)
+    slip          p_t . (u_t + u_t-)/2 <= 0    friction dissipates energy
+    momentum      m (v - v-) = F dt + sum p    reported impulses are those that act
 
 p: impulse of the step on the second body; u-, u: relative velocity of the two bodies at the contact before and after
-the step; n from the first to the second. Impulses are told as shares of the largest one of the run, works as shares of
-that impulse times the largest relative speed at a contact (of one step's fall, if nothing is faster): pure numbers, so
-that scenes and engines can be compared. Soft contacts, pyramids and sweeps that stop early show here by design.
+the step; n from the first to the second. Impulses are relative to the largest one of the run, works to that impulse
+times the largest relative speed at a contact (at least that of one step's fall): dimensionless, so that scenes and
+engines can be compared. Soft contacts, pyramids and unconverged iterations have residuals by design.
 
-Where an engine does not report its impulses there is no number, and the reason why.
+Where an engine reports no impulses there is a reason instead of a value.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from validation.running.apart import Apart
 
 #: Indices, as contact records have them.
 Whole = NDArray[np.int64]
-#: What is measured, in this order, and its law.
+#: The residuals, in order, and their laws.
 LAWS = {
     "pull": "contacts push: p_n >= 0",
     "cone": "|p_t| <= mu p_n",
     "separation": "p_n (u_n + e u_n-) = 0",
-    "slip": "friction takes energy: p_t . (u_t + u_t-)/2 <= 0",
+    "slip": "friction dissipates energy: p_t . (u_t + u_t-)/2 <= 0",
     "momentum": "m (v - v-) = F dt + sum p",
 }
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Largest residual of each law over a run, as shares; ``refused`` says why there are none at all."""
+    """Largest residual of each law over a run, as shares; ``refused`` is the reason where there are none."""
 
     slot: Slot
     values: dict[str, Measured]
@@ -55,7 +55,7 @@ class Residuals:
 
 
 def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int]:
-    """Largest residual of each law, and how many contacts were looked at; contacts recorded from the first step on."""
+    """Largest residual of each law, and the number of contacts; contacts recorded from the first step on."""
     record = found.contacts
     if record is None:
         return _nothing("the engine reports no contacts"), 0
@@ -63,7 +63,7 @@ def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int
     if len(rows.a) == 0:
         return _nothing("nothing touched"), 0
     if np.isnan(rows.impulse).any():
-        return _nothing("the engine does not say its impulses"), len(rows.a)
+        return _nothing("the engine does not report impulses"), len(rows.a)
     sample = np.repeat(record.step, np.diff(record.offset))
     before, after = (_relative(found, rows.a, rows.b, rows.point, sample - k) for k in (1, 0))
     normal = rows.normal
@@ -84,7 +84,7 @@ def residuals(scene: Scene, found: Trajectory) -> tuple[dict[str, Measured], int
     fall = math.hypot(*scene.gravity) * found.dt
     fastest = float(np.maximum(np.linalg.norm(np.concatenate([before, after]), axis=1).max(), fall))
     if largest == 0.0:
-        return _nothing("no contact carried anything"), len(rows.a)
+        return _nothing("no contact carried a load"), len(rows.a)
     work = largest * fastest
     push = np.maximum(pn, 0.0)
     numbers = {
@@ -126,7 +126,7 @@ def _velocity(found: Trajectory, body: Whole, point: Array, sample: Whole) -> Ar
 
 
 def _momentum(scene: Scene, found: Trajectory, sample: Whole) -> float:
-    """Largest change of a free body's momentum over a step that loads and reported impulses do not make [N s]."""
+    """Largest change of a free body's momentum in a step beyond loads and reported impulses [N s]."""
     record, d = found.contacts, scene.dimension
     assert record is not None
     total = np.zeros((len(found.t), len(scene.bodies), d))
@@ -138,7 +138,7 @@ def _momentum(scene: Scene, found: Trajectory, sample: Whole) -> float:
             load = body.mass * np.array(scene.gravity) + np.array(body.force)
             change = body.mass * np.diff(found.twist[:, k, :d], axis=0)
             off = np.linalg.norm(change - load * found.dt - total[1:, k], axis=1)
-            worst = float(np.maximum(worst, off.max()))  # not Python's max, which passes over what is no number
+            worst = float(np.maximum(worst, off.max()))  # Python's max skips NaN
     return worst
 
 
@@ -155,11 +155,11 @@ def measured(slot: Slot) -> Residuals:
         sampling = replace(canonical.sampling(scene), stride=1, contacts_from=0.0)
         found = run(engine, scene, slot.dt, settings, sampling)
         return Residuals(slot, *residuals(scene, found))
-    except BaseException as error:  # whatever an engine raises costs this question only
+    except BaseException as error:  # an engine may raise anything; only this result is lost
         return Residuals(slot, _nothing(said_by(error)), refused=said_by(error))
 
 
 def ask(slot: Slot, apart: Apart) -> Residuals:
-    """Residuals of a cell, from a process of its own."""
+    """Residuals of a cell, from a separate process."""
     answer = apart.ask(measured, slot)
     return Residuals(slot, _nothing(answer), refused=answer) if isinstance(answer, str) else answer

@@ -1,11 +1,11 @@
-"""How far engines are apart on a scene that has no closed form, at the last moment at which that means anything.
+"""Distance of engines on a scene without closed form, at the horizon of predictability.
 
-    horizon    of predictability: until then a disturbance in the last place has not grown to matter, as the certified
-               run of our own solver says; the end of the run where it says nothing against
-    spread     largest distance of a free body's centre from where that run has it, at the horizon [m]
+    horizon    time until which a disturbance in the last place stays small, from the certified
+               run of our own solver; at most the end of the run
+    spread     largest distance of a free body's centre from its place in that run, at the horizon [m]
 
-Beyond the horizon two correct engines differ; before it they must not. Distances are read from the recordings, whose
-places are rounded to 1/32767 of half their range: what is less is none.
+Beyond the horizon two correct engines differ; before it they must not. Distances are from recordings, whose positions
+are rounded to 1/32767 of half their range; smaller distances count as 0.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Spread:
 
 
 def spreads(observations: Sequence[Observation], recordings: Sequence[tuple[Slot, Recording]]) -> list[Spread]:
-    """Distances of every recorded run from that of our solver on the same scene; none where that did not run."""
+    """Distance of every recorded run from our solver's on the same scene; none where that did not run."""
     kept, found = dict(recordings), {observation.slot: observation for observation in observations}
     ours = (solver(), profile_of(solver(), "solution"))
     told = []
@@ -61,7 +61,7 @@ def _posed(slot: Slot) -> tuple[Any, ...]:
 
 
 def _horizon(observation: Observation, recording: Recording) -> float:
-    """Until when the run can be predicted [s]."""
+    """Horizon of predictability [s]."""
     said = observation.certificate.get("full", {}).get("horizon")
     end = float(recording.t[-1])
     return min(end, float(said)) if isinstance(said, int | float) else end

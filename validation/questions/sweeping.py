@@ -1,7 +1,7 @@
-"""Studies over parameters: which cells a sweep has, and their results as one table.
+"""Parameter sweeps: their cells, and the results as one table.
 
     grid     every value of LOW ... HIGH, N of them, evenly (or evenly in the logarithm)
-    list     every value that is named
+    list     every given value
     random   N points, independent and uniform between LOW and HIGH (or uniform in the logarithm), from a seed
     sobol    N points of a scrambled Sobol sequence, which fill the same range more evenly, from the same seed
 
@@ -27,7 +27,7 @@ from validation.judging.rows import Row
 from validation.posed import pinned, resolve
 from validation.running.plan import Request, slots
 
-#: Most cells of a sweep: their plan takes half a gigabyte of memory, and their rows some ten.
+#: Most cells of a sweep: the plan takes half a gigabyte of memory, the rows some ten.
 MOST_CELLS = 200_000
 #: Most points of a Sobol sequence or values of a grid.
 MOST_POINTS = 2**17
@@ -45,7 +45,7 @@ class Range:
     log: bool = False
 
     def at(self, share: float) -> float:
-        """Value at a share in [0, 1] of the way; the ends are exact."""
+        """Value at a share in [0, 1] of the range; the ends are exact."""
         if share in (0.0, 1.0):
             return self.high if share else self.low
         if self.log:
@@ -100,7 +100,7 @@ def listed(text: str) -> tuple[str, list[float]]:
 
 
 def points(ranges: Sequence[tuple[Kind, Range]], count: int, seed: int) -> list[dict[str, float]]:
-    """``count`` points of all ranges together; one empty point where there are none.
+    """``count`` points over all ranges; one empty point where there are none.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def points(ranges: Sequence[tuple[Kind, Range]], count: int, seed: int) -> list[
         from scipy.stats import qmc
 
         sequence = qmc.Sobol(len(even), scramble=True, rng=np.random.default_rng(seed))
-        drawn = sequence.random_base2(math.ceil(math.log2(count)))[:count]  # a whole power of two keeps its balance
+        drawn = sequence.random_base2(math.ceil(math.log2(count)))[:count]  # a power of two keeps the sequence balanced
         shares = np.hstack([shares, drawn])
     names = loose + even
     return [{each.name: each.at(float(s)) for each, s in zip(names, row, strict=True)} for row in shares]
@@ -126,7 +126,7 @@ def points(ranges: Sequence[tuple[Kind, Range]], count: int, seed: int) -> list[
 
 @dataclass(frozen=True)
 class Study:
-    """What varies: crossed values by parameter, and points drawn together."""
+    """The varied parameters: crossed values, and points drawn together."""
 
     crossed: Mapping[str, Sequence[float]]
     drawn: Sequence[Mapping[str, float]]
@@ -153,10 +153,10 @@ def study_slots(request: Request, study: Study) -> list[Slot]:
     fixed = dict(request.params or {})
     for name in first:
         if name in fixed:
-            raise SceneError(f"param: {name} is fixed and varied")
+            raise SceneError(f"param: {name} is both fixed and varied")
     each = len(slots(replace(request, params=_rounded(request, {**fixed, **first}))))
     if each * len(study) > MOST_CELLS:
-        raise SceneError(f"sweep: {each * len(study)} cells are more than the {MOST_CELLS} of one sweep")
+        raise SceneError(f"sweep: {each * len(study)} cases are more than the {MOST_CELLS} of one sweep")
     found: dict[Slot, None] = {}
     for params in study:
         found.update(dict.fromkeys(slots(replace(request, params=_rounded(request, {**fixed, **params})))))
@@ -164,7 +164,7 @@ def study_slots(request: Request, study: Study) -> list[Slot]:
 
 
 def _rounded(request: Request, params: Mapping[str, float]) -> dict[str, float]:
-    """Parameters with those that are whole numbers rounded to one."""
+    """Parameters, with whole ones rounded."""
     whole = {p.name for scene in _scenes(request) for p in scene.parameters if p.integer}
     return {name: float(round(value)) if name in whole else value for name, value in params.items()}
 
@@ -174,10 +174,10 @@ def _scenes(request: Request) -> list[CanonicalScene]:
 
 
 def table(rows: Sequence[Row]) -> pd.DataFrame:
-    """One line per cell: what was asked, its outcome, every metric's value, and whether all that is judged passes."""
+    """One line per cell: parameters, outcome, the value of every metric, and whether all judged ones pass."""
     lines: dict[str, dict[str, object]] = {}
     for row in rows:
-        if len(row.cells) > 1:  # a study of several cells is no cell
+        if len(row.cells) > 1:  # a study of several cells has no line
             continue
         line = lines.get(row.cells[0]) if row.cells[0] else None
         if line is None:

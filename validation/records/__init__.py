@@ -1,1 +1,1 @@
-"""What is kept: stores of runs with observations, recordings and times, which merge and age."""
+"""Stores of runs with observations, recordings and times; merging and pruning of stores."""

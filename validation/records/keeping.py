@@ -1,7 +1,7 @@
-"""Many runs in one place: stores of several machines become one, and what is too old goes.
+"""Merges stores of several machines, and deletes old runs.
 
-A run is the same run in two stores if its id, date, machine and plan are; else one of them gets another id, made from
-what it is, so that merging the same store twice adds nothing.
+A run is the same in two stores if id, date, machine and plan agree; otherwise one of them gets another id, a hash of
+these, so that merging the same store twice adds nothing.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from adapters.plain import one_line
 from validation.records.store import Run, Store, StoreError
 
-#: Tables whose rows belong to a run, and what names a row there.
+#: Tables whose rows belong to a run, and their keys.
 TABLES = {
     "observations": ("run", "slot"),
     "timings": ("run", "slot", "purpose", "sampled", "round"),
@@ -28,7 +28,7 @@ TABLES = {
 
 @dataclass(frozen=True)
 class Merged:
-    """What a merge did: runs that are new here, runs that were here, rows that came, rows that said something else."""
+    """Result of a merge: new runs, known runs, new rows, rows that differ."""
 
     runs: int
     known: int
@@ -37,20 +37,20 @@ class Merged:
 
 
 def merge(store: Store, other: Path) -> Merged:
-    """Add all runs of another store; nothing here is changed or doubled.
+    """Add all runs of another store; nothing here is changed or duplicated.
 
-    Rows of a run that both have are completed; where they have not the same row, ours stays, and is counted.
+    Runs in both stores are completed; where a row differs, ours stays, and is counted.
 
     Raises
     ------
     StoreError
-        If the other store cannot be read, or is this one.
+        If the other store cannot be read, or is the same.
     """
     theirs = Store(other, create=False)  # checks version and damage
     path = theirs.path.resolve()
     theirs.close()
     if path == store.path.resolve():
-        raise StoreError(f"merge: {path} is the store itself")
+        raise StoreError(f"merge: {path} is the same store")
     with store.writing() as db:
         db.execute("CREATE TEMP TABLE IF NOT EXISTS ids (theirs TEXT PRIMARY KEY, ours TEXT)")
         db.execute("DELETE FROM ids")
@@ -78,7 +78,7 @@ def _merged(db: sqlite3.Connection, source: sqlite3.Connection) -> Merged:
 
 
 def _own_id(db: sqlite3.Connection, run: Sequence[object]) -> tuple[str, bool]:
-    """Id of a run of the other store here, and whether it is new."""
+    """Id here of a run of the other store, and whether it is new."""
     identity = tuple(run[i] for i in (1, 3, 5))  # date, machine, plan
     digest = hashlib.sha256(repr(identity).encode()).hexdigest()[:6]
     for name in (str(run[0]), f"{str(run[0])[:56]}-{digest}"):
@@ -88,11 +88,11 @@ def _own_id(db: sqlite3.Connection, run: Sequence[object]) -> tuple[str, bool]:
         if there is None:
             db.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (name, *run[1:]))
             return name, True
-    raise StoreError(f"merge: two runs are called {one_line(run[0], 80)} and are not the same")
+    raise StoreError(f"merge: two runs are called {one_line(run[0], 80)} but differ")
 
 
 def _copy(db: sqlite3.Connection, source: sqlite3.Connection, table: str, theirs: str, ours: str) -> tuple[int, int]:
-    """Rows of one run that came, and rows that both have and that are not the same."""
+    """Number of new rows of one run, and of rows that differ."""
     if not source.execute("SELECT 1 FROM sqlite_master WHERE name = ?", (table,)).fetchone():
         return 0, 0
     columns = [row[1] for row in db.execute(f"PRAGMA table_info({table})")]
@@ -109,18 +109,18 @@ def _copy(db: sqlite3.Connection, source: sqlite3.Connection, table: str, theirs
 
 @dataclass(frozen=True)
 class Rules:
-    """What may go; without any rule nothing does.
+    """Rules for deletion; without any rule nothing is deleted.
 
     Parameters
     ----------
     keep
-        Of runs with the same title, all but the newest so many.
+        Number of newest runs that are kept of each title.
     days
-        Runs that are older.
+        Delete runs older than this.
     unfinished
-        Runs that were interrupted.
+        Delete interrupted runs.
     recordings
-        Not runs, but what the replay shows of all runs but the newest of each title.
+        Delete replay data of all runs except the newest of each title, not the runs.
     """
 
     keep: int | None = None
@@ -130,7 +130,7 @@ class Rules:
 
 
 def doomed(runs: Iterable[Run], rules: Rules, now: datetime | None = None) -> list[Run]:
-    """Runs that the rules let go; the newest finished run of each title always stays."""
+    """Runs that the rules delete; the newest finished run of each title always stays."""
     runs = list(runs)
     now = now or datetime.now(UTC)
     newest = {run.title: run.id for run in runs if run.finished}
@@ -148,7 +148,7 @@ def doomed(runs: Iterable[Run], rules: Rules, now: datetime | None = None) -> li
 
 
 def prune(store: Store, rules: Rules, now: datetime | None = None) -> list[Run]:
-    """Delete what the rules let go, and give the room back; says which runs went."""
+    """Delete by the rules and free the disk space; returns the deleted runs."""
     runs = store.runs()
     going = doomed(runs, rules, now)
     newest = {run.title: run.id for run in runs if run.finished}

@@ -1,4 +1,4 @@
-"""The result store: runs and their observations in one SQLite file, each cell kept the moment it finishes."""
+"""The result store: runs and their observations in one SQLite file; each cell is stored when it finishes."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from validation.running.tracks import Recording, recording_from_bytes
 FILE = "results.sqlite"
 #: Version of the tables, kept as ``user_version``; 0 is a store from before versions, which had no scenes.
 VERSION = 1
-#: Seconds that a process waits for another one that writes.
+#: Longest wait of a process for another one that writes [s].
 PATIENCE = 30.0
-#: Runs from moved starts, for the scatter of what another run found; never the latest run.
+#: Title of runs with moved starts, for the scatter of another run; never the latest run.
 SCATTER_TITLE = "scatter of "
-#: Runs of cells on another release of an engine (``release myengine==3.2.7: bounce``); never the latest run.
+#: Title of runs on another release of an engine (``release myengine==3.2.7: bounce``); never the latest run.
 RELEASE_TITLE = "release "
 _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS runs (
@@ -52,16 +52,16 @@ _SCHEMA = (
 )
 _COLUMNS = "id, date, commit_hash, machine, title, plan, finished"
 _T = TypeVar("_T")
-#: A run's id names files and folders, so a store from elsewhere must not choose it freely.
+#: A run's id names files and folders, so an id of another store must be checked.
 _ID = re.compile(r"[0-9A-Za-z][0-9A-Za-z_-]{0,63}")
 
 
 class StoreError(RuntimeError):
-    """The results cannot be kept or read; one line."""
+    """The results cannot be written or read; one line."""
 
 
 class MissingError(StoreError):
-    """What was asked for is not among the results; one line."""
+    """The requested result does not exist; one line."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Store:
     create
         False: results must be there.
     write
-        Whether anything is written; by default only where results may be made. Without, not even a file beside them.
+        Whether anything is written; by default only with ``create``. Otherwise not even a file beside the store.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class Store:
 
     @contextmanager
     def _guarded(self, what: str) -> Iterator[None]:
-        """Turn whatever a damaged, full, locked or foreign file raises into one line."""
+        """Turn errors of a damaged, full, locked or foreign file into one line."""
         try:
             yield
         except (sqlite3.Error, OSError, KeyError, TypeError, ValueError, AttributeError) as error:
@@ -134,7 +134,7 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        """Write all or nothing; the lock to write is taken first, so that two who read alike do not both write."""
+        """Write all or nothing; the write lock is taken before reading, so that two processes do not both write."""
         self._db.execute("BEGIN IMMEDIATE")
         try:
             yield
@@ -146,12 +146,12 @@ class Store:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Tables themselves, in one transaction: for work on many runs (`validation.records.keeping`)."""
+        """The tables, in one transaction: for work on many runs (`validation.records.keeping`)."""
         with self._guarded("write"), self._transaction():
             yield self._db
 
     def compact(self) -> None:
-        """Give the room of what was deleted back to the disk."""
+        """Free the disk space of deleted data."""
         with self._guarded("write"):
             self._db.execute("VACUUM")
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -164,12 +164,12 @@ class Store:
     def start(self, title: str, slots: Sequence[Slot], fresh: bool = False, apart: str = "") -> tuple[Run, set[str]]:
         """Resume the unfinished run of the same plan and code, or start a new one.
 
-        The plan names scene files with the hash of their text, and keeps the text. Runs with another ``apart`` are
-        never the same: they ask the same of something else.
+        The plan names scene files with the hash of their text, and stores the text. Runs with another ``apart`` are
+        never the same.
 
         Returns
         -------
-        The run, and the keys of the slots it already has.
+        The run, and the keys of slots with a result.
         """
         plan = [slot.key() for slot in slots]
         asked = [sorted(plan), code_hash((s.scene, s.engine) for s in slots), *([apart] if apart else [])]
@@ -195,7 +195,7 @@ class Store:
         return next(i for i in (stem, *(f"{stem}-{k}" for k in range(2, len(taken) + 3))) if i not in taken)
 
     def add(self, run: Run, observation: Observation) -> None:
-        """Keep an observation; it is on disk when this returns."""
+        """Store an observation; it is on disk when this returns."""
         slot = observation.slot
         row = (run.id, slot.key(), observation.cell, slot.engine, slot.scene, observation.outcome.value)
         body = json.dumps(observation.as_dict(), default=str)
@@ -206,20 +206,20 @@ class Store:
             self._db.execute(statement, values)
 
     def finish(self, run: Run) -> None:
-        """Mark the run as complete, so that the same plan starts a new one next time."""
+        """Mark the run as complete; the same plan then starts a new one."""
         self._write("UPDATE runs SET finished = 1 WHERE id = ?", (run.id,))
 
     def runs(self) -> list[Run]:
-        """All runs, oldest first: in the order in which they were started, whatever the clock said."""
+        """All runs, in the order in which they were started, not by their dates."""
         return self._runs("1")
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run; the latest is a bench or a scatter only if there is nothing else.
+        """Return one run; the latest is a benchmark or a scatter run only if there is no other.
 
         Raises
         ------
         MissingError
-            If there is none of that name.
+            If there is no such run.
         """
         last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC LIMIT 1"
         apart = (f"{SCATTER_TITLE}%", f"{RELEASE_TITLE}%")
@@ -238,7 +238,7 @@ class Store:
             return [_run_of(row) for row in self._db.execute(query, values).fetchall()]
 
     def timed_runs(self) -> list[Run]:
-        """Runs that have a protocol, oldest first: they timed something."""
+        """Runs with a protocol, which have timings; oldest first."""
         return self._runs("id IN (SELECT run FROM protocols)")
 
     def release_runs(self, engine: str, version: str = "") -> list[Run]:
@@ -247,7 +247,7 @@ class Store:
         return self._runs("substr(title, 1, length(?)) = ?", name, name)
 
     def observations(self, run: Run) -> list[Observation]:
-        """Observations of a run, in the order of its plan; its scene files need not be there any more."""
+        """Observations of a run, in the order of its plan; its scene files need not exist any more."""
         self._remember_scenes(run)
         with self._guarded("read"):
             rows = self._db.execute("SELECT slot, body FROM observations WHERE run = ?", (run.id,)).fetchall()
@@ -256,7 +256,7 @@ class Store:
             return [observation_from_dict(json.loads(body)) for _, body in rows]
 
     def missing(self, run: Run) -> int:
-        """How many cells of the plan of a run left no observation: it was interrupted, or rows of it are gone."""
+        """Number of planned cells of a run without observation: it was interrupted, or rows were deleted."""
         with self._guarded("read"):
             rows = self._db.execute("SELECT slot FROM observations WHERE run = ?", (run.id,)).fetchall()
             return len(set(run.plan) - {slot for (slot,) in rows})
@@ -275,7 +275,7 @@ class Store:
             raise StoreError(f"out: cannot read {self.path}: {one_line(error)}") from None
 
     def add_timings(self, run: Run, timings: Sequence[Timing]) -> None:
-        """Keep raw timings, in one transaction."""
+        """Store raw timings, in one transaction."""
         rows = []
         for timing in timings:
             slot, body = timing.slot, json.dumps(timing.as_dict())
@@ -285,27 +285,27 @@ class Store:
             self._db.executemany("INSERT OR REPLACE INTO timings VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
     def clear_timings(self, run: Run) -> None:
-        """Drop the timings of a run that was interrupted: rounds of two lanes do not mix."""
+        """Delete the timings of an interrupted run: rounds of two processes must not be mixed."""
         self._write("DELETE FROM timings WHERE run = ?", (run.id,))
 
     def timings(self, run: Run) -> list[Timing]:
-        """Raw timings of a run, in the order in which they were taken."""
+        """Raw timings of a run, in order."""
         with self._guarded("read"):
             rows = self._db.execute("SELECT body FROM timings WHERE run = ? ORDER BY rowid", (run.id,)).fetchall()
             return [timing_from_dict(json.loads(body)) for (body,) in rows]
 
     def set_protocol(self, run: Run, protocol: dict[str, Any]) -> None:
-        """Keep how a bench run was made: seed, limits, clock, what was left out and why."""
+        """Store how a benchmark was made: seed, limits, clock, and what was left out and why."""
         self._write("INSERT OR REPLACE INTO protocols VALUES (?, ?)", (run.id, json.dumps(protocol)))
 
     def protocol(self, run: Run) -> dict[str, Any] | None:
-        """Protocol of a bench run; None for a run that timed nothing."""
+        """Protocol of a benchmark; None for a run without timings."""
         with self._guarded("read"):
             row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
             return None if row is None else dict(json.loads(row[0]))
 
     def add_recording(self, run: Run, slot: Slot, recording: Recording) -> None:
-        """Keep what a replay shows of a cell."""
+        """Store the replay of a cell."""
         row = (run.id, slot.key(), json.dumps(slot.as_dict()), recording.to_bytes())
         self._write("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", row)
 
@@ -331,14 +331,14 @@ def _run_of(row: Sequence[Any]) -> Run:
 def _opened(path: Path) -> sqlite3.Connection:
     connection = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
     connection.execute("PRAGMA journal_mode=WAL")
-    # WAL with NORMAL survives the death of the process, which is what a run must survive.
+    # WAL with NORMAL survives the end of the process, which a run must survive.
     connection.execute("PRAGMA synchronous=NORMAL")
-    connection.execute("PRAGMA temp_store=MEMORY")  # a full folder for temporary files is not our business
+    connection.execute("PRAGMA temp_store=MEMORY")  # a full temporary folder does not matter here
     return connection
 
 
 def _opened_to_read(path: Path) -> sqlite3.Connection:
-    """Open without writing; where not even the log's index can be made, as a file that nobody changes."""
+    """Open without writing; where the log's index cannot be created, as an immutable file."""
     address = f"file:{quote(str(path.resolve()))}?mode=ro"
     for suffix in ("", "&immutable=1"):
         connection = sqlite3.connect(address + suffix, uri=True, timeout=PATIENCE, isolation_level=None)
@@ -348,13 +348,13 @@ def _opened_to_read(path: Path) -> sqlite3.Connection:
             return connection
         except sqlite3.OperationalError:
             connection.close()
-            if suffix or path.with_name(path.name + "-wal").exists():  # what stands in a log must not be overlooked
+            if suffix or path.with_name(path.name + "-wal").exists():  # entries of the log must not be missed
                 raise
     raise AssertionError("unreachable")
 
 
 def _patiently(action: Callable[[], _T]) -> _T:
-    """Repeat what fails because another process opens the same file: a change of the journal does not wait."""
+    """Repeat a call that fails as another process opens the file: a change of journal mode does not wait."""
     ends = time.monotonic() + PATIENCE
     while True:
         try:

@@ -1,10 +1,10 @@
-"""In which release did it change? Asks as few as possible, and says what it does not know.
+"""Finds the release of a change with as few runs as possible, and reports what remains unknown.
 
     known    like the first                    like the last
-             [A] . . . . . . ? . . . . . . . . [B]        ask the middle: log2(n) releases for one change
+             [A] . . . . . . ? . . . . . . . . [B]        run the middle: log2(n) releases for one change
 
-A release that cannot be asked is passed over for its neighbour. What lies between the two releases that are found is
-then named: the change is in one of them.
+A release that cannot run is replaced by its neighbour. Releases between the two that are found are then named: the
+change is in one of them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from validation.judging.comparison import Change, Kind, by_seriousness, compare_
 from validation.releases.floors import MOVES
 from validation.releases.history import ANSWERS, Told
 
-#: What a release says of the rows in question; None if it cannot be asked.
+#: Rows of a release; None if it cannot run.
 Ask = Callable[[int, Sequence[Slot]], Told]
 
 
@@ -30,15 +30,15 @@ class Found:
     Parameters
     ----------
     before, after
-        Indices of two releases between which it lies; no release that could be asked lies between them.
+        Indices of two releases between which it lies; none of those in between could run.
     asked
-        Indices of the releases that were asked for it, in this order; with those that did not answer.
+        Indices of the releases that were run, in order, including those without a result.
     silent
-        Index -> reason of those that did not answer.
+        Index -> reason of those without a result.
     change
         The row on both sides.
     others
-        Further pairs of neighbours between which the row changes; None if not all were asked.
+        Further pairs of neighbours between which the row changes; None if not all were run.
     """
 
     before: int
@@ -50,19 +50,19 @@ class Found:
 
     @property
     def unknown(self) -> list[int]:
-        """Releases between the two sides that did not answer: the change may be in one of them."""
+        """Releases between the two sides without a result: the change may be in one of them."""
         return [index for index in sorted(self.silent) if self.before < index < self.after]
 
 
 @dataclass(frozen=True)
 class Unchanged:
-    """Nothing changed between the ends, or an end does not answer."""
+    """Nothing changed between the ends, or an end has no result."""
 
     reason: str
 
 
 class _Questions:
-    """Asks each release once, and keeps what it said."""
+    """Runs each release once, and stores its rows."""
 
     def __init__(self, ask: Ask, metric: str) -> None:
         self._ask, self._metric = ask, metric
@@ -71,14 +71,14 @@ class _Questions:
         self.asked: list[int] = []
 
     def at(self, index: int, cells: Sequence[Slot]) -> dict[str, dict[str, Any]]:
-        """Rows of the metric by slot; empty where a release does not answer."""
+        """Rows of the metric by slot; empty where a release has no result."""
         if index not in self.asked:
             self.asked.append(index)
             told = self._ask(index, cells)
             found = [row.as_dict() for row in told.rows if _meant(row.metric, self._metric)]
             self.rows[index] = {_key(row): row for row in found if row["outcome"] in ANSWERS}
             if not self.rows[index]:
-                self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such row")
+                self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such check")
         return self.rows[index]
 
 
@@ -87,7 +87,7 @@ def _key(row: dict[str, Any]) -> str:
 
 
 def _meant(metric: str, asked: str) -> bool:
-    """``apex`` means all of a series, ``apex[1]`` one of it, ``bounce/apex[1]`` the same."""
+    """``apex`` means all of a series, ``apex[1]`` or ``bounce/apex[1]`` one of it."""
     asked = asked.rpartition("/")[2]
     return metric == asked or metric.partition("[")[0] == asked
 
@@ -95,15 +95,15 @@ def _meant(metric: str, asked: str) -> bool:
 def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool = False) -> Found | Unchanged:
     """Find between which of ``count`` releases a row of ``metric`` changes.
 
-    The ends are asked for all ``cells``; of the rows that differ there the most serious is followed, with its noise
-    floor. With ``every`` all releases are asked, and the other changes of that row are named.
+    The ends run all ``cells``; the most serious row that differs is followed, with its noise floor. With ``every`` all
+    releases run, and other changes of that row are named.
     """
     moved = [replace(slot, ulp=ulp) for slot in cells for ulp in MOVES]
     questions = _Questions(ask, metric)
     first, last = (questions.at(index, [*cells, *moved]) for index in (0, count - 1))
     for index, rows in ((0, first), (count - 1, last)):
         if not rows:
-            return Unchanged(f"release {index} cannot be asked: {questions.silent[index]}")
+            return Unchanged(f"release {index} cannot run: {questions.silent[index]}")
     changes = sorted(_changes(first.values(), last.values()), key=by_seriousness)
     if not changes and all(row["value"] is None for row in (*first.values(), *last.values())):
         why = next(iter(last.values()))["reason"]
@@ -127,7 +127,7 @@ def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool
 
 
 def search(count: int, like_first: Callable[[int], bool | None]) -> tuple[int, int]:
-    """Neighbours (among those that answer) of which the first is like release 0 and the second is not."""
+    """Neighbours (among those with a result) of which the first is like release 0 and the second is not."""
     before, after = 0, count - 1
     silent: set[int] = set()
     while True:
@@ -145,7 +145,7 @@ def search(count: int, like_first: Callable[[int], bool | None]) -> tuple[int, i
 
 
 def _differs(a: dict[str, Any], b: dict[str, Any], kind: Kind) -> bool:
-    """Whether two rows differ in what is searched for: the verdict where it flips, else the value beyond its floor."""
+    """Whether two rows differ: in the verdict where it flips, else in the value beyond its floor."""
     if kind in (Kind.FLIP, Kind.OUTCOME):
         return (a["outcome"], a["physics"]) != (b["outcome"], b["physics"])
     return bool(_changes([a], [b]))

@@ -1,10 +1,10 @@
-"""Our own code for an environment, laid out as an installation without dependencies would lay it.
+"""Our code for an environment, in the layout of an installation without dependencies.
 
     <cache>/contact-crosscheck/code/<hash>/     adapters, validation, reference_solver; their metadata and entry points;
-                                                the packages of plugins (engines, scenes) that are asked
+                                                the packages of the plugins used (engines, scenes)
 
-It is a copy of the code that runs here, uncommitted edits included, so that a release is driven by exactly what judges
-it. The copy is named after the hash of its content: it never changes, and many environments share it.
+It is a copy of the running code, including uncommitted edits, so that the same code runs and judges a release. The copy
+is named after the hash of its content: it never changes, and environments share it.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from adapters.engine import EngineError
 from validation import catalogue
 from validation.releases.environments import UNFINISHED, cache_folder
 
-#: Our packages that run and measure a cell; reports are made at home.
+#: Our packages that run and measure a cell; reports are made in the calling process.
 PACKAGES = ("reference_solver", "adapters", "validation")
-#: Entry points by which a cell is found.
+#: Entry points of engines and scenes.
 GROUPS = (registry.GROUP, catalogue.GROUP)
-#: Seconds after which a copy that nobody uses any more may go: a month.
+#: Seconds after which an unused copy may be deleted: a month.
 KEPT = 30 * 86400.0
 
 
 def code(engine: str, scenes: Iterable[str]) -> Path:
-    """Folder to put on the path of an interpreter that is to run ``scenes`` on ``engine``.
+    """Folder for the path of an interpreter that runs ``scenes`` on ``engine``.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def _source(module: str) -> Path:
     places = list(spec.submodule_search_locations or []) if spec else []
     path = Path(places[0]) if places else Path(spec.origin) if spec and spec.origin else None
     if path is None or not path.exists():
-        raise EngineError(f"engine: the source of {module} is no file that could be run elsewhere")
+        raise EngineError(f"engine: the source of {module} is not a file that can be run elsewhere")
     return path
 
 
@@ -102,14 +102,14 @@ def _lay_out(path: Path, sources: dict[str, Path], listed: str) -> None:
         (info / "entry_points.txt").write_text(listed, encoding="utf-8")
         made.rename(path)
     except OSError:
-        if not path.is_dir():  # else another process has laid out the same
+        if not path.is_dir():  # else another process has made the same copy
             raise
     finally:
         shutil.rmtree(made, ignore_errors=True)
 
 
 def _sweep(folder: Path) -> None:
-    """Remove copies that have not been used for long, and what was left half made."""
+    """Remove copies that have not been used for long, and incomplete ones."""
     for old in folder.iterdir():
         age = time.time() - old.stat().st_mtime
         if age > (3600.0 if old.name.startswith(UNFINISHED) else KEPT):

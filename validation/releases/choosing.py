@@ -1,4 +1,4 @@
-"""Which releases are meant: ``3.0.0..4.0.1``, ``3.0.0,3.1.6`` or ``latest``, looked up where pip looks."""
+"""Selects releases: ``3.0.0..4.0.1``, ``3.0.0,3.1.6`` or ``latest``, from pip's registry."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from adapters.engine import EngineError
 from adapters.plain import one_line
 from adapters.releases import Distribution, Releases
 
-#: Seconds for the registry to list what it has; it answers within two.
+#: Time limit of the registry [s]; it usually answers within two.
 PATIENCE = 60.0
-#: What a release is, as a user writes it.
+#: Syntax of a version.
 _VERSION = re.compile(r"[0-9][0-9A-Za-z.+!-]{0,40}")
 
 
 class RegistryError(EngineError):
-    """The package registry does not answer, or does not have what was asked for; one line."""
+    """The package registry does not answer, or does not have the version; one line."""
 
 
 @dataclass(frozen=True)
 class Release:
-    """One release of an engine, and what pip is asked for it.
+    """One release of an engine, and its requirements for pip.
 
     Parameters
     ----------
     distribution
-        Name of the package that carries this release.
+        Name of the package with this release.
     needs
-        Further requirements, as pip reads them; numpy is always one.
+        Further requirements of pip; numpy is always one.
     unknown
-        Why the adapter does not know this release; empty if it does.
+        Why the adapter does not support this release; empty if it does.
     """
 
     engine: str
@@ -51,51 +51,51 @@ class Release:
 
     @property
     def name(self) -> str:
-        """``myengine==3.2.7``, with the engine's name, whatever its distribution is called."""
+        """``myengine==3.2.7``, with the engine's name, not the distribution's."""
         return f"{self.engine}=={self.version}"
 
     @property
     def requirements(self) -> tuple[str, ...]:
-        """What pip is asked to install."""
+        """Requirements for pip."""
         return (f"{self.distribution}=={self.version}", *self.needs)
 
 
 def known_releases(engine: str) -> Releases:
     """Return the table of releases of an engine.
 
-    An engine without a table has one distribution, its package. If its adapter is part of this project, the known
-    releases are those that its extra installs; otherwise all are.
+    An engine without a table has one distribution, its package. For an adapter of this project the supported releases
+    are those of its extra; otherwise all are.
 
     Raises
     ------
     EngineError
-        If there is no such engine, or it is the solver of this package, which has no releases of its own.
+        If there is no such engine, or it is the solver of this package, which has no releases.
     """
     registry.find(engine)
     adapter, facts = registry.adapter(engine), registry.facts(engine)
     if adapter is not None and adapter.releases is not None:
         return adapter.releases
     if facts is None or engine == registry.solver():
-        raise EngineError(f"engine: {engine} has no releases of its own to choose from")
+        raise EngineError(f"engine: {engine} has no releases to choose from")
     return Releases((Distribution(facts.package),), known=_range(facts.package) if adapter is not None else "")
 
 
 def _range(package: str) -> str:
-    """Versions of a package that this project's extras install, as a specifier; "" where none names it."""
+    """Versions of a package in this project's extras, as a specifier; "" if none names it."""
     asked = [Requirement(text) for text in requires("contact-crosscheck") or ()]
     name = canonicalize_name(package)
     return next((str(each.specifier) for each in asked if canonicalize_name(each.name) == name), "")
 
 
 def chosen(engine: str, text: str) -> list[Release]:
-    """Releases that ``text`` means, oldest first.
+    """Releases selected by ``text``, oldest first.
 
     Raises
     ------
     EngineError
-        If the engine has none, a version is none, or nothing lies in the range.
+        If the engine has none, a version is malformed, or the range is empty.
     RegistryError
-        If a range or ``latest`` is asked for and the registry does not answer.
+        If a range or ``latest`` is given and the registry does not answer.
     """
     known = known_releases(engine)
     if text == "latest":
@@ -131,22 +131,22 @@ def _within(version: Version, low: Version | None, high: Version | None) -> bool
 
 
 def release(engine: str, known: Releases, version: str) -> Release:
-    """Return the release ``version`` with the distribution that carries it and what it needs."""
+    """Return the release ``version`` with its distribution and requirements."""
     carriers = [d for d in known.distributions if SpecifierSet(d.versions).contains(version, prereleases=True)]
     if not carriers:
-        raise EngineError(f"releases: no distribution of {engine} carries {version}")
+        raise EngineError(f"releases: no distribution of {engine} has {version}")
     needs = [r.needs for r in known.requirements if SpecifierSet(r.versions).contains(version, prereleases=True)]
     if not any(re.match(r"numpy\b", each) for each in needs):
-        needs.append("numpy")  # the adapter's own need: not every engine brings it
+        needs.append("numpy")  # needed by the adapter; not every engine installs it
     unknown = known.withheld.get(version, "")
     if not unknown and not SpecifierSet(known.known).contains(version, prereleases=True):
-        unknown = f"its adapter knows {known.known}; --try asks it all the same"
+        unknown = f"its adapter supports {known.known}; --try runs it all the same"
     return Release(engine, version, carriers[0].name, tuple(needs), unknown)
 
 
 @cache
 def offered(engine: str) -> list[Release]:
-    """All releases that the registry offers for this interpreter, oldest first; raises as `chosen`."""
+    """All releases in the registry for this interpreter, oldest first; raises as `chosen`."""
     known = known_releases(engine)
     found: dict[Version, Release] = {}
     for distribution in known.distributions:
@@ -157,7 +157,7 @@ def offered(engine: str) -> list[Release]:
 
 
 def _listed(distribution: str) -> list[Version]:
-    """Versions of a package in the registry that pip is set up for."""
+    """Versions of a package in pip's registry."""
     command = [sys.executable, "-m", "pip", "index", "versions", distribution, "--disable-pip-version-check"]
     try:
         asked = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
@@ -173,5 +173,5 @@ def _listed(distribution: str) -> list[Version]:
         try:
             versions.append(Version(word.strip()))
         except InvalidVersion:
-            continue  # of times before versions had rules
+            continue  # from before versions had rules
     return [version for version in versions if not version.is_prerelease]

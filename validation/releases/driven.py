@@ -1,11 +1,11 @@
-"""Runs in the environment of a release: an entry without a command line, for numpy and the engine alone.
+"""Runs in the environment of a release; needs only numpy and the engine.
 
     stdin    one JSON object: {"engine", "request" or null, "slots", "timed", "stated", "jobs", "timeout"}
     stdout   one JSON object per line: first what this is ({"told": ...}), then an observation or {"left": ...} each,
              then {"timed": ...} for each lap of what is to be timed
 
-Cells run as everywhere: `validation.workers` isolates them, receipts run before each. The parent keeps stdin open as
-long as it lives; when it closes, this process ends, and its workers with it.
+Cells run as usual: `validation.workers` isolates them, and property checks run before each. The parent keeps stdin
+open; when it closes, this process and its workers end.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from validation.workers import run_cells
 
 
 def main() -> None:
-    """Answer one question on stdin."""
+    """Handle one request on stdin."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever an engine prints is not an answer
+    os.dup2(2, 1)  # output of an engine is no answer
     asked = json.loads(sys.stdin.readline())
     threading.Thread(target=_end_with_parent, daemon=True).start()
     posed.hand_over(asked["stated"])
@@ -75,7 +75,7 @@ def _say(answers: TextIO, data: Mapping[str, Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Leave when the other end of stdin closes; guardians of the workers see to them."""
+    """Exit when the other end of stdin closes; the guardians of the workers end these."""
     while sys.stdin.read(4096):
         pass
     os._exit(1)

@@ -1,4 +1,4 @@
-"""Runs cells on releases: each in its environment, one run per release in the same store, what is stored asked once."""
+"""Runs cells on releases, each in its environment and as one run of the store; stored cells do not run again."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ from validation.releases.timing import kept, timed_cells
 from validation.running.plan import Request, slots
 from validation.workers import TIMEOUT
 
-#: Seconds beyond a cell's own limit after which an environment that says nothing is given up: it starts a worker.
+#: Seconds beyond a cell's limit after which a silent environment is given up: it must start a worker.
 SILENCE = 180.0
-#: Outcomes that may be different next time: what was missing may be there, what was slow may be fast. What an adapter
-#: refuses it refuses again; a release that it does not know was not asked at all, and its run says nothing of any code.
+#: Outcomes that may differ next time: something missing may be installed, a slow cell may finish. Refusals by an
+#: adapter stay; an unsupported release did not run at all, and its run is independent of the code.
 ASKED_AGAIN = (Outcome.NOT_INSTALLED, Outcome.TIMED_OUT)
-#: Most scenes that the title of a run names.
+#: Most scenes in the title of a run.
 NAMED = 4
 Say = Callable[[str], None]
 
 
 class Unasked(Exception):
-    """A release that cannot be asked at all; the message is the reason of its rows."""
+    """A release that cannot run at all; the message is the reason of its rows."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How cells are run: workers (0: one per core), seconds per cell, and whether what is stored counts."""
+    """How cells run: workers (0: one per core), seconds per cell, and whether stored results count."""
 
     jobs: int = 0
     timeout: float = TIMEOUT
     fresh: bool = False
-    #: Ask releases as well that the adapter does not know.
+    #: Also run releases that the adapter does not support.
     anyway: bool = False
 
 
 def planned(releases: Sequence[Release], request: Request, effort: Effort, say: Say) -> list[Slot]:
-    """Cells of a request: those of the engine that is installed here, else of the newest release that answers.
+    """Cells of a request: for the installed engine, else for the newest release that runs.
 
-    All releases are asked the same, so that their rows can be compared.
+    All releases run the same cells, so that their rows can be compared.
     """
     engine = releases[-1].engine
     request = replace(request, engines=[engine])
@@ -75,14 +75,14 @@ def drive(
     say: Say = lambda line: None,
     progress: Callable[[Observation], None] = lambda observation: None,
 ) -> list[Observation]:
-    """Observations of all ``wanted`` cells on one release; what the store does not have is run and kept in it.
+    """Observations of all ``wanted`` cells on one release; cells that the store lacks are run and stored.
 
-    A release that cannot be installed, imported or driven leaves an observation per cell with the reason.
+    A release that cannot be installed, imported or run has an observation per cell with the reason.
 
     Raises
     ------
     RegistryError
-        If the package registry does not answer while the release must be installed.
+        If the package registry does not answer during an installation.
     """
     have = {} if effort.fresh else answered(store, release, wanted)
     todo = [slot for slot in wanted if slot not in have]
@@ -124,7 +124,7 @@ def _asked(
 
 
 def _protocol(release: Release, todo: Sequence[Slot], told: dict[str, Any]) -> dict[str, Any]:
-    """What a run on a release was made with; what is stored answers for another one only if this is equal."""
+    """Conditions of a run on a release; stored results are reused only if they are equal."""
     scenes = dict.fromkeys(slot.scene for slot in todo)
     code_of = {"adapter": adapter_hash(release.engine), "scenes": {scene: scene_code(scene) for scene in scenes}}
     return {"release": {"engine": release.engine, "version": release.version}, "told": told, "code": code_of}
@@ -138,12 +138,12 @@ def _answers(
     say: Say,
     timed: Sequence[Slot] = (),
 ) -> Iterator[dict[str, Any]]:
-    """What the environment of a release says, line by line: first what it is, then an answer per cell, then laps.
+    """Output of a release's environment, line by line: its identity, a result per cell, then laps.
 
     Raises
     ------
     Unasked
-        If the release cannot be installed, imported, or is not what was asked for.
+        If the release cannot be installed or imported, or is another one.
     """
     if release.unknown and not effort.anyway:
         raise Unasked(release.unknown)
@@ -184,15 +184,15 @@ def _same(told: dict[str, Any], release: Release) -> bool:
 
 
 def _talk(environment: Environment, path: str, question: dict[str, Any], patience: float) -> Iterator[dict[str, Any]]:
-    """Ask the process in an environment; it ends with this generator.
+    """Talk to the process in an environment; it ends with this generator.
 
     Raises
     ------
     Unasked
-        If it ends without having said what it is, or falls silent.
+        If it ends without its identity, or does not answer.
     """
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONSTARTUP", "VIRTUAL_ENV")}
-    # Safe path: the working folder may hold packages of our names, this checkout among them.
+    # Safe path: the working folder may have packages with our names, such as this checkout.
     own = kept | {"PYTHONPATH": path, "PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"}
     process = subprocess.Popen(
         [str(environment.python), "-m", "validation.releases.driven"],
@@ -200,7 +200,7 @@ def _talk(environment: Environment, path: str, question: dict[str, Any], patienc
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=own,
-        start_new_session=True,  # Ctrl-C is this process's business; the other one ends when its stdin closes
+        start_new_session=True,  # this process handles Ctrl-C; the other one ends when its stdin closes
         text=True,
         encoding="utf-8",
         errors="replace",
@@ -218,7 +218,7 @@ def _talk(environment: Environment, path: str, question: dict[str, Any], patienc
             try:
                 line = said.get(timeout=patience)
             except queue.Empty:
-                raise Unasked(f"its environment has said nothing for {patience:g} s") from None
+                raise Unasked(f"its environment has not answered for {patience:g} s") from None
             if line is None:
                 break
             yield json.loads(line)
@@ -226,11 +226,9 @@ def _talk(environment: Environment, path: str, question: dict[str, Any], patienc
         readers[1].join(5.0)
         if process.wait(10.0) or first:
             tail = one_line(lines("".join(written), LOG_LINES).rpartition("\n")[2])
-            raise Unasked(
-                f"cannot be driven: its process ended with {process.returncode}" + (f": {tail}" if tail else "")
-            )
+            raise Unasked(f"cannot be run: its process ended with {process.returncode}" + (f": {tail}" if tail else ""))
     except subprocess.TimeoutExpired:
-        raise Unasked("cannot be driven: its process does not end") from None
+        raise Unasked("cannot be run: its process does not end") from None
     finally:
         with suppress(OSError):
             process.stdin.close()
@@ -261,7 +259,7 @@ def _keep(written: list[str], line: str | None) -> None:
 def time(
     store: Store, release: Release, wanted: Sequence[Observation], effort: Effort, say: Say = lambda line: None
 ) -> None:
-    """Time a release on cells that it has answered; what the store has of the same code is not timed again."""
+    """Time a release on cells with a result; timings of the same code in the store are reused."""
     todo = timed_cells(wanted)
     if not todo or (not effort.fresh and set(todo) <= _timed(store, release)):
         return
@@ -278,7 +276,7 @@ def time(
 
 
 def _timed(store: Store, release: Release) -> set[Slot]:
-    """Cells that the store has a release's times of, taken with the adapter that runs now."""
+    """Cells with stored times of a release, taken with the present adapter."""
     found: set[Slot] = set()
     for run in store.release_runs(release.engine, release.version):
         if (store.protocol(run) or {}).get("code", {}).get("adapter") == adapter_hash(release.engine):
@@ -287,7 +285,7 @@ def _timed(store: Store, release: Release) -> set[Slot]:
 
 
 def answered(store: Store, release: Release, wanted: Sequence[Slot]) -> dict[Slot, Observation]:
-    """Observations of these cells that the store has of a release, made by the code that runs now; the newest ones."""
+    """Stored observations of these cells on a release, by the present code; the newest ones."""
     asked, found = set(wanted), {}
     adapter = adapter_hash(release.engine)
     for run in store.release_runs(release.engine, release.version):

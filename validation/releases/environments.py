@@ -3,9 +3,9 @@
     <cache>/contact-crosscheck/environments/myengine-3.2.7-cp311-1a2b3c4d/     a virtual environment
         receipt.json    written last: interpreter, packages with versions, hash of all files
 
-An environment is made under a temporary name and renamed when it is complete, so what was interrupted never counts,
-and is swept by whoever builds the same one next. A lock keeps two processes from doing the same work; it is the
-operating system's, so it ends with its process. Before an environment is used its files are hashed again.
+An environment is made under a temporary name and renamed when it is complete, so an interrupted one never counts; the
+next build of the same one removes it. A lock of the operating system, which ends with its process, keeps two processes
+from the same work. Before an environment is used its files are hashed again.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from adapters.plain import one_line
 from validation.releases.choosing import Release
 
 RECEIPT = "receipt.json"
-#: Prefix of what is being built; a name that no release has.
+#: Prefix of an unfinished environment; no release has this name.
 UNFINISHED = ".building-"
 #: Seconds for pip to fetch and unpack one release; the largest wheels take half a minute.
 PATIENCE = 900.0
-#: What an installation does not change: compiled files appear when modules are first imported.
+#: Files outside the hash: compiled files appear when modules are first imported.
 _COMPILED = "__pycache__"
 
 
@@ -44,7 +44,7 @@ class BuildError(EngineError):
 
 @dataclass(frozen=True)
 class Environment:
-    """A complete environment: its folder, and the receipt of its making."""
+    """A complete environment: its folder and receipt."""
 
     path: Path
     receipt: dict[str, Any]
@@ -61,7 +61,7 @@ class Environment:
 
 
 def cache_folder() -> Path:
-    """Folder for everything that can be made again (``XDG_CACHE_HOME``, else ``~/.cache``)."""
+    """Folder for data that can be made again (``XDG_CACHE_HOME``, else ``~/.cache``)."""
     if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
         return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
@@ -73,7 +73,7 @@ def folder() -> Path:
 
 
 def name_of(release: Release) -> str:
-    """Folder name: engine, version, interpreter, and a digest of all that pip is asked for."""
+    """Folder name: engine, version, interpreter, and a digest of pip's requirements."""
     digest = hashlib.sha256("\n".join(release.requirements).encode()).hexdigest()[:8]
     tag = f"{'cp' if sys.implementation.name == 'cpython' else 'py'}{sys.version_info.major}{sys.version_info.minor}"
     return f"{release.engine}-{release.version}-{tag}-{digest}"
@@ -87,13 +87,13 @@ def found() -> list[Environment]:
 
 
 def existing(release: Release) -> Environment | None:
-    """The environment of a release if it is complete and as it was built; else None."""
+    """The environment of a release if it is complete and unchanged; else None."""
     environment = _read(folder() / name_of(release))
     return environment if environment is not None and not check(environment) else None
 
 
 def build(release: Release, say: Callable[[str], None] = lambda line: None) -> Environment:
-    """Return the environment of a release, made if there is none; one that is not as it was built is made anew.
+    """Return the environment of a release; a missing or changed one is built.
 
     Raises
     ------
@@ -111,11 +111,11 @@ def build(release: Release, say: Callable[[str], None] = lambda line: None) -> E
             wrong = check(environment)
             if not wrong:
                 return environment
-            say(f"{path.name}: {wrong}; it is built anew")
+            say(f"{path.name}: {wrong}; it is built again")
             shutil.rmtree(path)
-        for left in folder().glob(f"{UNFINISHED}{path.name}-*"):  # of a process that was killed: we hold the lock
+        for left in folder().glob(f"{UNFINISHED}{path.name}-*"):  # left by a killed process, as we hold the lock
             shutil.rmtree(left, ignore_errors=True)
-        if path.exists():  # without a receipt: not ours to trust
+        if path.exists():  # without a receipt: not trusted
             shutil.rmtree(path)
         say(f"installing {' '.join(release.requirements)}")
         return _made(release, path)
@@ -146,7 +146,7 @@ def _made(release: Release, path: Path) -> Environment:
 
 
 def _install(path: Path, release: Release) -> None:
-    """Let pip install the release; wheels only, for a build from sources may take an hour and anything else."""
+    """Install the release with pip; wheels only, as a build from sources may take an hour."""
     if find_spec("pip") is None:
         raise BuildError("environment: pip is not installed beside this command; python -m ensurepip brings it")
     command = [sys.executable, "-m", "pip", "--python", str(_python(path)), "install", "--quiet", "--no-input"]
@@ -176,7 +176,7 @@ print(json.dumps({"python": platform.python_version(), "implementation": sys.imp
 
 
 def _told_by(path: Path) -> dict[str, Any]:
-    """What the new interpreter says of itself and of what is installed."""
+    """Report of the new interpreter about itself and its packages."""
     command = [str(_python(path)), "-I", "-c", _TELL]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120.0)
     if done.returncode:
@@ -185,17 +185,17 @@ def _told_by(path: Path) -> dict[str, Any]:
 
 
 def check(environment: Environment) -> str:
-    """Why an environment is not what its receipt says; empty if it is."""
+    """Why an environment does not fit its receipt; empty if it does."""
     receipt = environment.receipt
     if not environment.python.exists():
         return "its interpreter is gone"
     if receipt.get("files") != _hash(environment.path):
-        return "its files are not those that were installed"
+        return "its files have changed since it was installed"
     return ""
 
 
 def remove(environment: Environment) -> None:
-    """Delete an environment; half of one is never seen under its name."""
+    """Delete an environment; a partly deleted one never has its name."""
     with locked(folder() / f".{environment.name}.lock"):
         away = Path(tempfile.mkdtemp(prefix=f"{UNFINISHED}{environment.name}-", dir=folder()))
         environment.path.rename(away / "removed")
@@ -220,7 +220,7 @@ def _read(path: Path) -> Environment | None:
 
 
 def _hash(path: Path) -> str:
-    """Hash over names and contents of all that is installed (compiled files aside)."""
+    """Hash over names and contents of all installed files except compiled ones."""
     digest = hashlib.sha256()
     places = sorted(path.glob("lib*/python*/site-packages")) or [path / "Lib" / "site-packages"]
     for root in dict.fromkeys(place.resolve() for place in places):
@@ -238,7 +238,7 @@ def _hash(path: Path) -> str:
 def locked(path: Path, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
     """Hold the lock at ``path``; it is released when the process ends, however it ends.
 
-    Where the system has no such locks two processes may both build: one of them renames, the other's work is lost.
+    On systems without such locks two processes may both build: one of them renames, the other's work is lost.
     """
     try:
         import fcntl

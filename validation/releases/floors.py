@@ -1,8 +1,8 @@
-"""Noise floors of what moved: whether a release changed a number, or any change would have.
+"""Noise floors of changes between releases.
 
-Cells whose values moved between two releases are asked again on both, from starts moved by units in the last place. A
-pile, or a break with many contacts, ends elsewhere after that, too: what a release does there to a value is no step of
-it unless it is more than that (`validation.judging.comparison`).
+Cells whose values changed between two releases run again on both, from starts moved by units in the last place. A pile,
+or a break with many contacts, ends elsewhere after such a move too: a change by a release counts only beyond that
+(`validation.judging.comparison`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from validation.cells import Slot, slot_from_dict
 from validation.judging.comparison import Kind
 from validation.releases.history import Told, steps
 
-#: Moves of the start, in units in the last place, that give a row its noise floor.
+#: Moves of the start, in units in the last place, for the noise floor of a row.
 MOVES = (1, 2)
 
 
 def moved_starts(releases: Sequence[Told]) -> dict[str, list[Slot]]:
-    """By release: the cells whose values moved from it or to it, each from its moved starts."""
+    """By release: the cells whose values changed from or to it, each with its moved starts."""
     wanted: dict[str, dict[Slot, None]] = {}
     for step in steps(releases):
         cells = (slot_from_dict(change.slot) for change in step.family.changes if change.kind is Kind.ERROR)

@@ -1,4 +1,4 @@
-"""Rows over releases: what each release answered, and what moved from one to the next."""
+"""Rows over releases, and changes from one release to the next."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from validation.judging.rows import Row, rows_of
 from validation.judging.verdicts import Physics
 from validation.records.store import RELEASE_TITLE, Store
 
-#: Outcomes that are an answer of the engine; the others are the reason why there is none.
+#: Outcomes with a result of the engine; the others are reasons for having none.
 ANSWERS = (Outcome.OK.value, Outcome.DIVERGED.value, Outcome.CRASHED.value, Outcome.TIMED_OUT.value)
-#: Outcomes that end without a number to judge: fewer rows that fail are no better if these are more.
+#: Outcomes without a value to judge: fewer failures are no improvement if these increase.
 ENDED = (Outcome.CRASHED.value, Outcome.TIMED_OUT.value, Outcome.INVALID.value)
 #: Engine, profile, scene, dimension.
 Key = tuple[str, str, str, int]
@@ -29,16 +29,16 @@ Key = tuple[str, str, str, int]
 
 @dataclass(frozen=True)
 class Told:
-    """What one release answered.
+    """Rows of one release.
 
     Parameters
     ----------
     reason
-        Why it answered nothing; empty if it did.
+        Why it has no result; empty if it has.
     doubted
-        Profiles without verdicts on this release, with the receipt that fails there.
+        Profiles without verdicts on this release, with the property check that fails there.
     times
-        Time of a scene over that of the yardstick (`validation.releases.timing`), where it was taken.
+        Time of a scene over that of the yardstick (`validation.releases.timing`), where timed.
     """
 
     engine: str
@@ -54,49 +54,49 @@ class Told:
         return f"{self.engine}=={self.version}"
 
     def count(self, physics: Physics) -> int:
-        """How many rows have this verdict."""
+        """Number of rows with this verdict."""
         return sum(row.physics == physics.value for row in self.rows)
 
     @property
     def ended(self) -> int:
-        """How many rows have no verdict because their cell crashed, hung, or is not driven as declared."""
+        """Number of rows without verdict because their cell crashed, hung, or failed a property check."""
         return sum(row.outcome in ENDED for row in self.rows)
 
     def pace(self, other: Told) -> float | None:
-        """Median over scenes of this release's time over that of ``other``; None where they share no time."""
+        """Median over scenes of this release's time over that of ``other``; None if no scene is timed on both."""
         both = [self.times[key] / other.times[key] for key in self.times if key in other.times]
         return statistics.median(both) if both else None
 
 
 @dataclass(frozen=True)
 class Step:
-    """Rows of one kind that moved together, between two releases that follow each other among those that answered."""
+    """Rows of one kind that changed together, between successive releases with a result."""
 
     before: str
     after: str
     family: Family
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data: the largest change, and how many moved with it."""
+        """Plain data: the largest change, and the number of rows."""
         return {"before": self.before, "after": self.after, "rows": len(self.family.changes)} | {
             "change": self.family.first.as_dict()
         }
 
 
 def versions(store: Store, engine: str) -> list[str]:
-    """Releases of an engine that the store has rows of, oldest first."""
+    """Releases of an engine in the store, oldest first."""
     titles = (run.title.removeprefix(f"{RELEASE_TITLE}{engine}==") for run in store.release_runs(engine))
     return [str(version) for version in sorted({Version(title.partition(":")[0]) for title in titles})]
 
 
 def engines(store: Store) -> list[str]:
-    """Engines that the store has releases of."""
+    """Engines with releases in the store."""
     titles = [run.title.removeprefix(RELEASE_TITLE) for run in store.runs() if run.title.startswith(RELEASE_TITLE)]
     return list(dict.fromkeys(title.partition("==")[0] for title in titles))
 
 
 def observations(store: Store, engine: str, version: str) -> list[Observation]:
-    """The newest answer of a release to every cell that it was ever asked; a missing answer never replaces one."""
+    """The newest result of a release for every cell; a missing result never replaces one."""
     found: dict[Slot, Observation] = {}
     for run in store.release_runs(engine, version):
         for observation in store.observations(run):
@@ -108,7 +108,7 @@ def observations(store: Store, engine: str, version: str) -> list[Observation]:
 
 
 def times(store: Store, engine: str, version: str) -> dict[Key, float]:
-    """Time of each scene that was timed on a release over that of the yardstick; the newest ratio of each."""
+    """Time of each timed scene on a release over that of the yardstick; the newest ratio of each."""
     found: dict[Key, float] = {}
     for run in store.release_runs(engine, version):
         for row in ratios(store, run).to_dict("records"):
@@ -118,9 +118,9 @@ def times(store: Store, engine: str, version: str) -> dict[Key, float]:
 
 
 def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapping[Key, float] | None = None) -> Told:
-    """Judge what a release answered; a profile of which a receipt fails there has no verdicts.
+    """Judge the results of a release; a profile with a failed property check there has no verdicts.
 
-    With settings of a user's own nothing is declared that could fail.
+    With settings of a user nothing is declared, so nothing can fail.
     """
     found = list(found)
     doubts: dict[str, str] = {}
@@ -130,13 +130,13 @@ def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapp
             doubts[observation.slot.profile] = f"receipt {broken[0]['quantity']} fails in {observation.slot.scene}"
     rows = tuple(_doubted(row, doubts) for row in rows_of(f"{engine}=={version}", found))
     answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)
-    reason = "" if answered else next((row.reason for row in rows), "it was not asked")
+    reason = "" if answered else next((row.reason for row in rows), "it was not run")
     said = tuple(f"{profile}: {why}" for profile, why in doubts.items())
     return Told(engine, version, rows, reason, said, taken or {})
 
 
 def _doubted(row: Row, doubts: dict[str, str]) -> Row:
-    """A row without its verdict where its profile is not driven as declared: right by chance is not right."""
+    """A row without verdict where its profile fails a property check: a pass by chance is none."""
     why = doubts.get(row.profile)
     if why is None or row.outcome == Outcome.INVALID.value:
         return row
@@ -144,7 +144,7 @@ def _doubted(row: Row, doubts: dict[str, str]) -> Row:
 
 
 def told(store: Store, engine: str, wanted: Sequence[str] = (), cells: Sequence[Slot] = ()) -> list[Told]:
-    """What releases of an engine answered, oldest first; of all that are stored and to all cells, if none is named."""
+    """Rows of releases of an engine, oldest first; of all stored ones and all cells if none is named."""
     asked = set(cells)
     out = []
     for version in wanted or versions(store, engine):
@@ -155,7 +155,7 @@ def told(store: Store, engine: str, wanted: Sequence[str] = (), cells: Sequence[
 
 
 def steps(releases: Sequence[Told]) -> list[Step]:
-    """What moved from each release to the next one that answered the same, the most serious first within a release."""
+    """Changes from each release to the next with the same cells, the most serious first within a release."""
     last: dict[tuple[str, str], tuple[str, dict[str, Any]]] = {}
     found: list[Step] = []
     for release in releases:
@@ -170,14 +170,14 @@ def steps(releases: Sequence[Told]) -> list[Step]:
 
 
 def identity(row: dict[str, Any]) -> tuple[str, str]:
-    """What a row asks: slot and metric."""
+    """Identity of a row: slot and metric."""
     return json.dumps(row["slot"], sort_keys=True), str(row["metric"])
 
 
 def mended(row: Row) -> bool:
-    """Whether a row passes on a release for which its finding is not listed: a finding of others that is none here.
+    """Whether a row passes on a release outside the range of its finding.
 
-    What passes within the band of its finding was marginal, and is the same here as there.
+    A value that passes within the band of its finding was marginal, and has not changed.
     """
     finding = finding_of(row)
     if finding is None or row.physics != Physics.PASS.value or finding.family.holds_for(row.engine_version):
@@ -186,7 +186,7 @@ def mended(row: Row) -> bool:
 
 
 def finding_of(row: Row) -> Finding | None:
-    """What is listed for a row, whatever releases it is listed for."""
+    """The finding of a row, for any release."""
     findings = findings_of(row.engine)
     return None if findings is None else findings.members.get(row_key(slot_from_dict(row.slot), row.metric))
 
@@ -198,7 +198,7 @@ def sentence(change: Change) -> str:
 
 
 def cell_of(change: Change) -> str:
-    """``3-D n=10 at 4 iterations``: which cell of its scene moved."""
+    """``3-D n=10 at 4 iterations``: the cell of a changed row."""
     iterations = change.slot.get("iterations")
     asked = f"at {iterations} iterations" if iterations else ""
     return " ".join(text for text in (f"{change.dimension}-D", change.params, asked) if text)

@@ -1,4 +1,4 @@
-"""Why did it move? What an engine's own notes say of steps that were found: ``changes.toml`` in the engine's folder.
+"""Explanations of changes by an engine's own notes: ``changes.toml`` in the engine's folder.
 
     [[change]]
     release = "3.12.0"
@@ -7,8 +7,8 @@
     says = "the box-box collider was rewritten"
     source = "change log of 3.12.0, item 8"
 
-An entry speaks of a release; a step between two releases that do not follow each other is told by those between them.
-A step of which nobody speaks is unexplained.
+An entry belongs to a release; a change between releases that do not follow each other may have entries of those in
+between. A change without an entry is unexplained.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ UNEXPLAINED = "unexplained"
 
 @dataclass(frozen=True)
 class Note:
-    """What a release's own notes say, or a public issue does."""
+    """A statement of a release's notes or of a public issue."""
 
     release: Version
     scenes: tuple[str, ...]
@@ -50,7 +50,7 @@ def notes_of(engine: str) -> tuple[Note, ...]:
     Raises
     ------
     FindingsError
-        Naming the entry that is wrong.
+        Naming the wrong entry.
     """
     path = inside(engine, FILE)
     if path is None:
@@ -74,13 +74,13 @@ def _note(label: str, entry: Any) -> Note:
     try:
         release = Version(entry["release"])
     except InvalidVersion:
-        raise FindingsError(f"{label}: release {one_line(entry['release'], 40)!r} is no version") from None
+        raise FindingsError(f"{label}: release {one_line(entry['release'], 40)!r} is not a version") from None
     said = (one_line(entry[name]) for name in ("says", "source"))
     return Note(release, tuple(entry["scenes"]), tuple(entry["profiles"]), *said)
 
 
 def explanations(engine: str, scene: str, profile: str, before: str, after: str) -> list[str]:
-    """What is said of a step of this scene and profile after ``before``, up to ``after``; *unexplained* if nothing."""
+    """Notes on a change of this scene and profile after ``before``, up to ``after``; else *unexplained*."""
     low, high = Version(before), Version(after)
     found = [
         str(note) for note in notes_of(engine)

@@ -1,11 +1,11 @@
-"""Times of releases: what a scene costs on each, against a unit of the same machine.
+"""Times of releases: cost of a scene on each, relative to a yardstick on the same machine.
 
     each round:  yardstick, timed call, yardstick, timed call, yardstick, ...     in the release's environment
     ratio        a call's time over the mean of the yardsticks on both of its sides; a busy machine slows all three
 
-Seconds of two machines, or of two hours of one, cannot be compared; a share of something that never changes can. The
-yardstick is a loop of plain Python: it is the same interpreter in every environment, where numpy differs between them.
-What is timed is one cell of each scene, dimension and profile, as the bench times it (`validation.bench.units`).
+Seconds on two machines, or at two times on one, cannot be compared; ratios to a constant yardstick can. It is a loop of
+plain Python, as all environments have the same interpreter but different versions of numpy. One cell of each scene,
+dimension and profile is timed, as in the benchmark (`validation.bench.units`).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
 
-#: Rounds, each in a process of its own: two that were disturbed are outvoted by three.
+#: Rounds, each in a separate process: two disturbed ones do not change the median of five.
 ROUNDS = 5
-#: Turns of the yardstick's loop: some 5 ms, a thousand times what reading the clock costs.
+#: Iterations of the yardstick's loop: some 5 ms, a thousand times the cost of reading the clock.
 TURNS = 50_000
-#: Name of the yardstick in place of an engine, and what it is called.
+#: Name of the yardstick in the place of an engine, and its description.
 YARDSTICK, CALLED = "python", "a loop of Python"
-#: Seconds without an answer after which what is timed counts as hanging.
+#: Seconds without an answer after which a timing counts as hanging.
 PATIENCE = 120.0
 
 
@@ -42,9 +42,9 @@ def yardstick() -> float:
 
 
 def timed_cells(observations: Iterable[Observation], suite: Suite = "quick") -> list[Slot]:
-    """One cell of each scene, dimension and profile: the first that was asked at the profile's own settings.
+    """One cell of each scene, dimension and profile: the first with the profile's own settings.
 
-    It is timed where it has an answer: what crashes or is invalid has no time.
+    It must have a result: cells that crash or are invalid are not timed.
     """
     first: dict[tuple[str, int, str], Observation] = {}
     for observation in observations:
@@ -76,9 +76,9 @@ def laps(slots: Sequence[Slot], rounds: int = ROUNDS) -> Iterator[dict[str, Any]
 
 
 def timings_of(answer: Mapping[str, Any], version: str) -> tuple[Timing, Timing]:
-    """Lap of an engine's release and lap of the yardstick, as the store keeps them."""
+    """Laps of an engine's release and of the yardstick, as stored."""
     slot = slot_from_dict(answer["timed"])
-    opponent = f"{YARDSTICK}/{slot.profile}"  # one beside each lap, so that both felt the same machine
+    opponent = f"{YARDSTICK}/{slot.profile}"  # one beside each lap, under the same load of the machine
     own = Timing(
         "work", slot, "", version, int(answer["bodies"]), opponent, int(answer["round"]), int(answer["order"]),
         int(answer["round"]), False, int(answer["steps"]), float(answer["seconds"]), float(answer["wall_seconds"]),
@@ -93,7 +93,7 @@ def timings_of(answer: Mapping[str, Any], version: str) -> tuple[Timing, Timing]
 
 
 def kept(answers: Iterable[Mapping[str, Any]], version: str, keep: Callable[[list[Timing]], None]) -> dict[str, str]:
-    """Hand all timings of a release to ``keep``, a round at a time; what could not be timed, with its reason."""
+    """Pass all timings of a release to ``keep``, a round at a time; returns failures with reasons."""
     void: dict[str, str] = {}
     pending: list[Timing] = []
     for answer in answers:

@@ -1,1 +1,1 @@
-"""From a request to observations: which cells, compiled ahead, run and certified in a process of its own if need be."""
+"""From a request to observations: choice of cells, compilation, runs and certificates."""

@@ -1,7 +1,7 @@
-"""Asks a question in a process of its own, where the question is none that a slot can state.
+"""Runs a function in a separate process, for questions that a slot cannot express.
 
-Cells run in the pool of `validation.workers`. What runs an engine otherwise (posed differently, recorded in full) is
-asked here: an engine that aborts or hangs costs one answer, and the next question finds a fresh process.
+Cells run in the pool of `validation.workers`. Other runs of an engine (in another pose, recorded in full) are made
+here: an engine that aborts or hangs loses one answer, and the next call starts a new process.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PATIENCE = 300.0
 
 
 class Apart:
-    """A process that answers one question at a time; use as a context, so that it ends.
+    """A process that runs one call at a time; use as a context, so that it ends.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Apart:
         self.stop()
 
     def ask(self, question: Callable[..., T], *args: Any, fresh: bool = False) -> T | str:
-        """Answer of ``question(*args)``, or why there is none; ``fresh`` asks a process that has run nothing else."""
+        """Result of ``question(*args)``, or why there is none; with ``fresh`` in a new process."""
         if fresh:
             self.stop()
         if self._pool is None:

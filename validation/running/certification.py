@@ -1,4 +1,4 @@
-"""The full certificate of a run that is judged, and how far its finite step puts each of its metrics off."""
+"""The full certificate of a judged run, and the error of each metric by the finite step."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from adapters.stepping import run, step_count
 from adapters.trajectory import Sampling, Trajectory
 from validation.cells import Prepared, Slot
 
-#: Fewest steps between two ends that both runs share, and how many times as many steps the other run makes: the square
-#: of the golden mean, whose multiples stay as far from whole numbers as any number's can.
+#: Fewest steps between two common ends of both runs, and the ratio of their step numbers: the square of the golden
+#: mean, whose multiples stay far from whole numbers.
 BLOCK, FINER = 13, 2.618
 
 
@@ -23,8 +23,8 @@ def fully_certified(
 ) -> Trajectory:
     """Return ``trajectory`` with the full certificate of its engine entered, where the engine has one.
 
-    Entries are ``full``, what the engine says, ``metric_errors``, and what both make of ``certified`` and ``reasons``.
-    Runs that diverged, and those moved by units in the last place, are not judged and keep the light one.
+    Entries are ``full`` (from the engine), ``metric_errors``, and the resulting ``certified`` and ``reasons``. Runs
+    that diverged, and those with a moved start, are not judged and keep the light certificate.
     """
     light = trajectory.certificate
     if slot.ulp or "certified" not in light or trajectory.finish == "diverged":
@@ -35,7 +35,7 @@ def fully_certified(
         if full is None:
             return trajectory
         entries = {"full": full, "metric_errors": _metric_errors(engine, prepared, slot, settings, trajectory)}
-    except Exception as error:  # what cannot be certified is not certified
+    except Exception as error:  # a run that cannot be certified is not certified
         full = {"holds": False, "reasons": [f"{type(error).__name__}: {error}".splitlines()[0]]}
         entries = {"full": full}
     said = list(light.get("reasons", ()))
@@ -47,22 +47,22 @@ def fully_certified(
 def _metric_errors(
     engine: Engine, prepared: Prepared, slot: Slot, settings: Mapping[str, Any], trajectory: Trajectory
 ) -> dict[str, float | None]:
-    """How far the finite step puts each metric off: twice its largest difference to that of two other runs.
+    """Error of each metric by the finite step: twice its largest difference from two other runs.
 
-    A scheme of order p is off by C h^p. A run with steps of r h, r <= 1/2, is off by r^p of that, and both differ by
-    (1 - r^p) of it, which is at least half, whatever p >= 1.
+    A scheme of order p has the error C h^p. A run with steps of r h, r <= 1/2, has r^p of it, and the two differ by (1
+    - r^p) of it, at least half for every p >= 1.
 
-    The first run makes two steps of each. All ends of whole steps are ends of its own: what a solver decides there,
-    by the time that is left of a step or by what it finds at its end, comes out alike in both, and so does what is
-    wrong with it. So the second makes its steps where `_elsewhere` says, and shares few ends or none.
+    The first run divides each step into two. Both runs then decide alike at the ends of whole steps (by the rest of a
+    step, or by the state at its end), and share errors of these decisions. So the second run has the steps of
+    `_elsewhere`, with few common ends or none.
 
-    None where only one of a pair of runs has the metric.
+    None where only one of two runs has the metric.
     """
     canonical, scene = prepared.canonical, prepared.scene
     sampling, steps = canonical.sampling(scene), step_count(scene.duration, slot.dt)
 
     def finer(steps: int, more: int, sampling: Sampling) -> Trajectory:
-        """The first ``steps`` steps once more, in ``more`` of them."""
+        """The time of the first ``steps`` steps again, in ``more`` steps."""
         return run(engine, replace(scene, duration=steps * slot.dt), steps / more * slot.dt, settings, sampling)
 
     def measured(one: Trajectory) -> dict[str, float | None]:
@@ -72,18 +72,18 @@ def _metric_errors(
         there = measured(other)
         return {name: _difference(value, there[name]) for name, value in measured(one).items()}
 
-    # The same samples: what a metric owes to their spacing is no error of the run.
+    # The same sample times: their spacing is no error of the run.
     states = replace(trajectory, contacts=None)
     apart = Sampling(2 * sampling.stride)
     each, blocks, more = _elsewhere(steps // sampling.stride, sampling.stride)
     halves = differences(states, replace(finer(steps, 2 * steps, apart), dt=slot.dt))
     other = finer(blocks * each * sampling.stride, blocks * more, Sampling(more))
     others = differences(_told(states, slice(0, blocks * each + 1, each)), replace(other, dt=slot.dt))
-    # What samples that far apart do not show is told by the halves alone.
+    # Metrics that samples this far apart do not show are compared with the halves only.
     found = {name: _larger(value, others[name]) for name, value in halves.items()}
     if trajectory.contacts is None:
         return found
-    # Impulses are those of a step, and metrics of them know of which: they are asked of every step of each run.
+    # Impulses belong to a step, and so do metrics of them: they are taken at every step of each run.
     here, of_states = measured(trajectory), measured(states)
     halves = differences(trajectory, finer(steps, 2 * steps, sampling))
     others = differences(trajectory, finer(steps, _coprime(steps), sampling))
@@ -94,8 +94,8 @@ def _metric_errors(
 def _elsewhere(samples: int, stride: int) -> tuple[int, int, int]:
     """Samples in a block, number of blocks, and steps that another run makes in a block of ``stride`` steps a sample.
 
-    Only the ends of blocks are ends of steps of both runs, so that blocks are as long as is told without losing sight
-    of the motion, `BLOCK` steps or up to twice as many: the number that leaves the fewest samples over at the end.
+    Only the ends of blocks are ends of steps of both runs. Blocks have `BLOCK` to twice as many steps, so that samples
+    still resolve the motion; the number with the fewest samples left over at the end.
     """
     least = max(1, -(-BLOCK // stride))
     each = min(samples, min(range(least, 2 * least), key=lambda size: samples % size))
@@ -108,7 +108,7 @@ def _coprime(steps: int) -> int:
 
 
 def _told(trajectory: Trajectory, at: slice) -> Trajectory:
-    """The same run, known at fewer samples."""
+    """The same run at fewer samples."""
     return replace(trajectory, t=trajectory.t[at], pose=trajectory.pose[at], twist=trajectory.twist[at], contacts=None)
 
 

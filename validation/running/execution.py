@@ -1,6 +1,6 @@
 """Runs one cell in this process: scene -> receipts -> trajectory -> metrics -> observation.
 
-Everything an engine says is checked and made plain here (`adapters.plain`, `adapters.foreign`) before it goes on.
+All data of an engine are checked and converted here (`adapters.plain`, `adapters.foreign`).
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ def execute(slot: Slot, keep: Path | None = None) -> Observation:
     Parameters
     ----------
     keep
-        Where to write the trajectory (``.npz``), if it is wanted.
+        File for the trajectory (``.npz``), or None.
 
     Raises
     ------
     SceneError
-        If the slot itself is wrong; what an engine does becomes an outcome, not an exception.
+        If the slot itself is wrong; failures of an engine become outcomes, not exceptions.
     """
     return perform(slot, keep)[0]
 
 
 def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[Observation, Recording | None]:
-    """Run ``slot`` and measure it; see `execute`. If its motion is shown, also record it.
+    """Run ``slot`` and measure it; see `execute`. Also record its motion if it is shown.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
             return replace(blank, outcome=Outcome.NOT_INSTALLED, reason=found.reason), None
         try:
             refusal = found.engine.refusal(posed_for(found.engine, prepared.scene), slot.base, slot.dt)
-            if refusal is None and slot.is_own:  # another release may not have them
+            if refusal is None and slot.is_own:  # other releases may not have them
                 own(found.engine, slot.switched, settings_of(found.engine, slot.stock, prepared.scene))
         except EngineError as error:
             refusal = str(error)
@@ -75,7 +75,7 @@ def perform(slot: Slot, keep: Path | None = None, shown: bool = False) -> tuple[
         recording = record(prepared.canonical, prepared.scene, trajectory) if shown and trajectory else None
     except SceneError:
         raise
-    except BaseException as error:  # whatever an engine raises costs this cell only
+    except BaseException as error:  # an engine may raise anything; only this cell is lost
         return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
     if keep is not None and trajectory is not None:
         trajectory.save(keep)
@@ -90,15 +90,15 @@ def _observe(
     settings = settings_of(engine, slot, scene)
     blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
     try:
-        # What a profile declares holds for its own settings; an experiment with others is about what they change, and
-        # a model's are its author's. With a user's own nothing is declared: what they make of the engine is told.
+        # Declarations hold for a profile's own settings, not for experiments or a model's settings. With a user's
+        # settings nothing is declared, and the measured properties are reported.
         slips: Sequence[Receipt] = ()
         if prepared.canonical.brought(slot.engine, slot.base) is None and (slot.is_own or not slot.switched):
             others = settings if slot.is_own else None
             slips = receipts(engine, slot.base, wanted, slot.dt, slot.iterations, others)
         values = {setting.name: setting.value for setting in settings}
         sampling = prepared.canonical.sampling(scene)
-        if looked_at and sampling.stride == 1:  # what is looked at has its contacts from the start
+        if looked_at and sampling.stride == 1:  # a recorded cell has its contacts from the start
             sampling = replace(sampling, contacts_from=0.0)
         trajectory = run(engine, scene, slot.dt, values, sampling)
         trajectory = fully_certified(engine, prepared, slot, values, trajectory)
@@ -110,7 +110,7 @@ def _observe(
 def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], trajectory: Trajectory) -> Observation:
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
-    if trajectory.finish == "diverged":  # an engine that certifies says why it ended the run
+    if trajectory.finish == "diverged":  # an engine with a certificate reports why it ended the run
         said = [trajectory.reason, *map(str, trajectory.certificate.get("reasons", ()))]
         return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
     metrics = dict(prepared.canonical.measure(prepared.scene, trajectory))
@@ -129,7 +129,7 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
 
 
 def _finite(value: float | None, reason: str) -> Measured:
-    """What is not finite is a value that is missing, with its reason: it can be neither judged nor stored."""
+    """A value that is not finite becomes a missing value with a reason: it can be neither judged nor stored."""
     if value is None or math.isfinite(value):
         return (None if value is None else float(value)), reason
     said = f"the value is {float(value)}, not a finite number"
@@ -137,7 +137,7 @@ def _finite(value: float | None, reason: str) -> Measured:
 
 
 def _plain(slip: Receipt) -> dict[str, Any]:
-    """A receipt as JSON-ready data; what could not be measured is null, JSON has no NaN."""
+    """A property check as JSON-ready data; a missing measurement is null, as JSON has no NaN."""
     found = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(slip).items()}
     return dict(plain(found))
 

@@ -1,9 +1,9 @@
-"""Which slots a run consists of: the cells that each scene declares, on every engine and profile.
+"""The slots of a run: the cells that each scene declares, on every engine and profile.
 
 quick
-    dt 1/240; a few cells of each scene, with every check, and every law and family of findings that speaks of it.
+    dt 1/240; a few cells of each scene, which cover every check, law and family of findings.
 standard
-    dt 1/240; the cells whose FAILs are listed row by row: whatever else a scene is asked as a matter of course.
+    dt 1/240; the cells whose FAILs are listed one by one.
 full
     each scene's full cells at dt 1/240; the standard cells from 1/60 to 1/960 by halves as well, and at each engine's
     customary step; representative cells moved by 1 and 2 units in the last place (the floor that comparisons use).
@@ -32,21 +32,21 @@ FULL_DT = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asked to run; empty means everything.
+    """A user's request; empty means everything.
 
     Parameters
     ----------
     scenes
         Names of the catalogue or paths.
     params
-        Fixed parameters; any given replaces the suite's variation by this one.
+        Fixed parameters; if given, they replace the suite's variations.
     ulps
         Moves of the start, in units in the last place.
     floors
         Also run the representative cells moved by 1 and 2 units in the last place.
     sets
-        Settings of a user's own, by name, which every engine must have: of the profile as shipped, or of a model's
-        own, where no profile is named.
+        A user's settings, by name, which every engine must have; without a profile they change the one as shipped, or a
+        model's own.
     """
 
     scenes: Sequence[str]
@@ -63,7 +63,7 @@ class Request:
 
 
 def slots(request: Request) -> list[Slot]:
-    """All slots of a request, in the order in which they are shown.
+    """All slots of a request, in display order.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def slots(request: Request) -> list[Slot]:
 def _engine_slots(
     request: Request, argument: str, canonical: CanonicalScene, dimension: int, name: str, engine: Engine | None
 ) -> Iterable[Slot]:
-    # An engine that is not installed still gets its rows, under one profile.
+    # An engine that is not installed gets rows too, under one profile.
     profiles = list(engine.profiles) if engine else [_one_profile(name)]
     if engine and name in canonical.brings:
         profiles.append(canonical.brings[name].profile)
@@ -113,7 +113,7 @@ def _engine_slots(
                 check_size(scene, dt)
                 sets = _own(request, engine, base, scene)
                 if argument not in CATALOGUE:
-                    canonical.checks(scene, dt)  # a scene that cannot be judged is refused before it runs
+                    canonical.checks(scene, dt)  # a scene that cannot be judged is refused before any run
                 for iterations in _iterations(request, variation, engine, base):
                     if not _stepped(request, replace(base, iterations=iterations)):
                         continue
@@ -122,21 +122,21 @@ def _engine_slots(
 
 
 def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> tuple[tuple[str, Any], ...]:
-    """Settings of a user's own, as the engine takes them; as they are where it is not here."""
-    # A request that another process hands over has lists for tuples.
+    """A user's settings in the engine's form; unchanged where it is not installed."""
+    # A request from another process has lists instead of tuples.
     sets = tuple((str(name), tuple(value) if isinstance(value, list) else value) for name, value in request.sets)
     if request.iterations and any(name == "iterations" for name, _ in sets):
-        raise EngineError("set: iterations are asked for by --iterations as well")
+        raise EngineError("set: --iterations sets iterations as well")
     return sets if engine is None or not sets else own(engine, sets, settings_of(engine, slot, scene))
 
 
 def knowing(request: Request) -> list[str]:
-    """Engines of a request that have all settings which it sets, take their values, and are here.
+    """Installed engines of a request that have all its settings and accept their values.
 
     Raises
     ------
     EngineError
-        If there is none: who has which, what is near it, or why the value cannot be taken.
+        If there is none: which engine has which setting, a similar name, or why the value is refused.
     """
     canonical = resolve(pinned(request.scenes[0]))
     wanted = needs(canonical.scene(canonical.dimensions[-1]))
@@ -159,32 +159,32 @@ def knowing(request: Request) -> list[str]:
         lost = next((name for name in asked if not who[name]), None)
         if lost is not None:
             close = near(lost, dict.fromkeys(name for names in known.values() for name in sorted(names)))
-            raise EngineError(f"set: no engine that is here has a setting {one_line(lost, NAME)!r}{close}")
+            raise EngineError(f"set: no installed engine has a setting {one_line(lost, NAME)!r}{close}")
         told = "; ".join(f"{name}: {', '.join(engines)}" for name, engines in who.items())
         raise EngineError(f"set: no engine has all of these settings ({told}); name one with --engine")
     return found
 
 
 def _is_asked(request: Request, canonical: CanonicalScene, variation: Variation, engine: str, profile: str) -> bool:
-    """Whether a suite asks a profile this cell: the quick one asks those without a rank what stands for a scene."""
+    """Whether a suite runs this cell; the quick one runs unranked profiles in representative cells only."""
     if request.suite != "quick" or request.params or profile in request.profiles or is_ranked(engine, profile):
         return True
     return canonical.stands_for_it(variation.params)
 
 
 def _one_profile(name: str) -> str:
-    """Profile as shipped of an engine that is not here; the first that is known of one that ships none."""
+    """Profile as shipped of an engine that is not installed; else its first known one."""
     told = facts(name)
     return (told.profile("shipped") or next(iter(told.roles), NOT_KNOWN)) if told else NOT_KNOWN
 
 
 def is_standard(slot: Slot) -> bool:
-    """Whether the standard suite runs this slot, or reads a study from its cells: its FAILs are listed row by row."""
+    """Whether the standard suite runs this slot, or uses it in a study: its FAILs are listed one by one."""
     if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
         return False
     canonical, own = CATALOGUE[slot.scene], dict(slot.params).items()
     return any(
-        # What differs from the defaults is stated by the variation: most are told apart by that, before any is checked.
+        # Variations are compared by what differs from the defaults first, which is faster than a check of each.
         own <= variation.params.items()
         and slot.iterations in variation.iterations
         and variation.runs_in(slot.dimension)
@@ -214,9 +214,9 @@ def _steps(request: Request, engine: Engine | None, profile: str) -> Iterable[fl
 
 
 def _stepped(request: Request, slot: Slot) -> bool:
-    """Whether the suite asks for this step: others than 1/240 s only where the standard suite has the cell.
+    """Whether the suite has this step: steps other than 1/240 s only where the standard suite has the cell.
 
-    What a user asks for (steps, parameters, iterations) is asked with all of them.
+    A user's steps, parameters and iteration counts are combined with all of them.
 
     All variations with all steps are 51 607 cells, 14 385 of which took 34 min of CPU; these are 19 704.
     """
@@ -235,7 +235,7 @@ def _iterations(request: Request, variation: Variation, engine: Engine | None, s
 
 
 def has_iterations(engine: Engine, slot: Slot) -> bool:
-    """Whether the profile stops at an iteration count that can be replaced; one that fails says so in its cells."""
+    """Whether the profile has an iteration count that can be replaced; one that fails reports it in its cells."""
     canonical = resolve(slot.scene)
     if canonical.brought(slot.engine, slot.base) is not None:
         return False

@@ -1,9 +1,9 @@
-"""Recordings: what a replay needs of a trajectory, kept for one cell per scene, dimension, engine and profile.
+"""Recordings: data of a replay, for one cell per scene, dimension, engine and profile.
 
     trajectory (every step, 64 bit)  ->  recording (60 Hz, 16 bit, impulses summed per pair)  ->  bytes in the store
 
-Nothing is judged from a recording: metrics were taken from the trajectory. Only the moment at which the motion left
-what the stated tolerances allow is computed here, from the full trajectory, and kept with it.
+Nothing is judged from a recording: metrics come from the trajectory. Only the time at which the motion left its
+tolerances is computed here, from the full trajectory, and stored with it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from validation.cells import Slot
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
 
-#: Frames per second: what a screen shows.
+#: Frames per second of a screen.
 RATE = 60.0
 #: Fewest frames of a recording: an impact scene lasts half a second only.
 FRAMES = 120
@@ -35,7 +35,7 @@ _LEVELS = 2**15 - 1
 
 @dataclass(frozen=True)
 class Recording:
-    """A trajectory for the eye.
+    """A trajectory for display.
 
     Parameters
     ----------
@@ -93,10 +93,10 @@ def _quantised(name: str, values: Array) -> dict[str, NDArray[np.generic]]:
 
 
 def representatives(slots: Iterable[Slot]) -> set[Slot]:
-    """Slots whose motion is kept: per scene and dimension the same parameters and step for every profile.
+    """Slots whose motion is recorded: per scene and dimension the same parameters and step for every profile.
 
-    Preferred is the scene's representative cell at dt = 1/240 and the profile's own iterations;
-    a plan without such a slot keeps what comes closest.
+    The scene's representative cell at dt = 1/240 and the profile's own iterations is preferred; otherwise the closest
+    slot of the plan.
     """
     chosen: dict[tuple[str, int], dict[tuple[str, str], Slot]] = {}
     candidates = [slot for slot in slots if slot.ulp == 0]
@@ -119,7 +119,7 @@ def _distance(slot: Slot) -> tuple[bool, float, bool, int]:
 
 
 def record(canonical: CanonicalScene, scene: Scene, trajectory: Trajectory) -> Recording:
-    """Reduce a trajectory to what is shown."""
+    """Reduce a trajectory to its recording."""
     t = trajectory.t
     every = min(1.0 / RATE, t[-1] / FRAMES) if t[-1] > 0.0 else 1.0
     wanted = np.arange(0.0, t[-1] + 0.5 * every, every)
@@ -153,7 +153,7 @@ def _loads(
 
 @dataclass(frozen=True)
 class Tube:
-    """How far the stated tolerances let a body be from its exact motion: distance [m], and time per impact [s]."""
+    """Tolerance of a body's distance from its exact motion: distance [m], and time per impact [s]."""
 
     distance: float
     per_impact: float
@@ -162,9 +162,9 @@ class Tube:
 def tube(canonical: CanonicalScene, scene: Scene, dt: float, speed: float) -> Tube:
     """Derive the tube around an exact motion with top speed ``speed`` [m/s].
 
-    Distance: an impact found late by up to one step leaves a path displaced by (1 + e) v dt; on top comes whatever
-    the checks allow over the whole run, and the distance g dt^2 that one step of free fall adds. Time: an impact
-    found late by a step changes its speed by up to (1 - e^2)/e g dt, hence all later flights by 2 (1 + e)/e dt.
+    Distance: an impact found up to one step late displaces the path by (1 + e) v dt; added are the tolerances of the
+    checks over the run, and g dt^2 of one step of free fall. Time: an impact found a step late changes its speed by up
+    to (1 - e^2)/e g dt, and so all later flights by 2 (1 + e)/e dt.
     """
     e, duration = needs(scene).restitution, scene.duration
     reach = {"m": 1.0, "m/s": duration, "m/s^2": 0.5 * duration**2}

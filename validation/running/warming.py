@@ -1,8 +1,8 @@
-"""Makes engines that compile at their first steps do so before any clock or time limit starts.
+"""Compiles engines that compile at their first steps, before any clock or time limit starts.
 
-Kernels are kept on disk by their engine (`adapters.engine.Engine.kernels`). One small cell per scene and profile of a
-plan makes its first steps and is thrown away, dimension by dimension in processes of their own, so that nothing is
-compiled twice. A mark beside the kernels says what was compiled: the next run of the same sources waits for nothing.
+Engines store their kernels on disk (`adapters.engine.Engine.kernels`). One small cell per scene and profile of a plan
+makes its first steps and is discarded, in one process per dimension, so that nothing is compiled twice. A mark beside
+the kernels lists what was compiled, so the next run of the same sources does not wait.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.cells import Slot, prepare, settings_of, slot_from_dict
 
-#: Steps of each cell. A kernel is compiled with all that it calls at its first call, whatever a scene does later; two
-#: more are for what an engine keeps of the step before.
+#: Steps of each cell. A kernel is compiled at its first call with everything that it calls; two more steps are for data
+#: that an engine keeps from the step before.
 STEPS = 3
 
-#: What a first compilation takes where no earlier one has left its time: CPU [s], twice that of the longer one of two
-#: parts (ours in space, 76 s on a machine of 2 cores that had nothing else to do).
+#: Time of a first compilation where none is on record: CPU [s], twice that of the longer of two parts (ours in 3-D, 76
+#: s on an idle machine with 2 cores).
 FIRST = 152.0
 
 
 class Warming:
-    """What is left to compile for a plan.
+    """The kernels that a plan still needs.
 
     Parameters
     ----------
     slots
-        Cells that are going to run.
+        Cells of the plan.
     """
 
     def __init__(self, slots: Sequence[Slot]) -> None:
@@ -60,7 +60,7 @@ class Warming:
 
     @property
     def begun(self) -> bool:
-        """Whether all parts have been compiled for other cells: what is left are kernels that those did not call."""
+        """Whether all parts have been compiled for other cells: only kernels that those did not call are missing."""
         return all(any(_dimension(path) == wanted[0]["dimension"] for path in mark.parent.glob("warm-*.json"))
                    for wanted, mark in self._tasks)  # fmt: skip
 
@@ -71,15 +71,14 @@ class Warming:
     def estimate(self, jobs: int) -> float:
         """Expected time on idle cores [s]: the longest of earlier compilations here and the one on another machine.
 
-        CPU time, which a busy machine hardly changes. Earlier ones may have found their kernels ready, and took less
-        than the next will.
+        CPU time, which a busy machine hardly changes. Earlier compilations may have found kernels in the cache.
         """
         known = [_seconds(path) for _, mark in self._tasks for path in mark.parent.parent.glob("*/warm-*.json")]
         each = max([*known, FIRST / 2.0])
         return each * -(-len(self._tasks) // max(1, min(jobs, len(self._tasks))))
 
     def run(self, jobs: int) -> Iterator[str]:
-        """Compile; yields the name of each part that is done. What fails here fails again, and is told, as a cell."""
+        """Compile; yields the name of each finished part. A failure here is reported later by its cell."""
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(max(1, min(jobs, len(self._tasks))), context, end_with, (os.getpid(),)) as pool:
             running = {pool.submit(_compile, slots): (slots, mark) for slots, mark in self._tasks}
@@ -95,7 +94,7 @@ class Warming:
 
 
 def _groups(slots: Sequence[Slot]) -> dict[tuple[str, int], dict[tuple[str, str], Slot]]:
-    """First cell of every profile and scene, by engine and dimension: what shares kernels stays together."""
+    """First cell of every profile and scene, by engine and dimension, which share kernels."""
     found: dict[tuple[str, int], dict[tuple[str, str], Slot]] = defaultdict(dict)
     for slot in slots:
         found[slot.engine, slot.dimension].setdefault((slot.profile, slot.scene), slot)
@@ -103,16 +102,16 @@ def _groups(slots: Sequence[Slot]) -> dict[tuple[str, int], dict[tuple[str, str]
 
 
 def _compile(slots: Sequence[dict[str, object]]) -> float:
-    """Make first steps for what they leave in the cache; return the CPU time that took [s]."""
+    """Make first steps to fill the cache; return the CPU time [s]."""
     started = time.process_time()
     for slot in slots:
-        with contextlib.suppress(Exception):  # the cell itself will say what is wrong
+        with contextlib.suppress(Exception):  # the cell itself reports the error
             first_steps(slot_from_dict(slot))
     return time.process_time() - started
 
 
 def first_steps(slot: Slot) -> None:
-    """Run the first `STEPS` steps of a cell, its contacts read: all that an engine compiles, it compiles there.
+    """Run the first `STEPS` steps of a cell and read its contacts: the engine compiles everything there.
 
     Raises
     ------
@@ -137,7 +136,7 @@ def _dimension(mark: Path) -> object:
 
 
 def _told(mark: Path) -> dict[str, Any]:
-    """What a mark says; nothing where it cannot be read."""
+    """Content of a mark; empty where it cannot be read."""
     try:
         return dict(json.loads(mark.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):

@@ -1,7 +1,7 @@
-"""The scenes of the project: one file each, named here in the order in which they are shown.
+"""The scenes of the project: one file each, listed here in display order.
 
 ``validation/scenes/NAME.py`` ends in ``SCENE = CanonicalScene(name="NAME", ...)``; `validation.catalogue` loads it.
-Other packages bring theirs through the entry point group ``contact_crosscheck.scenes``.
+Other packages add theirs through the entry point group ``contact_crosscheck.scenes``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-r"""Three stones make an arch: a keystone between two that stand on the floor, which friction alone keeps from parting.
+r"""Three stones form an arch: a keystone between two springers on the floor, which only friction holds together.
 
       ______________        the faces of the keystone are smooth, each leans out by beta:
      |   \      /   |       N = W/(2 sin(beta))    on each face,    W: weight of the keystone
@@ -8,8 +8,8 @@ r"""Three stones make an arch: a keystone between two that stand on the floor, w
     ==================      else      out by  A = g (k - mu R)/(R + k cot(beta)),  k = (cot(beta) - mu)/2,
       <- A    v   A ->                down by  A cot(beta),  N = m (g - A cot(beta))/(2 sin(beta))
 
-Nothing but the shape of the stones turns a weight into a thrust several times as large: a solver that is not done when
-it stops leaves the keystone a little too heavy for its springers. All forces are determined, none is vertical alone.
+The shape of the stones turns a weight into a thrust several times as large: with an unconverged solver the keystone is
+a little too heavy for its springers. All forces are determined, and none is only vertical.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from validation.truths import leaning
 #: Height of the springers and of the keystone, flush on top; width of a springer on the floor, and half of the
 #: keystone's lower side [m]. Below the keystone the springers stand straight.
 TALL, KEY, BASE, NARROW = 1.5, 0.5, 1.5, 0.25
-#: How far the keystone sinks before a run ends [m]: it stays well above the floor and on the faces.
+#: Sinking of the keystone until the run ends [m]: it stays well above the floor and on the faces.
 SINKS = 0.2
 #: Duration of a run in which it stands [s].
 DURATION = 2.0
-#: The springers by name, their bodies, and which way each goes.
+#: The springers by name, their bodies, and the direction of each.
 SPRINGERS = (("left", 1, -1.0), ("right", 2, 1.0))
 
 
 def _beta(p: Params) -> float:
-    """Angle of the keystone's faces against the upright [rad]."""
+    """Angle of the keystone's faces to the vertical [rad]."""
     return math.radians(p["beta"])
 
 
@@ -68,9 +68,9 @@ def _stones(p: Params) -> tuple[tuple[tuple[float, float], ...], ...]:
 
 
 def _held(p: Params) -> bool:
-    """Whether the floor presses within the base of a springer, wherever on its face the keystone does.
+    """Whether the floor's force acts within the base of a springer, wherever on its face the keystone pushes.
 
-    With d'Alembert's force at the centre of a springer that goes out; the load is between the ends of the face.
+    With d'Alembert's force at the centre of an accelerating springer; the load acts between the ends of the face.
     """
     out, load = motion(p)
     s, c = math.sin(_beta(p)), math.cos(_beta(p))
@@ -120,7 +120,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's laws of three stones, at rest or on their way."""
+    """Newton's laws of three stones, at rest or in motion."""
     p = scene.params
     out, load = motion(p)
     loads = {f"face_load[{name}]": load for name, _, _ in SPRINGERS}
@@ -131,7 +131,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Accelerations and loads over the second half, largest way of a stone, how far stones part, sink in or turn."""
+    """Accelerations and loads over the second half, largest displacement of a stone, gaps, overlaps and rotations."""
     p, t, pose, twist = scene.params, trajectory.t, trajectory.pose, trajectory.twist
     s, c = math.sin(_beta(p)), math.cos(_beta(p))
     weight, late = p["mass"] * p["g"] * trajectory.dt, 0.5 * scene.duration
@@ -160,8 +160,8 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Constant forces are exact at every step; floor and faces may each be found one step late at the start.
 
-    Loads are as exact as the speeds that they make: those of the faces bear the keystone's weight, and what they differ
-    by moves it sideways.
+    Loads are as exact as the speeds that they cause: those of the faces carry the keystone's weight, and their
+    difference moves it sideways.
     """
     p, g = scene.params, scene.params["g"]
     late = 2.0 * g * dt * dt + bounds.ROUND_OFF * TALL
@@ -176,10 +176,10 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     found = [pushed.check(name, "weights", truth[name], source) for name in truth if name.startswith("face_load")]
     if "moved" in truth:
         moved = bounds.Bound(2.0 * late, because + "; and a corner sinks or slips as far")
-        carried = bounds.Bound((p["heavy"] + 0.5) * told, f"{pace.because}, before and after, of what it carries")
+        carried = bounds.Bound((p["heavy"] + 0.5) * told, f"{pace.because}, before and after, of its load")
         found += [carried.check(name, "weights", truth[name], source) for name in truth if name.startswith("floor")]
         return [moved.check("moved", "m", truth["moved"], "Coulomb's law: the floor holds the springers"), *found]
-    # The keystone goes down by cot(beta) of what a springer goes out: so does what is forgiven.
+    # The keystone moves down by cot(beta) times the motion of a springer, and so does the tolerance.
     sinking = bounds.Bound(pace.value * max(1.0, 1.0 / math.tan(_beta(p))), f"{pace.because}, of a springer")
     return [
         *(pace.check(f"parting[{name}]", "m/s^2", truth[f"parting[{name}]"], source) for name, _, _ in SPRINGERS),
@@ -191,14 +191,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track:
-    """Where the keystone is."""
+    """Place of the keystone."""
     down = motion(scene.params)[0] / math.tan(_beta(scene.params))
     x, y = scene.bodies[3].pose[:2]
     return Track("keystone", lambda t: (x, y - 0.5 * down * t * t))
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Way of an arch that should stand, in heights; error of the sinking of one that gives way, relative to it."""
+    """Displacement of an arch that should stand, in heights; relative error of the sinking of one that gives way."""
     truth = exact(scene)
     metric, size = ("moved", TALL) if "moved" in truth else ("sinking", truth["sinking"])
     value, reason = found[metric]
@@ -215,8 +215,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= cot(beta)/(2 R + 1), N = W/(2 sin(beta)); else gives way, A = g (k - mu R)/(R + k cot(beta))",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction of the floor over what it takes", 0.01, 100.0),
-        Parameter("beta", 30.0, "degrees", "of the keystone's faces against the upright", 10.0, 45.0),
+        Parameter("ratio", 1.05, "1", "friction of the floor over the least that holds", 0.01, 100.0),
+        Parameter("beta", 30.0, "degrees", "angle of the keystone's faces to the vertical", 10.0, 45.0),
         Parameter("heavy", 3.0, "1", "mass R of a springer over that of the keystone", 1.0, 1e3),
         standard_gravity(),
         mass_of("the keystone"),
@@ -235,8 +235,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the arch that should stand, in heights; error of the sinking of the one that gives way, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the arch that should stand, in heights; relative error of the sinking of the one that "
+        "gives way",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [{}, {"ratio": 0.8}],
         error,
         "the whole scene: the arch stands",

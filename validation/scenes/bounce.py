@@ -6,8 +6,8 @@ r"""A ball is dropped and bounces until it rests.
       v    /   \/ \/\       at rest after sqrt(2 h0/g) (1 + e)/(1 - e)
     =====================
 
-A central fall: friction cannot act and is 0. The height is the clearance below the ball, so the truth does not
-know the radius.
+A central fall: friction cannot act and is 0. The height is the clearance below the ball, so the truth does not depend
+on the radius.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from validation.canonical import (
 from validation.scenes.parts import ball, floor, mass_of, standard_gravity, states_and_impulses, upward
 
 RADIUS = 0.5
-#: Runs for this long after the last impact, or after a tenth more than it takes to rest [s].
+#: Time after the last impact, or after 1.1 times the time of rest [s].
 AFTERMATH = 0.25
 #: Apexes compared; the fifth of e = 0.5 is 1e-3 of the drop, below what a step of 1/240 s resolves.
 APEXES = 5
@@ -102,10 +102,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def _force_in_flight(scene: Scene, trajectory: Trajectory, clearance: Array, velocity: Array) -> Measured:
-    """Largest force that the floor is told to exert in steps of flight, relative to the weight.
+    """Largest reported force of the floor in steps of flight, relative to the weight.
 
-    A step is one of flight if at both of its ends the floor is farther away than the ball could move in a step: what
-    finds an impact ahead of it, or late, acts nearer.
+    A step is in flight if at both of its ends the floor is farther away than the ball moves in a step: an impact found
+    early or late acts nearer.
     """
     g, dt, contacts = scene.params["g"], trajectory.dt, trajectory.contacts
     if contacts is None:
@@ -113,7 +113,7 @@ def _force_in_flight(scene: Scene, trajectory: Trajectory, clearance: Array, vel
     is_far, end = clearance > (np.abs(velocity) + g * dt) * dt, contacts.step
     in_flight = metrics.forces(trajectory, 1, [0])[is_far[end] & is_far[np.maximum(end - 1, 0)]]
     if len(in_flight) == 0:
-        return None, "no step is one of flight"
+        return None, "no step is in flight"
     if np.isnan(in_flight).any():
         return None, metrics.UNAVAILABLE
     return float(np.linalg.norm(in_flight, axis=1).max() / (scene.params["mass"] * g)), ""
@@ -144,7 +144,7 @@ def clearance(e: float, height: float, g: float, t: float) -> float:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a bounce that is found within a step, and not at its time, may be off by.
+    """Tolerances of bounces that are found within a step, not at their time.
 
     That is `bounds.rebound_late` for each; errors shrink by e^2 with each later bounce.
     """
@@ -160,20 +160,22 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         apex = bound + g * dt * dt / 8.0
         velocity_error.append(apex * g / speed)
         name = f"apex[{n}]"
-        found.append(Check(name, "m", truth[name], apex, because, "energy balance of a bounce found late by <= dt"))
+        found.append(
+            Check(name, "m", truth[name], apex, because, "energy balance of a bounce that is found late by up to dt")
+        )
     found.append(_growth_check(height, g, dt, truth["apex_growth"]))
     if len(velocity_error) >= 3:
         found.append(_interval_check(e, height, g, dt, velocity_error, truth["apex_interval_ratio"]))
     if "rest_time" in truth:
         found.append(_rest_check(e, height, g, dt, truth["rest_time"]))
     if height > 3.0 * g * dt * dt:  # falling from rest the first step is one of flight
-        source = "forces at a distance are none of contact"
+        source = "without contact there is no contact force"
         found.append(bounds.exact().check("force_in_flight", "1", truth["force_in_flight"], source))
     return found
 
 
 def _growth_check(height: float, g: float, dt: float, truth: float) -> Check:
-    """No bounce may add energy, whatever e <= 1; an impact that is found late adds none either.
+    """No bounce may add energy for e <= 1, even if the impact is found late.
 
     The semi-implicit step keeps ``H = v^2/2 + g y - s g v dt/2`` in flight, s = +1 velocity first, -1 position first; a
     mid-point step has s = 0. An impact replaces the velocity -|v| that its step began with by e |v|, in the place of
@@ -182,13 +184,13 @@ def _growth_check(height: float, g: float, dt: float, truth: float) -> Check:
 
         H after - H before  =  -(1 - e^2) v^2/2 - (1 - e) g |v| dt/2  <=  0,   and 0 for e = 1.
 
-    So no allowance for the location of an impact is owed: whoever reflects gravity's own g dt as well gains |v| dt of
-    height at every bounce and is to be seen. What is left is the start: released at rest at a sample, the ball moves on
-    a parabola whose top lies half a step beside that sample, g (dt/2)^2/2 = g dt^2/8 above it.
+    So no tolerance for the time of an impact is needed: restitution of gravity's g dt gains |v| dt of height at every
+    bounce and must be noticed. The start remains: released at rest at a sample, the ball moves on a parabola whose top
+    lies half a step beside that sample, g (dt/2)^2/2 = g dt^2/8 above it.
     """
     because = (
-        "e <= 1 adds no energy and both step orders keep their energy through a late impact: only the top of the first "
-        "parabola lies up to g dt^2/8 above the sample of release"
+        "e <= 1 adds no energy, and velocity-first and position-first schemes conserve energy in a late impact; "
+        "only the top of the first parabola lies up to g dt^2/8 above the sample of release"
     )
     bound = g * dt * dt / 8.0 / height + bounds.ROUND_OFF
     return Check("apex_growth", "1", truth, bound, because, "conservation of energy")
@@ -205,7 +207,7 @@ def _interval_check(e: float, height: float, g: float, dt: float, error: list[fl
 
 
 def _rest_check(e: float, height: float, g: float, dt: float, truth: float) -> Check:
-    """Allowance for the rest time: location of every bounce, unresolved tail, scatter of phases."""
+    """Tolerance of the rest time: time of every bounce, unresolved tail, scatter of phases."""
     speed = math.sqrt(2.0 * g * height)
     bounces = math.log(speed / (2.0 * g * dt)) / math.log(1.0 / e) if e > 0.0 and speed > 2.0 * g * dt else 1.0
     tail = 4.0 / (1.0 - e)
@@ -233,7 +235,7 @@ def apex_error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measur
 
 
 def rebound(params: Params, height: float) -> float:
-    """Restitution that a first apex shows: h_1 = e^2 h_0."""
+    """Restitution from a first apex: h_1 = e^2 h_0."""
     return math.sqrt(max(height, 0.0) / params["height"])
 
 
@@ -270,7 +272,7 @@ SCENE = CanonicalScene(
             1e4,
             positive=True,
         ),
-        Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
+        Parameter("mu", 0.0, "1", "friction of the pair; it has no effect on a central impact", 0.0, 10.0),
         standard_gravity(),
         mass_of("the ball"),
     ),
@@ -284,14 +286,14 @@ SCENE = CanonicalScene(
     quick=(*_from(0.8, HEIGHTS[0], HEIGHTS[3]), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
     standard=(*_from_all_heights(0.8), *(_from(e, HEIGHTS[0])[0] for e in (0.5, 0.95, 1.0))),
     full=_from_all_heights(0.5, 0.8, 0.95, 1.0),
-    planted=({"e": 0.8}, {"e": 1.0}),  # energy that a bounce adds shows only where it takes none away
+    planted=({"e": 0.8}, {"e": 1.0}),  # added energy is visible only where a bounce loses none
     primary=Primary(
         "apex error",
         "h0",
         f"largest |h_n - e^2n h0| / h0 over {len(HEIGHTS)} drop heights and all resolved apexes "
         f"(e^n v0 > {RESOLVED:g} g dt, n <= {APEXES})",
-        "heights are what one sees of a bounce, and the phase of the first impact decides them: a single "
-        "height may be right by luck at any step",
+        "heights are what one sees of a bounce; they depend on the phase of the first impact, so a single height "
+        "may be right by chance",
         lambda dt: [{"height": height} for height in HEIGHTS],
         apex_error,
         "the whole scene: fall, bounces, rest",

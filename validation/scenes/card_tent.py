@@ -1,4 +1,4 @@
-r"""Two cards lean against each other, and friction of the floor alone holds them apart: they stand, or they slide out.
+r"""Two cards lean against each other, held by friction of the floor only: they stand, or they slide out.
 
             _/\_            moments about a foot:    H = W cot(lean) / (2 + w/(L' sin(lean)))  where the heads meet
         H  /    \  H        stands    if  mu >= H/W,    of thin cards tan(from upright)/2
@@ -6,9 +6,8 @@ r"""Two cards lean against each other, and friction of the floor alone holds the
     mu W /________\ mu W              one angle, by Newton's and Euler's laws with mu N at each foot
     ======================  W: weight of a card, w: thickness, L' = L - w: length of its axis, L: with its round ends
 
-The edges of the cards are round: of two corners that meet nobody can say along what they push. Three forces at each
-card are all there are, so that the loads are determined; the heads push level, and grip each other, which keeps the
-tent from leaning to one side.
+The edges of the cards are round, because the normal between two corners is undefined. Three forces act on each card, so
+the loads are determined; the heads push horizontally, and grip each other, which keeps the tent symmetric.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import floor, mass_of, standard_gravity, tilted, upward
 from validation.truths import leaning
 
-#: The cards by name, their bodies, and which way each turns when its foot goes out.
+#: The cards by name, their bodies, and the direction in which each turns when its foot slides out.
 CARDS = (("left", 1, -1.0), ("right", 2, 1.0))
 
 
@@ -56,7 +55,7 @@ def _moment(p: Params) -> float:
 
 
 def _forces(p: Params, lean: float, square: float) -> tuple[float, float, float]:
-    """Acceleration of the lean [rad/s^2] of cards that slide, and loads of a foot and of the heads over the weight.
+    """Acceleration of the lean [rad/s^2] of sliding cards, and loads of a foot and of the heads over the weight.
 
     The centre of a card is at (-a cos(lean) - r, a sin(lean) + r) from where the heads' middle stands over the floor.
     """
@@ -82,7 +81,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        For a tent that parts from floor or heads on its way down.
+        For a tent whose feet or heads separate in the fall.
     """
     p, lean = params, math.radians(params["lean"])
     duration = leaning.DURATION
@@ -114,7 +113,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest way of a point of either card, loads at the end, passages through a turn, and gaps of feet and heads."""
+    """Largest displacement of a point of either card, loads at the end, times of a rotation, gaps of feet and heads."""
     p, t = scene.params, trajectory.t
     a, r = _sizes(p)
     found: dict[str, Measured] = {}
@@ -140,7 +139,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As of all that leans, stands or falls."""
+    """As for all leaning bodies that stand or fall."""
     p = scene.params
     return leaning.checks(
         p,
@@ -154,7 +153,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Way of a tent that should stand, in lengths; error of the time of one that slides, relative to it."""
+    """Displacement of a tent that should stand, in lengths; relative error of the time of one that slides."""
     return leaning.outcome(scene, exact(scene), found)
 
 
@@ -167,8 +166,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= a cos(lean)/(2 a sin(lean) + r), which is the load of the heads over a card's weight",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction over what it takes", 0.01, 100.0),
-        Parameter("lean", 60.0, "degrees", "of the cards over the floor", 20.0, 85.0),
+        Parameter("ratio", 1.05, "1", "friction over the least that holds", 0.01, 100.0),
+        Parameter("lean", 60.0, "degrees", "angle of the cards to the floor", 20.0, 85.0),
         Parameter("length", 2.0, "m", "of a card", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.05, "1", "thickness over length", 0.0, 0.3, positive=True),
         standard_gravity(),
@@ -185,8 +184,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the tent that should stand, in lengths; error of the time of the one that slides, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the tent that should stand, in lengths; relative error of the time of the one that slides",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [dict(params) for params in leaning.STANDS_AND_SLIDES],
         error,
         "the whole scene: the tent stands",

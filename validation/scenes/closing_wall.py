@@ -1,11 +1,11 @@
-"""A ball is thrown to and fro between a wall and a plate that closes in: each blow of the plate adds twice its speed.
+"""A ball moves to and fro between a wall and an approaching plate: each blow of the plate adds twice its speed.
 
     |                |<- V         v_n = v_0 + 2 n V  after n blows of the plate
     |      o -->     |             (v_n - V) L_n is kept: faster as it gets narrow
     |<----- L ------>|
 
-Against what moves, Newton's law is one of relative speeds. Whoever takes a plate that moves for one that rests leaves
-the ball as fast as it was; whoever finds a blow late finds all later ones later.
+Against a moving body, Newton's law holds for relative speeds. An engine that ignores the plate's motion leaves the
+ball's speed unchanged; one that finds a blow late finds all later ones later.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from validation.scenes.parts import along, at, ball, between_impacts, mass_of, p
 
 #: Of the plate [m]; the ball is a tenth of its width.
 THICKNESS, WIDTH = 1.0, 2.0
-#: Blows of the plate that are told.
+#: Judged blows of the plate.
 BLOWS = 3
 
 
@@ -63,7 +63,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's law with e = 1 against what moves and what does not."""
+    """Newton's law with e = 1 against the moving plate and the fixed wall."""
     truth: dict[str, float] = {}
     for n, (time, _, speed) in enumerate(blows(scene.params), 1):
         truth |= {f"speed[{n}]": speed, f"time[{n}]": time}
@@ -93,10 +93,10 @@ def _turned_back(t: Array, x: Array, velocity: Array, k: int) -> float:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Speeds are exact at every step; times gather what each blow before was late.
+    """Speeds are exact at every step; delays of blows add up in the times.
 
-    A blow that is found d late is found u d deep, u the speed of approach, and the ball parts with u: it takes as long
-    again to be where it would have been at once. What comes after is 2 d late at most, d up to a step.
+    A blow that is found d late is found u d deep, u the speed of approach, and the ball parts with u: it needs that
+    time again to reach the place of an exact rebound. Later blows are at most 2 d late, d up to a step.
     """
     fastest = truth[f"speed[{BLOWS}]"]
     source = "Newton's law of restitution against a moving wall; (v - V) L is kept"
@@ -104,7 +104,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     for n in range(1, BLOWS + 1):
         late = bounds.Bound(
             (4.0 * (n - 1) + 1.0) * dt + bounds.ROUND_OFF * truth[f"time[{n}]"],
-            "each of the blows before is found up to one step late and delays what follows by twice that; this one is "
+            "each earlier blow is found up to one step late, which delays the next ones by twice that; this one is "
             "found up to one step late",
         )
         speed = bounds.exact(fastest)
@@ -123,7 +123,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the speed after the last blow, over what the plate has added."""
+    """Error of the speed after the last blow, over the speed added by the plate."""
     value, reason = found[f"speed[{BLOWS}]"]
     if value is None:
         return None, reason
@@ -142,7 +142,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("closing", 0.25, "m/s", "speed V of the plate", 0.0, 1e2, positive=True),
         Parameter("v", 1.0, "m/s", "of the ball at the start", 0.0, 1e2, positive=True),
-        Parameter("length", 1.0, "m", "way that is left to the ball at the start", 0.0, 1e3, positive=True),
+        Parameter("length", 1.0, "m", "gap for the ball at the start", 0.0, 1e3, positive=True),
         Parameter("radius", 0.1, "m", "of the ball", 0.0, 1e3, positive=True),
         mass_of("the ball"),
     ),
@@ -158,8 +158,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "speed error",
         "1",
-        "error of the speed after three blows of the plate, over what they have added",
-        "what a moving wall adds is what it is there for",
+        "error of the speed after three blows of the plate, over the speed that they add",
+        "a moving wall acts by the speed that it adds",
         lambda dt: [{}],
         error,
         "the whole scene: to and fro, three times",

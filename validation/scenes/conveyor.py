@@ -1,12 +1,12 @@
-r"""A box is set down on a belt that runs: friction drags it until it goes with the belt.
+r"""A box is set down on a running belt: friction drags it until it moves with the belt.
 
        +---+
        |   |  x = V t - V^2/(2 mu g)       slips for V/(mu g), pulled by mu g,
      ==========   V ->                     and leaves a mark of V^2/(2 mu g) on the belt;
     (o)      (o)                           from then on it rests against the belt
 
-The floor is the belt: it stays where it is, and its surface runs. Seen from the belt this is a box that slides to a
-stop. Whoever takes the belt for a floor leaves the box where it was.
+The floor is the belt: it is fixed, and its surface has a velocity. In the frame of the belt the box slides to a stop.
+An engine that ignores the surface velocity leaves the box at rest.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from validation.truths import sliding
 
 #: Height of the box [m].
 HEIGHT = 0.5
-#: What a slide to a stop is called where it is seen from the belt.
+#: Names of the metrics of a slide to a stop, in the frame of the belt.
 NAMES = {"stopping_distance": "slipped", "braking": "pull", "end_speed": "slip_speed"}
 
 
@@ -46,7 +46,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def _from_the_belt(scene: Scene, trajectory: Trajectory) -> Trajectory:
-    """The same motion seen by who goes with the belt, and looks back: the box slides away and stops."""
+    """The same motion in the frame of the belt, with the direction reversed: the box slides away and stops."""
     d, run = scene.dimension, scene.params["v"] * heading(scene)
     pose, twist = trajectory.pose.copy(), trajectory.twist.copy()
     place = pose[:, 1, : d - 1]
@@ -56,13 +56,13 @@ def _from_the_belt(scene: Scene, trajectory: Trajectory) -> Trajectory:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Way and speed against the belt, pull over the middle half of the slip, hop and turn of the box."""
+    """Distance and speed relative to the belt, pull over the middle half of the slip, hop and rotation of the box."""
     found = sliding.measure(scene, _from_the_belt(scene, trajectory))
     return {NAMES.get(name, name): value for name, value in found.items()}
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a slide owes; places are told to the round-off of the whole ride."""
+    """The checks of a slide; positions have the round-off of the whole distance."""
     names = {new: old for old, new in NAMES.items()}
     slide = {names.get(name, name): value for name, value in truth.items()}
     found = sliding.checks(scene, dt, slide, scene.params["v"] * scene.duration)
@@ -70,7 +70,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track:
-    """Where the box is: what the belt has run, less what the box has slipped."""
+    """Place of the box: motion of the belt less the slip of the box."""
     p, line = scene.params, heading(scene)
     end = sliding.stop(p)
 
@@ -82,7 +82,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Distance of the place where the box ends on the belt from where it should, over the mark that it leaves."""
+    """Distance of the box's final place on the belt from the exact one, over the length of its slide mark."""
     return sliding.error(scene, dt, {old: found[new] for old, new in NAMES.items()} | dict(found))
 
 
@@ -93,12 +93,12 @@ SCENE = CanonicalScene(
     title="Box that is set down on a running belt",
     symptoms=("a conveyor belt carries objects at the wrong speed",),
     figure=__doc__ or "",
-    law="x = V t - V^2/(2 mu g) once it goes with the belt, after V/(mu g)",
+    law="x = V t - V^2/(2 mu g) once it moves with the belt, after V/(mu g)",
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 2.0, "m/s", "speed V of the belt", 0.0, 1e2, positive=True),
         Parameter("mu", 0.4, "1", "friction; below aspect, so that the box does not tip", 0.0, 1.0, positive=True),
-        Parameter("heading", 0.0, "degrees", "of the belt against the box's edges; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the belt to the box's edges; 3-D only", 0.0, 90.0),
         Parameter("aspect", 1.5, "1", "width over height of the box", 1.1, 20.0),
         standard_gravity(),
         mass_of("the box"),
@@ -118,8 +118,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "ride error",
         "mark",
-        "distance of the place where the box ends on the belt from where it should, over the mark that it leaves",
-        "one number for a pull that is too weak, too strong or astray, and for slip that does not end",
+        "distance of the box's final place on the belt from the exact one, over the length of its slide mark",
+        "one number for a pull that is too weak, too strong or in a wrong direction, and for slip that does not end",
         lambda dt: [{}],
         error,
         "the box while it slips",
@@ -130,7 +130,7 @@ SCENE = CanonicalScene(
         "slipped": "slips {value} on the belt",
         "pull": "is pulled by {value}",
         "pull<0": "is held back by {value}",
-        "slip_speed": "still slips with {value} when it should go with the belt",
+        "slip_speed": "still slips with {value} when it should move with the belt",
         "turned": "turns: its corners move by {value}",
     },
 )

@@ -3,13 +3,13 @@
         o -->   o o o o        a gap apart, e = 1: only the last one leaves
         v                      (0, 0, ..., 0, v)
 
-        o -->   oooo           touching: several contacts act at once, and momentum
-        v                      and energy alone do not say what comes out
+        o -->   oooo           touching: simultaneous contacts; momentum
+        v                      and energy do not determine the result
 
 With gaps every impact is between two balls, and they swap their velocities. Touching, laws of impact differ: solved
 together (Newton's law for each contact, as this project's solver does) the striker comes back with (n - 2)/n v and the
-others leave with 2 v/n; one after the other, the last one leaves with v. Neither is judged against the other: judged is
-what both conserve, and the speeds are shown.
+others leave with 2 v/n; one after the other, the last one leaves with v. Neither is preferred: conserved quantities are
+judged, and the speeds are shown.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _energy(scene: Scene, twist: Array) -> float:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Each impact is exact; round-off of n of them adds up. Touching balls are not told how to share the blow."""
+    """Each impact is exact; round-off of n of them adds up. Touching balls have no unique result."""
     v, n, apart = scene.params["v"], len(scene.bodies), scene.params["apart"]
     found = [
         bounds.bookkeeping(n).check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum"),
@@ -96,7 +96,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track | None:
-    """The last ball: at rest until it is struck. None for a touching row, whose answer depends on the law."""
+    """The last ball: at rest until it is struck. None for a touching row, whose result depends on the impact law."""
     p, n = scene.params, len(scene.bodies)
     if p["apart"] == 0.0:
         return None
@@ -113,7 +113,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
             return None, reason
         if name.startswith("speed["):
             off.append(abs(value - truth) / scene.params["v"])
-    return (metrics.largest(off), "") if off else (None, "a touching row has no one answer")
+    return (metrics.largest(off), "") if off else (None, "a touching row has no unique solution")
 
 
 SCENE = CanonicalScene(
@@ -145,7 +145,7 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         f"largest error of a ball's speed over the striker's, of 4 balls, over {PHASES} phases of the first contact",
-        "a row of impacts hands on every error that one makes; with gaps, since touching there is no one answer",
+        "a row of impacts passes on the error of each; with gaps, since a touching row has no unique solution",
         phases,
         error,
         "the whole scene: approach, impacts, departure",

@@ -1,4 +1,4 @@
-r"""A domino is pushed: it falls back, or it goes over and hits the next one.
+r"""A domino is pushed: it falls back, or it falls over and hits the next one.
 
      __        __         goes over if  w0^2 > 2 p^2 (1 - cos(alpha)),   p^2 = 3 g/(4 rho),  alpha = atan(width/height)
     |  | w0   |  |        its corner meets the next face at  sin(theta) = gap/height, with
@@ -7,9 +7,9 @@ r"""A domino is pushed: it falls back, or it goes over and hits the next one.
     |__+      |__+           w1' = w - (1 + e) w b1/(b1 + b2),   b1 = h (cos(theta) + nu sin(theta))
     =======gap======         w2' =     (1 + e) w b2/(b1 + b2),   b2 = h cos(theta) - nu width
 
-The blow passes at one height, as long an arm for one foot as for the other: without friction nu between the dominoes
-they share the spin, whatever that height is. Friction of the floor has to hold both feet, which it does for thick
-dominoes that stand well apart: a thin one has its foot thrown back by a blow so high.
+The blow acts at one height, with equal lever arms about both feet: without friction nu between the dominoes they share
+the spin, whatever that height is. Friction of the floor must hold both feet, which works for thick dominoes that stand
+well apart: a high blow throws back the foot of a thin one.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, states, upward
 from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
-#: Share of the angle of the hit at which the first domino is told, and the angle [rad] at which the second is.
+#: Share of the angle of the hit at which the first domino is measured, and the angle [rad] for the second.
 TOLD, STRUCK = 0.9, math.radians(3.0)
-#: Goes on for this long [s]: whoever is late by what a step of 1/60 s may cost is told as well.
+#: Time of the run beyond that [s], for runs that are late by the error of a step of 1/60 s.
 AFTERMATH = 0.1
-#: Angles on the way at which the grip of a foot and the gap are asked.
+#: Number of angles at which the grip of a foot and the gap are checked.
 ASKED = 50
 
 
@@ -40,13 +40,13 @@ def _pivot(p: Params) -> Pivot:
 
 
 def _spin(p: Params) -> float:
-    """Spin of the push [rad/s]: ``ratio`` of that which takes the centre over the foot."""
+    """Spin of the push [rad/s]: ``ratio`` times the least that moves the centre over the foot."""
     on = _pivot(p)
     return p["ratio"] * math.sqrt(2.0 * on.rate * (1.0 - math.cos(on.alpha)))
 
 
 def _hit(p: Params) -> float:
-    """Turn of the first domino at which it meets the second [rad]."""
+    """Rotation of the first domino at which it hits the second [rad]."""
     return math.asin(p["gap"])
 
 
@@ -68,10 +68,10 @@ def _feet_hold(p: Params) -> bool:
     """Whether friction of the floor holds both feet in the blow, and both press on it."""
     on, theta = _pivot(p), _hit(p)
     lost, won = (share - before for share, before in zip(_shares(p), (1.0, 0.0), strict=True))
-    # Impulse between the dominoes, along the floor, over m rho w: what turns the first about its foot.
+    # Impulse between the dominoes, along the floor, over m rho w, which turns the first about its foot.
     blow = -lost * 4.0 / 3.0 * on.arm / (on.height * (math.cos(theta) + p["rub"] * math.sin(theta)))
     for change, angle, side in ((lost, theta - on.alpha, -1.0), (won, -on.alpha, 1.0)):
-        # The foot gives what the motion of the centre needs beyond the blow and its friction.
+        # The foot provides the momentum of the centre beyond the blow and its friction.
         across = change * math.cos(angle) - side * blow
         up = -change * math.sin(angle) + side * p["rub"] * blow
         if up <= 0.0 or abs(across) > p["mu"] * up:
@@ -87,7 +87,7 @@ def _foot_holds(p: Params, start: float, spin: float, end: float) -> bool:
 
 
 def _follows(p: Params, first: float, second: float) -> float:
-    """Turn [rad] that the first has at the time at which the second is told; infinite if it catches up before.
+    """Rotation [rad] of the first when the second is measured; infinite if it catches up before.
 
     ``first``, ``second``: spins after the blow [rad/s].
     """
@@ -121,16 +121,16 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        For a push that just balances the first, for feet that do not hold, for a second domino that does not get to
-        where it is told or that the first catches up with.
+        For a push that just balances the first, for feet that do not hold, or for a second domino that does not reach
+        its angle or is caught up by the first.
     """
     p, on = params, _pivot(params)
     spin, width, height = _spin(p), on.width, on.height
     if p["ratio"] == 1.0:
-        raise SceneError("domino.ratio: at 1 the domino balances on its foot, it takes less or more")
+        raise SceneError("domino.ratio: at 1 the domino balances on its foot; choose less or more")
     end = _top(p, spin) if p["ratio"] < 1.0 else _hit(p)
     if not _foot_holds(p, -on.alpha, spin, end - on.alpha):
-        raise SceneError(f"domino.mu: {p['mu']:g} does not hold the foot of the domino that is pushed")
+        raise SceneError(f"domino.mu: {p['mu']:g} does not hold the foot of the pushed domino")
     if p["ratio"] < 1.0:
         # By symmetry it is back after twice the time to the top.
         half = on.time(end - on.alpha, 0.0, -on.alpha)
@@ -165,7 +165,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def _times(p: Params) -> tuple[float, float]:
-    """Times until the dominoes meet, and from there until the second is told [s]."""
+    """Times until the dominoes hit, and from there until the second is measured [s]."""
     on = _pivot(p)
     return (
         on.time(-on.alpha, _spin(p), _hit(p) - on.alpha),
@@ -174,7 +174,7 @@ def _times(p: Params) -> tuple[float, float]:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Pendulums that are held by their feet, and one blow between them."""
+    """Pendulums about their feet, and one blow between them."""
     p, on = scene.params, _pivot(scene.params)
     spin = _spin(p)
     if p["ratio"] < 1.0:
@@ -190,7 +190,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Passages of both dominoes through angles, largest turn, and ways of the first foot and of the second domino."""
+    """Passages of both dominoes through angles, largest rotation, motion of the first foot and the second domino."""
     p, on = scene.params, _pivot(scene.params)
     turn, rate = -metrics.tilt(trajectory, 1), -metrics.tilt_rate(trajectory, 1)
     time, spin = metrics.crossing(trajectory.t, turn, rate, TOLD * _hit(p))
@@ -212,9 +212,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a fall owes (`fall_checks`), from a spin at the start; the blow is found up to one step late.
+    """The checks of a fall (`fall_checks`), from a spin at the start; the blow is found up to one step late.
 
-    However late, its arm is the same for both feet, and both have turned a step more: a step of acceleration.
+    The lever arms of both feet stay equal, and both have rotated a step more: a step of acceleration.
     """
     p, on, g = scene.params, _pivot(scene.params), scene.params["g"]
     spin, source = (
@@ -230,9 +230,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
             math.inf if over else off,
             "the spin at the start to 1.5 steps of acceleration, step order and a late contact; an edge carried away",
         )
-        foot = bounds.Bound(
-            carried + bounds.ROUND_OFF * on.arm, "steps carry the foot away, rho (w dt)^2/2 each; g dt^2"
-        )
+        foot = bounds.Bound(carried + bounds.ROUND_OFF * on.arm, "steps move the foot, rho (w dt)^2/2 each; g dt^2")
         still = bounds.Bound(
             2.0 * g * dt * dt + bounds.ROUND_OFF * on.height,
             "one contact found one step late, g dt^2, and a corner that sinks or slips as far",
@@ -252,11 +250,12 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         + on.time_off(-on.alpha, second, STRUCK - on.alpha, dt, off)
     )
     late = bounds.Bound(
-        time, "what the fall before owes, one step for the blow, and the time of a spin that is as far off"
+        time, "the error of the fall before, one step for the blow, and the time of a spin with that error"
     )
     fast = bounds.Bound(
         on.spin_off(-on.alpha, second, STRUCK - on.alpha, dt, off),
-        "the second's share of what the first's spin owes, a step of acceleration for a blow found late, and its own",
+        "the second's share of the error of the first's spin, a step of acceleration for a blow found late, and its "
+        "own",
     )
     return [
         *fall_checks(on, -on.alpha, TOLD * _hit(p) - on.alpha, dt, truth, spin=spin),
@@ -266,7 +265,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the second's spin, or of the turn at which the first comes back, relative to it."""
+    """Relative error of the second's spin, or of the rotation at which the first turns back."""
     metric = "highest" if scene.params["ratio"] < 1.0 else "struck_spin"
     value, reason = found[metric]
     return (None, reason) if value is None else (abs(value / exact(scene)[metric] - 1.0), "")
@@ -279,14 +278,15 @@ SCENE = CanonicalScene(
     title="Domino that is pushed against the next one",
     symptoms=("dominoes fall too fast or too slowly",),
     figure=__doc__ or "",
-    law="goes over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); hands on (1 + e)/2 of its spin where sin(theta) = gap/height",
+    law="falls over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); passes on (1 + e)/2 of its spin where sin(theta) = "
+    "gap/height",
     dimensions=(2,),
     parameters=(
         Parameter(
             "ratio",
             1.5,
             "1",
-            "spin of the push over that which takes the centre over the foot",
+            "spin of the push over the least that moves the centre over the foot",
             0.0,
             10.0,
             positive=True,
@@ -315,9 +315,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "error of the spin that is handed on, and of the turn at which a domino that is pushed too little comes back, "
-        "relative to them",
-        "whether it goes over, and what it hands on, is what a row of dominoes is made of",
+        "relative errors of the spin that is passed on, and of the angle at which a domino with too small a push "
+        "turns back",
+        "a row of dominoes depends on whether each falls over, and on the spin that it passes on",
         lambda dt: [{}, {"ratio": 0.9}],
         error,
         "the whole scene: push, fall and blow",

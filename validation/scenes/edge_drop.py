@@ -7,8 +7,8 @@ r"""A tilted box lands on an edge, in free space: a blow beside its centre.
     =====\/===========  in space both corners of the edge hit at once, and must do so alike: no twist
           |<>| l
 
-Nothing acts but the blow. Half of it goes into spin, so that e is not the share of speed that comes back; corners that
-share it unequally turn the box about the other axes as well.
+Only the blow acts. Half of it goes into spin, so the rebound speed is not e times the approach; corners that share it
+unequally turn the box about the other axes as well.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HEIGHT = 1.0
 
 
 def _corner(p: Params) -> tuple[float, float]:
-    """The lower edge against the centre: along the floor (towards +x), and below it [m]."""
+    """The lower edge relative to the centre: along the floor (towards +x), and below it [m]."""
     return landing_corner(p["aspect"] * HEIGHT, HEIGHT, math.radians(p["tilt"]))
 
 
@@ -91,7 +91,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The box does not turn before the blow: however late it is found, its arm is the same."""
+    """The box does not rotate before the blow, so its lever arm does not depend on when it is found."""
     p = scene.params
     source = "Newton's law of restitution at the edge; balance of momentum and angular momentum"
     turning = p["v"] / HEIGHT
@@ -143,7 +143,7 @@ SCENE = CanonicalScene(
         "blow error",
         "1",
         f"larger of the errors of rise and spin, relative, over {PHASES} contact times within a step",
-        "how a blow is shared between speed and spin is all there is to it",
+        "the scene is how a blow is divided between speed and spin",
         phases,
         error,
         "the whole scene: approach, contact, departure",

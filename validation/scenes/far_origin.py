@@ -1,12 +1,12 @@
-"""A box slides to a stop on a plate far away from the origin: physics does not know where that is.
+"""A box slides to a stop on a plate far from the origin, which must not matter.
 
                                               +---+  v
                                               |   | -->        stops after d = v^2/(2 mu g),
     0 ....................................  =============      as at the origin
     |<---------------- far ----------------->|
 
-Numbers are told to a share of their size: at 1e6 m a double knows places to 1e-10 m, a float to 6 cm. What takes small
-differences of large places (contact points, depths, arms) shows it here.
+Floating-point numbers have a relative precision: at 1e6 m positions are known to 1e-10 m in doubles, to 6 cm in floats.
+Small differences of large coordinates (contact points, depths, lever arms) show it here.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Those of a box at the origin, and the round-off of places as far away."""
+    """Those of a box at the origin, and the round-off of coordinates at that distance."""
     return sliding.checks(scene, dt, truth, scene.params["far"])
 
 
@@ -51,7 +51,7 @@ SCENE = CanonicalScene(
     version=1,
     title="Box that slides to a stop far away from the origin",
     symptoms=(
-        "it behaves otherwise far away from the origin",
+        "it behaves differently far away from the origin",
         "a large world loses precision",
     ),
     figure=__doc__ or "",
@@ -77,8 +77,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
-        "one number for friction, depth and arms that are told by differences of large places",
+        "distance of the place where it stops from the exact one, over the length of its slide",
+        "one number for friction, overlap and lever arms, which are differences of large coordinates",
         lambda dt: [{}],
         sliding.error,
         "the sliding box",

@@ -6,8 +6,8 @@
         |       |             (no gravity: nothing else acts)
     =================
 
-The corners hit together and each must leave with e times its speed: their impulses push each other, so one pass over
-them, corner by corner, leaves the box spinning and slow. The corners' shares of a wide box couple more than a cube's.
+The corners hit together and each must leave with e times its speed: their impulses are coupled, so one pass over them,
+corner by corner, leaves the box spinning and slow. The coupling of a wide box is stronger than a cube's.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """By symmetry the box does not turn: Newton's law of restitution of the whole box."""
+    """By symmetry the box does not rotate: Newton's law of restitution for the whole box."""
     e, v, mass = scene.params["e"], scene.params["v"], scene.params["mass"]
     return {"rebound_ratio": e, "edge_speed": 0.0, "sideways": 0.0, "impulse": mass * (1.0 + e) * v}
 
@@ -85,7 +85,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """One body that touches at all its corners: the law is that of a ball, exact at every step."""
     v, mass, reach = scene.params["v"], scene.params["mass"], metrics.reach(scene.bodies[1].shape)
     source = "symmetry and Newton's law of restitution; no external force"
-    # A corner's impulse is known to round-off and turns the box by the ratio of its arm to its radius of gyration.
+    # A corner's impulse has round-off, which turns the box by the ratio of its lever arm to its radius of gyration.
     arm = max(1.0, reach / HEIGHT) ** 2
     scales = {
         "rebound_ratio": ("1", 1.0),
@@ -141,8 +141,8 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"larger of |v+/v- - e| and of a corner's speed by spin over v-, over {PHASES} contact times within a step",
-        "restitution of several contacts of one body has an exact answer only if they are solved together; spin is "
-        "what a pass over them one by one leaves",
+        "restitution at several contacts of a body is exact only if they are solved together; solving one after the "
+        "other leaves spin",
         phases,
         error,
         "the whole scene: approach, contact, departure",

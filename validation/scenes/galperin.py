@@ -5,7 +5,7 @@
          |                            M/m = 1, 100, 10000: 3, 31, 314
 
 In the plane of sqrt(M) V and sqrt(m) v the energy is a circle on which two impacts, with the ball and with the wall,
-turn by the angle 2 t; it ends when the small ball cannot catch up any more. After j impacts of the balls
+turn by the angle 2 t; it ends when the small ball cannot catch up. After j impacts of the balls
 V_j = V cos(2 j t) towards the wall and v_j = sqrt(M/m) V sin(2 j t) [G. Galperin, Regul. Chaotic Dyn. 8 (2003) 375].
 One impact too many or too few shows in both speeds.
 """
@@ -35,7 +35,7 @@ def _turn(params: Params) -> float:
 def count(params: Params) -> int:
     """Number of impacts, of balls and with the wall: the j-th keeps j t below pi."""
     turns = math.pi / _turn(params)
-    # Where pi/t is whole the last impact grazes, and there is none: one less, told to round-off.
+    # Where pi/t is whole the last impact has no speed: one less, decided to round-off.
     return (round(turns) if abs(turns - round(turns)) < 1e-9 else math.ceil(turns)) - 1
 
 
@@ -98,10 +98,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def growth(scene: Scene) -> float:
-    """By how much blows multiply what the balls are off their line by: 4e10 in 31 impacts at ratio 100, gap 2 m.
+    """Factor by which blows amplify a distance of the balls from their line: 4e10 in 31 impacts at ratio 100, gap 2 m.
 
-    Two balls that meet at the speed u, off the line by y, have a normal that is tilted by y/R, R being the sum of their
-    radii: an elastic blow adds 2 u y/R to their speed across it. The smooth wall changes none.
+    Two balls that hit at the speed u, at a distance y from the line, have a normal tilted by y/R, R being the sum of
+    their radii: an elastic blow adds 2 u y/R to their speed across it. The smooth wall adds none.
     """
     found = impacts(scene.params)
     ends = [time for time, _, _ in found[2::2]] + [scene.duration]
@@ -113,7 +113,7 @@ def growth(scene: Scene) -> float:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Each impact is exact however late it is found, and round-off of n of them adds up; n must lie steps apart."""
+    """Each impact is exact even if found late, and round-off of n of them adds up; they must lie steps apart."""
     p, n = scene.params, count(scene.params)
     source = "Galperin's rotations: conservation of momentum and energy, impact after impact"
     allowed = {
@@ -172,8 +172,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"distance of both speeds from theirs on the circle of energy over its radius, {PHASES} phases of the contact",
-        "a dozen impacts in the right order: one too many, too few or too soft turns the point on the circle",
+        f"distance of both speeds from the exact point on the circle of energy, over its radius, {PHASES} phases of "
+        "the contact",
+        "a dozen impacts in the right order: one too many, too few or too soft moves the point on the circle",
         phases,
         error,
         "the whole scene: 12 impacts",

@@ -5,8 +5,8 @@
        v1       v2          v2' = v2 + (1 + e)/(1 + r)   (v1 - v2)
                             J   = (1 + e) r m/(1 + r)    (v1 - v2)
 
-Momentum is conserved and the relative speed is reversed by e. With a large r the second ball is a free wall: what the
-first one does converges to the law of an immovable floor as 1/r.
+Momentum is conserved and the relative speed is reversed by e. With a large r the second ball is a free wall: the motion
+of the first converges to that on an immovable floor as 1/r.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |(v2' - v1')/(v1 - v2) - e| over {PHASES} contact times within a step",
-        "the impact law between two free bodies: what a contact with a floor cannot show; the worst phase counts",
+        "the impact law between two free bodies, which a contact with a floor does not test; the worst phase counts",
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",

@@ -6,8 +6,8 @@
         |   |             nothing moves, drifts or sinks
     ==============
 
-The light box is pressed between two large forces that all but cancel. What a solver leaves of them, or softness in
-units of the light box's own mass, squeezes it out or lets the heavy one sink in. It starts exactly touching.
+The light box is pressed between two large forces that nearly cancel. The residual of a solver, or softness in units of
+the light box's mass, squeezes it out or lets the heavy one sink in. It starts in exact contact.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def track(scene: Scene) -> Track:
-    """The heavy box stays where it is."""
+    """The heavy box at rest."""
     top = scene.bodies[-1]
     return Track(top.name, lambda t: top.pose[: scene.dimension])
 
@@ -75,7 +75,7 @@ SCENE = CanonicalScene(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 5 s, per side of a box, at the default ratio",
-        "nothing may move, so whatever did is error, sideways or into the neighbour",
+        "nothing may move, so any motion is error, sideways or into the neighbour",
         lambda dt: [{}],
         lambda scene, dt, found: columns.displacement(found, SIDE),
         "the standing pair, half a second after the start",

@@ -5,7 +5,7 @@
        .'   R   '.                    v' = g sin(phi) - f,  (k r) w' = f,  N = g cos(phi) - v^2/(R + r)
       |     + phi |          no longer touched, it flies: its speed along is that of leaving
 
-What carries it fades to nothing: whoever sticks, is sucked on or lets go early leaves at another angle and speed.
+The normal force falls to zero: with sticking, pulling or early separation the disc leaves at another angle and speed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from validation.truths.quadrature import gauss
 from validation.truths.rolling import gyration
 
 K = gyration(2)
-#: Runs on for this share of the time until it leaves.
+#: Time after leaving, as a share of the time before.
 AFTERMATH = 0.25
 #: Steps of the integration: eight times as many change an angle by 1e-10.
 STEPS = 4000
@@ -36,8 +36,8 @@ STEPS = 4000
 def _leaving(v: float, mu: float, g: float, radius: float, hill: float) -> tuple[float, float, float]:
     """Time [s], angle [rad] and speed [m/s] at which the disc leaves.
 
-    Rolling needs f = g sin(phi) k/(1 + k); where that is more than mu N the disc slips and f = mu N. Integrated by
-    Runge and Kutta's fourth order in the angle, which grows from the start, up to where N is nothing.
+    Rolling needs f = g sin(phi) k/(1 + k); where that exceeds mu N the disc slips and f = mu N. Integrated by a
+    fourth-order Runge-Kutta method in the angle, up to N = 0.
     """
     reach = radius + hill
     lowest = math.acos(min(1.0, 2.0 / 3.0 + v * v / (3.0 * g * reach)))  # where it leaves without friction
@@ -46,7 +46,7 @@ def _leaving(v: float, mu: float, g: float, radius: float, hill: float) -> tuple
     h, t, phi, square = 0.5 * math.pi / STEPS, 0.0, 0.0, v * v
 
     def slope(phi: float, square: float) -> float:
-        """d(v^2)/d phi, with the friction that rolling takes and not more than there is."""
+        """d(v^2)/d phi, with the friction of rolling, at most mu N."""
         normal = max(0.0, g * math.cos(phi) - square / reach)
         friction = min(g * math.sin(phi) * K / (1.0 + K), mu * normal)
         return 2.0 * reach * (g * math.sin(phi) - friction)
@@ -85,12 +85,12 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If it is so fast that it leaves the top at once.
+        If it is fast enough to leave the top at once.
     """
     p = params
     reach = p["radius"] + p["hill"]
     if p["v"] ** 2 >= 0.5 * p["g"] * reach:
-        raise SceneError(f"hilltop.v: with {p['v']:g} m/s the disc all but leaves the top at once")
+        raise SceneError(f"hilltop.v: with {p['v']:g} m/s the disc leaves the top almost at once")
     hill = Body("hill", Disc(p["hill"]), pose=pose_at(dimension, (0.0, 0.0)), motion="fixed")
     disc = at(ball("disc", dimension, p["mass"], p["radius"], 0.0), dimension, (0.0, reach), (p["v"], 0.0))
     if p["mu"] > 0.0:
@@ -101,16 +101,16 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Where what carries it is nothing."""
+    """The point where the normal force is zero."""
     time, angle, speed = _of(scene.params)
     return {"level_speed": speed * math.cos(angle), "leaving_angle": math.degrees(angle), "leaving_time": time}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """From the flight at the end: it keeps the level speed that it left with, and falls since then.
+    """From the flight at the end: it keeps its horizontal speed of leaving, and falls since then.
 
-    Where nothing carries it any more, v^2 = g (R + r) cos(phi): the level speed v cos(phi) says which angle that was.
-    The place of leaving itself shows in no path: flight and hill part by the third power of time.
+    Where the normal force vanishes, v^2 = g (R + r) cos(phi): the horizontal speed v cos(phi) gives that angle. The
+    place of leaving cannot be read from the path: flight and hill separate by the third power of time.
     """
     p = scene.params
     reach = p["radius"] + p["hill"]
@@ -130,32 +130,32 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def growth(scene: Scene) -> float:
-    """By how much the hill multiplies what is off its line across it, at most.
+    """Largest amplification of a distance across the hill.
 
-    The push of the hill, m g at most, is tilted by y/(R + r): y'' = g y/(R + r) at most, what rolls gains less. It is
-    little from a start of some speed, and grows as 1/v where the disc begins almost at rest.
+    The normal force of the hill, at most m g, is tilted by y/(R + r): y'' = g y/(R + r) at most, less in rolling. It is
+    small with some initial speed, and grows as 1/v where the disc starts almost at rest.
     """
     p = scene.params
     return bounds.saddle(scene.duration * math.sqrt(p["g"] / (p["hill"] + p["radius"])))
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Steps of first order: they take (a dt)^2/2 off the energy, a: what keeps the disc on the hill, v^2/(R + r).
+    """First-order schemes: each step loses (a dt)^2/2 of energy, a: centripetal acceleration v^2/(R + r).
 
-    As much as that is worth in height, either way, the disc starts faster or slower; half a step by the order of a
-    step, one for a contact found late. A disc that is found g dt^2 deep goes around a hill that is smaller by that.
-    And what the hill pushes with points along the normal of a place up to one step away: on the way that turns its
-    level part by dt times the integral of the force over the angle.
+    The start is faster or slower by the height of that energy; half a step by the order of the scheme, one for a
+    contact found late. A disc that is found g dt^2 deep moves around a hill smaller by that. The normal is that of a
+    place up to one step away, which turns the horizontal part of the force: dt times the integral of the force over the
+    angle.
     """
     p = scene.params
     g, reach, time = p["g"], p["radius"] + p["hill"], truth["leaving_time"]
     phi = np.linspace(0.0, math.radians(truth["leaving_angle"]), 257)
     square = p["v"] ** 2 + 2.0 * g * reach * (1.0 - np.cos(phi))
-    # The integral of a^2 dt/2 over the way, without friction, which is the fastest.
+    # The integral of a^2 dt/2 over the path, without friction, which is the fastest.
     lost = 0.5 * dt * float(np.trapezoid(square**1.5 / reach, phi)) / g
     force = g * np.cos(phi) - square / reach + (g * np.sin(phi) * K / (1.0 + K) if p["mu"] > 0.0 else 0.0)
     turned = dt * float(np.trapezoid(np.maximum(0.0, force), phi))
-    # The angle of a level speed, v^2 = g (R + r) cos(phi)^3, and the time in which flight falls what that changes.
+    # The angle of a horizontal speed, v^2 = g (R + r) cos(phi)^3, and the time of a fall by the resulting change.
     cosine, sine = math.cos(phi[-1]), math.sin(phi[-1])
     askew = math.degrees(2.0 * truth["level_speed"] * turned / (3.0 * g * reach * cosine**2 * sine))
     found: dict[str, list[float]] = {"level_speed": [], "leaving_angle": [], "leaving_time": []}
@@ -166,8 +166,8 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         found["leaving_angle"].append(abs(math.degrees(leaves) - truth["leaving_angle"]))
         found["leaving_time"].append(abs(later - time))
     because = (
-        "the hill pushes along the normal of a place up to one step away, steps take (a dt)^2/2 off the energy, a: "
-        "what keeps the disc on the hill; and a contact found late"
+        "the hill pushes along the normal of a place up to one step away; each step loses (a dt)^2/2 of energy, a: "
+        "acceleration towards the hill; and a contact found late"
     )
     source = "energy, Coulomb's law, and a normal force that fades to nothing"
     speed = bounds.Bound(turned + max(found["level_speed"]), because)
@@ -181,7 +181,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the level speed, relative to it."""
+    """Relative error of the horizontal speed."""
     truth = exact(scene)["level_speed"]
     value, reason = found["level_speed"]
     return (None, reason) if value is None else (abs(value / truth - 1.0), "")
@@ -215,8 +215,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "speed error",
         "1",
-        "error of the level speed of the flight, over it, worst of rough and slippery",
-        "the level speed is set by where the hill stops to carry, and the flight keeps it",
+        "relative error of the horizontal speed of the flight, worst of rough and slippery",
+        "the horizontal speed depends on where the disc leaves the hill, and stays constant in flight",
         lambda dt: [{}, {"mu": 0.1}],
         error,
         "the whole scene: on the hill, then in flight",

@@ -1,12 +1,12 @@
-"""A ball hits an immovable floor in free space: the bare impact law.
+"""A ball hits an immovable floor without gravity: the impact law alone.
 
           o   m = 0.5 kg, r = 0.5 m
           |  v                          v+ = -e v-
           v                             J  = m (1 + e) v
     ==============  floor               (no gravity: nothing else acts)
 
-Gravity is left out because it would add g dt to what is sampled: rebound ratios belong in free space. Friction
-cannot act on a central hit and is 0, so that no solver needs rotation or friction rows.
+Gravity is left out because it would add g dt to the sampled speeds. Friction cannot act in a central impact and is 0,
+so that no solver needs rotation or friction.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 6.0, "m/s", "approach speed; 6 with e = 0.8 is the worked example", 0.0, 1e3, positive=True),
         delay(),
-        Parameter("mu", 0.0, "1", "friction of the pair; a central hit has no use for it", 0.0, 10.0),
+        Parameter("mu", 0.0, "1", "friction of the pair; it has no effect on a central impact", 0.0, 10.0),
         mass_of("the ball (worked example)", 0.5),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
     ),
@@ -148,7 +148,7 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states_and_impulses,
     track=track,
-    # Slow, fast and in between, and both edges of restitution: thresholds, tunnels and laws show in one of them.
+    # Slow, medium and fast, and both limits of restitution, which show thresholds, tunnelling and impact laws.
     quick=tuple(
         Variation({"e": e, "v": v})
         for e, v in ((0.0, 6.0), (0.5, 0.1), (0.5, 1.0), (0.8, 6.0), (1.0, 6.0), (1.0, 50.0))
@@ -161,8 +161,8 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |v+/v- - e| over {PHASES} contact times within a step",
-        "the impact law itself: no gravity, no apex, nothing else enters; an engine that acts before or after "
-        "the contact may depend on the phase, so the worst phase counts",
+        "the impact law alone, without gravity; an engine that acts before or after the contact may depend on the "
+        "phase, so the worst phase counts",
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",

@@ -4,8 +4,8 @@
        |   | ->       sticks if tan(theta) <= mu,
     ==============    else a = g (sin(theta) - mu cos(theta))
 
-Gravity is turned by theta, not the floor: a tilted, touching start is not representable exactly and costs some engines
-a transient. ``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
+Gravity is rotated by theta, not the floor: a tilted start in contact is not exactly representable and causes a
+transient in some engines. ``ratio`` is tan(theta)/mu: 1 is the edge of the friction cone.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Acceleration that leads as far astray, in g: creep v over the run T as far as 2 v/T."""
+    """Equivalent acceleration in g: creep v over the run T moves the box as far as 2 v/T."""
     g, duration = scene.params["g"], scene.duration
     truth = exact(scene)
     metric = next(iter(truth))
@@ -103,7 +103,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     return (2.0 * off / (g * duration) if metric == "creep" else off / g), ""
 
 
-# ---- the threshold: what several ratios say together ----
+# ---- the threshold, from several ratios -----------------
 
 
 def _slides(member: Member) -> bool:
@@ -120,7 +120,7 @@ def _slides(member: Member) -> bool:
 
 def threshold(members: Sequence[Member]) -> Reduced | None:
     """Middle of the bracket [largest ratio that sticks, smallest that slides], and half its width as bound."""
-    # On the edge itself Coulomb's law lets a box stick and slide alike: that cell tells neither.
+    # At the limit itself Coulomb's law allows sticking and sliding, so that cell is not used.
     telling = [member for member in members if member.params["ratio"] != 1.0]
     measured = [member for member in telling if member.metrics.get("acceleration", (None, ""))[0] is not None]
     ratios = [(member.params["ratio"], _slides(member)) for member in measured]
@@ -169,15 +169,15 @@ SCENE = CanonicalScene(
     sampling=states,
     track=track,
     quick=tuple(Variation({"ratio": ratio}) for ratio in RATIOS),
-    representative={"ratio": 1.1},  # a box that slides shows more than one that does not
+    representative={"ratio": 1.1},  # a sliding box is more interesting to watch
     planted=({"ratio": 0.9}, {"ratio": 1.1}),
     primary=Primary(
         "acceleration error",
         "g",
         "largest of |a - a_exact| / g where it slides and 2 creep / (g T) where it sticks, "
         "tan(theta)/mu = 1.1, 0.9, 0.5, 2",
-        "creep v over the run T leads as far astray as the acceleration 2 v / T: one unit for both sides of the "
-        "threshold, so that neither hides the other",
+        "creep v over the run T moves the box as far as an acceleration 2 v / T: one unit on both sides of the "
+        "threshold",
         lambda dt: [{"ratio": ratio} for ratio in (1.1, 0.9, 0.5, 2.0)],
         error,
         "the sliding box, half a second after the start",

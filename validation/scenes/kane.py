@@ -1,4 +1,4 @@
-r"""A leaning rod lands on its lower end while that end slides: a law of impact that adds energy.
+r"""A leaning rod lands on its sliding lower end: an impact law that adds energy.
 
             //          velocity of the end:  u+ = u- + W p,  normal and tangent coupled by its arm
            //           Newton:   u_n+ = -e u_n-
@@ -7,8 +7,8 @@ r"""A leaning rod lands on its lower end while that end slides: a law of impact 
     ====/===========
 
 [T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications, McGraw-Hill 1985: a pendulum that gains energy so.]
-Newton's coefficient fixes the normal speed alone; the work of friction enters nowhere. An engine that states e and mu
-has to show the gain, one that does not has another law: no answer here is better physics, and none may be in silence.
+Newton's coefficient determines the normal speed only; the work of friction does not enter. An engine with this e and mu
+has to show the gain; one that does not has another impact law, which must be declared.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LENGTH = 1.0
 
 
 def _corner(p: Params) -> tuple[float, float]:
-    """The end that lands against the centre: along the floor (towards +x), and below it [m]."""
+    """The landing end relative to the centre: along the floor (towards +x), and below it [m]."""
     return landing_corner(p["aspect"] * LENGTH, LENGTH, math.radians(90.0 - p["lean"]))
 
 
@@ -48,7 +48,7 @@ def _mobility(p: Params) -> Array:
 
 
 def answers(mobility: Array, approach: Array, e: float, mu: float) -> list[Array]:
-    """All impulses over the mass (normal, tangent) [m/s] that Newton's and Coulomb's laws allow at one contact.
+    """All impulses over the mass (normal, tangent) [m/s] that satisfy Newton's and Coulomb's laws at one contact.
 
     ``approach``: velocity of the contact before, (normal < 0, tangent) [m/s].
     """
@@ -74,11 +74,11 @@ def _blow(p: Params) -> Array:
     Raises
     ------
     SceneError
-        Where the law has no answer, or several.
+        Where the law has no solution, or several.
     """
     found = answers(_mobility(p), np.array([-p["v"], p["along"] * p["v"]]), p["e"], p["mu"])
     if len(found) != 1:
-        raise SceneError(f"kane.mu: at {p['mu']:g} the law has {len(found)} answers, it takes one")
+        raise SceneError(f"kane.mu: at {p['mu']:g} the law has {len(found)} solutions, the scene needs one")
     return found[0]
 
 
@@ -95,7 +95,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the law has not one answer, or the other end would land within the run.
+        If the law has no unique solution, or the other end would land within the run.
     """
     p = params
     _, below = _corner(p)
@@ -113,7 +113,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's and Coulomb's laws at one contact; the energy is what they make of it."""
+    """Newton's and Coulomb's laws at one contact, and the resulting energy."""
     p = scene.params
     ahead, rise, spin = _after(p)
     return {"rise": rise, "ahead": ahead, "spin": spin, "gain": _gain(p, ahead, rise, spin)}
@@ -126,7 +126,7 @@ def _gain(p: Params, ahead: float, rise: float, spin: float) -> float:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Velocities at the end, and the energy that they have."""
+    """Velocities at the end, and their energy."""
     d, last = scene.dimension, trajectory.twist[-1, 1]
     ahead, rise = float(last[0]), float(last[d - 1])
     spin = float(metrics.tilt_rate(trajectory)[-1])
@@ -139,7 +139,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The rod does not turn before the blow: however late it is found, its arm is the same."""
+    """The rod does not rotate before the blow, so its lever arm does not depend on when it is found."""
     v = scene.params["v"]
     source = "Newton's law of restitution and Coulomb's of friction at one contact"
     turning = 12.0 * v / LENGTH
@@ -175,8 +175,10 @@ SCENE = CanonicalScene(
     dimensions=(2,),
     parameters=(
         Parameter("e", 0.9988, "1", "coefficient of restitution; near 1, so that little else is lost", 0.0, 1.0),
-        Parameter("mu", 0.883, "1", "friction: lets the end stick from a slide to either side", 0.0, 10.0),
-        Parameter("lean", 56.4, "degrees", "of the rod over the floor; near where a blow couples most", 30.0, 80.0),
+        Parameter("mu", 0.883, "1", "friction: stops the end from a slide in either direction", 0.0, 10.0),
+        Parameter(
+            "lean", 56.4, "degrees", "angle of the rod to the floor; near the strongest coupling in a blow", 30.0, 80.0
+        ),
         Parameter(
             "along",
             0.727,
@@ -203,7 +205,7 @@ SCENE = CanonicalScene(
         "1",
         f"largest error of the speeds of rise, along the floor and of an end by spin, over the approach, over {PHASES} "
         "contact times within a step",
-        "how normal and friction share one blow that they both enter is all there is to it",
+        "the scene is how normal and friction impulse share a blow",
         phases,
         error,
         "the whole scene: approach, contact, departure",

@@ -1,4 +1,4 @@
-r"""A ladder leans on a smooth wall, and friction of the floor alone holds it: it stands, or it slides down.
+r"""A ladder leans on a smooth wall, held by friction of the floor only: it stands, or it slides down.
 
               /|         moments about the foot:   N_w = W/2 (cot(lean) - w/L),  w: thickness
              / |  <- N_w   stands    if  mu >= N_w/W
@@ -6,7 +6,7 @@ r"""A ladder leans on a smooth wall, and friction of the floor alone holds it: i
      mu W->/___|           one angle, by Newton's and Euler's laws with mu N at the foot
     ==============         W: weight, L: length
 
-``ratio`` is mu over what it takes. The load on the wall is told as well: nothing else than the moments decides it.
+``ratio`` is mu over the least that holds. The load on the wall is judged as well: it follows from the moments.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def friction(p: Params) -> float:
 def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -> tuple[float, float, float]:
     """Acceleration of the lean [rad/s^2], and loads of floor and wall over the weight.
 
-    The foot is at (-L cos(lean), 0), the head L along from there at the wall, the centre half of it along and w/2 off.
+    The foot is at (-L cos(lean), 0), the head at distance L along the ladder at the wall, the centre at half of it and
+    w/2 off.
     """
     length, half, thick = p["length"], 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
     c, s = math.cos(lean), math.sin(lean)
@@ -49,7 +50,7 @@ def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -
     foot = np.array([-half * c + thick * s, -half * s - thick * c])
     head = np.array([half * c + thick * s, half * s - thick * c])
     own = length * length * (1.0 + p["aspect"] ** 2) / 12.0
-    # Unknown: lean'', and forces of floor and wall over the mass: (mu, 1), against a foot that goes out, and (-1, 0).
+    # Unknown: lean'', and forces of floor and wall over the mass: (mu, 1), against a foot that slides out, and (-1, 0).
     system = np.array(
         [
             [by[0], -mu, 1.0],
@@ -75,7 +76,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        For a ladder so upright that it needs no wall, and one that lets go of a wall on its way.
+        For a ladder that needs no wall, and one that leaves the wall in the fall.
     """
     p, lean = params, math.radians(params["lean"])
     if needed(p) <= 0.0:
@@ -108,7 +109,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest way of a point of the ladder, loads at the end, its passage through a turn, and gaps of its two ends."""
+    """Largest displacement of a point of the ladder, loads at the end, time of a rotation, and gaps of its two ends."""
     p, d, t = scene.params, scene.dimension, trajectory.t
     turned, rate = metrics.tilt(trajectory, 2), metrics.tilt_rate(trajectory, 2)
     time, spin = metrics.crossing(t, turned[0] - turned, -rate, leaning.TOLD)
@@ -128,7 +129,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As of all that leans, stands or falls."""
+    """As for all leaning bodies that stand or fall."""
     p = scene.params
     return leaning.checks(
         p,
@@ -142,7 +143,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Way of a ladder that should stand, in lengths; error of the time of one that slides, relative to it."""
+    """Displacement of a ladder that should stand, in lengths; relative error of the time of one that slides."""
     return leaning.outcome(scene, exact(scene), found)
 
 
@@ -156,8 +157,8 @@ SCENE = CanonicalScene(
     law="stands if mu >= (cot(lean) - w/L)/2, which is the load on the wall over the weight; else slides down",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.05, "1", "friction of the floor over what it takes", 0.01, 100.0),
-        Parameter("lean", 60.0, "degrees", "of the ladder over the floor", 20.0, 85.0),
+        Parameter("ratio", 1.05, "1", "friction of the floor over the least that holds", 0.01, 100.0),
+        Parameter("lean", 60.0, "degrees", "angle of the ladder to the floor", 20.0, 85.0),
         Parameter("length", 4.0, "m", "of the ladder", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.02, "1", "thickness over length", 0.0, 0.3, positive=True),
         standard_gravity(),
@@ -174,8 +175,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the ladder that should stand, in lengths; error of the time of the one that slides, relative to it",
-        "whether it stands, and how fast it goes if it does not",
+        "displacement of the ladder that should stand, in lengths; relative error of the time of the one that slides",
+        "whether it stands, and how fast it moves if it does not",
         lambda dt: [dict(params) for params in leaning.STANDS_AND_SLIDES],
         error,
         "the whole scene: the ladder stands",

@@ -1,4 +1,4 @@
-"""A short column rests for a long time: what creeps, however slowly, is somewhere else in an hour.
+"""A short column rests for a long time, which shows slow creep.
 
         +---+
         |   |  n        drift per hour       0
@@ -6,8 +6,8 @@
         |   |  1        turn per hour        0
     ==============
 
-A check over a few seconds forgives a drift of a tenth of a millimetre. Told per hour, the same drift is a decimetre;
-the longer the run, the finer what is seen.
+A check over a few seconds allows a drift of a tenth of a millimetre, a decimetre per hour; a longer run resolves slower
+creep.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
 
 SIDE, HOUR = 1.0, 3600.0
-#: What happens until then is the start's [s].
+#: Time until which motion belongs to the start [s].
 SETTLED = 1.0
 #: Steps between two samples.
 STRIDE = 60
@@ -44,7 +44,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest way of a body along and across the floor, and of a corner by turning, from 1 s to the end."""
+    """Largest displacement of a body along and across the floor, and of a corner by rotation, from 1 s to the end."""
     d, free = scene.dimension, metrics.free_bodies(scene)
     first = int(np.searchsorted(trajectory.t, SETTLED - 1e-9))
     pose = trajectory.pose[first:]
@@ -59,19 +59,19 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a column may slip, once and for all; the longer the run, the less of it falls to an hour."""
+    """The slip of a column, once in the run; a longer run gives less per hour."""
     n, g = len(scene.bodies) - 1, scene.params["g"]
     hours = (scene.duration - SETTLED) / HOUR
     slip = bounds.slips(n, g, dt)
     rate = bounds.Bound(
-        (slip.value + bounds.ROUND_OFF * n * SIDE) / hours, f"{slip.because}, once within the run, told per hour"
+        (slip.value + bounds.ROUND_OFF * n * SIDE) / hours, f"{slip.because}, once within the run, given per hour"
     )
     source = "static equilibrium"
     return [rate.check(metric, "m/h", truth[metric], source) for metric in truth]
 
 
 def sampling(scene: Scene) -> Sampling:
-    """A few samples a second: nothing should happen between them."""
+    """A few samples a second, as nothing should happen."""
     return Sampling(STRIDE, None)
 
 
@@ -115,7 +115,7 @@ SCENE = CanonicalScene(
         "creep",
         "side/h",
         "largest of drift, sinking and turning per hour, in sides of a box",
-        "what never stops creeping is found by time alone",
+        "only a long run shows a creep that never stops",
         lambda dt: [{}],
         error,
         "the resting column, a second after the start",

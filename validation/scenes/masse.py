@@ -1,11 +1,11 @@
-r"""A ball is pushed and spun askew (a masse shot): its path is a parabola until it rolls, then straight.
+r"""A ball with a push and oblique spin (a masse shot): its path is a parabola until it rolls, then straight.
 
           u0 \                    slip u0 = v0 + w0 x (-r z): its direction u never changes
       v0 ---> \__                 path  x = v0 t - mu g t^2 u/2,   t <= t_f = |u0| k/((1 + k) mu g)
                   \__  v_f        then  v_f = v0 - u0 k/(1 + k),   k = 2/5
 
-Friction acts against the slip, not against the motion: both velocity and slip lose along the one direction u. A cone
-that is a pyramid, or friction that is solved axis by axis, turns it.
+Friction acts against the slip, not against the motion: velocity and slip both change along the direction u. A friction
+pyramid, or friction solved axis by axis, turns it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from validation.scenes.parts import ball, floor, mass_of, standard_gravity, stat
 from validation.truths.rolling import gyration, of_the_arm, on_a_late_arm
 
 K = gyration(3)
-#: Runs for this many times the time until it rolls.
+#: Duration over the time until it rolls.
 RUNS = 2.0
 
 
@@ -35,13 +35,13 @@ def _spin(p: Params) -> Array:
 
 
 def _slip(p: Params, arm: float) -> Array:
-    """Velocity of the point that touches, ``arm`` [m] below the centre, at the start [m/s]."""
+    """Velocity of the contact point, ``arm`` [m] below the centre, at the start [m/s]."""
     wx, wy, _ = _spin(p)
     return np.array([p["v"] - wy * arm, wx * arm])
 
 
 def _rolling(p: Params, arm: float) -> tuple[float, Array, Array]:
-    """Time [s], place [m] and velocity [m/s] with which rolling begins, if friction acts ``arm`` [m] below."""
+    """Time [s], place [m] and velocity [m/s] at which rolling begins, if friction acts ``arm`` [m] below."""
     k, slip, start = K * (p["radius"] / arm) ** 2, _slip(p, arm), np.array([p["v"], 0.0])
     time = float(np.linalg.norm(slip)) * k / ((1.0 + k) * p["mu"] * p["g"])
     lost = slip * k / (1.0 + k)
@@ -59,7 +59,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Coulomb's law along a slip whose direction is constant."""
+    """Coulomb's law along a slip of constant direction."""
     p = scene.params
     time, place, velocity = _rolling(p, p["radius"])
     end = place + velocity * (scene.duration - time)
@@ -76,7 +76,7 @@ def exact(scene: Scene) -> dict[str, float]:
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     """Velocity and place at the end; the angle by which the slip's direction changes before it is nearly gone.
 
-    The last step may end some time before or after the scene's duration: the place is told at that, straight on.
+    The last step may end before or after the scene's duration: the place is extrapolated to that.
     """
     p = scene.params
     velocity, spin = trajectory.twist[:, 1, :2], trajectory.twist[:, 1, 3:]
@@ -99,10 +99,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As a slide that ends in rolling: velocities exact on their arm, places shifted by step order and a late contact.
+    """As for a slide that ends in rolling: exact velocities, places shifted by the scheme and a late contact.
 
-    On an arm that is shorter by a depth h the slip is off by w h; told with the radius while the slip is at least a
-    quarter of the first, its direction is off by 4 w h/|u0|.
+    On a lever arm shorter by a depth h the slip has the error w h; measured with the radius while the slip is at least
+    a quarter of the first, its direction has the error 4 w h/|u0|.
     """
     p, r = scene.params, scene.params["radius"]
     depth = p["g"] * dt * dt
@@ -126,7 +126,8 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
     turned = bounds.Bound(
         4.0 * float(np.linalg.norm(_spin(p))) * depth / slip + bounds.ROUND_OFF * fastest / slip,
-        "friction keeps the slip's direction; told with the radius it is off by 4 w g dt^2/|u0| at a quarter of it",
+        "friction keeps the direction of the slip; measured with the radius it is off by 4 w g dt^2/|u0| at a "
+        "quarter of it",
     )
     found = {
         "final_vx": ("m/s", velocity(0)),
@@ -154,7 +155,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Distance of the end from where it should be, over the way that friction has changed."""
+    """Distance of the end from the exact place, over the displacement by friction."""
     p, truth, off = scene.params, exact(scene), []
     for name in ("end_x", "end_y"):
         value, reason = found[name]
@@ -175,8 +176,10 @@ SCENE = CanonicalScene(
     dimensions=(3,),
     parameters=(
         Parameter("v", 2.0, "m/s", "of the centre, along x", 0.0, 1e2, positive=True),
-        Parameter("side", 3.0, "m/s", "of the surface at the floor by spin, across the motion", -1e2, 1e2),
-        Parameter("back", 1.0, "m/s", "of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2),
+        Parameter("side", 3.0, "m/s", "speed of the surface at the floor by spin, across the motion", -1e2, 1e2),
+        Parameter(
+            "back", 1.0, "m/s", "speed of the surface at the floor by spin, along the motion: backspin", -1e2, 1e2
+        ),
         Parameter("mu", 0.2, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
         standard_gravity(),
@@ -196,8 +199,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "place error",
         "1",
-        "distance of the end from where it should be, over how far friction moves the end",
-        "friction whose direction is wrong for a moment shows in where the ball goes",
+        "distance of the end from the exact place, over the distance by which friction moves it",
+        "friction in a wrong direction, even for a moment, changes where the ball goes",
         lambda dt: [{}],
         error,
         "the whole scene: the ball slides askew, then rolls",

@@ -6,8 +6,8 @@ r"""A ball is thrown at the floor with spin: it grips, slips or comes back.
     ========|/=====           slips otherwise:
                                  v' = v -+ mu (1 + e) v_n,      w' r = w r +- mu (1 + e) v_n/k
 
-Coulomb's law of friction for an impact, with Newton's restitution along the normal; no gravity. Backspin that is fast
-enough sends the ball back: v' < 0 where -k w r > v, what a table tennis ball does.
+Coulomb's law of friction for an impact, with Newton's restitution along the normal; no gravity. Enough backspin sends
+the ball back: v' < 0 where -k w r > v, as with a table tennis ball.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """One contact: exact at every step, but that the ball is found up to one step of its fall inside the floor."""
+    """One contact: exact at every step, except that the ball is found up to one step of its motion inside the floor."""
     p, r = scene.params, scene.params["radius"]
     depth, scale = p["fall"] * dt, abs(p["v"]) + abs(p["spin"]) + p["fall"]
     source = "Coulomb's law of friction for an impact, Newton's law of restitution; angular momentum"
@@ -114,7 +114,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Distance of speed and spin from theirs, over the slip at the start."""
+    """Distance of speed and spin from the exact ones, over the slip at the start."""
     truth, p, off = exact(scene), scene.params, []
     for name in ("forward_speed", "spin_speed"):
         value, reason = found[name]
@@ -135,11 +135,18 @@ SCENE = CanonicalScene(
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 3.0, "m/s", "along the floor", 0.0, 1e2),
-        Parameter("spin", 0.0, "m/s", "of the surface, w r; positive: rolls along, negative: backspin", -1e3, 1e3),
+        Parameter(
+            "spin",
+            0.0,
+            "m/s",
+            "speed of the surface by spin, w r; positive: as in rolling, negative: backspin",
+            -1e3,
+            1e3,
+        ),
         Parameter("fall", 2.0, "m/s", "of the approach, v_n", 0.0, 1e2, positive=True),
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("mu", 0.5, "1", "friction of the pair; 0.5: the ball grips", 0.0, 10.0),
-        Parameter("heading", 0.0, "degrees", "of the motion against the axes; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the motion to the axes; 3-D only", 0.0, 90.0),
         delay(),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
         mass_of("the ball"),
@@ -165,8 +172,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"distance of speed and spin from theirs over the slip, worst of gripping and slipping, {PHASES} contact times",
-        "friction of an impact has two answers and a limit between them: both must be right, in speed and in spin",
+        f"distance of speed and spin from the exact ones, over the slip, worst of gripping and slipping, {PHASES} "
+        "contact times",
+        "an impact with friction either grips or slips, with a limit between: both must be right, in speed and spin",
         lambda dt: [cell | phase for cell in ({}, {"mu": 0.1}) for phase in phases(dt)],
         error,
         "the whole scene: approach, contact, departure",

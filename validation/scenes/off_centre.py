@@ -7,15 +7,15 @@
         +----------------+       ball: v' = v - J/m   (down is positive)
              |-d-|
 
-The face is smooth, so that nothing acts along it, and the bar may move towards the ball. With d = 0 the law of two
-balls is left; far out the bar gives way, as if it were lighter.
+The face is smooth, so no force acts along it, and the bar may move towards the ball. With d = 0 it is the law of two
+balls; far out the bar yields as if it were lighter.
 
-A bar that spins already with w gives way at d, or comes to meet the ball: they close with u = v - V - d w in place of
-v - V, and the spin is w + d J/I. The bar is level when it is struck.
+A bar with an initial spin w recedes or approaches at d: the closing speed is u = v - V - d w instead of v - V, and the
+spin is w + d J/I. The bar is level when it is struck.
 
-A bar that turns with w comes back at the ball: seen along its normal the ball, H above the bar's centre, closes with
-H w^2 and is met again after some 2 e u/(H w^2). A scene in which that is within its time has another answer, and is
-refused, as is one in which a spinning bar would have met the ball before; with e = 0 they do not part at all.
+A bar that turns with w hits the ball again: along its normal the ball, H above the bar's centre, accelerates towards it
+with H w^2 and is hit again after some 2 e u/(H w^2). A scene with a second blow within its time has another solution,
+and is refused, as is one in which a spinning bar would have hit the ball before; with e = 0 they do not separate.
 """
 
 from __future__ import annotations
@@ -58,21 +58,21 @@ def _moment(params: Params) -> float:
 
 @dataclass(frozen=True)
 class Blow:
-    """What a blow leaves: velocities up and sideways [m/s], spin of the bar [rad/s], impulse [N s]."""
+    """Result of a blow: velocities up and sideways [m/s], spin of the bar [rad/s], impulse [N s]."""
 
     ball_speed: float
     bar_speed: float
     spin: float
     impulse: float
     sideways: float
-    #: Energy of the closing speed at the point that is struck, k u^2/2 [J].
+    #: Energy of the closing speed at the struck point, k u^2/2 [J].
     available: float
 
 
 def _blow(p: Params, late: float = 0.0) -> Blow:
     """The blow ``late`` seconds after the bar is level and the two touch: bar turned by w t, ball gone on by (v - V) t.
 
-    Seen from the bar's centre the ball is at (-d, H - (v - V) t), the bar's normal is (-sin(w t), cos(w t)).
+    Relative to the bar's centre the ball is at (-d, H - (v - V) t), the bar's normal is (-sin(w t), cos(w t)).
     """
     m, big, moment, closing = p["mass"], p["ratio"] * p["mass"], _moment(p), p["v"] + p["rise"]
     c, s = math.cos(p["whirl"] * late), math.sin(p["whirl"] * late)
@@ -91,12 +91,12 @@ def _blow(p: Params, late: float = 0.0) -> Blow:
 
 
 def _struck(p: Params) -> float:
-    """Speed [m/s] with which the two close at the point that is struck."""
+    """Closing speed [m/s] at the struck point."""
     return p["v"] + p["rise"] - p["whirl"] * p["offset"]
 
 
 def _meets(p: Params, until: float, closing: float, spin: float) -> float | None:
-    """First time of 256 up to ``until`` [s] at which ball and bar overlap but for the blow at 0; None if they do not.
+    """First of 256 times up to ``until`` [s] at which ball and bar overlap again; None if they do not.
 
     Both move freely from there: along the bar's normal they are ``d sin(w t) + (H - c t) cos(w t) - H`` apart, where c
     is the speed with which their centres close in.
@@ -114,11 +114,11 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the bar turns back at the ball within the scene's time, or away from it before they have met.
+        If the bar hits the ball again within the scene's time, or before.
     """
     p, struck = params, _struck(params)
     if struck <= 0.0:
-        raise SceneError(f"off_centre.whirl: with {p['whirl']:g} rad/s the bar gives way faster than the ball comes")
+        raise SceneError(f"off_centre.whirl: with {p['whirl']:g} rad/s the bar recedes faster than the ball approaches")
     before = _meets(p, -p["delay"], p["v"] + p["rise"], p["whirl"])
     if before is not None:
         raise SceneError(
@@ -149,7 +149,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's law at the point that is struck, with the bar's own mass there."""
+    """Newton's law at the struck point, with the bar's effective mass there."""
     p = scene.params
     blow = _blow(p)
     truth = {
@@ -164,10 +164,10 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Velocities at the end; energy in units of what the closing speed has at the point that is struck.
+    """Velocities at the end; energy over that of the closing speed at the struck point.
 
-    Sideways nothing may move where the bar is level whenever it is struck; where it spins already the two together may
-    not, and angular momentum tells whether each was pushed at the same place.
+    Without initial spin the bar is level at the blow, and nothing may move sideways; with spin only the common centre
+    may not, and angular momentum shows whether both were pushed at the same place.
     """
     p, d = scene.params, scene.dimension
     m, big = p["mass"], p["ratio"] * p["mass"]
@@ -201,14 +201,14 @@ def _turning(twist: Array, dimension: int) -> float:
 
 
 def _energy(scene: Scene, twist: Array) -> float:
-    """Kinetic energy [J] of all, ``twist`` of (2, 3) or (2, 6), without what the ball's own spin has."""
+    """Kinetic energy [J] of both, ``twist`` of (2, 3) or (2, 6), without the ball's spin."""
     p, d = scene.params, scene.dimension
     moving = float(p["ratio"] * p["mass"] * (twist[0, :d] ** 2).sum() + p["mass"] * (twist[1, :d] ** 2).sum())
     return 0.5 * (moving + _moment(p) * _turning(twist[0], d) ** 2)
 
 
 def _angular(scene: Scene, pose: Array, twist: Array) -> float:
-    """Angular momentum of all in the plane of motion [kg m^2/s], counter-clockwise about the foot of the ball's way.
+    """Angular momentum of both in the plane of motion [kg m^2/s], counter-clockwise about the foot of the ball's path.
 
     ``pose`` and ``twist`` are those of bar and ball, rows of a record.
     """
@@ -220,16 +220,16 @@ def _angular(scene: Scene, pose: Array, twist: Array) -> float:
 
 
 def _swing(p: Params) -> float:
-    """Angular momentum that there is [kg m^2/s]: the bar's own, and what the ball brings at its distance."""
+    """Total angular momentum [kg m^2/s]: of the bar, and of the ball at its distance."""
     return _moment(p) * abs(p["whirl"]) + p["mass"] * (p["v"] + p["rise"]) * p["offset"]
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The face is smooth, and level until the blow unless the bar spins: exact whenever within a step it is found."""
+    """The face is smooth, and level until the blow unless the bar spins: exact at every phase of the step."""
     p, blow = scene.params, _blow(scene.params)
     closing = p["v"] + p["rise"] + abs(p["whirl"]) * p["offset"]
     source = "Newton's law of restitution at the point that is struck; conservation of momentum and angular momentum"
-    # A difference of energies: round-off of all of them, in units of what there is to lose.
+    # A difference of energies: round-off of all of them, over the energy of the blow.
     there = 0.5 * p["mass"] * (p["v"] ** 2 + p["ratio"] * p["rise"] ** 2) + 0.5 * _moment(p) * p["whirl"] ** 2
     scales = {
         "ball_speed": ("m/s", closing),
@@ -241,7 +241,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     defect = bounds.bookkeeping().check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum")
     if not p["whirl"]:
         return [*bounds.exact_laws(scales, truth, source), defect]
-    because = "the blow is found up to a step late, or ahead by as much, when the bar is turned by w dt: the law there"
+    because = "the blow is found up to a step late or early, when the bar has turned by w dt: the law there"
     off = dict.fromkeys((*scales, "sideways"), 0.0)
     for turned in (_blow(p, -dt), _blow(p, dt)):
         taken = (1.0 - p["e"] ** 2) * turned.available / blow.available
@@ -252,19 +252,19 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         bounds.Bound(off[name] + bounds.ROUND_OFF * scale, because).check(name, unit, truth[name], source)
         for name, (unit, scale) in scales.items()
     ]
-    # Two arms that are a step's way apart across the normal; what is added are momenta times places.
+    # Two lever arms a step's motion apart across the normal; the terms are momenta times positions.
     apart = blow.impulse * closing * dt * abs(math.sin(p["whirl"] * dt))
     sizes = p["mass"] * closing * (WIDTH + closing * scene.duration)
     swung = bounds.Bound(
         (apart + bounds.ROUND_OFF * sizes) / _swing(p),
-        "what a step finds acts where they are within it: their way in a step, across a normal that turns by w dt",
+        "the blow acts somewhere within their motion of a step, across a normal that turns by w dt",
     )
     turning = swung.check("angular_defect", "1", truth["angular_defect"], "conservation of angular momentum")
     return [*found, defect, turning]
 
 
 def track(scene: Scene) -> Track:
-    """The ball: straight down, then with what the blow leaves it."""
+    """The ball: straight down, then with its speed after the blow."""
     p = scene.params
     height = between_impacts(RADIUS + p["v"] * p["delay"], -p["v"], [(p["delay"], exact(scene)["ball_speed"])])
     return Track("ball", lambda t: along(scene.dimension, -p["offset"], height(t)))
@@ -297,9 +297,7 @@ SCENE = CanonicalScene(
         Parameter("e", 0.8, "1", "coefficient of restitution of the pair", 0.0, 1.0),
         Parameter("v", 3.0, "m/s", "of the ball, downwards", 0.0, 1e2, positive=True),
         Parameter("rise", 1.0, "m/s", "of the bar, upwards: both move", 0.0, 1e2),
-        Parameter(
-            "whirl", 0.0, "rad/s", "spin of the bar before; above 0 it gives way where it is struck", -10.0, 10.0
-        ),
+        Parameter("whirl", 0.0, "rad/s", "spin of the bar before; above 0 the struck point recedes", -10.0, 10.0),
         delay(),
         mass_of("the ball", 0.5),
     ),
@@ -324,7 +322,7 @@ SCENE = CanonicalScene(
         "velocity error",
         "1",
         f"largest error of the ball's, the bar's and its end's speed over the closing speed, {PHASES} contact times",
-        "a blow beside the centre tests what a central one cannot: the mass that a turning body has where it is struck",
+        "a blow beside the centre tests the effective mass of a turning body at the struck point",
         phases,
         error,
         "the whole scene: approach, blow, departure",
@@ -333,9 +331,9 @@ SCENE = CanonicalScene(
         "ball_speed": "sends the ball off with {value}",
         "bar_speed": "leaves the bar with {value}",
         "spin": "turns the bar with {value}",
-        "energy_lost": "takes {value} of the energy that the blow has",
-        "energy_lost<0": "adds {value} of the energy that the blow has",
+        "energy_lost": "loses {value} of the energy of the blow",
+        "energy_lost<0": "gains {value} of the energy of the blow",
         "angular_defect": "changes the angular momentum by {value} (relative)",
-        "sideways": "throws ball or bar aside with {value}",
+        "sideways": "moves ball or bar sideways with {value}",
     },
 )

@@ -5,8 +5,8 @@
         [_____]                   and n blocks reach  L/2 (1 + 1/2 + ... + 1/n)  beyond the first
     =====================         a share ``margin`` less stands, a share more falls
 
-Each face carries a weight that is all but at its end. A block that gives by a hair, or a slop that lets it, is enough
-to bring the stack down where the margin is small.
+Each face carries a weight almost at its end. With a small margin, a block that yields a little, or a slop, is enough to
+bring the stack down.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from validation.scenes.parts import at, block, floor, upward
 from validation.truths import columns
 
 LENGTH, HEIGHT = 2.0, 0.5
-#: Half of what a block has turned by at least that leans on the one below with its end on the floor [rad].
+#: Half the least rotation of a fallen block, which leans on the one below with its end on the floor [rad].
 LEANS = 0.5 * HEIGHT / LENGTH
 
 
@@ -47,21 +47,21 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Equilibrium on this side of the limit; beyond it only that the stack falls."""
+    """Equilibrium below the limit; beyond it only that the stack falls."""
     return {"stands": 1.0} | columns.exact(scene) if scene.params["margin"] > 0.0 else {"stands": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """As of a column, and whether the block on top is still up: half a block lower, or leaning, it is not."""
+    """As for a column, and whether the block on top is still up: not half a block lower, nor inclined."""
     _, sunk, turned = (float(change) for change in trajectory.pose[-1, -1] - trajectory.pose[0, -1])
     stands = 1.0 if abs(sunk) < 0.5 * HEIGHT and abs(turned) < LEANS else 0.0
     return {"stands": (stands, "")} | columns.measure(scene, trajectory)
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A column whose loads are at its edges: the bounds are those of any column."""
-    told = bounds.Bound(0.5, "it stands or it falls; half a block lower, or leaning, is fallen")
-    found = [told.check("stands", "1", truth["stands"], "the centre of mass of each part lies over what carries it")]
+    """The bounds of a column."""
+    told = bounds.Bound(0.5, "it stands or falls; half a block lower, or inclined, counts as fallen")
+    found = [told.check("stands", "1", truth["stands"], "the centre of mass of each part lies over its support")]
     return found + (columns.checks(scene, dt, truth) if scene.params["margin"] > 0.0 else [])
 
 
@@ -80,10 +80,10 @@ SCENE = CanonicalScene(
     dimensions=(2,),
     parameters=(
         Parameter("n", 4.0, "1", "number of blocks", 2.0, 20.0, integer=True),
-        Parameter("margin", 0.05, "1", "share of each step that is left; below 0 it falls", -0.5, 1.0),
+        Parameter("margin", 0.05, "1", "share of each overhang left as a margin; below 0 it falls", -0.5, 1.0),
         Parameter("mu", 0.5, "1", "friction of all pairs", 0.0, 10.0, positive=True),
         Parameter("g", GRAVITY, "m/s^2", "gravity", 0.0, 1e3, positive=True),
-        Parameter("duration", 4.0, "s", "of the run; beyond the limit it takes time to fall", 1.5, 100.0),
+        Parameter("duration", 4.0, "s", "of the run; beyond the limit a fall takes time", 1.5, 100.0),
         Parameter("mass", 1.0, "kg", "of each block", 0.0, 1e6, positive=True),
     ),
     make=make,
@@ -98,7 +98,7 @@ SCENE = CanonicalScene(
         "displacement",
         "block heights",
         "larger of the drift and of the deepest overlap",
-        "what does not stand shows in both",
+        "a stack that falls shows in both",
         lambda dt: [{}],
         error,
         "the resting stack",

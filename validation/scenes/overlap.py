@@ -1,14 +1,14 @@
-"""Two balls start inside each other in free space, moving side by side: an overlap is no spring.
+"""Two balls start with an overlap in free space, moving side by side: an overlap is not a spring.
 
        ,---.---.    ^
       (  o  ( ) o  ) | v    against each other 0 -> 0: no energy is in an overlap,
        `---'---'    |       the common centre goes straight on,
            |<>| depth       and the overlap does not grow
 
-Rigid bodies do not overlap, and no law of theirs says how fast they come apart; but nothing may be thrown. Whoever
-takes an overlap out by a velocity leaves the bodies flying: a share beta of the depth taken out within a step is a
-speed beta depth/dt, which depends on the step and on nothing physical. The motion that they share changes nothing: by
-it a run knows which speeds are large.
+Rigid bodies do not overlap, and rigid-body mechanics does not define how fast they separate; but they must not be
+thrown. Correcting an overlap by a velocity leaves the bodies in motion: a share beta of the depth within a step is a
+speed beta depth/dt, which depends on the step and on nothing physical. The common motion does not matter; it is the
+scale of speeds.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Nothing acts: energy and momentum stay nothing."""
+    """Without forces energy and momentum stay 0."""
     return {"thrown": 0.0, "centre_moved": 0.0, "grown": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest relative speed, way of the common centre along the line, growth of the overlap, and what is left."""
+    """Largest relative speed, motion of the common centre along the line, growth of the overlap, and its rest."""
     d = scene.dimension
     masses = np.array([body.mass for body in scene.bodies])
     relative = trajectory.twist[:, 1, :d] - trajectory.twist[:, 0, :d]
@@ -61,15 +61,15 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Conservation laws hold at every step; what is left is shown, for no law says when it has to be gone."""
+    """Conservation laws hold at every step; the rest of the overlap is shown only, as no law defines its decay."""
     deep = scene.params["depth"] * RADIUS
     source = "conservation of energy and momentum: a contact that does not close does no work"
     thrown = bounds.Bound(
         bounds.ROUND_OFF * (deep / dt + scene.params["v"]),
-        "exact law at every dt: round-off of the speed that takes the depth out in a step",
+        "exact law at every dt: round-off of the speed that removes the overlap in a step",
     )
     reach = RADIUS + scene.params["v"] * scene.duration
-    placed = bounds.Bound(bounds.ROUND_OFF * reach, "exact law at every dt: round-off of places")
+    placed = bounds.Bound(bounds.ROUND_OFF * reach, "exact law at every dt: round-off of positions")
     return [
         thrown.check("thrown", "m/s", truth["thrown"], source),
         placed.check("centre_moved", "m", truth["centre_moved"], source),
@@ -79,20 +79,20 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
             "1",
             None,
             None,
-            "shown: no law of rigid bodies says how fast an overlap has to go",
+            "shown: rigid-body mechanics does not define how fast an overlap is corrected",
             "depth at the end over that at the start",
         ),
     ]
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Speed that the overlap has given, over the speed that takes it out in one step."""
+    """Speed caused by the overlap, over the speed that removes it in one step."""
     value, reason = found["thrown"]
     return (None, reason) if value is None else (value * dt / (scene.params["depth"] * RADIUS), "")
 
 
 def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
-    """How it ended, if an overlap was more than a start that cannot be: one word, or nothing."""
+    """How it failed, as one word, or nothing."""
     thrown, moved, grown = (found[name][0] for name in ("thrown", "centre_moved", "grown"))
     if thrown is None or moved is None or grown is None:
         return "no answer"
@@ -113,7 +113,7 @@ SCENE = CanonicalScene(
         "overlapping bodies fly apart",
     ),
     figure=__doc__ or "",
-    law="no speed comes of an overlap, the common centre stays; an overlap is no spring",
+    law="an overlap causes no speed and does not move the common centre; it is not a spring",
     dimensions=(2, 3),
     parameters=(
         Parameter("depth", 0.5, "radii", "of the overlap at the start", 0.0, 1.0, positive=True),
@@ -133,8 +133,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "thrown",
         "depth/dt",
-        "largest relative speed, over the speed that takes the overlap out in one step",
-        "the share of an overlap that an engine turns into motion, in the unit in which it does",
+        "largest relative speed, over the speed that removes the overlap in one step",
+        "the share of an overlap that an engine turns into motion",
         lambda dt: [{}],
         error,
         "the two balls coming apart",
@@ -148,8 +148,8 @@ SCENE = CanonicalScene(
             1.0,
             1.0,
             fate,
-            "came apart more slowly than both move on (1 m/s), their centre within a tenth of a radius, no deeper by a "
-            "tenth of the overlap",
+            "separated more slowly than both move on (1 m/s), with their centre within a tenth of a radius, and no "
+            "deeper by a tenth of the overlap",
         ),
     ),
     words={

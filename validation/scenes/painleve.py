@@ -7,8 +7,8 @@ r"""A rod is pushed along the floor, its lower end ahead: it slides, or it jams 
        a          beyond: an impact without a collision stops the end at once, w = -b v/(i^2 + a^2 + b^2)
 
 [P. Painleve, Comptes Rendus 121 (1895) 112; F. Genot, B. Brogliato, Eur. J. Mech. A/Solids 18 (1999) 653.] The stop
-takes the impulse that holds the end in both directions, friction over pressure (i^2 + a^2)/(a b): it is within the cone
-just where sliding is not possible. It does not depend on the step. Afterwards the rod turns about its end.
+needs an impulse that holds the end in both directions, with friction over pressure (i^2 + a^2)/(a b): it lies within
+the cone exactly where sliding is not possible. It does not depend on the step. Afterwards the rod turns about its end.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from validation.truths.corners import landing_corner
 from validation.truths.leaning import Turn, turn
 from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
-#: Turn at which the rod is told [rad], to either side.
+#: Rotation at which the rod is measured [rad], to either side.
 TOLD = math.radians(3.0)
-#: Goes on for this long [s]: whoever is late by what a step of 1/60 s may cost is told as well.
+#: Time of the run beyond that [s], for runs that are late by the error of a step of 1/60 s.
 AFTERMATH = 0.1
-#: Angles on the way at which the grip of the end is asked.
+#: Number of angles at which the grip of the end is checked.
 ASKED = 50
 
 
 def _tilt(p: Params) -> float:
-    """Turn of the rod from upright at the start [rad], counter-clockwise: its lower end to the right."""
+    """Angle of the rod to the vertical at the start [rad], counter-clockwise: its lower end to the right."""
     return math.radians(90.0 - p["lean"])
 
 
@@ -48,7 +48,7 @@ def _gyration(p: Params) -> float:
 
 
 def _arm(p: Params, tilt: float) -> tuple[float, float]:
-    """The lower end against the centre: a to the right, and b below [m]."""
+    """The lower end relative to the centre: a to the right, and b below [m]."""
     across, below = landing_corner(p["aspect"] * p["length"], p["length"], tilt)
     return -across, below
 
@@ -65,7 +65,7 @@ def friction(p: Params) -> float:
 
 
 def _acceleration(p: Params, tilt: float, square: float) -> tuple[float, float]:
-    """Angular acceleration [rad/s^2] of the rod whose end slides, and what friction takes off its speed [m/s^2].
+    """Angular acceleration [rad/s^2] of the rod with a sliding end, and its deceleration by friction [m/s^2].
 
     Moments about the centre, N (a - mu b), and the height b of the centre, whose derivative by the tilt is -a.
     """
@@ -90,7 +90,7 @@ def _key(p: Params) -> tuple[tuple[str, float], ...]:
 
 
 def _vault(p: Params) -> tuple[Pivot, float, float, float]:
-    """The rod on its end: angles of its diagonal at the start and where it is told, and its spin between (start)."""
+    """The rod on its end: angles of its diagonal at the start and at the measurement, and its spin at the start."""
     on = Pivot(p["aspect"] * p["length"], p["length"], p["g"])
     start = on.alpha - _tilt(p)
     _, b = _arm(p, _tilt(p))
@@ -103,12 +103,12 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the rod does not lean over its end, the end would stop or lift before the rod is told, or friction would not
-        hold it once it has jammed.
+        If the rod does not lean over its end, the end would stop or lift before the measurement, or friction would not
+        hold it after the jam.
     """
     p = params
     if _arm(p, _tilt(p))[0] <= 0.0:
-        raise SceneError(f"painleve.lean: at {p['lean']:g} degrees a rod so thick stands over its end: nothing jams it")
+        raise SceneError(f"painleve.lean: at {p['lean']:g} degrees a rod so thick stands over its end and cannot jam")
     if p["ratio"] < 1.0:
         found = _slides(_key(p))
         if found is None:
@@ -136,7 +136,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's and Euler's laws of a rod whose end slides, or angular momentum about the end that jams."""
+    """Newton's and Euler's laws of a rod with a sliding end, or angular momentum about the jamming end."""
     p = scene.params
     if p["ratio"] < 1.0:
         found = _slides(_key(p))
@@ -151,7 +151,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Passage through the told turn, speed lost until then, and way of the lower end."""
+    """Passage through the measured rotation, speed lost until then, and motion of the lower end."""
     p, t = scene.params, trajectory.t
     turned, rate = metrics.tilt(trajectory) - _tilt(p), metrics.tilt_rate(trajectory)
     end = metrics.point(trajectory, 1, (-0.5 * p["aspect"] * p["length"], -0.5 * p["length"]))
@@ -173,10 +173,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Steps of first order: half a step of acceleration by their order, one for a contact that is found late.
+    """First-order schemes: half a step of acceleration by their order, one for a contact that is found late.
 
-    Steps carry the end off the floor, arm (w dt)^2/2 each; what it is off by is taken as a start that leans otherwise.
-    What jams may slide on for the step in which its contact is found.
+    Steps lift the end off the floor, arm (w dt)^2/2 each; that error is treated as another initial angle. A jamming end
+    may slide for the step in which its contact is found.
     """
     p, g = scene.params, scene.params["g"]
     if p["ratio"] >= 1.0:
@@ -193,7 +193,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     late = 1.5 * dt
     fast = max(abs(_acceleration(p, _tilt(p) + side * TOLD, 0.0)[0]) for side in (-1.0, 0.0, 1.0))
     brake = max(_acceleration(p, _tilt(p) + side * TOLD, 0.0)[1] for side in (-1.0, 0.0, 1.0))
-    because = "half a step by the order of a step, one for a contact found late, and an end that steps carry away"
+    because = "half a step by the order of the scheme, one for a contact found late, and an end that steps move"
     time = late + max(abs(other.time - found_turn.time) for other in others)
     spin_off = late * fast + max(abs(other.spin - found_turn.spin) for other in others)
     lost = late * brake + max(abs(other.gathered - found_turn.gathered) for other in others)
@@ -202,14 +202,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         bounds.Bound(time, because).check("turning_time", "s", truth["turning_time"], source),
         bounds.Bound(spin_off, because).check("turning_spin", "rad/s", truth["turning_spin"], source),
         bounds.Bound(lost, because).check("slowed", "m/s", truth["slowed"], source),
-        bounds.Bound(carried + bounds.ROUND_OFF * p["length"], "steps carry it, arm (w dt)^2/2 each; g dt^2").check(
+        bounds.Bound(carried + bounds.ROUND_OFF * p["length"], "steps move it, arm (w dt)^2/2 each; g dt^2").check(
             "lifted", "m", truth["lifted"], "the end stays on the floor"
         ),
     ]
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the spin where the rod is told, relative to it."""
+    """Relative error of the rod's spin at the measurement."""
     metric = "passing_spin" if scene.params["ratio"] >= 1.0 else "turning_spin"
     value, reason = found[metric]
     return (None, reason) if value is None else (abs(value / exact(scene)[metric] - 1.0), "")
@@ -225,8 +225,15 @@ SCENE = CanonicalScene(
     law="jams at once where mu > (1 + 3 c^2)/(3 s c), with w = -b v/(i^2 + a^2 + b^2); else slides",
     dimensions=(2,),
     parameters=(
-        Parameter("ratio", 1.2, "1", "friction over that beyond which the end cannot slide", 0.01, 5.0),
-        Parameter("lean", 60.0, "degrees", "of the rod over the floor; near where the least friction jams", 20.0, 80.0),
+        Parameter("ratio", 1.2, "1", "friction over the limit beyond which the end cannot slide", 0.01, 5.0),
+        Parameter(
+            "lean",
+            60.0,
+            "degrees",
+            "angle of the rod to the floor; near the angle that jams with the least friction",
+            20.0,
+            80.0,
+        ),
         Parameter("v", 6.0, "m/s", "of the rod along the floor", 0.0, 1e3, positive=True),
         Parameter("length", 10.0, "m", "of the rod: the longer, the slower it turns", 0.0, 1e3, positive=True),
         Parameter("aspect", 0.02, "1", "thickness over length of the rod", 0.0, 0.2, positive=True),
@@ -244,8 +251,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "spin error",
         "1",
-        "error of the spin with which the rod turns, relative to it, jammed and sliding",
-        "whether the end stops at once, and with what spin, is what no smooth law says",
+        "relative error of the spin of the rod, jammed and sliding",
+        "no smooth law predicts whether the end stops at once, and with which spin",
         lambda dt: [{}, {"ratio": 0.6}],
         error,
         "the whole scene: the end jams and the rod rises on it",

@@ -6,9 +6,9 @@
         v      v                        a    e11 mu11     e12 mu12
     ================ floor              b    e21 mu21     e22 mu22 = cross x (what a product would give)
 
-Every impact slips, so that its friction is told by mu = (change along)/(change across), and its restitution by the
-ratio of speeds; without gravity, and with the balls in lanes of their own. With ``cross`` 1 the table is
-made of products of one number per body; else of no rule at all, which an engine that combines two numbers cannot do.
+Every impact slips, so its friction is mu = (change along)/(change across), and its restitution the ratio of speeds;
+without gravity, and with the balls in separate lanes. With ``cross`` 1 the table consists of products of one value per
+body; otherwise of no rule, which an engine that combines two values cannot represent.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from validation.truths.rolling import gyration, launched, struck
 RADIUS, GAP, LANE = 0.5, 1.0, 5.0
 #: Runs for this long after the last impact [s]: softest engine compared keeps contact for about 0.05 s.
 AFTERMATH = 0.35
-#: Names of the pairs, in the order of their numbers.
+#: Names of the pairs, in order.
 PAIRS = (("a", "floor"), ("a", "ceiling"), ("b", "floor"), ("b", "ceiling"))
 #: Restitution and friction of the first three; the fourth follows from ``cross``.
 RESTITUTION, FRICTION = (0.9, 0.6, 0.6), (0.2, 0.1, 0.1)
@@ -44,7 +44,7 @@ def materials(p: Params) -> list[tuple[float, float]]:
 
 
 def _times(p: Params) -> list[tuple[float, float]]:
-    """Times [s] at which each ball meets the floor and the ceiling."""
+    """Times [s] at which each ball hits the floor and the ceiling."""
     found = materials(p)
     return [(p["delay"], p["delay"] + GAP / (found[first][0] * p["fall"])) for first in (0, 2)]
 
@@ -74,7 +74,7 @@ def make(dimension: int, params: Params) -> Scene:
             v, w = struck(v, side * w, (1.0 + e) * up, mu, k, RADIUS, RADIUS)
             w, up = side * w, e * up
     pairs = [Pair(one, other, restitution=e, friction=mu) for (one, other), (e, mu) in zip(PAIRS, found, strict=True)]
-    # The balls never meet; whatever is said of them, a product of two numbers can be made of it.
+    # The balls never touch; their pair gets values that keep a table of products possible.
     pairs.append(Pair("a", "b", restitution=0.5, friction=0.1))
     duration = max(last for _, last in _times(p)) + AFTERMATH
     return Scene("pair_matrix", 1, dimension, tuple(bodies), tuple(pairs), upward(dimension, 0.0), duration, p)
@@ -101,7 +101,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def _realised(before: Array, after: Array) -> tuple[Measured, Measured]:
-    """Restitution and friction that an impact has shown, from velocities (along, up)."""
+    """Restitution and friction of an impact, from velocities (along, up)."""
     across = abs(float(after[1] - before[1]))
     if not after[1] * before[1] <= 0.0 or across == 0.0:
         return (None, "it does not come back"), (None, "it does not come back")
@@ -109,11 +109,11 @@ def _realised(before: Array, after: Array) -> tuple[Measured, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """One contact at a time and no external force: exact at every step; an impulse that slips knows no arm."""
+    """One contact at a time and no external force: exact at every step, with slip for any lever arm."""
     p, found = scene.params, materials(scene.params)
     scales: dict[str, tuple[str, float]] = {}
     for n, (e, _) in enumerate(found, 1):
-        # The ceiling is met with what the floor has left of the speed.
+        # The ball reaches the ceiling with its speed after the floor.
         approach = p["fall"] * (found[n - 2][0] if n % 2 == 0 else 1.0)
         scales[f"restitution[{n}]"] = ("1", p["fall"] / approach)
         scales[f"friction[{n}]"] = ("1", p["v"] / ((1.0 + e) * approach))
@@ -138,10 +138,12 @@ SCENE = CanonicalScene(
     symptoms=("friction or restitution of two materials is combined wrongly",),
     family="materials",
     figure=__doc__ or "",
-    law="each pair bounces with its own e and slips with its own mu, whatever its bodies do in other pairs",
+    law="each pair rebounds with its own e and slips with its own mu, independent of other pairs",
     dimensions=(2, 3),
     parameters=(
-        Parameter("cross", 1.0, "1", "fourth pair over what products would give; 1: products", 0.1, 1.5),
+        Parameter(
+            "cross", 1.0, "1", "values of the fourth pair over those of products of factors; 1: products", 0.1, 1.5
+        ),
         Parameter("v", 6.0, "m/s", "along the floor; fast enough to slip", 0.0, 1e3, positive=True),
         Parameter("fall", 2.0, "m/s", "of the approach", 0.0, 1e2, positive=True),
         delay("the floor"),
@@ -159,7 +161,7 @@ SCENE = CanonicalScene(
         "coefficient error",
         "1",
         f"largest error of a pair's e or mu of four pairs, over {PHASES} contact times within a step",
-        "what a pair realises is what all other scenes assume of it",
+        "all other scenes rely on the materials of a pair",
         phases,
         error,
         "the whole scene: four impacts",

@@ -1,4 +1,4 @@
-"""Bodies and directions that the canonical scenes share, in two and three dimensions."""
+"""Bodies and directions shared by the canonical scenes, in two and three dimensions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.trajectory import Sampling
 from validation.canonical import GRAVITY, Parameter
 
-#: Time until a first contact [s]: 12.6 steps of 1/240 s, so that it falls inside a step and not on its edge, where
-#: engines may differ by whether a touching contact counts.
+#: Time until a first contact [s]: 12.6 steps of 1/240 s, so that it lies inside a step and not at its end, where
+#: engines differ in whether a touching contact counts.
 DELAY = 0.0525
 #: Phases of a contact within a step; primary errors of impacts are suprema over them.
 PHASES = 16
@@ -97,12 +97,12 @@ def block(name: str, dimension: int, mass: float, width: float, height: float) -
 
 
 def phases(dt: float) -> list[dict[str, float]]:
-    """Contact times spread evenly over one step, in the middle of each of its `PHASES` parts."""
+    """Contact times distributed over one step, in the middle of each of its `PHASES` parts."""
     return [{"delay": DELAY + (k + 0.5) / PHASES * dt} for k in range(PHASES)]
 
 
 def delay(until: str = "contact") -> Parameter:
-    """The parameter that `phases` varies: time ``until`` something is met."""
+    """The parameter that `phases` varies: time ``until`` a contact."""
     because = f"time until {until}: sets its phase within a step"
     return Parameter("delay", DELAY, "s", because, 0.0, 10.0, positive=True)
 
@@ -137,7 +137,7 @@ def states_and_impulses(scene: object) -> Sampling:
 
 
 def between_impacts(start: float, speed: float, impacts: Iterable[tuple[float, float]]) -> Callable[[float], float]:
-    """Coordinate [m] over time [s] of what moves straight but for ``impacts``: times [s] and speeds after them."""
+    """Coordinate [m] over time [s] of straight motion between ``impacts``: times [s] and speeds after them."""
     known = tuple(impacts)
 
     def place(t: float) -> float:

@@ -1,4 +1,4 @@
-"""A box is held between a wall and a pad that presses on it: grip by friction alone.
+"""A box is held between a wall and a pressing pad by friction only.
 
     wall |+-----+| pad  |
          || box ||      | <-- N       sticks if W <= 2 mu N:  margin = 2 mu N/W >= 1
@@ -6,8 +6,8 @@
          |   W   |      |             wall and pad together carry W
     =====================
 
-The pad is a block on a smooth floor, pressed by a constant force through its centre, so that it carries its share of
-the weight into the floor. How wall and pad share the weight is not determined; their sum is.
+The pad is a block on a smooth floor, pressed by a constant force through its centre, and passes its share of the weight
+to the floor. The shares of wall and pad are not determined; their sum is.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Creep and turn of the box over the second half of the run; loads over the last second."""
+    """Creep and rotation of the box over the second half of the run; loads over the last second."""
     p, d, dt = scene.params, scene.dimension, trajectory.dt
     sunk = metrics.mean_rate(trajectory.t, -trajectory.pose[:, 2, d - 1])
     spin = float(np.linalg.norm(trajectory.twist[-1, 2, d:]))
@@ -61,7 +61,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     weight = p["mass"] * p["g"]
     measured["grip"] = (float(wall[:, 0].mean() / (grip(p) * dt)), "")
     measured["carried"] = (float((wall[:, -1] - pad[:, -1]).mean() / (weight * dt)), "")
-    # `pad` is what the box does to the pad.
+    # `pad` is the force of the box on the pad.
     for load, steps in (("grip", wall[:, 0] / grip(p)), ("carried", (wall[:, -1] - pad[:, -1]) / weight)):
         measured |= metrics.over_time(load, steps / dt, ("least", "greatest"))
     measured["unbalanced"] = (float(np.abs(wall[:, 0] - pad[:, 0]).max() / (grip(p) * dt)), "")
@@ -69,17 +69,17 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A box that sticks may slip by one step of fall; loads are told by the momentum of what does not move."""
+    """A sticking box may slip by one step of fall; loads follow from the momentum of bodies at rest."""
     p = scene.params
     g = p["g"]
     source = "Coulomb's law, static; equilibrium of forces"
     still = bounds.STILL * g * dt
     turn = bounds.Bound(still, "a box whose edges are slower than v1/100 = g dt/100 does not turn")
-    # What is left of v1/100 before and after the last second is momentum, towards the wall of the pad as well.
+    # Speeds of v1/100 before and after the last second are momentum, also of the pad towards the wall.
     share = bounds.carried(dt)
     heavy, light = (p["mass"] + p["pad"]) * g / grip(p), p["mass"] * g / grip(p)
     pressed = bounds.Bound(share.value * heavy, share.because)
-    # The wall and the pad push the box equally, but for what its own momentum changes by in the step.
+    # The wall and the pad push the box equally, up to its momentum change in the step.
     balance = bounds.Bound(bounds.steady().value * light, bounds.steady().because)
     return [
         bounds.stuck(g, dt, scene.duration).check("creep", "m/s", truth["creep"], source),
@@ -98,12 +98,12 @@ def sampling(scene: Scene) -> Sampling:
 
 
 def track(scene: Scene) -> Track:
-    """The box stays where it is."""
+    """The box at rest."""
     return Track("box", lambda t: scene.bodies[2].pose[: scene.dimension])
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Acceleration that leads as far astray as the creep within the run, in g."""
+    """Acceleration that moves the box as far as the creep within the run, in g."""
     value, reason = found["creep"]
     return (None, reason) if value is None else (2.0 * abs(value) / (scene.params["g"] * scene.duration), "")
 
@@ -142,7 +142,7 @@ SCENE = CanonicalScene(
         "creep",
         "g",
         "2 creep/(g T) of the box over the run T, margins 2, 1.05 and 100",
-        "a grip that creeps loses what it holds, however slowly; in the unit in which sliding on an incline is told",
+        "a grip that creeps loses its object, however slowly; the unit is that of sliding on an incline",
         lambda dt: [{}, {"margin": 1.05}, {"margin": 100.0}],
         error,
         "the held box, half a second after the start",
@@ -154,8 +154,8 @@ SCENE = CanonicalScene(
         "creep": "lets the box creep down at {value}",
         "creep<0": "lets the box creep up at {value}",
         "turned": "turns the box: its edges move with {value}",
-        "grip": "grips with {value} of the force that presses",
-        "carried": "carries {value} of the weight it holds",
+        "grip": "grips with {value} of the pressing force",
+        "carried": "carries {value} of the weight",
         "unbalanced": "grips from its two sides with forces that differ by {value} of the grip",
     },
 )

@@ -7,8 +7,8 @@ r"""A box that leans beyond its balance falls over its edge.
          \,'
     ======+===========  the edge stays where it is
 
-Friction must hold the edge, which carries less and less; and the solver must turn a body about a point that is not its
-centre. Judged are time and spin when phi passes ``to``, before the side lands, and what the edge has moved.
+Friction must hold the edge, whose load decreases, and the solver must rotate a body about a point that is not its
+centre. Time and spin are judged when phi passes ``to``, before the side lands, and so is the motion of the edge.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import along, block, floor, mass_of, standard_gravity, states, tilted, upward
 from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
-#: Runs on for this long after the angle should be passed [s]: a step of 1/30 s at least.
+#: Time of the run after the passage of the angle [s]: at least a step of 1/30 s.
 AFTERMATH = 0.05
-#: Angles at which it is asked whether friction can hold the edge.
+#: Number of angles at which the friction of the edge is checked.
 ASKED = 64
 
 
@@ -52,7 +52,7 @@ def make(dimension: int, params: Params) -> Scene:
     start, end = _angles(p)
     if not start < end:
         raise SceneError(f"pivot.to: {p['to']:g} must be greater than from, {p['from']:g}")
-    # The spin at the end turns it on meanwhile, faster than that by less than half.
+    # The box turns on with the spin at the end, which grows by less than half of it meanwhile.
     further = end + 1.5 * AFTERMATH * on.speed(start, 0.0, end)
     if further > 0.5 * math.pi - on.alpha:
         raise SceneError(f"pivot.to: at {p['to']:g} degrees the side of a box of this aspect is about to land")
@@ -83,7 +83,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """When and how fast the angle of the diagonal passes, and the largest way of the edge from where it was."""
+    """Time and spin of the passage of the diagonal's angle, and the largest displacement of the edge."""
     on, (_, end), d = pivot(scene.params), _angles(scene.params), scene.dimension
     angle, spin = -metrics.tilt(trajectory) - on.alpha, -metrics.tilt_rate(trajectory)
     time, speed = metrics.crossing(trajectory.t, angle, spin, end)
@@ -100,7 +100,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Those of any box that falls over an edge; in space it does not leave its plane."""
+    """Those of any box that falls over an edge; in 3-D it must stay in its plane."""
     on, (start, end) = pivot(scene.params), _angles(scene.params)
     found = fall_checks(on, start, end, dt, truth)
     if "twisted" in truth:
@@ -112,7 +112,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the time at which the angle is passed, relative to it."""
+    """Relative error of the time at which the angle is passed."""
     truth = exact(scene)["passing_time"]
     value, reason = found["passing_time"]
     return (None, reason) if value is None else (abs(value / truth - 1.0), "")
@@ -127,8 +127,8 @@ SCENE = CanonicalScene(
     law="phi'' = p^2 sin(phi), p^2 = 3 g/(4 rho), about an edge that stays where it is",
     dimensions=(2, 3),
     parameters=(
-        Parameter("from", 10.0, "degrees", "of the diagonal against the vertical at the start", 0.01, 80.0),
-        Parameter("to", 40.0, "degrees", "at which time and spin are told, before the side lands", 0.1, 85.0),
+        Parameter("from", 10.0, "degrees", "angle of the diagonal to the vertical at the start", 0.01, 80.0),
+        Parameter("to", 40.0, "degrees", "at which time and spin are measured, before the side lands", 0.1, 85.0),
         Parameter("aspect", 0.5, "1", "width over height", 0.02, 2.0),
         Parameter("height", 1.0, "m", "of the box", 0.0, 1e3, positive=True),
         Parameter("mu", 0.8, "1", "friction: must hold the edge, to the end", 0.0, 10.0),
@@ -147,7 +147,7 @@ SCENE = CanonicalScene(
         "time error",
         "1",
         "|t/t_exact - 1| of the time at which the diagonal passes 40 degrees",
-        "time gathers all that is wrong on the way: a slipping edge, lost energy, a late start",
+        "the time contains all errors of the motion: a slipping edge, lost energy, a late start",
         lambda dt: [{}, {"from": 1.0, "to": 30.0}],
         error,
         "the whole fall",

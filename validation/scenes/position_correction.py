@@ -1,12 +1,12 @@
-"""A box that starts sunk into the floor, under gravity, comes up to the floor and no higher.
+"""A box that starts below the floor's surface, under gravity, rises to the floor and no higher.
 
        +---+                 +---+
        |   |                 |   |
     ===|   |===   ------>  ==+---+==      highest place: on the floor
        +---+ depth                        nothing thrown, nothing sideways
 
-The work of gravity is all that happens: to come up at all takes a correction of places that is no motion. A correction
-that is one (Baumgarte: beta depth/dt) throws the box v^2/(2 g) high, and the smaller the step, the higher.
+The box can rise only by a correction of positions, which must not cause motion. A correction by velocity (Baumgarte:
+beta depth/dt) throws the box v^2/(2 g) high, higher with smaller steps.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """On the floor at the highest; nothing acts sideways."""
+    """At most on the floor; nothing acts sideways."""
     return {"launched": 0.0, "sunk": 0.0, "drift": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Highest place above that of a box on the floor, lowest below the start, way along the floor, depth at the end."""
+    """Greatest height above a box on the floor, lowest place below the start, motion along the floor, final depth."""
     height, deep = trajectory.pose[:, 1, scene.dimension - 1], scene.params["depth"] * SIDE
     return {
         "launched": (metrics.largest([0.0, height.max() - 0.5 * SIDE]), ""),
@@ -50,7 +50,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A contact may be found one step late, at either end; what is left is shown, for no law says when it is gone."""
+    """A contact may be found one step late, at either end; the final depth has no law and is only shown."""
     g, source = scene.params["g"], "conservation of energy: a contact that does not close does no work"
     late = bounds.found_late(g, dt, SIDE)
     return [
@@ -62,7 +62,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
             "1",
             None,
             None,
-            "shown: no law of rigid bodies says how fast an overlap has to go",
+            "shown: rigid-body mechanics does not define how fast an overlap is corrected",
             "depth at the end over that at the start",
         ),
     ]
@@ -84,14 +84,14 @@ SCENE = CanonicalScene(
         "a sunk body jumps out of the floor",
     ),
     figure=__doc__ or "",
-    law="comes up to the floor and no higher: correcting a place is no motion",
+    law="rises to the floor and no higher: correcting a position causes no motion",
     dimensions=(2, 3),
     parameters=(
         Parameter("depth", 0.1, "sides", "below the floor at the start", 0.0, 0.49, positive=True),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0),
         standard_gravity(),
         mass_of("the box"),
-        Parameter("duration", 2.0, "s", "long enough to be thrown and to come down again", 0.1, 1e3),
+        Parameter("duration", 2.0, "s", "long enough to be thrown up and to fall down again", 0.1, 1e3),
     ),
     make=make,
     exact=exact,

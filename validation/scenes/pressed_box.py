@@ -1,4 +1,4 @@
-"""A box is pressed onto the floor and pushed along it: grip grows with the load.
+"""A box is pressed onto the floor and pushed along it: friction grows with the load.
 
             | N = load W
             v
@@ -7,8 +7,8 @@
           +---+           slides if not:  a = (F - mu (W + N))/m
     ================
 
-The same push that moves a box which nothing presses leaves one at rest that is pressed. All forces act at the centre,
-so that the push turns load from the rear edge to the front one.
+A push that moves an unloaded box leaves a pressed one at rest. All forces act at the centre, so the push shifts load
+from the rear edge to the front one.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Coulomb's law; forces of the floor are relative to what it has to bear."""
+    """Coulomb's law; forces of the floor are relative to the load and the push."""
     p = scene.params
     forces = {"carried": 1.0, "sheared": 1.0}
     if p["shear"] <= _limit(p):
@@ -79,9 +79,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As on an incline, under the acceleration that all that presses would give: g (1 + load).
+    """As on an incline, with the acceleration of all pressing forces: g (1 + load).
 
-    Forces are told by the momentum of what moves as the law says but for v1/100, before and after the last second.
+    Forces follow from the momentum, with errors of v1/100 before and after the last second.
     """
     p = scene.params
     pressed, source = p["g"] * (1.0 + p["load"]), "Coulomb's law; equilibrium of forces"
@@ -110,7 +110,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Larger of the errors of what the floor carries and of what it holds back, over the load and the push."""
+    """Larger of the errors of normal force and friction, over the load and the push."""
     carried, sheared = found["carried"], found["sheared"]
     if carried[0] is None or sheared[0] is None:
         return None, carried[1] or sheared[1]
@@ -127,8 +127,8 @@ SCENE = CanonicalScene(
     law="sticks if F <= mu (W + N), and the floor bears both; else a = (F - mu (W + N))/m",
     dimensions=(2, 3),
     parameters=(
-        Parameter("load", 1.0, "weights", "what presses on the box", 0.0, 1e4),
-        Parameter("shear", 0.8, "weights", "what pushes it along; 0.8 moves it unless it is pressed", 0.0, 1e4),
+        Parameter("load", 1.0, "weights", "force that presses on the box", 0.0, 1e4),
+        Parameter("shear", 0.8, "weights", "force that pushes it along; 0.8 moves it unless it is pressed", 0.0, 1e4),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
         standard_gravity(),
         mass_of("the box"),
@@ -146,8 +146,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "force error",
         "1",
-        "larger of the errors of what the floor carries and of what it holds back, over the load and the push",
-        "a force read-out is asked of engines more often than anything else of a contact",
+        "larger of the errors of normal force and friction, over the load and the push",
+        "forces are the values of a contact that users read most often",
         lambda dt: [{}, {"load": 0.0}],
         error,
         "the held box, half a second after the start",
@@ -156,7 +156,7 @@ SCENE = CanonicalScene(
     ),
     smooth=("creep", "acceleration"),
     words={
-        "carried": "carries {value} of what presses",
+        "carried": "carries {value} of the load",
         "sheared": "holds back {value} of the push",
     },
 )

@@ -1,12 +1,12 @@
-"""A wall of boxes, each over the gap between two others, that should stay as it is.
+"""A wall of boxes, each over the gap between two others, at rest.
 
             +---+          1
           +---++---+       2       each row carries the weight above it:
         +---++---++---+    ...         sum of its contacts = weight of all rows above
         ================           nothing moves, drifts or sinks
 
-How the contacts of a row share its load is not determined (a rigid box on two others has more contacts than balances of
-force and moment); their sum is. Boxes of a row are apart, so that nothing is pinched between them.
+The shares of the contacts of a row are not determined (a rigid box on two others has more contacts than equations of
+balance); their sum is. Boxes of a row are apart, so that nothing is squeezed between them.
 """
 
 from __future__ import annotations
@@ -50,17 +50,17 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """As of a column, row by row."""
+    """As for a column, row by row."""
     return columns.measure(scene, trajectory, layers(int(scene.params["rows"])))
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As of a column with as many interfaces as there are rows."""
+    """As for a column with an interface per row."""
     return columns.checks(scene, dt, truth)
 
 
 def track(scene: Scene) -> Track:
-    """The box at the top stays where it is."""
+    """The box at the top at rest."""
     top = scene.bodies[-1]
     return Track(top.name, lambda t: top.pose[: scene.dimension])
 
@@ -94,8 +94,8 @@ SCENE = CanonicalScene(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 4 s, per side of a box",
-        "nothing may move, so whatever did is error; loads are left out because any wall at rest carries its weight on "
-        "average",
+        "nothing may move, so any motion is error; loads are left out because any wall at rest carries its weight "
+        "on average",
         lambda dt: [{}],
         lambda scene, dt, found: columns.displacement(found, SIDE),
         "the standing wall, half a second after the start",

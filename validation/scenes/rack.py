@@ -1,4 +1,4 @@
-r"""A ball breaks a rack: momentum, energy and the mirror stay, whatever the law of impact makes of the rest.
+r"""A ball breaks a rack: momentum, energy and mirror symmetry are conserved by every impact law.
 
                   o
                o  o         sum of m v:       that of the cue, at all times
@@ -6,9 +6,9 @@ r"""A ball breaks a rack: momentum, energy and the mirror stay, whatever the law
                o  o         left and right:   (vx, vy) of a ball is (vx, -vy) of its image
                   o
 
-How balls share a blow that follow each other within a step, or touch, is no law of mechanics (Newton's law for all
-contacts at once, or one pair after the other), so no speed is judged. But none of them knows left from right: an engine
-that solves contact after contact, and not to the end, shows its order here. Nothing turns; balls are smooth.
+Impacts within a step, or of touching balls, have no unique law (Newton's law for all contacts at once, or one pair
+after the other), so no speed is judged. But all laws are symmetric: an engine that solves contact after contact,
+without convergence, shows its order here. Balls are smooth and do not rotate.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """What every law of impact keeps at e = 1."""
+    """Conservation laws of every impact law at e = 1."""
     return {"momentum_defect": 0.0, "energy_defect": 0.0, "asymmetry": 0.0, "penetration": 0.0}
 
 
@@ -88,7 +88,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Conservation holds at every step; an impact may be found one step late, at most sqrt(2) v dt deep by energy."""
     v, n = scene.params["v"], len(scene.bodies)
     place = RADIUS * 2.0 * scene.params["rows"]
-    # Two balls with all the energy, m v^2/2, close in by at most sqrt(2) v.
+    # Two balls with all the energy, m v^2/2, approach by at most sqrt(2) v.
     late = bounds.Bound(
         math.sqrt(2.0) * v * dt + bounds.ROUND_OFF * place,
         "an impact is found up to one step late; by energy no two balls approach faster than sqrt(2) v",
@@ -96,13 +96,13 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     return [
         bounds.bookkeeping(n).check("momentum_defect", "1", truth["momentum_defect"], "conservation of momentum"),
         bounds.exact(n).check("energy_defect", "1", truth["energy_defect"], "e = 1: conservation of energy"),
-        bounds.exact(n).check("asymmetry", "1", truth["asymmetry"], "no law of mechanics knows left from right"),
+        bounds.exact(n).check("asymmetry", "1", truth["asymmetry"], "the laws of mechanics are symmetric"),
         late.check("penetration", "m", truth["penetration"], "rigid bodies"),
     ]
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Larger of the shares of energy and of speed that are not as they should be."""
+    """Larger of the relative errors of energy and symmetry."""
     off = []
     for metric in ("energy_defect", "asymmetry"):
         value, reason = found[metric]
@@ -118,7 +118,7 @@ SCENE = CanonicalScene(
     version=1,
     title="Break of a rack",
     figure=__doc__ or "",
-    law="momentum, energy and the mirror are kept at e = 1",
+    law="momentum, energy and mirror symmetry are conserved at e = 1",
     dimensions=(2,),
     parameters=(
         Parameter("rows", 4, "1", "of the rack: 10 balls", 1, 20, integer=True),
@@ -138,8 +138,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "defect",
         "1",
-        f"larger of the relative errors of energy and of the mirror, over {PHASES} phases of the first contact",
-        "what every law of impact keeps",
+        f"larger of the relative errors of energy and mirror symmetry, over {PHASES} phases of the first contact",
+        "every impact law conserves them",
         phases,
         error,
         "the whole scene: approach, break, departure",
@@ -147,6 +147,6 @@ SCENE = CanonicalScene(
     words={
         "momentum_defect": "changes the momentum by {value} (relative)",
         "energy_defect": "changes the energy by {value} (relative)",
-        "asymmetry": "throws left and right apart by {value} of the cue's speed",
+        "asymmetry": "makes left and right differ by {value} of the cue's speed",
     },
 )

@@ -1,13 +1,13 @@
-r"""A ball between two plates that throw it back faster than it came: who takes e > 1, and does what it says.
+r"""A ball between two plates with e > 1, which throw it back faster than it came.
 
     |   <- e^2 v         |       no gravity; after n blows   v_n = e^n v,   energy e^(2 n) as much
-    |    o               |       a blow in every  L/v_n:  without end in a finite time, L/v e/(e - 1)
+    |    o               |       a blow in every  L/v_n:  infinitely many in a finite time,  L/v e/(e - 1)
     |         e v ->     |       1 <= e <= 2
     |  <- v       o      |
     |<-------- L ------->|
 
-No pair of materials does this, and a solver that refuses is right. An engine that takes the number should do what it
-says: people set 1.1 for a bumper, and find it clamped, or gaining otherwise.
+No pair of materials does this, and a solver may refuse it. An engine that accepts the value should apply it: users set
+1.1 for a bumper, and find it clamped, or another gain.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
 from validation.scenes.parts import along, at, ball, between_impacts, mass_of, states
 
-#: Radius of the ball, and way of its centre from plate to plate L [m].
+#: Radius of the ball, and distance of its centre from plate to plate L [m].
 RADIUS, APART = 0.5, 4.0
 
 
 def _blows(p: Params) -> list[tuple[float, float]]:
-    """Times of the blows [s] and the speeds after them, to the right [m/s]; the first flight is half a way."""
+    """Times of the blows [s] and the speeds after them, to the right [m/s]; the first flight is half the distance."""
     speeds = [p["v"] * p["e"] ** k for k in range(int(p["blows"]) + 1)]
     times = accumulate(way / speed for way, speed in zip((0.5 * APART, *[APART] * len(speeds)), speeds, strict=False))
     return [(time, -((-1.0) ** k) * speeds[k + 1]) for k, time in zip(range(int(p["blows"])), times, strict=False)]
@@ -55,7 +55,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's law of restitution, taken at its word."""
+    """Newton's law of restitution, with e above 1."""
     p = scene.params
     return {"growth": p["e"], "blows": p["blows"], "astray": 0.0}
 
@@ -78,16 +78,16 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A blow has an exact law at every step; blows that are late leave their number, as the run ends halfway.
+    """A blow is exact at every step; late blows do not change their number, as the run ends halfway.
 
-    Each may be late by a step for its contact and one for the blow itself; where that adds up to the last half flight,
-    one blow more or less is none.
+    Each may be late by a step for its contact and one for the blow itself; where that exceeds the last half flight, one
+    blow more or less is allowed.
     """
-    p, source = scene.params, "Newton's law of restitution, taken at its word"
+    p, source = scene.params, "Newton's law of restitution, with e above 1"
     left = 0.5 * APART / (p["v"] * p["e"] ** p["blows"])
     lost = 0.0 if 2.0 * dt * p["blows"] < left else 1.0
     count = bounds.Bound(
-        0.5 + lost, "a whole number: the run ends half a flight after the last blow, which late ones eat"
+        0.5 + lost, "a whole number: the run ends half a flight after the last blow, and late blows shorten that"
     )
     return [
         bounds.exact(p["e"]).check("growth", "1", truth["growth"], source),
@@ -118,10 +118,10 @@ SCENE = CanonicalScene(
         "energy grows at each collision",
     ),
     figure=__doc__ or "",
-    law="v_n = e^n v after n blows, for whoever takes e > 1",
+    law="v_n = e^n v after n blows, for engines that accept e > 1",
     dimensions=(2,),
     parameters=(
-        Parameter("e", 1.1, "1", "restitution; people set a little above 1 for a bumper", 1.0, 2.0),
+        Parameter("e", 1.1, "1", "restitution; values a little above 1 are used for bumpers", 1.0, 2.0),
         Parameter("v", 2.0, "m/s", "of the ball at the start", 0.0, 1e3, positive=True),
         Parameter("blows", 5, "1", "until it ends", 1, 100, integer=True),
         mass_of("the ball"),
@@ -139,7 +139,7 @@ SCENE = CanonicalScene(
         "growth error",
         "1",
         "|mean factor of the speed a blow - e|",
-        "whoever takes a number should do what it says",
+        "an engine that accepts a value should apply it",
         lambda dt: [{}, {"e": 1.5}],
         error,
         "the whole scene: five blows",

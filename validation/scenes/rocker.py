@@ -5,8 +5,8 @@
              ( )                + m g ((R + h) cos(theta) + R theta sin(theta)) = E
              ( )  R           stable for R > h; small swings: omega^2 = g (R - h)/(h^2 + i^2)
 
-Nothing is lost: the contact rolls, and friction does no work. The time from one side to the other is the integral of
-d theta/theta', for any amplitude. A solver that loses or adds energy at a contact that wanders shows it here.
+Energy is conserved: the contact rolls, and friction does no work. The time from one side to the other is the integral
+of d theta/theta', for any amplitude. The scene shows energy errors at a moving contact point.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import block, mass_of, pose_at, standard_gravity, states, tilted, upward
 from validation.truths.quadrature import gauss
 
-#: Swings from side to side that are followed.
+#: Number of swings from side to side.
 SWINGS = 3
 #: Nodes of the quadrature: twice as many change nothing at 1e-12.
 NODES = 96
@@ -36,12 +36,12 @@ def _square(p: Params) -> float:
 
 
 def _inertia(p: Params, theta: Array) -> Array:
-    """What theta'^2/2 is multiplied by, over the mass [m^2]."""
+    """Factor of theta'^2/2 in the energy, over the mass [m^2]."""
     return np.asarray((0.5 * p["thickness"]) ** 2 + (p["radius"] * theta) ** 2 + _square(p))
 
 
 def _raised(p: Params, theta: Array) -> Array:
-    """Height of the centre over that of the level board [m], without loss of digits where it is small."""
+    """Height of the centre above that of the level board [m], without cancellation where it is small."""
     half = np.sin(0.5 * theta)
     return np.asarray(p["radius"] * theta * np.sin(theta) - 2.0 * (p["radius"] + 0.5 * p["thickness"]) * half**2)
 
@@ -57,7 +57,7 @@ def _swing(p: Params) -> float:
 
 
 def _grips(p: Params) -> bool:
-    """Whether friction holds the contact all the way, and it carries."""
+    """Whether friction holds the contact throughout, under load."""
     start = np.array(math.radians(p["tilt"]))
     theta = np.linspace(-start, start, 201)
     inertia, r, h, g = _inertia(p, theta), p["radius"], 0.5 * p["thickness"], p["g"]
@@ -77,12 +77,12 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the board would fall off, slip, or not come back.
+        If the board would fall off, slip, or not return.
     """
     p, theta = params, math.radians(params["tilt"])
     r, h = p["radius"], 0.5 * p["thickness"]
     if r <= h:
-        raise SceneError(f"rocker.radius: {r:g} m does not hold a board of {2.0 * h:g} m, half as thick it would")
+        raise SceneError(f"rocker.radius: {r:g} m does not hold a board of {2.0 * h:g} m; half as thick it would")
     path = np.linspace(0.0, theta, 101)[1:]
     if r * theta > 0.45 * p["length"] or (np.diff(_raised(p, path)) <= 0.0).any():
         raise SceneError(f"rocker.tilt: at {p['tilt']:g} degrees the board falls off")
@@ -103,13 +103,13 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Energy, and the time that it takes from side to side."""
+    """Energy, and the time from side to side."""
     truth = {"swing_time": _swing(scene.params), "amplitude": 1.0, "slip": 0.0}
     return truth | ({} if scene.dimension == 2 else {"yaw": 0.0})
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Times at which the board is level, its last tilt to a side, and how far the contact has slipped along it."""
+    """Times at which the board is level, its last tilt to a side, and the slip of the contact along it."""
     p, d = scene.params, scene.dimension
     theta, spin = metrics.tilt(trajectory), metrics.tilt_rate(trajectory)
     first, _ = metrics.crossing(trajectory.t, -theta, -spin, 0.0)
@@ -119,7 +119,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     swing: Measured = (None, metrics.NOT_PASSED)
     if first[0] is not None and last[0] is not None:
         swing = ((last[0] - first[0]) / (SWINGS - 1), "")
-    # Where the log's normal along the board meets it, against how far the tilt has rolled it.
+    # Contact point on the board by the log's normal, against the rolled distance.
     centre = trajectory.pose[:, 1, [0, d - 1]]
     along = -(np.cos(theta) * centre[:, 0] + np.sin(theta) * centre[:, 1])
     rolled = along + p["radius"] * theta
@@ -135,10 +135,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def _left_out(p: Params) -> tuple[float, float]:
-    """What steps of first order leave out over one swing, over dt: way of the centre [m/s], and energy as height [m/s].
+    """Error of a first-order scheme over one swing, over dt: motion of the centre [m/s], and energy as height [m/s].
 
-    A step moves the centre by its velocity: dt^2/2 times the acceleration a that keeps it on the log is missing. The
-    next one takes the velocity a dt off it, (a dt)^2/2 of energy.
+    A step moves the centre by its velocity: dt^2/2 times the acceleration a towards the log is missing. The next one
+    removes the velocity a dt, (a dt)^2/2 of energy.
     """
     start = np.array(math.radians(p["tilt"]))
     x, weight = gauss(NODES)
@@ -152,11 +152,11 @@ def _left_out(p: Params) -> tuple[float, float]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Steps of first order: what they leave out of the way of the contact, and take off its energy.
+    """First-order schemes: their errors in the contact's motion and in energy.
 
-    An amplitude is as far off as that energy takes it, and as a step and a half of acceleration at the start do, for
-    the order of a step and a contact found late. A swing takes the time of its amplitude, and each of the two times at
-    which the board is level may be a step off.
+    An amplitude has the error of that energy, and of 1.5 steps of acceleration at the start, for the order of the
+    scheme and a contact found late. A swing has the time of its amplitude, and each of the two times at which the board
+    is level may be a step off.
     """
     p, g = scene.params, scene.params["g"]
     start = math.radians(p["tilt"])
@@ -167,14 +167,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     other = [_swing({**p, "tilt": p["tilt"] * (1.0 + side * min(error, 0.2))}) for side in (-1.0, 1.0)]
     swing = bounds.Bound(
         2.0 * dt / (SWINGS - 1) + max(abs(each - truth["swing_time"]) for each in other),
-        "a step at both ends of the swings, and the time that an amplitude takes that steps of first order change",
+        "a step at both ends of the swings, and the time that follows from an amplitude error of a first-order scheme",
     )
     amplitude = bounds.Bound(
-        error, "steps take (a dt)^2/2 off the energy, a: what keeps the board on the log; and 1.5 steps at the start"
+        error, "each step loses (a dt)^2/2 of energy, a: acceleration towards the log; and 1.5 steps at the start"
     )
     slip = bounds.Bound(
         SWINGS * way * dt + g * dt * dt,
-        "a step leaves out dt^2/2 of the acceleration that keeps the board on the log; a contact found one step late",
+        "a step neglects dt^2/2 of the acceleration towards the log; a contact found one step late",
     )
     source = "Lagrange's equation of a board that rolls on a log; energy"
     found = [
@@ -191,7 +191,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the time of a swing, relative to it."""
+    """Relative error of the time of a swing."""
     truth = exact(scene)["swing_time"]
     value, reason = found["swing_time"]
     return (None, reason) if value is None else (abs(value / truth - 1.0), "")
@@ -225,8 +225,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "time error",
         "1",
-        "error of the time from side to side, over it",
-        "a period gathers inertia, gravity and the place of a contact that wanders",
+        "relative error of the time from side to side",
+        "a period contains inertia, gravity and the moving contact point",
         lambda dt: [{}],
         error,
         "the rocking board",

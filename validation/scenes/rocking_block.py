@@ -1,4 +1,4 @@
-r"""A block that is tilted and let go rocks from edge to edge, less and less.
+r"""A tilted block rocks from edge to edge, with decreasing amplitude.
 
         __           theta'' = -p^2 sin(alpha - theta),  p^2 = 3 g/(4 rho),  alpha = atan(width/height)
        |  \          where it lands on the other edge:   w+ = eta w-,  eta = 1 - 3/2 sin(alpha)^2
@@ -7,8 +7,8 @@ r"""A block that is tilted and let go rocks from edge to edge, less and less.
          \__/
     ======+======    [G. W. Housner, Bull. Seismol. Soc. Am. 53 (1963) 403]
 
-The landing is an impact at both edges at once, without rebound: the edge that it turned about lets go, and angular
-momentum about the other one is kept. A solver that lets it bounce or stick at the first edge has another eta.
+The landing is an impact at both edges at once, without rebound: the former edge separates, and angular momentum about
+the other one is conserved. A solver with a bounce, or sticking at the first edge, has another eta.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from validation.truths.pivoting import Pivot
 
 #: Landings that are judged, and the amplitudes after them.
 LANDINGS = 3
-#: An amplitude counts if the block rises to it faster than this many steps of its acceleration: as slow as the error
-#: of a landing otherwise.
+#: An amplitude counts if the block rises to it faster than this many steps of its acceleration, as slower ones are
+#: within the error of a landing.
 FAST = 20.0
 
 
@@ -40,12 +40,12 @@ def pivot(p: Params) -> Pivot:
 
 
 def eta(p: Params) -> float:
-    """Share of the spin that a landing leaves."""
+    """Share of the spin after a landing."""
     return 1.0 - 1.5 * math.sin(pivot(p).alpha) ** 2
 
 
 def _amplitudes(p: Params) -> list[float]:
-    """Tilt [rad] at the start and after each landing that is followed."""
+    """Tilt [rad] at the start and after each landing."""
     on, keep = pivot(p), eta(p) ** 2
     tops = [p["tilt"] * on.alpha]
     for _ in range(LANDINGS):
@@ -54,7 +54,7 @@ def _amplitudes(p: Params) -> list[float]:
 
 
 def _height(on: Pivot, theta: float) -> float:
-    """What a tilt raises the centre, over the arm."""
+    """Height of the centre by a tilt, over the arm."""
     return 2.0 * math.sin(on.alpha - 0.5 * theta) * math.sin(0.5 * theta)
 
 
@@ -80,7 +80,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        For a block so squat that it does not rock, and for friction that does not hold it where it lands.
+        For a block too wide to rock, and for friction that does not hold it at a landing.
     """
     p, on = params, pivot(params)
     square = math.sin(on.alpha) ** 2
@@ -88,7 +88,7 @@ def make(dimension: int, params: Params) -> Scene:
         raise SceneError(f"rocking_block.aspect: a block of {p['aspect']:g} stays where it lands, below 1.41 it rocks")
     needed = 3.0 * math.sin(on.alpha) * math.cos(on.alpha) / (4.0 - 3.0 * square)
     if p["mu"] <= needed:
-        raise SceneError(f"rocking_block.mu: {p['mu']:g} lets it slide where it lands; it takes {needed:.3g}")
+        raise SceneError(f"rocking_block.mu: {p['mu']:g} lets it slide where it lands; it needs {needed:.3g}")
     tops = _amplitudes(p)
     angle = on.alpha - tops[0]
     centre = (on.arm * math.sin(angle), on.arm * math.cos(angle))
@@ -107,7 +107,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Housner's amplitudes, and the times of a pendulum that is held at its edge."""
+    """Housner's amplitudes, and the times of a pendulum about its edge."""
     on, tops = pivot(scene.params), _amplitudes(scene.params)
     truth = {f"amplitude[{n}]": tops[n] for n in range(1, LANDINGS + 1)}
     times = _landings(on, tops)
@@ -115,7 +115,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Changes of the tilt's sign, the largest tilts between them, and how far the middle of the base has moved."""
+    """Sign changes of the tilt, the largest tilts between them, and the motion of the middle of the base."""
     on, theta = pivot(scene.params), metrics.tilt(trajectory)
     after = _changes(theta)
     measured: dict[str, Measured] = {}
@@ -133,7 +133,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def _changes(theta: Array) -> list[int]:
-    """Samples at which the tilt has another sign than before; a tilt of nothing has none."""
+    """Samples at which the tilt has another sign than before; a tilt of 0 has none."""
     signs = np.sign(theta)
     known = np.flatnonzero(signs)
     return [int(b) for a, b in pairwise(known) if signs[a] != signs[b]]
@@ -142,10 +142,10 @@ def _changes(theta: Array) -> list[int]:
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """A landing is found up to one step late, w dt turned too far, and the errors of landings add up.
 
-    In heights of the centre over the arm that is ``sin(alpha) w dt``: the block has fallen as much too far, of which it
-    keeps eta^2, and it rises from a tilt that is already as much on the other side, about an edge as deep in the floor.
-    The order of steps is worth half a step of acceleration before and after, ``eta (1 + eta)/2`` of it. What was off
-    before is left by eta^2. Steps carry the edge away meanwhile.
+    In heights of the centre over the arm that is ``sin(alpha) w dt``: the block has fallen too far by it, of which
+    eta^2 remains, and it rises from a tilt that is already on the other side by it, about an edge as deep in the floor.
+    The order of the scheme gives half a step of acceleration before and after, ``eta (1 + eta)/2`` of it. Earlier
+    errors are reduced by eta^2. Steps also move the edge.
     """
     p, on, tops = scene.params, pivot(scene.params), _amplitudes(scene.params)
     keep, source = eta(p), "angular momentum about the edge that it lands on [Housner 1963]; energy in between"
@@ -165,11 +165,11 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         found.append(check if fast else check.unjudged())
         late += dt + 2.0 * _stretched(on, tops[n], off)
         slid += 2.0 * rocked[n] + p["g"] * dt * dt
-    # At the end it stands, but for what it turns in the time by which the last landing may be off.
+    # At the end it is upright, up to its rotation in the error of the last landing's time.
     turned = min(on.speed(on.alpha - tops[-1], 0.0, on.alpha) * late, on.alpha)
     moved = bounds.Bound(
         slid + 0.5 * on.width * (1.0 - math.cos(turned)),
-        "steps carry the edge away, rho (w dt)^2/2 each; g dt^2 for each contact found late; and the tilt at the end",
+        "steps move the edge, rho (w dt)^2/2 each; g dt^2 for each contact found late; and the tilt at the end",
     )
     return [*found, moved.check("slid", "m", truth["slid"], "friction holds")]
 
@@ -227,7 +227,7 @@ SCENE = CanonicalScene(
         "amplitude error",
         "1",
         "largest error of the amplitudes after three landings, over the first tilt",
-        "the landing at two edges at once, three times over",
+        "a landing on two edges at once, three times",
         lambda dt: [{}, {"aspect": 0.5, "tilt": 0.7}],
         error,
         "the whole scene: the block rocks and lands three times",

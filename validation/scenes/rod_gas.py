@@ -1,12 +1,12 @@
-"""A gas of rods in one line: at e = 1 rods of equal mass swap their speeds, as if each flew through all others.
+"""A gas of rods in one line: at e = 1 rods of equal mass exchange their speeds, as if they passed through each other.
 
     |o-->   <--o  o->    <--o|      take the lengths out: n points that pass each other in L - n d,
     |                        |      each flying freely from wall to wall; sorted, and i d put back,
     |<--------- L ---------->|      they are the rods at any time
 
-A whole history of meetings has a closed form [D. W. Jepsen, J. Math. Phys. 6 (1965) 405]. Each point keeps its speed
-for ever, so that the last meeting is as exact as the first; a meeting that is missed, or two that are taken for one,
-hands a rod the speed of another. A rod that nothing turns is a ball that stays in line.
+The whole history of collisions has a closed form [D. W. Jepsen, J. Math. Phys. 6 (1965) 405]. Each point keeps its
+speed, so the last collision is as exact as the first; a missed collision, or two taken for one, gives a rod the speed
+of another. A rod without rotation is a ball that stays in line.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import DELAY, PHASES, along, at, ball, mass_of, phases, states
 
 RADIUS = 0.125
-#: What k times the one and k^2 times the other leave of whole numbers is spread over (0, 1) evenly, without a common
-#: period; speeds that grew as places do would bring three points to one place.
+#: The fractional parts of k times the one and k^2 times the other are evenly distributed over (0, 1), without a common
+#: period; with speeds that grow like positions three points would meet at one place.
 PLACES, SPEEDS = math.sqrt(2.0), math.sqrt(3.0)
-#: What a normal may be off by: a difference, its length and a division round it, each by a unit or two.
+#: Error of a normal: a difference, its length and a division, each with a rounding of a unit or two.
 NORMAL = 8.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Two points that pass each other, or one (twice) that meets a wall.
+    """Two points that pass each other, or one (twice) at a wall.
 
-    ``closing`` is the speed at which they close in [m/s], ``rank`` the number of points to the left of the place: rods
-    ``rank - 1`` and ``rank`` touch, counted from 0; the walls stand at the ends.
+    ``closing`` is their closing speed [m/s], ``rank`` the number of points to the left: rods ``rank - 1`` and ``rank``
+    touch, counted from 0; the walls are at the ends.
     """
 
     time: float
@@ -56,7 +56,7 @@ def flights(p: Params) -> tuple[Array, Array]:
 def flown(p: Params, t: float) -> tuple[Array, Array]:
     """Places [m] and velocities [m/s] of the points after ``t`` seconds between walls at 0 and ``room``."""
     start, velocity = flights(p)
-    # Round a ring of twice the room, of which the second half is the way back.
+    # On a ring of twice the room, whose second half is the way back.
     ring = np.mod(start + velocity * t, 2.0 * p["room"])
     out = ring < p["room"]
     return np.where(out, ring, 2.0 * p["room"] - ring), np.where(out, velocity, -velocity)
@@ -93,7 +93,7 @@ def meetings(p: Params) -> list[Meeting]:
 
 
 def _rank(p: Params, t: float, points: tuple[int, int]) -> int:
-    """Rods to the left of a meeting, the left one of the two that meet among them; at the walls 0 and n."""
+    """Rods to the left of a collision, including the left one of the two; at the walls 0 and n."""
     place, _ = flown(p, t)
     left = int(sum(place[k] < place[points[0]] for k in range(len(place)) if k not in points))
     if points[0] != points[1]:
@@ -102,24 +102,24 @@ def _rank(p: Params, t: float, points: tuple[int, int]) -> int:
 
 
 def shifted(p: Params, seen: list[Meeting]) -> list[float]:
-    """How far each meeting's points may be off their flights before it, together, by all before [m per s of step].
+    """Error of the points of each collision by all earlier ones, together [m per s of step].
 
-    A meeting that is found a time late has its rods overlap by the way that they close in meanwhile: both go on from
-    there, each off its flight by that way. At a wall the point has gone as far beyond it: twice that way.
+    In a collision found late the rods overlap by their approach in that time: both continue from there, each displaced
+    by that distance. At a wall the displacement is twice that.
     """
     off, before = [0.0] * int(p["n"]), []
     for meeting in seen:
         k, m = meeting.points
         before.append(off[k] if k == m else off[k] + off[m])
-        for point in meeting.points:  # a wall's one point is named twice
+        for point in meeting.points:  # the point at a wall is listed twice
             off[point] += meeting.closing
     return before
 
 
 def coarsest(p: Params) -> float:
-    """Largest step [s] at which each rod meets its neighbours one after the other, and none at the end.
+    """Largest step [s] at which the collisions of each rod stay in order, with none at the end.
 
-    A meeting is early or late by what its points are off over the speed at which they close in.
+    The time error of a collision is the error of its points over their closing speed.
     """
     seen = meetings(p)
     late = [off / meeting.closing for off, meeting in zip(shifted(p, seen), seen, strict=True)]
@@ -133,10 +133,10 @@ def coarsest(p: Params) -> float:
 
 
 def strayed(p: Params, seen: list[Meeting], begun: float = 0.0, rounded: bool = True) -> float:
-    """How far off the line [m] what is rounded in the normals of all meetings may bring a rod, ``begun`` off it.
+    """Largest distance of a rod from the line [m] by rounding of all normals, from ``begun`` at the start.
 
-    A normal that is off by q pushes two rods across the line with u q each, a wall's one rod with 2 u q. Rods that are
-    off it by y and y' touch with a normal that is off by up to (y + y')/d: round ends spread what comes in, every time.
+    A normal with the error q pushes two rods across the line with u q each, one at a wall with 2 u q. Rods at distances
+    y and y' from the line have a normal error of up to (y + y')/d: round ends amplify distances in each collision.
     """
     off, across = [begun] * int(p["n"]), [0.0] * int(p["n"])
     normal = NORMAL if rounded else 0.0
@@ -155,9 +155,9 @@ def strayed(p: Params, seen: list[Meeting], begun: float = 0.0, rounded: bool = 
 
 
 def growth(scene: Scene) -> float:
-    """By how much meetings multiply what rods are off their line by, at most: 1e5 in the 16 of the defaults.
+    """Largest amplification of distances from the line by collisions: 1e5 in the 16 of the defaults.
 
-    What is out of the plane is off the line as what is off it in the plane is, and spreads as in `strayed`.
+    Distances out of the plane grow like those in the plane, as in `strayed`.
     """
     end = scene.params["delay"] + scene.duration
     return strayed(scene.params, [each for each in meetings(scene.params) if each.time < end], 1.0, rounded=False)
@@ -186,12 +186,12 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Nothing is off the free flights."""
+    """Free flights without error."""
     return {"misplaced": 0.0, "wrong_speed": 0.0, "energy_defect": 0.0, "astray": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest error of a rod's place and velocity at the end, of all energy, and the largest way off the line."""
+    """Largest errors of places and velocities at the end, of the total energy, and largest distance from the line."""
     p, d = scene.params, scene.dimension
     place, velocity = rods(p, p["delay"] + p["duration"])
     x, v = trajectory.pose[-1, 2:, 0], trajectory.twist[-1, 2:, :d]
@@ -204,9 +204,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Speeds are swapped exactly, however late; places gather what each meeting before was late by.
+    """Speeds are exchanged exactly, even if late; delays of earlier collisions add up in the places.
 
-    Sorted, places are off by no more than the point that is off most.
+    Sorting does not increase the largest error of a place.
     """
     p, n = scene.params, len(scene.bodies) - 2
     seen = [meeting for meeting in meetings(p) if meeting.time < p["delay"] + p["duration"]]
@@ -214,14 +214,14 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     length = p["room"] + 2.0 * RADIUS * n
     late = bounds.Bound(
         max(off) * dt + bounds.ROUND_OFF * length,
-        "each meeting is found up to one step late and puts its rods off by the way that they close in meanwhile, "
-        "twice that at a wall: the sum over the flight that has most",
+        "each collision is found up to one step late and displaces its rods by their approach in that time, twice "
+        "that at a wall: the largest sum over a flight",
     )
     line = bounds.Bound(
         strayed(p, seen) + bounds.ROUND_OFF * length,
-        "round ends spread what is rounded in a normal, from meeting to meeting: the largest sum over all of them",
+        "round ends amplify the rounding of a normal, from collision to collision: the largest sum over all of them",
     )
-    source = "Jepsen's free flights: momentum and energy of rods of equal mass, meeting after meeting"
+    source = "Jepsen's free flights: momentum and energy of rods of equal mass, collision after collision"
     found = [
         late.check("misplaced", "m", truth["misplaced"], source),
         bounds.exact(len(seen) * p["v"]).check("wrong_speed", "m/s", truth["wrong_speed"], source),
@@ -243,14 +243,14 @@ SCENE = CanonicalScene(
     title="Gas of rods in one line, between two walls",
     family="many impacts",
     figure=__doc__ or "",
-    law="sorted free flights in L - n d, and i d put back: speeds only change hands",
+    law="sorted free flights in L - n d, plus i d: collisions exchange speeds",
     dimensions=(2,),
     parameters=(
         Parameter("n", 6, "1", "number of rods", 1, 1000, integer=True),
         Parameter("v", 2.0, "m/s", "no rod is faster", 0.0, 1e2, positive=True),
-        Parameter("room", 5.0, "m", "length of the line that no rod takes up, L - n d", 0.0, 1e3, positive=True),
-        Parameter("duration", 3.75, "s", "16 meetings, none near the end", 0.0, 1e3, positive=True),
-        Parameter("delay", DELAY, "s", "time that the gas has flown at the start: phases of meetings", 0.0, 10.0),
+        Parameter("room", 5.0, "m", "free length of the line, L - n d", 0.0, 1e3, positive=True),
+        Parameter("duration", 3.75, "s", "16 collisions, none near the end", 0.0, 1e3, positive=True),
+        Parameter("delay", DELAY, "s", "time that the gas has moved before the start: phases of collisions", 0.0, 10.0),
         mass_of("each rod"),
     ),
     make=make,
@@ -268,8 +268,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "velocity error",
         "1",
-        f"largest error of a rod's velocity at the end over the fastest flight's, {PHASES} phases of the meetings",
-        "velocities change hands and nothing else: one meeting missed, doubled or too soft gives a rod a wrong one",
+        f"largest error of a rod's velocity at the end over the fastest, {PHASES} phases of the collisions",
+        "collisions only exchange velocities: one missed, doubled or too soft gives a rod a wrong one",
         phases,
         error,
         "the whole scene",

@@ -1,11 +1,12 @@
-"""A ball is released on an incline: it rolls, or slides and turns where friction cannot keep up.
+"""A ball is released on an incline: it rolls, or slides and turns where friction is too small.
 
         ( ) ->                 mu >= tan(theta) k/(1 + k):   a = g sin(theta)/(1 + k),  w' r = a
     ==============             less:                         a = g (sin(theta) - mu cos(theta)),
       gravity turned                                         w' r = mu g cos(theta)/k
 
-k = I/(m r^2): a disc needs a third of tan(theta) to roll, a ball two sevenths. Gravity is turned by theta, not the
-floor, as a tilted, touching start is not representable exactly. ``ratio`` is tan(theta) k/((1 + k) mu): 1 is the limit.
+k = I/(m r^2): a disc needs a third of tan(theta) to roll, a ball two sevenths. Gravity is rotated by theta, not the
+floor, as a tilted start in contact is not exactly representable. ``ratio`` is tan(theta) k/((1 + k) mu): 1 is the
+limit.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def _rates(scene: Scene, arm: float) -> tuple[float, float]:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Rolling friction is what rolling takes, up to Coulomb's limit."""
+    """The friction of rolling, up to Coulomb's limit."""
     acceleration, turning = _rates(scene, scene.params["radius"])
     return {"acceleration": acceleration, "turning": turning, "hop": 0.0}
 
@@ -66,7 +67,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     driven = bounds.driven(p["g"], dt, 0.5 * scene.duration - dt)
 
     def allowed(answer: Callable[[float], float]) -> bounds.Bound:
-        because = f"{driven.because}; and what an arm shortened by g dt^2, of a late contact, changes"
+        because = f"{driven.because}; and the effect of a lever arm shorter by g dt^2, from a late contact"
         return bounds.Bound(driven.value + of_the_arm(answer, r, p["g"] * dt * dt), because)
 
     source = "Newton's and Euler's laws with Coulomb's friction"
@@ -101,7 +102,7 @@ SCENE = CanonicalScene(
     title="Ball that rolls down an incline",
     symptoms=(
         "a wheel or ball rolls too slowly or too fast down a slope",
-        "there is rolling resistance that nobody set",
+        "there is rolling resistance that was not set",
     ),
     family="friction",
     figure=__doc__ or "",
@@ -129,8 +130,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "acceleration error",
         "1",
-        "larger error of the accelerations of centre and surface over the pull, worst of rolling and sliding",
-        "friction that only turns the ball, and friction at its limit: an engine may have one right and not the other",
+        "larger error of the accelerations of centre and surface, over g sin(theta), worst of rolling and sliding",
+        "friction that turns the ball, and friction at its limit: an engine may have only one of them right",
         lambda dt: [{}, {"ratio": 0.99}, {"ratio": 1.5}],
         error,
         "the rolling ball",

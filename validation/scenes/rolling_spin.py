@@ -1,11 +1,11 @@
-"""A ball rolls and spins about the vertical as well: a point of contact cannot brake that spin.
+"""A ball rolls and spins about the vertical: a contact point cannot brake that spin.
 
          | s                  spin about the normal: s for ever
         (|)  -->  v           speed:                 v for ever, straight on
     ====================
 
-Friction at a point has no lever arm about the normal, and a rolling point does not slip: Coulomb's law takes nothing
-from either. Spin that decays is torsional friction, speed that decays is resistance to rolling; neither was asked for.
+Friction at a point has no lever arm about the normal, and a rolling point does not slip: Coulomb's law changes neither.
+A decay of spin is torsional friction, a decay of speed rolling resistance; the scene has neither.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Nothing acts but the load and what carries it."""
+    """Only weight and normal force act."""
     return {"spin": scene.params["spin"], "speed": scene.params["v"], "hop": 0.0, "astray": 0.0}
 
 
@@ -50,9 +50,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Exact at every step, but that a contact found one step late is g dt^2 deep: rolling there needs less speed.
+    """Exact at every step, except that a contact found one step late is g dt^2 deep: rolling there needs less speed.
 
-    The impulse that makes it roll on the shorter arm is told by the law of an impact that grips.
+    The impulse that makes it roll on the shorter lever arm follows from the law of a gripping impact.
     """
     p, r = scene.params, scene.params["radius"]
     depth = p["g"] * dt * dt
@@ -77,7 +77,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Spin that is lost, relative to the spin."""
+    """Lost share of the spin."""
     value, reason = found["spin"]
     return (None, reason) if value is None else (abs(value / scene.params["spin"] - 1.0), "")
 
@@ -89,13 +89,13 @@ SCENE = CanonicalScene(
     symptoms=("a spinning ball slows down or stops spinning",),
     family="turning",
     figure=__doc__ or "",
-    law="spin about the normal and speed of rolling last for ever: friction at a point takes from neither",
+    law="spin about the normal and rolling speed stay constant: friction at a point reduces neither",
     dimensions=(3,),
     parameters=(
         Parameter("spin", 10.0, "rad/s", "about the vertical", 0.0, 1e3, positive=True),
         Parameter("v", 1.0, "m/s", "of the centre; the ball rolls from the start", 0.0, 1e2),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
-        Parameter("heading", 30.0, "degrees", "of the motion against the axes", 0.0, 90.0),
+        Parameter("heading", 30.0, "degrees", "angle of the motion to the axes", 0.0, 90.0),
         Parameter("radius", 0.5, "m", "of the ball", 0.0, 1e3, positive=True),
         standard_gravity(),
         Parameter("duration", 2.0, "s", "of the run", 0.1, 100.0),
@@ -115,8 +115,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "lost spin",
         "1",
-        "spin about the vertical that is lost by the end, over the spin",
-        "a point of contact has no torsional friction: what is lost is the engine's own",
+        "share of the spin about the vertical that is lost by the end",
+        "a contact point has no torsional friction, so any loss is the engine's",
         lambda dt: [{}],
         error,
         "the rolling, spinning ball",

@@ -1,13 +1,12 @@
-r"""The same scene in millimetres and in kilometres, in grams and in tons: lengths and masses carry no physics here.
+r"""The same scene in millimetres and kilometres, in grams and tons: the results must not depend on the scale.
 
        o  h = 2 L               the ball rises to  e^2  of its fall
        |        _____
        v       |_____| v ->     the box stops after  v^2/(2 mu g)
     ==========================  every length times L, gravity too: times stay what they are, and so does the step
 
-All numbers are told in units of L, and all answers must be the same. What differs is what an engine measures in metres
-of its own: slops, margins and thresholds of speed that suit bodies of about one metre. A threshold of 1 cm is nothing
-for a ship and all of a pebble.
+All numbers are in units of L, and all results must be equal. Differences come from fixed lengths of an engine: slops,
+margins and speed thresholds that suit bodies of about one metre. 1 cm is nothing for a ship and the size of a pebble.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from validation.canonical import GRAVITY, CanonicalScene, Check, Measured, Param
 from validation.scenes.parts import along, at, ball, floor, states, upward
 from validation.truths import sliding
 
-#: In units of L: radius and drop of the ball, size of the box, and how far apart they are.
+#: In units of L: radius and drop of the ball, size of the box, and their distance.
 RADIUS, DROP, SIDE, APART = 0.5, 2.0, 1.0, 5.0
 #: Restitution of the ball; friction, speed of the box in L/s, and gravity in L/s^2.
 E, MU, SPEED = 0.5, 0.3, 2.0
 
 
 def _sliding(p: Params) -> dict[str, float]:
-    """What `validation.truths.sliding` asks of a scene, in metres."""
+    """Parameters for `validation.truths.sliding`, in metres."""
     return {"v": SPEED * p["length"], "mu": MU, "g": GRAVITY * p["length"], "mass": p["mass"]}
 
 
@@ -60,12 +59,12 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def _slide(scene: Scene) -> Scene:
-    """The same scene, with the parameters of what slides."""
+    """The same scene, with the parameters of the slide."""
     return replace(scene, params=_sliding(scene.params))
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Way and braking of the box, and the first apex of the ball, over L."""
+    """Distance and braking of the box, and the first apex of the ball, over L."""
     length, d = scene.params["length"], scene.dimension
     found = sliding.measure(_slide(scene), trajectory)
     measured = {name: (None if value is None else value / length, why) for name, (value, why) in found.items()}
@@ -75,7 +74,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a slide and a rebound owe in metres, over L: the same at every length."""
+    """The checks of a slide and a rebound in metres, over L: the same at every length."""
     p, length = scene.params, scene.params["length"]
     metres = {name: value * length for name, value in truth.items()}
     found = [
@@ -99,7 +98,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Larger of the relative errors of the way of the box and of the apex of the ball."""
+    """Larger of the relative errors of the box's distance and the ball's apex."""
     return metrics.relative_error(found, exact(scene), ("stopping_distance", "apex"))
 
 
@@ -109,15 +108,15 @@ SCENE = CanonicalScene(
     version=1,
     title="The same scene in millimetres and in kilometres",
     symptoms=(
-        "small or tiny objects behave otherwise than large ones",
+        "small or tiny objects behave differently from large ones",
         "units of millimetres give other results",
     ),
     figure=__doc__ or "",
-    law="stops after v^2/(2 mu g), rises to e^2 of its fall: in units of L the same whatever L and the mass are",
+    law="stops after v^2/(2 mu g), rises to e^2 of its fall: in units of L the same for every L and mass",
     dimensions=(2, 3),
     parameters=(
         Parameter("length", 1e-3, "m", "the unit L of all lengths: 1e-3 is a pebble, 1e3 a mountain", 1e-6, 1e6),
-        Parameter("mass", 1.0, "kg", "of either body: a gram is 1e-3, a ton 1e3", 1e-9, 1e9),
+        Parameter("mass", 1.0, "kg", "mass of either body: a gram is 1e-3, a ton 1e3", 1e-9, 1e9),
     ),
     make=make,
     exact=exact,
@@ -130,8 +129,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "unit error",
         "1",
-        "larger of the relative errors of the way of the box and the rise of the ball, in millimetres and kilometres",
-        "a unit is no physics: what depends on it is a number of the engine's own",
+        "larger of the relative errors of the box's slide and the ball's rise, in millimetres and kilometres",
+        "results must not depend on the unit; where they do, a fixed length of the engine is the cause",
         lambda dt: [{}, {"length": 1e3}],
         error,
         "the whole scene: the ball bounces and the box slides",

@@ -1,12 +1,12 @@
-"""A box slides over plates that lie flush side by side: seams are not there.
+"""A box slides over flush plates, whose seams must not matter.
 
        +---+  v
        |   | -->              stops after d = v^2/(2 mu g), as on one face:
     +--+---+-+------+------+  no hop, no turn, no bump at any seam
     +--------+------+------+
 
-Contacts of two flush faces with one box are those of one face. Whoever finds each plate's contacts by itself meets the
-sides of plates that lie inside the floor: edges that are not there stop or lift what slides over them.
+Contacts of two flush faces with one box are those of one face. Contact detection for each plate alone finds the inner
+sides of plates, and these wrong contacts stop or lift the sliding box.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def make(dimension: int, params: Params) -> Scene:
     """Build the scene: plates as long as ``plate``, the box in the middle of the first."""
     p = params
     width, half = p["aspect"] * HEIGHT, 0.5 * p["plate"]
-    # Far enough for whoever stops too late: half as much again, and the box itself.
+    # Room for a stop that is too late: half as much again, and the box itself.
     count = math.ceil((half + 1.5 * sliding.way(p) + width) / p["plate"])
     plates = tuple(_plate(f"plate{k + 1}", dimension, p["plate"], k * p["plate"]) for k in range(count))
     box = sliding.launched(dimension, p, width, HEIGHT)
@@ -35,13 +35,13 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def _plate(name: str, dimension: int, length: float, x: float) -> Body:
-    """A fixed plate whose upper face is level 0, as wide as it takes."""
+    """A fixed plate with its upper face at level 0, wide enough."""
     half = (0.5 * length, *(2.0,) * (dimension - 2), 0.5 * THICKNESS)
     return Body(name, Box(half), pose=pose_at(dimension, along(dimension, x, -0.5 * THICKNESS)), motion="fixed")
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Those of a box on one face: a seam earns nothing."""
+    """Those of a box on one face: seams have no extra tolerance."""
     return sliding.checks(scene, dt, truth, abs(scene.bodies[-2].pose[0]))
 
 
@@ -77,8 +77,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
-        "an edge that is not there stops what slides over it, or throws it on",
+        "distance of the place where it stops from the exact one, over the length of its slide",
+        "a wrong contact at a flush edge stops a sliding body or throws it",
         lambda dt: [{}],
         sliding.error,
         "the sliding box",

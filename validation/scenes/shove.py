@@ -6,8 +6,8 @@ r"""A box slides down a slope and shoves another one along the floor, all of it 
        \/  |    |
     ====\=============    nothing turns while slope and floor can hold both
 
-What one contact does depends on the three others: a solver that treats them one after the other, and not to the end,
-gives the boxes accelerations that do not fit each other.
+Each contact depends on the three others: solving them one after the other, without convergence, gives accelerations
+that do not agree.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _laws(p: Params) -> tuple[float, float, float]:
 
 
 def _corner(p: Params) -> tuple[float, float]:
-    """Where the upper right corner of the box on the slope is at the start [m]; the slope meets the floor at 0."""
+    """The upper right corner of the box on the slope at the start [m]; the slope meets the floor at 0."""
     angle = math.radians(p["angle"])
     return UPPER[1] * math.sin(angle) - CLEARANCE / math.tan(angle), CLEARANCE + UPPER[1] * math.cos(angle)
 
@@ -48,7 +48,7 @@ def _held(p: Params, sunk: float) -> bool:
     angle, (width, height) = math.radians(p["angle"]), UPPER
     _, _, force = _laws(p)
     c, s = math.cos(angle), math.sin(angle)
-    # Where the slope presses on the upper box, and the floor on the lower one, against their middles.
+    # Points of action of the slope on the upper box, and of the floor on the lower one, relative to their middles.
     slope = -force * (height * c - width * s) / 2.0 / (p["mass"] * p["g"] * c + force * s)
     ground = (_corner(p)[1] - sunk - 0.5 * LOWER[1]) * force / (p["mass"] * p["ratio"] * p["g"])
     return abs(slope) < 0.45 * width and abs(ground) < 0.45 * LOWER[0]
@@ -60,7 +60,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        If the boxes would tip, or the upper one would get to the floor or leave the other's face.
+        If the boxes would tip, or the upper one would reach the floor or leave the other's face.
     """
     p, angle = params, math.radians(params["angle"])
     down, _, _ = _laws(p)
@@ -85,14 +85,14 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's law for both boxes, tied by one force."""
+    """Newton's law for both boxes, with one force between them."""
     down, ahead, force = _laws(scene.params)
     truth = {"down": down, "ahead": ahead, "force": force / (scene.params["mass"] * scene.params["g"])}
     return truth | {"parted": 0.0, "turned": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Mean accelerations and force over the second half, largest gap or overlap between the boxes, largest turn."""
+    """Mean accelerations and force over the second half, largest gap or overlap between the boxes, largest rotation."""
     p, angle, t = scene.params, math.radians(scene.params["angle"]), trajectory.t
     along = np.array([math.cos(angle), -math.sin(angle)])
     corner = metrics.point(trajectory, 2, (0.5 * UPPER[0], 0.5 * UPPER[1]))[:, 0]
@@ -114,21 +114,21 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Constant forces are exact in every scheme, once all contacts are found; one may be found a step late.
 
-    The force is told by impulses, which are as exact as the speed that they make: ``driven`` by the mass it moves.
+    The force follows from impulses, which are as exact as the speed that they cause: ``driven`` for the moved mass.
     """
     p, g = scene.params, scene.params["g"]
     pace = bounds.driven(g, dt, 0.5 * scene.duration)
     load = bounds.Bound(
         p["ratio"] * pace.value / g,
-        f"{pace.because}, of the mass that it moves",
+        f"{pace.because}, of the moved mass",
     )
     apart = bounds.Bound(
         2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "one contact found one step late, g dt^2, on either side"
     )
     turn = bounds.Bound(
-        2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "a corner of either end found one step late sinks by g dt^2"
+        2.0 * g * dt * dt + bounds.ROUND_OFF * LOWER[0], "a corner whose contact is found one step late sinks by g dt^2"
     )
-    source = "Newton's law for two bodies that one force ties"
+    source = "Newton's law for two bodies with one force between them"
     return [
         pace.check("down", "m/s^2", truth["down"], source),
         pace.check("ahead", "m/s^2", truth["ahead"], source),
@@ -169,7 +169,7 @@ SCENE = CanonicalScene(
         "acceleration error",
         "1",
         "larger of the relative errors of both accelerations",
-        "the two accelerations fit each other where all four contacts are solved together",
+        "the two accelerations agree if all four contacts are solved together",
         lambda dt: [{}, {"ratio": 20.0}],
         error,
         "the boxes on their way",

@@ -1,9 +1,9 @@
-"""A scene in other sizes and masses: what is similar to it falls alike, in times that go with the root of its length.
+"""A similar scene in other sizes and masses: times scale with the root of the length.
 
     lengths times L, masses times M, times times sqrt(L)    ->    speeds sqrt(L), forces and impulses M, M sqrt(L)
 
-Gravity, restitution and friction stay what they are, so that the laws of rigid bodies say the same of both. An engine
-that counts in metres and seconds (a margin, a threshold of speed, a time constant) may not.
+Gravity, restitution and friction are unchanged, so the laws of rigid bodies give similar motions. An engine with fixed
+metres and seconds (a margin, a speed threshold, a time constant) may not.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from adapters.shapes import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polyg
 from adapters.trajectory import Sampling, Trajectory
 from validation.canonical import CanonicalScene
 
-#: Masses of a scene in other sizes: unlike those that the same matter would have, so that neither is a unit.
+#: Factor of masses in other sizes, different from that of a constant density.
 MASS = 0.2
 
 
@@ -91,7 +91,7 @@ def _enlarged(shape: Shape, length: float) -> Shape:
 
 
 def told_in_units_of(found: Trajectory, length: float, mass: float) -> Trajectory:
-    """Return what happened to an `enlarged` scene in the units of the scene itself."""
+    """Return the result of an `enlarged` scene in the units of the scene itself."""
     time, d = math.sqrt(length), found.dimension
     pose, twist = np.array(found.pose), np.array(found.twist)
     pose[:, :, :d] /= length

@@ -5,7 +5,7 @@
     ==================      straight on, without turning or hopping;
        |<------ d ------>|      pressed by m g and braked by mu m g at every step
 
-In space it may head in any direction against the box's edges, which Coulomb's law does not know of: a cone that is a
+In 3-D it may move in any direction relative to the box's edges, on which Coulomb's law does not depend: a friction
 pyramid brakes less along its diagonals or turns the path.
 """
 
@@ -31,13 +31,13 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """A slide's truth, and its forces: relative to the weight and to mu times it."""
+    """The truth of a slide, and its forces, relative to the weight and to mu times it."""
     forces = {f"{force}[{by}]": 1.0 for force in ("normal", "friction") for by in ("mean", "least", "greatest")}
     return sliding.exact(scene) | forces
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """What is measured of a slide, and the floor's force over its middle half, upwards and against the heading."""
+    """The metrics of a slide, and the floor's force over its middle half, upwards and against the heading."""
     p, long = scene.params, sliding.stop(scene.params)
     floor_force = metrics.forces(trajectory, 1, [0], 0.25 * long, 0.75 * long) / (p["mass"] * p["g"])
     along_way = floor_force[:, : scene.dimension - 1] @ heading(scene)
@@ -49,7 +49,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a slide owes, and its forces: it moves neither up nor down, and friction is mu times the normal force."""
+    """The checks of a slide, and of its forces: no vertical motion, and friction is mu times the normal force."""
     window = 0.5 * sliding.stop(scene.params)
     return [
         *sliding.checks(scene, dt, truth),
@@ -74,12 +74,12 @@ SCENE = CanonicalScene(
     ),
     family="friction",
     figure=__doc__ or "",
-    law="d = v^2/(2 mu g), straight on; friction does not know the heading, and is mu m g at every step",
+    law="d = v^2/(2 mu g), straight on; friction is mu m g at every step and heading",
     dimensions=(2, 3),
     parameters=(
         Parameter("v", 3.0, "m/s", "speed at the start", 0.0, 1e2, positive=True),
         Parameter("mu", 0.4, "1", "friction; below aspect, so that the box does not tip", 0.0, 1.0, positive=True),
-        Parameter("heading", 0.0, "degrees", "of the slide against the box's edges; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the slide to the box's edges; 3-D only", 0.0, 90.0),
         Parameter("aspect", 1.5, "1", "width over height of the box", 1.1, 20.0),
         standard_gravity(),
         mass_of("the box"),
@@ -99,7 +99,7 @@ SCENE = CanonicalScene(
     primary=Primary(
         "stopping error",
         "way",
-        "distance of the place where it stops from where it should, over the way that it slides",
+        "distance of the place where it stops from the exact one, over the length of its slide",
         "one number for too far, too short and astray",
         lambda dt: [{}],
         sliding.error,

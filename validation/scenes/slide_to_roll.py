@@ -1,12 +1,12 @@
-"""A ball that is thrown along the floor without spin slides until it rolls.
+"""A ball thrown along the floor without spin slides until it rolls.
 
         -->  v                               v'  = v/(1 + k)        2/3 v of a disc, 5/7 v of a ball
        ( )          ( )   v'                 t   = v k/((1 + k) mu g)
     ========================================  x   = v^2 k (2 + k)/(2 mu g (1 + k)^2)
        |<--- x ---->|  from here it rolls    k   = I/(m r^2)
 
-Friction decides when and where rolling begins, and not how fast the ball is then: its angular momentum about the line
-of contact is kept. A rolling ball loses nothing, so that its speed says whether an engine resists rolling.
+Friction determines when and where rolling begins, but not the speed then: angular momentum about the line of contact is
+conserved. A rolling ball loses nothing, so its speed shows rolling resistance.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
 from validation.truths.rolling import forward, gyration, launched, of_the_arm, on_a_late_arm
 
-#: Runs for this many times the time until it rolls: two thirds of the run it rolls.
+#: Duration over the time until it rolls: it rolls for two thirds of the run.
 RUNS = 3.0
 
 
@@ -33,7 +33,7 @@ def _time(p: Params, k: float) -> float:
 
 
 def _place(p: Params, k: float) -> float:
-    """Way until the ball rolls [m]."""
+    """Distance until the ball rolls [m]."""
     return p["v"] ** 2 * k * (2.0 + k) / (2.0 * p["mu"] * p["g"] * (1.0 + k) ** 2)
 
 
@@ -63,7 +63,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Speed and slip at the end; when and where the slip, as it falls along a line, would be nothing."""
+    """Speed and slip at the end; time and place at which the linearly falling slip would be 0."""
     speed, spin = forward(scene, trajectory)
     slip = speed - scene.params["radius"] * spin
     time = _vanishes(trajectory.t, slip)
@@ -94,20 +94,20 @@ def _vanishes(t: np.ndarray, slip: np.ndarray) -> Measured:
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """Velocities are exact at every step; the start, which touches, may find its contact one step late.
 
-    The ball then does not brake for one step, v dt farther and dt later, and sinks by g dt^2, by which its arm is
-    shorter. Places show half a step of the speed that braking takes, as step orders do of a parabola.
+    The ball then does not brake for one step, v dt farther and dt later, and sinks by g dt^2, by which its lever arm is
+    shorter. Places have an error of half a step times the lost speed, by the order of the scheme.
     """
     p, k, r = scene.params, gyration(scene.dimension), scene.params["radius"]
     g, v, end = p["g"], p["v"], truth["final_speed"]
     depth = g * dt * dt
 
     def changed(answer: Callable[[float], float]) -> float:
-        """What an arm shortened by ``depth`` changes in ``answer(k)``."""
+        """Change of ``answer(k)`` by a lever arm shorter by ``depth``."""
         return of_the_arm(lambda arm: answer(k * (r / arm) ** 2), r, depth)
 
     time = bounds.Bound(
         dt + changed(lambda k: _time(p, k)) + bounds.ROUND_OFF * scene.duration,
-        "braking is constant in every scheme: only a contact found one step late, and the arm that it leaves",
+        "braking is constant in every scheme, except for a contact found one step late and the lever arm after it",
     )
     place = bounds.Bound(
         v * dt
@@ -115,11 +115,13 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         + p["mu"] * depth
         + changed(lambda k: _place(p, k))
         + bounds.ROUND_OFF * truth["rolling_place"],
-        "a contact found one step late is v dt without brakes, a step order shows (v - v') dt/2; and mu g dt^2",
+        "a contact found one step late gives v dt without friction, velocity and position half a step apart (v - "
+        "v') dt/2; and mu g dt^2",
     )
     rolls = on_a_late_arm(lambda arm: v / (1.0 + k * (r / arm) ** 2), r, depth, v)
     slip = bounds.Bound(
-        end * depth / r + bounds.ROUND_OFF * v, "it rolls on its arm; told with the radius that is a slip of v g dt^2/r"
+        end * depth / r + bounds.ROUND_OFF * v,
+        "it rolls on its lever arm; measured with the radius that is a slip of v g dt^2/r",
     )
     source = "Coulomb's law; angular momentum about the line of contact"
     found = [
@@ -148,7 +150,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Error of the final speed, relative to it."""
+    """Relative error of the final speed."""
     truth = exact(scene)["final_speed"]
     value, reason = found["final_speed"]
     return (None, reason) if value is None else (abs(value - truth) / truth, "")
@@ -169,7 +171,7 @@ SCENE = CanonicalScene(
     parameters=(
         Parameter("v", 3.0, "m/s", "speed at the start, without spin", 0.0, 1e2, positive=True),
         Parameter("mu", 0.3, "1", "friction of the pair: when rolling begins, not how fast", 0.0, 10.0, positive=True),
-        Parameter("heading", 0.0, "degrees", "of the motion against the axes; spatial only", 0.0, 90.0),
+        Parameter("heading", 0.0, "degrees", "angle of the motion to the axes; 3-D only", 0.0, 90.0),
         Parameter("radius", 0.25, "m", "of the ball", 0.0, 1e3, positive=True),
         standard_gravity(),
         mass_of("the ball"),
@@ -190,8 +192,8 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         "|v'/v (1 + k) - 1| of the speed at the end, when the ball has rolled twice as long as it slid",
-        "the one number that no friction coefficient changes: sliding that ends too early or late does not show in "
-        "it, wrong rolling does",
+        "the one number that does not depend on friction: it shows wrong rolling, but not sliding that ends too "
+        "early or late",
         lambda dt: [{}, {"mu": 0.1}],
         error,
         "the whole scene: the ball slides, then rolls",
@@ -201,6 +203,6 @@ SCENE = CanonicalScene(
         "final_speed": "rolls off with {value}",
         "slip": "goes on sliding with {value} where it should roll",
         "rolling_time": "rolls after {value}",
-        "rolling_place": "rolls after a way of {value}",
+        "rolling_place": "rolls after {value}",
     },
 )

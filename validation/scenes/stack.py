@@ -1,4 +1,4 @@
-"""A column of boxes that starts in equilibrium and should stay there.
+"""A column of boxes at rest.
 
         +---+  n
         +---+  ...        interface i carries the weight above it:
@@ -6,7 +6,7 @@
         +---+  1          nothing moves, drifts or sinks
     ==============
 
-It starts exactly touching: whatever moves afterwards, the engine made. The forces on each box cancel at every step.
+It starts in exact contact, so any motion is the engine's. The forces on each box cancel at every step.
 """
 
 from __future__ import annotations
@@ -55,17 +55,17 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """A column's truth, and loads at every step: the least and the greatest of all, relative to the weight above."""
+    """The truth of a column, and the least and greatest load of all steps, relative to the weight above."""
     return columns.exact(scene) | {"load[least]": 1.0, "load[greatest]": 1.0, "unbalanced": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """What is measured of a column, and over the last second the load of each interface and the force on each box."""
+    """The metrics of a column, and over the last second the load of each interface and the force on each box."""
     n, weight = len(scene.bodies), scene.params["mass"] * scene.params["g"]
     begin = trajectory.t[-1] - WINDOW
     up = [metrics.forces(trajectory, i, [i - 1], begin)[:, -1] / weight for i in range(1, n)]
     loads = np.concatenate([load / (n - i) for i, load in enumerate(up, 1)])
-    # The box above pushes down with what it is pushed up by; nothing stands on the last one.
+    # The box above pushes down with the force on it; nothing stands on the last one.
     off = np.abs(np.array(up) - np.array([*up[1:], np.zeros_like(up[-1])]) - 1.0)
     unbalanced = metrics.over_time("", off.ravel(), ("greatest",))["[greatest]"]
     return {
@@ -76,7 +76,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What a column owes, and the same of every step: of the weight above, and of each box its own."""
+    """The checks of a column, and the same for every step: for the weight above, and for each box."""
     balance = bounds.steady().check("unbalanced", "1", truth["unbalanced"], "equilibrium of forces on each box")
     return [
         *columns.checks(scene, dt, truth),
@@ -86,13 +86,13 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track:
-    """The top box stays where it is."""
+    """The top box at rest."""
     top = scene.bodies[-1]
     return Track(top.name, lambda t: top.pose[: scene.dimension])
 
 
 def _heights(*swept: int) -> tuple[Variation, ...]:
-    """Every height at the profiles' own iterations, those of ``swept`` at other counts as well."""
+    """Every height at the profiles' own iterations; heights in ``swept`` at other counts as well."""
     return tuple(Variation({"n": n}, (None, *SWEEPS) if n in swept else (None,)) for n in HEIGHTS)
 
 
@@ -123,17 +123,17 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=columns.sampling,
     track=track,
-    # One box, the column of the bench and the tallest; starved, with three times a usual count, and with all it needs.
+    # One box, the benchmark's column and the tallest; with too few iterations, three times a usual count, and enough.
     quick=(Variation({"n": 1}), Variation({"n": 10}, (None, 1, 30, 100)), Variation({"n": 20})),
     standard=_heights(10),
     full=_heights(*HEIGHTS),
-    representative={"n": 10.0},  # starves a solver that stops too soon
+    representative={"n": 10.0},  # too few iterations for many solvers
     planted=({"n": 2.0},),
     primary=Primary(
         "displacement",
         "side",
         "larger of the sideways drift and the deepest overlap within 5 s, per side of a box, n = 10",
-        "nothing may move, so whatever did is error, sideways or into the neighbour; loads are left out because "
+        "nothing may move, so any motion is error, sideways or into the neighbour; loads are left out because "
         "any column at rest carries its weight on average",
         lambda dt: [{"n": 10.0}],
         lambda scene, dt, found: columns.displacement(found, SIDE),

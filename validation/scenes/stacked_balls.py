@@ -1,4 +1,4 @@
-"""A small ball follows a large one onto a floor, a gap apart, and is thrown back higher than it came from.
+"""A small ball follows a large one onto a floor, a gap apart, and rebounds faster than it came.
 
           o  m
           |  v             1. the large ball hits the floor: it leaves with e v
@@ -8,8 +8,8 @@
     ==============         3. a large ball that is thrown down hits the floor again, and may
                               catch up with the small one: followed until they have parted
 
-Each impact is between two bodies, with the next one well apart in time, so that the law of pairs decides and no law of
-several contacts at once: v_m is almost 3 v for a light ball and e = 1. No gravity: speeds are what the impacts make.
+Each impact is between two bodies, with the next one well apart in time, so the law of pairs holds and no law of
+simultaneous contacts is needed: v_m is almost 3 v for a light ball and e = 1. There is no gravity.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from validation.scenes.parts import PHASES, ball, between_impacts, delay, floor,
 LARGE, SMALL = 0.5, 0.2
 #: Runs for this long after the last impact [s], of which the softest engine compared keeps contact for some.
 AFTERMATH, SOFT = 0.35, 0.05
-#: Steps up to this [s] find the last impact before the end, however late.
+#: Largest step [s] that finds the last impact before the end, even if late.
 COARSEST = 1.0 / 240.0
-#: Impacts that are followed at most.
+#: Largest number of impacts.
 MOST = 20
 
 
 def _gap(params: Params) -> float:
-    """Gap between the balls [m]: they meet ``apart`` seconds after the large one has left the floor."""
+    """Gap between the balls [m]: they hit ``apart`` seconds after the large one has left the floor."""
     return (1.0 + params["e"]) * params["v"] * params["apart"]
 
 
@@ -55,13 +55,13 @@ def make(dimension: int, params: Params) -> Scene:
 def impacts(params: Params) -> list[tuple[float, float, float]]:
     """Time [s] of every impact, and the speeds of the large and the small ball after it, upwards [m/s].
 
-    Between impacts both move straight. After the balls have met only the floor can be next, and after the floor only
-    the other ball, so that the order is never in doubt; it ends when the small one is the faster, upwards.
+    Between impacts both move straight. Impacts with the floor and between the balls alternate; they end when the small
+    ball is the faster, upwards.
 
     Raises
     ------
     SceneError
-        If there are more than `MOST` of them: small restitutions gather infinitely many.
+        If there are more than `MOST` of them: small restitutions give infinitely many.
     """
     p, e, share = params, params["e"], params["ratio"] / (1.0 + params["ratio"])
     time, height, gap = p["delay"], 0.0, _gap(p)  # of the large ball over the floor, and between the balls
@@ -83,16 +83,16 @@ def impacts(params: Params) -> list[tuple[float, float, float]]:
 
 
 def lateness(params: Params, dt: float) -> float:
-    """How late the last impact is at most to a method of fixed steps [s].
+    """Largest delay of the last impact in a fixed-step method [s].
 
-    Each impact is found up to a step after it has happened, and lets go from where the bodies have got to by then, or
-    from where push-out of up to all of the overlap has put them. The next one is later by the time that this takes to
-    close, which is long between slow balls. Places and times are sums over what each impact may do, the largest of
-    which has each of these at the end of its range that delays.
+    Each impact is found up to a step late, and the bodies separate from their places then, or from places after a
+    correction of up to the whole overlap. The next one is later by the time to close that distance, which is long
+    between slow balls. Places and times are sums over the errors of each impact, each at the end of its range with the
+    largest delay.
     """
     p, known = params, impacts(params)
     light = p["ratio"] / (1.0 + p["ratio"])
-    # Of the large and the small ball, and of the time: columns are delays of each impact and its push-out [m], [s].
+    # For the large and the small ball, and the time: columns are delays of each impact and its correction [m], [s].
     ways, late = np.zeros((2, 2 * len(known))), np.zeros(2 * len(known))
     before = (-p["v"], -p["v"])
     for k, (_, *after) in enumerate(known):
@@ -108,7 +108,7 @@ def lateness(params: Params, dt: float) -> float:
 
 
 def _aftermath(params: Params) -> float:
-    """How long the scene goes on after the last impact [s]."""
+    """Time after the last impact [s]."""
     return max(AFTERMATH, SOFT + lateness(params, COARSEST))
 
 
@@ -122,7 +122,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Velocities at the end, and the share of the energy that is gone."""
+    """Velocities at the end, and the lost share of the energy."""
     p, up = scene.params, scene.dimension - 1
     large, small = (float(v) for v in trajectory.twist[-1, 1:, up])
     before = 0.5 * (1.0 + p["ratio"]) * p["mass"] * p["v"] ** 2
@@ -131,10 +131,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """Impacts that lie steps apart are exact pair by pair; closer ones are one to a method of fixed steps.
+    """Impacts that lie steps apart are exact pair by pair; a fixed-step method cannot separate closer ones.
 
-    Nor is the end judged where a coarse step may find the last impact after it: a large ball that is left almost at
-    rest gets to the floor when the steps of its faster way have decided.
+    The end is not judged where a coarse step may find the last impact after it: a large ball almost at rest reaches the
+    floor at a time that depends on the steps before.
     """
     p, times = scene.params, [time for time, _, _ in impacts(scene.params)]
     source = "Newton's law of restitution and conservation of momentum, pair after pair"
@@ -197,7 +197,7 @@ SCENE = CanonicalScene(
         "speed error",
         "1",
         f"larger error of the balls' speeds at the end over that of the fall, over {PHASES} phases of the first impact",
-        "what the second impact makes of the first shows whether they are resolved one by one; the worst phase counts",
+        "the second impact shows whether impacts are resolved one by one; the worst phase counts",
         phases,
         error,
         "the whole scene: fall, two or three impacts, departure",

@@ -1,12 +1,12 @@
-"""A row of balls is pressed against a wall: each contact carries the press, and a solver has to pass it on.
+"""A row of balls is pressed against a wall: each contact carries the press, which a solver must pass on.
 
          |
     wall | o o o o o <-- F     nothing moves; every contact carries F,
          | 1 2  ...  n         that of the wall as well
 
-A contact knows its neighbours alone, so that the press gets to the wall by one contact a sweep, and what a sweep over
-all contacts leaves of an error shrinks by cos^2(pi/2n): ten balls take forty sweeps for each factor of e. A solver that
-stops sooner lets the row in. Nothing else is asked: no friction, no weight, one contact from ball to ball.
+A contact depends on its neighbours only, so the press moves by one contact an iteration, and the error falls by
+cos^2(pi/2n) an iteration over all contacts: ten balls take forty iterations for each factor of e. With fewer the row is
+compressed. There is no friction and no weight, and one contact from ball to ball.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from validation.canonical import CanonicalScene, Check, Frontier, Measured, Para
 from validation.scenes.parts import along, at, ball, mass_of
 
 RADIUS = 0.5
-#: Iteration counts that starve a sweeping solver, beside each profile's own.
+#: Iteration counts that are too small, beside each profile's own.
 FEW, MANY = (1, 4), (1, 2, 4, 10, 20, 50, 100)
 
 
@@ -48,7 +48,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Farthest way of a ball and deepest overlap at any time; energy, and the worst mean load, of the last second."""
+    """Largest displacement of a ball and deepest overlap; energy and worst mean load of the last second."""
     d = scene.dimension
     place = trajectory.pose[:, 1:, :d]
     late = trajectory.t > trajectory.t[-1] - WINDOW
@@ -68,10 +68,10 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """As of a column that stands, under the acceleration that the press gives the ball that it acts on."""
+    """As for a standing column, with the acceleration of the press on its ball."""
     p, n = scene.params, len(scene.bodies) - 1
     pressed, length, source = p["press"] / p["mass"], 2.0 * RADIUS * n, "static equilibrium"
-    # The momentum that is unaccounted for is that of all balls, the load is that of one.
+    # The momentum error is that of all balls, the load that of one.
     share = bounds.carried(dt)
     allowed = {
         "displacement": ("m", bounds.slips(n, pressed, dt)),
@@ -83,11 +83,11 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def growth(scene: Scene) -> float:
-    """By how much a pressed row multiplies what is off its line, at most: it buckles, a saddle, not a rest that lasts.
+    """Largest amplification of a distance from the line: a pressed row buckles.
 
-    Two balls that are y and y' off the line press each other across it by F (y - y')/d, d being their diameter:
-    m y_k'' = F/d (2 y_k - y_{k-1} - y_{k+1}). The sizes of these factors add up to 4 at most, and those of all
-    powers of the differences to powers of 4, so that what began at rest grows as cosh(2 t sqrt(F/(m d))) at most.
+    Two balls at distances y and y' from the line push each other across it by F (y - y')/d, d being their diameter: m
+    y_k'' = F/d (2 y_k - y_{k-1} - y_{k+1}). The magnitudes of these factors sum to at most 4, and those of powers of
+    the differences to powers of 4, so a start at rest grows at most as cosh(2 t sqrt(F/(m d))).
     """
     p = scene.params
     return bounds.saddle(2.0 * scene.duration * math.sqrt(p["press"] / (p["mass"] * 2.0 * RADIUS)))
@@ -99,13 +99,13 @@ def sampling(scene: Scene) -> Sampling:
 
 
 def track(scene: Scene) -> Track:
-    """The ball that is pressed stays where it is."""
+    """The pressed ball at rest."""
     last = scene.bodies[-1]
     return Track(last.name, lambda t: last.pose[: scene.dimension])
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Farthest way of a ball, in diameters."""
+    """Largest displacement of a ball, in diameters."""
     value, reason = found["displacement"]
     return (None, reason) if value is None else (value / (2.0 * RADIUS), "")
 
@@ -124,16 +124,16 @@ _HELD = "held: no ball a tenth of its diameter off its place, or inside another"
 SCENE = CanonicalScene(
     name="starved",
     version=1,
-    title="Row of balls pressed against a wall, with too few sweeps",
+    title="Row of balls pressed against a wall, with too few iterations",
     symptoms=("a row or heap is squeezed with too few solver iterations",),
     family="hard",
     figure=__doc__ or "",
     law="nothing moves; every contact carries the press",
     dimensions=(2,),
     parameters=(
-        Parameter("n", 10, "1", "number of balls: forty sweeps for each factor of e", 1, 1000, integer=True),
+        Parameter("n", 10, "1", "number of balls: forty iterations for each factor of e", 1, 1000, integer=True),
         Parameter("press", 10.0, "N", "force on the last ball, about the weight of one", 0.0, 1e6, positive=True),
-        Parameter("duration", 2.0, "s", "a second to give way, and one to carry", 1.0, 1e3),
+        Parameter("duration", 2.0, "s", "one second to yield, and one to carry", 1.0, 1e3),
         mass_of("each ball"),
     ),
     make=make,
@@ -149,8 +149,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "displacement",
         "diameter",
-        "farthest way of a ball from its place within 2 s, in diameters, n = 10",
-        "nothing may move: what sweeps leave of the press lets the row in",
+        "largest displacement of a ball within 2 s, in diameters, n = 10",
+        "nothing may move: the residual of the iterations lets the press move the row",
         lambda dt: [{}],
         error,
         "the pressed row, half a second after the start",

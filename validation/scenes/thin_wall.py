@@ -1,12 +1,12 @@
-"""A fast ball meets a thin plate in free space: it comes back, however fast it is.
+"""A fast ball hits a thin plate without gravity: it rebounds at every speed.
 
               |#|
        o -->  |#|  d         v+ = -e v-,  on the side that it came from
               |#|
        |<- v dt ->|          a method of fixed steps sees it only where its steps end
 
-Newton's law knows no speed and no thickness. A method that looks at overlaps at the ends of its steps finds a contact
-up to v dt late; a ball that is on the other side by then is not found, or is pushed out there.
+Newton's law does not depend on speed or thickness. A method that detects overlaps at the ends of its steps finds a
+contact up to v dt late; a ball beyond the plate by then is missed, or pushed out there.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ WIDTH = 2.0
 AFTERMATH = 0.35
 
 
-#: Time until contact [s] that is a hair more than 12 steps of 1/240 s: found as late, and as deep, as it can be.
+#: Time until contact [s], slightly more than 12 steps of 1/240 s: found as late and as deep as possible.
 LATEST = 0.0500001
 
 
@@ -57,12 +57,12 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """Newton's law of restitution against what does not move."""
+    """Newton's law of restitution against a fixed body."""
     return {"rebound_ratio": scene.params["e"], "beyond": 0.0}
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Speed away from the plate at the end, and how far the ball has been beyond where it touches."""
+    """Speed away from the plate at the end, and the largest penetration of the ball."""
     p = scene.params
     x = trajectory.pose[:, 1, 0]
     return {
@@ -72,7 +72,7 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
-    """``tunnelled``, ``stuck``; empty of a ball that came back, however slowly."""
+    """``tunnelled``, ``stuck``; empty for a ball that came back, however slowly."""
     back, beyond = found["rebound_ratio"][0], found["beyond"][0]
     if back is None or beyond is None:
         return "NaN"
@@ -82,7 +82,7 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The law is exact at every step; what is found late is v dt deep, whatever is behind the face."""
+    """The law is exact at every step; a late contact is v dt deep, whatever is behind the face."""
     p = scene.params
     reach = p["v"] * (p["delay"] + AFTERMATH)
     deep = bounds.Bound(p["v"] * dt + bounds.ROUND_OFF * reach, "the contact is found up to one step late, v dt deep")
@@ -152,7 +152,7 @@ SCENE = CanonicalScene(
         "rebound error",
         "1",
         f"largest |v+/v- - e| over {PHASES} contact times within a step; 1 + e for a ball that passes",
-        "the worst phase of the contact decides whether a ball passes",
+        "a ball passes if it does so at the worst phase",
         phases,
         error,
         "the whole scene: approach, contact, departure",

@@ -1,4 +1,4 @@
-"""A block on a table that is tilted: it stays, slides or topples.
+"""A block on a tilted table: it stays, slides or topples.
 
          ____
         /   /|           stays    if tan(theta) <= mu and tan(theta) <= width/height
@@ -6,8 +6,8 @@
       /___/  |           topples  where the edge gives first:  phi'' = p^2 sin(phi), from phi = theta - alpha
     =========== theta
 
-Gravity is turned by theta, not the table. ``ratio`` is tan(theta) over the limit that is met first: below 1 nothing
-may move, above it the block must go, and the way that it goes.
+Gravity is rotated by theta, not the table. ``ratio`` is tan(theta) over the limit that is reached first: below 1
+nothing may move, above it the block must slide or topple, as the limit says.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from validation.canonical import CanonicalScene, Check, Measured, Parameter, Par
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, states, upward
 from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
-#: What a toppling block turns until it is told [rad], and the time that the run goes on [s].
+#: Rotation of a toppling block at the measurement [rad], and the time of the run beyond it [s].
 TOLD, AFTERMATH = math.radians(15.0), 0.05
-#: Angles on the way at which the grip of the edge is asked.
+#: Number of angles at which the grip of the edge is checked.
 ASKED = 50
 #: Duration of a run in which the block stays or slides [s].
 DURATION = 2.0
@@ -45,7 +45,7 @@ def outcome(p: Params) -> str:
 
 
 def _fall(p: Params) -> tuple[Pivot, float, float]:
-    """The block on its lower edge, and the angles of its diagonal against gravity at the start and where it is told."""
+    """The block on its lower edge, and the angles of its diagonal to gravity at the start and at the measurement."""
     on = Pivot(p["aspect"] * p["height"], p["height"], p["g"])
     return on, angle(p) - on.alpha, angle(p) - on.alpha + TOLD
 
@@ -63,7 +63,7 @@ def make(dimension: int, params: Params) -> Scene:
     Raises
     ------
     SceneError
-        For limits so near each other that it does both, and for an edge that friction does not hold on its way.
+        For limits so near each other that it does both, and for an edge that friction does not hold throughout.
     """
     p, theta = params, angle(params)
     duration = DURATION
@@ -82,7 +82,7 @@ def make(dimension: int, params: Params) -> Scene:
 
 
 def exact(scene: Scene) -> dict[str, float]:
-    """At rest, a constant acceleration, or a pendulum that is held by an edge."""
+    """At rest, a constant acceleration, or a pendulum about an edge."""
     p = scene.params
     if outcome(p) == "stays":
         return {"moved": 0.0}
@@ -97,7 +97,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Largest way of a point of the block, mean acceleration over the second half, and its passage through an angle."""
+    """Largest displacement of a point of the block, mean acceleration over the second half, time of an angle."""
     p, d = scene.params, scene.dimension
     width, pose = p["aspect"] * p["height"], trajectory.pose[:, 1]
     turn, spin = -metrics.tilt(trajectory), -metrics.tilt_rate(trajectory)
@@ -116,9 +116,9 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """What stays may be found one step late, at its centre and at a corner; what slides is under constant forces.
+    """Contacts of a resting block may be found one step late; a sliding block has constant forces.
 
-    A block that topples starts from an angle that is known to a corner that is found one step late, g dt^2 deep.
+    A toppling block starts from an angle with the error of a corner found one step late, g dt^2 deep.
     """
     p, g, source = scene.params, scene.params["g"], "Coulomb's law; the centre of mass over the base"
     if "moved" in truth:
@@ -139,7 +139,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Way of a block that should stay, in heights; else the error of acceleration or time, relative to it."""
+    """Displacement of a block that should stay, in heights; else the relative error of acceleration or time."""
     truth = exact(scene)
     metric = next(iter(truth))
     value, reason = found[metric]
@@ -156,10 +156,10 @@ SCENE = CanonicalScene(
     title="Block on a tilted table: stays, slides or topples",
     symptoms=("a block topples instead of sliding",),
     figure=__doc__ or "",
-    law="stays if tan(theta) <= min(mu, width/height); else slides or topples, whichever limit is met first",
+    law="stays if tan(theta) <= min(mu, width/height); else slides or topples, whichever limit is reached first",
     dimensions=(2, 3),
     parameters=(
-        Parameter("ratio", 0.98, "1", "tan(theta) over the limit that is met first", 0.0, 10.0, positive=True),
+        Parameter("ratio", 0.98, "1", "tan(theta) over the limit that is reached first", 0.0, 10.0, positive=True),
         Parameter("mu", 0.5, "1", "friction of the pair", 0.0, 10.0, positive=True),
         Parameter("aspect", 0.3, "1", "width over height of the block; below mu it topples", 0.05, 10.0),
         Parameter("height", 1.0, "m", "of the block", 0.0, 1e3, positive=True),
@@ -183,9 +183,9 @@ SCENE = CanonicalScene(
     primary=Primary(
         "outcome error",
         "1",
-        "way of the block that should stay, in heights; error of the time of the one that topples, and of the "
-        "acceleration of the one that slides, relative to them",
-        "which way it goes, and how fast, at both of its limits",
+        "displacement of the block that should stay, in heights; relative errors of the time of the one that "
+        "topples and of the acceleration of the one that slides",
+        "whether it slides or topples, and how fast, at both limits",
         lambda dt: [{}, {"ratio": 1.1}, {"ratio": 1.1, "aspect": 1.0}],
         error,
         "the whole scene: the block stays",

@@ -1,4 +1,4 @@
-"""A box that spins about its middle axis in free space turns over, and over again.
+"""A box that spins about its middle axis in free space turns over again and again.
 
            I1 < I2 < I3            spin about axis 2 is unstable: (0, s, delta s) grows as exp(lambda t),
         +------------+               lambda = s sqrt((I2 - I1)(I3 - I2)/(I1 I3))
@@ -6,8 +6,8 @@
       +------------+ +  v          q = delta^2 I3 (I3 - I1)/(I2 (I2 - I1)),
       +------------+/              n^2 = s^2 (I3 - I2)(I2 (I2 - I1) + delta^2 I3 (I3 - I1))/(I1 I2 I3)
 
-Nothing touches it: angular momentum and energy are kept, and the spin follows Jacobi's elliptic functions, w2 as sn
-from a quarter period on [L. D. Landau, E. M. Lifshitz, Mechanics, section 37]. K: complete elliptic integral.
+There is no contact: angular momentum and energy are conserved, and the spin follows Jacobi's elliptic functions, w2 as
+sn from a quarter period on [L. D. Landau, E. M. Lifshitz, Mechanics, section 37]. K: complete elliptic integral.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from validation.scenes.parts import mass_of, pose_at, states
 
 #: Sides of the box [m]: three different moments.
 SIDES = (1.0, 0.6, 0.2)
-#: Runs on for this share of the time until it has turned over.
+#: Time of the run after the turn, as a share of the time before.
 AFTERMATH = 0.5
-#: Half as much again as errors of first order add up to, for the orders beyond: the motion drifts with them.
+#: Factor on first-order errors for higher orders.
 BEYOND = 1.5
-#: Steps of the integration that errors of a step are added up on; four times as many change a bound by 1e-6 of it.
+#: Steps of the integration of a step's errors; four times as many change a bound by 1e-6 of it.
 STEPS = 2000
 
 
@@ -90,12 +90,12 @@ def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
     }
 
 
-#: Share of energy or angular momentum that may be gained or lost while a body still spins on.
+#: Largest relative change of energy or angular momentum of a body that still spins on.
 HALF = 0.5
 
 
 def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
-    """``exploded``, ``changed its spin``; empty of a body that spun on, however inexactly."""
+    """``exploded``, ``changed its spin``; empty for a body that spun on, however inexactly."""
     momentum, energy = found["momentum_drift"][0], found["energy_drift"][0]
     if momentum is None or energy is None:
         return "NaN"
@@ -112,11 +112,11 @@ def _euler(own: Array, spin: Array, other: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _step_errors(start: tuple[float, ...], duration: float) -> tuple[float, float, float, float]:
-    """What a step of first order errs by, over dt: of angular momentum, energy, attitude [rad], and time [s].
+    """Errors of a first-order step, over dt: of angular momentum, energy, attitude [rad], and time [s].
 
-    A step of dt leaves out dt^2/2 times the second derivative: w'' of the spin, w' of the attitude. They are added up
-    by size along the motion, which is integrated by Runge and Kutta's fourth-order step. Attitude tells the spin in
-    body axes: it moves the zero by what it turns over the rate there.
+    A step of dt neglects dt^2/2 times the second derivative: w'' of the spin, w' of the attitude. Their magnitudes are
+    summed along the motion, which is integrated by a fourth-order Runge-Kutta method. An attitude error changes the
+    spin in body axes and moves the zero by that over the rate there.
     """
     own, h, spin = moments(1.0), duration / STEPS, np.array(start)
     momentum, energy = float(np.linalg.norm(own * spin)), float(own @ spin**2)
@@ -140,10 +140,10 @@ def _step_errors(start: tuple[float, ...], duration: float) -> tuple[float, floa
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A step of first order: what it leaves out of spin and attitude, added up.
+    """A first-order scheme: the sum of its errors in spin and attitude.
 
-    While it grows, a disturbance of exp(lambda t) is short of lambda^2 dt/2 a second, which is lambda dt t/2 of time;
-    step orders show half a step, and sampled attitudes and spins may belong half a step apart.
+    A growing disturbance of exp(lambda t) is too small by lambda^2 dt/2 a second, which is lambda dt t/2 of time; the
+    order of the scheme gives half a step, and sampled attitudes and spins may be half a step apart.
     """
     p = scene.params
     i1, i2, i3 = moments(1.0)
@@ -155,10 +155,10 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     )
     momentum = bounds.Bound(
         BEYOND * (lost + turned) * dt + bounds.ROUND_OFF,
-        "what steps of first order leave out of spin and attitude, w'' and w'",
+        "error of a first-order scheme in spin and attitude, w'' and w'",
     )
     energy = bounds.Bound(
-        BEYOND * given * dt + bounds.ROUND_OFF, "what steps of first order leave out of the spin, w'' dt^2/2"
+        BEYOND * given * dt + bounds.ROUND_OFF, "error of a first-order scheme in the spin, w'' dt^2/2"
     )
     source = "Euler's equations: angular momentum and energy are kept; period of Jacobi's elliptic functions"
     return [
@@ -185,7 +185,7 @@ SCENE = CanonicalScene(
     ),
     family="turning",
     figure=__doc__ or "",
-    law="L and E are kept; spin about the middle axis turns over after K(m)/n",
+    law="L and E are conserved; spin about the middle axis turns over after K(m)/n",
     dimensions=(3,),
     parameters=(
         Parameter("spin", 3.0, "rad/s", "about the middle axis", 0.0, 1e3, positive=True),
@@ -206,7 +206,7 @@ SCENE = CanonicalScene(
             1e3,
             1e3,
             fate,
-            "spun on: at no time more than half of its energy, or of its angular momentum, was gained or lost",
+            "spun on: at no time was more than half of its energy or angular momentum gained or lost",
         ),
     ),
     quick=(Variation({}), Variation({"delta": 0.01, "spin": 6.0})),
@@ -216,7 +216,7 @@ SCENE = CanonicalScene(
         "drift",
         "1",
         "larger of the relative drifts of angular momentum and energy until it has turned over",
-        "both are kept by the motion: an integrator that loses either turns over at another time and in another way",
+        "the motion conserves both: an integrator that loses either turns over at another time",
         lambda dt: [{}],
         error,
         "a free body that tumbles",

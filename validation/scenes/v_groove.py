@@ -1,4 +1,4 @@
-r"""A ball lies in a groove between two smooth planes, of unequal slopes.
+r"""A ball at rest in a groove between two smooth planes of unequal slopes.
 
         \               /
          \    ___      /           left:  N = m g sin(b)/sin(a + b)
@@ -7,8 +7,8 @@ r"""A ball lies in a groove between two smooth planes, of unequal slopes.
             \     / /              nothing moves; with a = b each carries
         a __ \_+_/_/ __ b          m g/(2 cos(a))
 
-Both contacts act at once and neither is vertical: a solver must find two forces of which each alone would throw the
-ball out. It starts exactly touching both.
+Both contacts act at once and neither is vertical: a solver must find two forces, each of which alone would throw the
+ball out. It starts in exact contact with both.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ RADIUS = 0.5
 
 
 def _slopes(params: Params) -> tuple[float, float]:
-    """Slopes of the left and the right plane against the horizontal [rad]."""
+    """Slopes of the left and the right plane to the horizontal [rad]."""
     return math.radians(params["left"]), math.radians(params["right"])
 
 
 def make(dimension: int, params: Params) -> Scene:
     """Build the scene: the planes meet in a line through the origin."""
     a, b = _slopes(params)
-    # The normals of the planes are (sin a, cos a) and (-sin b, cos b); the centre lies a radius above both.
+    # The normals of the planes are (sin a, cos a) and (-sin b, cos b); the centre is a radius above both.
     x = RADIUS * (math.cos(b) - math.cos(a)) / math.sin(a + b)
     y = RADIUS * (math.sin(a) + math.sin(b)) / math.sin(a + b)
     planes = (
@@ -89,7 +89,7 @@ def _mean_load(scene: Scene, trajectory: Trajectory, plane: int, expected: float
 
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """The ball may move by what one step of free fall adds, down or along one plane where the other is found late."""
+    """The ball may move by one step of free fall, down or along one plane where the other is found late."""
     p, (a, b) = scene.params, _slopes(scene.params)
     g, source = p["g"], "static equilibrium"
     late = bounds.found_late(g, dt, RADIUS)
@@ -99,7 +99,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
         "kinetic_energy": ("J", bounds.still_energy(p["mass"], g, dt)),
     }
     found = [bound.check(name, unit, truth[name], source) for name, (unit, bound) in still.items()]
-    # A velocity of v1/100 that is left costs 2 m v1/100 of momentum over the window: of the smaller force the more.
+    # A remaining velocity of v1/100 is 2 m v1/100 of momentum over the window, relative to each force.
     weight, small = p["mass"] * g, min(_loads(scene))
     share = bounds.carried(dt)
     share = bounds.Bound(share.value * weight / small / math.sin(a + b), share.because)
@@ -113,12 +113,12 @@ def sampling(scene: Scene) -> Sampling:
 
 
 def track(scene: Scene) -> Track:
-    """The ball stays where it is."""
+    """The ball at rest."""
     return Track("ball", lambda t: scene.bodies[2].pose[: scene.dimension])
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """How far the ball came from its place, in radii."""
+    """Displacement of the ball, in radii."""
     value, reason = found["displacement"]
     return (None, reason) if value is None else (value / RADIUS, "")
 
@@ -151,8 +151,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "displacement",
         "radius",
-        "farthest that the ball comes from its place within the run, over its radius",
-        "nothing may move, so whatever did is error; loads are left out because a ball at rest has the right ones",
+        "largest displacement of the ball within the run, over its radius",
+        "nothing may move, so any motion is error; loads are left out because a ball at rest has the right ones",
         lambda dt: [{}, {"left": 60.0, "right": 20.0}],
         error,
         "the ball at rest, half a second after the start",

@@ -1,4 +1,4 @@
-r"""A block slides down a wedge that is free to give way: each pushes the other, and what the floor cannot hold moves.
+r"""A block slides down a free wedge, which gives way on a smooth floor.
 
     |\                A = N (sin(alpha) - mu cos(alpha))/M           the wedge, to the left
     | \[]  a ->       N = m g cos(alpha)/(1 + (m/M) sin(alpha) (sin(alpha) - mu cos(alpha)))
@@ -7,7 +7,8 @@ r"""A block slides down a wedge that is free to give way: each pushes the other,
   ================    no friction on the floor:  m u + M U = 0 at all times
 
 [Any textbook of mechanics, with mu = 0.] Two bodies accelerate at once through a contact that accelerates too: a solver
-that holds the wedge while it moves the block, or gives way step by step, misses the load on the face and with it both.
+that holds the wedge while it moves the block, or moves them in turns, gets the load on the face wrong, and so both
+accelerations.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def motion(p: Params) -> tuple[float, float, float]:
 
 
 def _way() -> float:
-    """What the block slides until it is told [m]."""
+    """Sliding distance of the block at the measurement [m]."""
     return FACE - WIDTH - 2.0 * LEFT
 
 
@@ -154,7 +155,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 
 def track(scene: Scene) -> Track:
-    """Where the block is."""
+    """Place of the block."""
     away, pull, _ = motion(scene.params)
     start = np.array(scene.bodies[2].pose[:2])
     along, _ = _face(scene.params)
@@ -202,8 +203,8 @@ SCENE = CanonicalScene(
     primary=Primary(
         "coupling error",
         "1",
-        "larger of the relative errors of both accelerations; way of what should stay, over the face",
-        "the load on the face decides both, and is not the weight",
+        "larger of the relative errors of both accelerations; displacement where nothing should move, over the face",
+        "both depend on the load on the face, which is not the weight",
         lambda dt: [{}, {"mu": 0.7}],
         error,
         "the whole scene: the block slides, the wedge gives way",

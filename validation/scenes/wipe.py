@@ -138,7 +138,8 @@ SCENE = CanonicalScene(
         "force error",
         "1",
         "largest error of normal force, friction and the stop's force at any step of the last second, as a share",
-        "a controller feels each of them at every step; their means are right where contacts push and let go by turns",
+        "a controller acts on these forces at every step; their means are right even where contacts alternate "
+        "between load and none",
         lambda dt: [{}],
         error,
         "the sliding hand, half a second after the start",

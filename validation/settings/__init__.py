@@ -1,1 +1,1 @@
-"""What a setting does: switched alone, searched for, proven as a reason, decisive in a cure."""
+"""Effects of settings: single changes, searches, proofs of causes, and the decisive ones of a fix."""

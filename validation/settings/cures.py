@@ -1,19 +1,20 @@
-"""Cures: which stock settings mend what an engine gets wrong as shipped on a scene, and what they cost.
+"""Fixes: stock settings that correct an engine's failures as shipped on a scene, and their cost.
 
     as shipped          the standard cells of the scene: checks that fail
     one setting         every candidate of the engine's experiments, every setting that another profile changes, and
                         ten times the iterations, each alone
     one more            where no setting is enough alone: each candidate beside the best one
-    another profile     all that it changes, and then fewer and fewer of them, until nothing can be left out
-    the cure            mends most checks and breaks none; of equals the one that changes least, then the nearest
+    another profile     all its changes, and then fewer and fewer of them, until none can be left out
+    the fix             corrects most checks and breaks none; of equals the one with the fewest changes, then the
+                        smallest error
 
-Of a scene of the catalogue a cure is told as one of any model like it: what a change mends counts only if it does so in
-other sizes at another step as well (`ELSEWHERE`), with the values that the profile it comes from has there. What works
-at one step by the phase of a blow, or at one size by an engine's margin in metres, is none.
+The fix of a catalogue scene must hold for similar models: it counts only if it also works in other sizes at another
+step (`ELSEWHERE`), with the values that its profile has there. A change that works at one step by the phase of a blow,
+or at one size by an engine's margin in metres, is no fix.
 
-The same cells, candidates and rule for every engine. Error and cost stand side by side: CPU time per step, the least of
-interleaved rounds in the bench's own lane, as shipped and cured. What was found stands in ``cures.csv`` of the engine's
-folder, by scene *and dimension*: a cure that was measured in the plane is not told of space.
+Every engine has the same cells, candidates and rule. Error and cost are given side by side: CPU time per step, the
+least of interleaved rounds in the benchmark's process, as shipped and fixed. Results are in ``cures.csv`` of the
+engine's folder, by scene *and dimension*: a fix measured in 2-D is not claimed for 3-D.
 """
 
 from __future__ import annotations
@@ -42,19 +43,18 @@ from validation.running.plan import QUICK_DT, has_iterations
 from validation.settings.decisive import changes_of
 from validation.settings.switching import Reading, observe, readings, switched
 
-#: Most cells that a search asks: beyond them the scene's representative, planted and searched ones stand for it.
+#: Most cells of a search; with more, the scene's representative, planted and searched ones are used.
 MOST_CELLS = 6
-#: Rounds of timing; the least of so many is the time that nothing else disturbed.
+#: Rounds of timing; the least is the undisturbed time.
 ROUNDS = 7
-#: Simulated time that is clocked [s].
+#: Simulated time of a timing [s].
 CLOCKED = 0.5
-#: Sizes, beside the scene's, and the step [s] at which a cure must hold as well: bodies of centimetres, as grippers
-#: have them, in place of decimetres and metres, and the step that is customary in robotics.
+#: Further sizes and the step [s] at which a fix must also hold: bodies of centimetres, as for grippers, instead of
+#: decimetres and metres, and the usual step in robotics.
 ELSEWHERE = (0.3, 1.0 / 500.0)
-#: A check this far below its tolerance cannot be improved in a way that anyone sees.
+#: Share of the tolerance below which an improvement does not count.
 INVISIBLE = 1e-3
-#: Largest share of the error that may remain for a single setting to be shown beside a fix with several. With more than
-#: half of the error left, the setting does less than its absence would.
+#: Largest share of the error that may remain for a single setting to be shown beside a fix with several.
 HALF = 0.5
 
 Changes = Mapping[str, Any]
@@ -62,37 +62,37 @@ Changes = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Cure:
-    """What mends an engine as shipped on one scene and dimension.
+    """The fix of an engine as shipped on one scene and dimension.
 
     Parameters
     ----------
     cells
-        Parameters of the cells that were asked, as what differs from the scene's defaults.
+        Parameters of the cells that ran, where they differ from the scene's defaults.
     failing, left, judged
-        Checks of these cells that fail as shipped and with the cure, and all of them.
+        Number of checks of these cells that fail as shipped and with the fix, and of all.
     metric, unit, params
-        The check that is told: of those that the cure mends (or that fail, if it mends none), the first that the scene
-        states, where it was farthest off.
+        The check that is shown: the first of the scene's checks that the fix corrects (or that fails, if none), in the
+        cell with the largest error.
     truth, tolerance, before, after
-        Its numbers; a value is None where the engine gave no answer.
+        Its numbers; a value is None where the engine has no result.
     changes
-        Settings of the cure with their values in the cell that is told; empty if nothing that was tried helps.
+        Settings of the fix with their values in that cell; empty if no change helps.
     profile
-        Profile that has all of these settings; empty for a cure that no profile is.
+        Profile with all of these settings; empty if there is none.
     others
-        Other single settings that mend as many checks alone.
+        Other single settings that correct as many checks alone.
     tried
-        How many changes were tried.
+        Number of tried changes.
     cost_before, cost_after
-        CPU time per step [s] in the cell that is told; None where it was not clocked.
+        CPU time per step [s] in that cell; None where it was not timed.
     mends
-        Kinds of metrics, without their index, that failed as shipped in cells that were asked and pass in all of them
-        with the cure. Of no other kind anything is promised; empty in a table that was kept before it was written down.
+        Kinds of metrics, without index, that failed as shipped and pass in all cells with the fix. Nothing is claimed
+        for other kinds; empty in older tables.
     dt
         Step of the cells [s].
     alone, alone_after
-        Where the cure has several settings: the one that does most by itself and breaks nothing, if it takes away at
-        least half of the error of the check that is told, and the value with it.
+        Where the fix has several settings: the one with the largest effect alone that breaks nothing, if it removes at
+        least half of the error of the shown check, and the value with it.
     """
 
     engine: str
@@ -124,17 +124,17 @@ class Cure:
 
     @property
     def helps(self) -> bool:
-        """Whether anything was found."""
+        """Whether there is a fix."""
         return self.left < self.failing
 
     @property
     def times(self) -> float | None:
-        """Cost of the cure in units of the cost as shipped."""
+        """Cost of the fix over the cost as shipped."""
         return self.cost_after / self.cost_before if self.cost_before and self.cost_after else None
 
 
 def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
-    """Cells of a search: all standard ones at the profile's own iterations, or those that stand for them."""
+    """Cells of a search: all standard ones at the profile's own iterations, or a selection."""
     canonical = resolve(scene)
     cells = [v.params for v in canonical.variations("standard") if v.runs_in(dimension) and None in v.iterations]
     if len(cells) > MOST_CELLS:
@@ -145,7 +145,7 @@ def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
 
 @dataclass(frozen=True)
 class _Found:
-    """A change, tried: the checks that fail with it, what it broke, and decades of error over tolerance."""
+    """A tried change: failing checks, broken ones, and decades of error over tolerance."""
 
     changes: tuple[Changes, ...]
     failing: int
@@ -157,14 +157,14 @@ class _Found:
         return len({name for each in self.changes for name in each})
 
     def rank(self) -> tuple[int, int, float]:
-        """Order of cures: checks left, settings changed, decades."""
+        """Sort key of fixes: remaining failures, number of settings, decades."""
         return self.failing, self.size, self.decades
 
 
 class _Trials:
-    """Readings of all cells under changes; a change may have another value in each cell. Each cell runs once.
+    """Results of all cells under changes; a change may have another value in each cell. Each cell runs once.
 
-    With ``elsewhere`` each cell runs in other sizes at another step as well, where a change must mend the same.
+    With ``elsewhere`` each cell also runs in other sizes at another step, where a change must correct the same checks.
     """
 
     def __init__(self, slots: Sequence[Slot], jobs: int, elsewhere: bool = False) -> None:
@@ -175,7 +175,7 @@ class _Trials:
         size, dt = ELSEWHERE
         self.others = [replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt) for slot in slots] if elsewhere else []
         names = _profiles(slots[0].engine) if elsewhere else []
-        #: What each profile changes here and there, cell by cell.
+        #: Changes of each profile in both sizes, cell by cell.
         self.profiles = [
             [(changes_of(slot, name), changes_of(other, name)) for name in names]
             for slot, other in zip(slots, self.others, strict=elsewhere)
@@ -184,7 +184,7 @@ class _Trials:
         self.start = [found for slot in slots for found in self.seen[slot]]
 
     def _readings(self, slots: Sequence[Slot]) -> list[Reading]:
-        """Readings of one slot for each cell, check by check as `start`; without a value where there is none."""
+        """Results of one slot for each cell, in the order of `start`; without a value where there is none."""
         found = []
         for own, asked in zip(self.slots, slots, strict=True):
             seen = {reading.check.metric: reading for reading in self.seen[asked]}
@@ -200,7 +200,7 @@ class _Trials:
         self.seen |= {slot: readings(found) for slot, found in observe(new, self.jobs).items()}
 
     def _elsewhere(self, changes: Sequence[Changes]) -> list[Slot]:
-        """The other cells under a change: what a profile sets has the value that it has there."""
+        """The cells in other sizes under a change, with the profile's values there."""
         found = []
         for other, profiles, own in zip(self.others, self.profiles, changes, strict=bool(self.others)):
             of_profile = (there for here, there in profiles if own.items() <= here.items())
@@ -209,7 +209,7 @@ class _Trials:
         return found
 
     def all(self, many: Sequence[Sequence[Changes]]) -> list[_Found]:
-        """Try changes, all of their cells in one go."""
+        """Try changes, all cells together."""
         kept = [[_differing(each, own) for each, own in zip(one, self.own, strict=True)] for one in many]
         kept = [one for one in kept if any(one)]
         self._run(slot for one in kept for slot in self._here(one))
@@ -219,14 +219,14 @@ class _Trials:
         return tried
 
     def _mends(self, changes: Sequence[Changes]) -> bool:
-        """Whether a change mends anything in the scene's own size."""
+        """Whether a change corrects a check in the scene's own size."""
         after = self._readings(self._here(changes))
         return any(old.badness > 1.0 >= new.badness for old, new in zip(self.start, after, strict=True))
 
     def badness(self, changes: Sequence[Changes]) -> list[float]:
-        """Errors over tolerances with a change; of what failed as shipped the worse one of both sizes."""
+        """Errors over tolerances with a change; for checks that failed as shipped the worse of both sizes."""
         here, elsewhere = self._readings(self._here(changes)), self._elsewhere(changes)
-        if not elsewhere or any(slot not in self.seen for slot in elsewhere):  # or it mends nothing here
+        if not elsewhere or any(slot not in self.seen for slot in elsewhere):  # or it corrects nothing here
             return [found.badness for found in here]
         worse = zip(self.start, here, self._readings(elsewhere), strict=True)
         return [max(new.badness, other.badness) if old.badness > 1.0 else new.badness for old, new, other in worse]
@@ -245,13 +245,13 @@ def _own(slot: Slot) -> dict[str, Any]:
 
 
 def _differing(changes: Changes, own: Changes) -> Changes:
-    """What a change would set otherwise than the profile has it; an experiment may add settings of its own."""
+    """Settings that a change sets differently from the profile; an experiment may add others."""
     return {name: value for name, value in changes.items() if name not in own or own[name] != value}
 
 
 @dataclass(frozen=True)
 class Unsearched:
-    """Why nothing was searched: the engine passes as shipped, or (not ``asked``) the scene cannot be asked of it."""
+    """Why there was no search: the engine passes as shipped, or (not ``asked``) cannot run the scene."""
 
     asked: bool
     reason: str
@@ -265,15 +265,15 @@ def search(
     params: Params | None = None,
     dt: float | None = None,
 ) -> Cure | Unsearched:
-    """Search what mends ``engine`` as shipped, if something fails there.
+    """Search a fix for ``engine`` as shipped, if a check fails.
 
     Parameters
     ----------
     scene
         Name in the catalogue, or a scene file.
     params, dt
-        One case, and its step [s]: what mends that is searched, in its own size and at its own step alone. Without
-        params it is the scene's standard cells; without a step that of a model made for this engine, else `QUICK_DT`.
+        One case and its step [s], searched in its own size and step only. Without params the scene's standard cells;
+        without a step that of a model made for this engine, else `QUICK_DT`.
 
     Raises
     ------
@@ -287,7 +287,7 @@ def search(
     if shipped is None:
         return Unsearched(False, f"{engine} has no profile as shipped")
     if not cells:
-        return Unsearched(False, f"{scene} has no standard cell in {dimension}-D at a profile's own iterations")
+        return Unsearched(False, f"{scene} has no standard case in {dimension}-D at a profile's own iterations")
     own = [Slot(scene, tuple(sorted(cell.items())), dimension, engine, shipped, dt) for cell in cells]
     first = observe(own, jobs)
     for found in first.values():
@@ -295,7 +295,7 @@ def search(
             return Unsearched(False, found.reason)
     trials = _Trials(own, jobs, elsewhere=scene in CATALOGUE and params is None and dt == QUICK_DT)
     if not trials.start:
-        return Unsearched(False, "no check of its cells is judged")
+        return Unsearched(False, "no check of its cases is judged")
     failing = [found for found in trials.start if found.badness > 1.0]
     if not failing:
         return Unsearched(True, f"it passes all {len(trials.start)} checks")
@@ -304,7 +304,7 @@ def search(
 
 
 def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tuple[_Found | None, list[_Found]]:
-    """The best change, and all single settings that are no worse than it."""
+    """The best change, and all single settings that are as good."""
     others = [name for name in _profiles(engine) if name != own[0].profile]
     wholes = {name: [changes_of(slot, name) for slot in own] for name in others}
     singles = _singles(engine, own, list(wholes.values()))
@@ -321,7 +321,7 @@ def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tu
 
 
 def _profiles(engine: str) -> list[str]:
-    """Profiles whose settings may cure: those that have a rank, since the settings of others are not stock."""
+    """Profiles with settings for a fix: ranked ones, since settings of others are not stock."""
     return [name for name in load(engine).profiles if is_ranked(engine, name)]
 
 
@@ -330,7 +330,7 @@ def _useful(found: Iterable[_Found], failing: int) -> list[_Found]:
 
 
 def _singles(engine: str, own: Sequence[Slot], wholes: Sequence[Sequence[Changes]]) -> list[list[Changes]]:
-    """Every setting alone: candidates, those of other profiles with what belongs to them, and more iterations."""
+    """Single settings: candidates, those of other profiles with dependent ones, and more iterations."""
     belongs = belongs_of(engine)
     singles: list[list[Changes]] = [
         [{name: value}] * len(own) for name, values in candidates_of(engine).items() for value in values
@@ -346,7 +346,7 @@ def _singles(engine: str, own: Sequence[Slot], wholes: Sequence[Sequence[Changes
 
 
 def _smallest(trials: _Trials, engine: str, whole: _Found) -> _Found:
-    """A profile's changes without those that can be left out, one after the other."""
+    """A profile's changes after removing unnecessary ones, one at a time."""
     belongs = belongs_of(engine)
     best = whole
     for name in dict.fromkeys(name for each in whole.changes for name in each if name not in belongs):
@@ -363,14 +363,14 @@ def _cure(
     told = _told(trials, failing, best)
     place = trials.slots.index(told.slot)
     changes: Changes = best.changes[place] if best else {}
-    if best and not changes:  # what is told was mended by nothing; tell the values of a cell in which something is set
+    if best and not changes:  # no setting corrects the shown check; show values of a cell with changes
         changes = next(each for each in best.changes if each)
     cured = switched(told.slot, best.changes[place]) if best else told.slot
     after = next(each for each in trials.seen[cured] if each.check.metric == told.check.metric)
     before_cost, after_cost = clocked([told.slot, cured]) if best else (None, None)
     others = tuple(each.changes[place] for each in singles if best and each.changes != best.changes)
     check = told.check
-    assert check.truth is not None and check.bound is not None  # only judged checks fail
+    assert check.truth is not None and check.bound is not None  # only judged checks can fail
     return Cure(
         engine, find(engine).version, told.slot.profile, told.slot.scene, told.slot.dimension,
         tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
@@ -381,7 +381,7 @@ def _cure(
 
 
 def _alone(trials: _Trials, told: Reading, best: _Found | None) -> tuple[Changes, float | None]:
-    """The single setting that does most, and the value of the check that is told with it; see `Cure.alone`."""
+    """The single setting with the largest effect, and the shown check's value with it; see `Cure.alone`."""
     singles = [each for each in trials.found if each.size == 1 and not each.broken]
     if best is None or best.size == 1 or not singles:
         return {}, None
@@ -396,7 +396,7 @@ def _kind(found: Reading) -> str:
 
 
 def _mended(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> tuple[str, ...]:
-    """Kinds that fail as shipped and of which nothing fails with the cure, in the order in which scenes state them."""
+    """Kinds that fail as shipped and pass everywhere with the fix, in the scene's order."""
     if best is None:
         return ()
     left = {_kind(old) for old, new in zip(trials.start, trials.badness(best.changes), strict=True) if new > 1.0}
@@ -404,7 +404,7 @@ def _mended(trials: _Trials, failing: Sequence[Reading], best: _Found | None) ->
 
 
 def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
-    """The check that stands for a cure: the first that the scene states of those it mends, where it was worst."""
+    """The shown check: the first of the scene's checks that the fix corrects, in its worst cell."""
     after = trials.badness(best.changes) if best else []
     mended = [old for old, new in zip(trials.start, after, strict=False) if old.badness > 1.0 >= new]
     shown = mended or failing
@@ -413,7 +413,7 @@ def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> R
 
 
 def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
-    """Profile that has all settings of a cure."""
+    """Profile with all settings of a fix."""
     for name in _profiles(engine) if best else ():
         wanted = [changes_of(slot, name) for slot in slots]
         if best and all(each.items() <= w.items() for each, w in zip(best.changes, wanted, strict=True)):
@@ -422,7 +422,7 @@ def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
 
 
 def clocked(slots: Sequence[Slot]) -> tuple[float | None, ...]:
-    """CPU time per step of each slot [s]: the least of `ROUNDS`, taken in turns in one process of the bench's lane."""
+    """CPU time per step of each slot [s]: the least of `ROUNDS`, alternating in one process of the benchmark."""
     units = []
     for slot in slots:
         scene = prepare(slot).scene
@@ -446,21 +446,21 @@ def clocked(slots: Sequence[Slot]) -> tuple[float | None, ...]:
 
 @cache
 def cures_of(engine: str) -> Mapping[tuple[str, int], Cure]:
-    """What was measured and is listed, by scene and dimension; nothing for an engine that nobody measured."""
+    """Listed fixes by scene and dimension; empty for an engine without them."""
     path = inside(engine, CURES)
     try:
         found = read(path) if path else []
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are read by a test
+    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are tested
         return {}
     return {(cure.scene, cure.dimension): cure for cure in found if cure.engine == engine}
 
 
-#: How a field of the table is written: as JSON what has parts or may be missing, as text the rest.
+#: Format of fields of the table: JSON for composite or optional ones, text for the rest.
 _PLAIN = ("engine", "version", "shipped", "scene", "metric", "unit", "profile")
 
 
 def write(cures: Iterable[Cure], path: Path) -> None:
-    """Write a table of cures; what stood there stays until all of it is written."""
+    """Write a table of fixes; the old one stays until it is complete."""
     fresh = path.with_suffix(".new")
     with fresh.open("w", encoding="utf-8", newline="") as lines:
         table = csv.writer(lines, lineterminator="\n")
@@ -475,7 +475,7 @@ def write(cures: Iterable[Cure], path: Path) -> None:
 
 
 def _of_numpy(value: Any) -> Any:
-    """A number of numpy as Python's own: engines and metrics hand them on."""
+    """A numpy number as a Python number."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{value!r} cannot be written into a table of cures")
@@ -486,7 +486,7 @@ def _digits(value: float | None, digits: int) -> float | None:
 
 
 def read(path: Path) -> list[Cure]:
-    """Read a table of cures."""
+    """Read a table of fixes."""
     with path.open(encoding="utf-8", newline="") as lines:
         return [_cure_of(row) for row in csv.DictReader(lines)]
 
@@ -496,10 +496,10 @@ def _cure_of(row: Mapping[str, str]) -> Cure:
     others = tuple(_settings(each) for each in values["others"])
     values |= {"cells": tuple(values["cells"]), "others": others}
     values |= {name: _settings(values[name]) for name in ("changes", "alone") if name in values}
-    values["mends"] = tuple(values.get("mends", ()))  # tables of before it was written down have none
+    values["mends"] = tuple(values.get("mends", ()))  # older tables do not have it
     return Cure(**values)
 
 
 def _settings(plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings as they were before JSON made lists of tuples."""
+    """Settings with tuples again, which JSON turned into lists."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()}

@@ -1,12 +1,12 @@
-"""Which of the settings that a cure changes matters: each of them alone, each of them left out, and how few suffice.
+"""Decisive settings of a fix: each alone, each left out, and the smallest sufficient set.
 
     shipped profile + one change           does it pass with that alone?
     shipped profile + all changes but one  does it fail without that?
-    shipped profile + fewer and fewer      where no change is enough alone: what cannot be left out any more
+    shipped profile + fewer and fewer      where no change is enough alone: a set without unnecessary ones
 
-Every number is the worst of the same checks of the same cells, run by `validation.settings.switching`. What came out
-stands beside the engine's experiments as data (``decisive.csv``), with the release that it was measured with;
-``crosscheck tune ENGINE --decisive`` measures it again.
+Every number is the worst of the same checks of the same cells, run by `validation.settings.switching`. Results are
+stored beside the engine's experiments (``decisive.csv``), with the engine's release; ``crosscheck tune ENGINE
+--decisive`` measures them again.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from validation.cells import Observation, Slot, prepare, settings_of
 from validation.running.plan import QUICK_DT
 from validation.settings.switching import observe, readings, switched
 
-#: How a setting decides: it is enough by itself; or the check fails without it; or it completes a set that is enough,
-#: in which another might stand for it.
+#: How a setting matters: it is enough alone; or the check fails without it; or it belongs to a sufficient set, in which
+#: another could replace it.
 ALONE, NEEDED, COMPLETES = "alone", "needed", "completes"
 COLUMNS = (
     "engine", "version", "shipped", "better", "scene", "dimension", "cells", "metrics", "before", "after",
@@ -43,12 +43,12 @@ class Part:
     Parameters
     ----------
     setting, value
-        Its name, and what the better profile sets it to in each cell (one value where it is the same in all), as JSON.
+        Its name, and its value in the better profile for each cell (one value if equal in all), as JSON.
     alone, without
         Error over tolerance of the shipped profile with this change only, and with all changes but this one: up to 1
-        passes; infinite where the engine gave no answer.
+        passes; infinite where the engine has no result.
     decides
-        `ALONE`, `NEEDED`, `COMPLETES`, or empty: it does not matter to this check.
+        `ALONE`, `NEEDED`, `COMPLETES`, or empty: no effect on this check.
     """
 
     setting: str
@@ -60,7 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Decisive:
-    """The changes of one cure, measured; ``before`` and ``after`` are the worst error over tolerance of its checks.
+    """The measured changes of one fix; ``before`` and ``after`` are the worst error over tolerance of its checks.
 
     ``cells`` and ``metrics`` are those of `adapters.experiment.Cured`.
     """
@@ -79,7 +79,7 @@ class Decisive:
 
     @property
     def settings(self) -> list[str]:
-        """Settings that decide."""
+        """Decisive settings."""
         return [part.setting for part in self.parts if part.decides]
 
     def _so(self, decides: str) -> list[str]:
@@ -100,7 +100,7 @@ def _joined(names: Sequence[str]) -> str:
 
 
 def slots_of(engine: str, target: Cured) -> list[Slot]:
-    """Cells of a cure as the shipped profile has them."""
+    """Cells of a fix with the shipped profile."""
     return [
         Slot(target.scene, tuple(sorted(cell.items())), target.dimension, engine, target.shipped, QUICK_DT)
         for cell in target.cells
@@ -108,12 +108,12 @@ def slots_of(engine: str, target: Cured) -> list[Slot]:
 
 
 def measure(engine: str, target: Cured, jobs: int = 1) -> Decisive:
-    """Switch the changes of a cure, one by one.
+    """Switch the changes of a fix, one by one.
 
     Raises
     ------
     ValueError
-        If the target is none: its checks pass as shipped, or one fails with all changes made.
+        If it is no fix: its checks pass as shipped, or one fails with all changes.
     """
     own = slots_of(engine, target)
     changes = {slot: changes_of(slot, target.better) for slot in own}
@@ -132,7 +132,9 @@ def measure(engine: str, target: Cured, jobs: int = 1) -> Decisive:
     before, after = badness([(), names])
     if not before > 1.0 or not after <= 1.0:
         what = f"{engine} {target.scene}"
-        raise ValueError(f"{what}: {before:.3g} tolerances as shipped, {after:.3g} with every change: no cure")
+        raise ValueError(
+            f"{what}: {before:.3g} tolerances as shipped, {after:.3g} with every change, so this is no fix"
+        )
     alone = dict(zip(names, badness([[name] for name in names]), strict=True))
     without = dict(zip(names, badness([[n for n in names if n != name] for name in names]), strict=True))
     enough = [name for name in names if alone[name] <= 1.0]
@@ -160,7 +162,7 @@ def worst(observation: Observation, metrics: Sequence[str]) -> float:
 def smallest(
     names: Sequence[str], without: Mapping[str, float], badness: Callable[[Sequence[Iterable[str]]], list[float]]
 ) -> list[str]:
-    """Changes of which none can be left out; those without which it fares best are tried first."""
+    """Changes of which none can be left out; those with the least effect are removed first."""
     kept = list(names)
     for name in sorted(names, key=lambda each: without[each]):
         fewer = [each for each in kept if each != name]
@@ -170,7 +172,7 @@ def smallest(
 
 
 def changes_of(slot: Slot, better: str) -> dict[str, Any]:
-    """Settings that profile ``better`` sets otherwise than the slot's own, with their values."""
+    """Settings that profile ``better`` sets differently from the slot's, with their values."""
     engine, scene = load(slot.engine), prepare(slot).scene
     own = {s.name: s.value for s in settings_of(engine, slot, scene)}
     other = Slot(slot.scene, slot.params, slot.dimension, slot.engine, better, slot.dt)
@@ -179,13 +181,13 @@ def changes_of(slot: Slot, better: str) -> dict[str, Any]:
 
 
 def measure_all(engine: str, jobs: int = 1) -> list[Decisive]:
-    """Measure every cure that the experiments of ``engine`` name."""
+    """Measure every fix in the experiments of ``engine``."""
     return [measure(engine, target, jobs) for target in cured_of(engine)]
 
 
 @cache
 def measured_of(engine: str) -> tuple[Decisive, ...]:
-    """What was measured of ``engine`` and is listed; nothing for an engine that nobody measured."""
+    """Listed measurements of ``engine``; empty if there are none."""
     path = inside(engine, DECISIVE)
     try:
         return tuple(entry for entry in (read(path) if path else ()) if entry.engine == engine)
@@ -194,13 +196,13 @@ def measured_of(engine: str) -> tuple[Decisive, ...]:
 
 
 def decisive(engine: str, scene: str, dimension: int, shipped: str, better: str) -> Decisive | None:
-    """What was measured of one cure in this dimension; None where nothing was."""
+    """Measurement of one fix in this dimension; None if there is none."""
     wanted = (scene, dimension, shipped, better)
     return next((e for e in measured_of(engine) if (e.scene, e.dimension, e.shipped, e.better) == wanted), None)
 
 
 def read(path: Path) -> list[Decisive]:
-    """Read a list of measured cures."""
+    """Read a list of measured fixes."""
     groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
     with path.open(encoding="utf-8", newline="") as lines:
         for row in csv.DictReader(lines):
@@ -219,7 +221,7 @@ def _entry(rows: Sequence[Mapping[str, str]]) -> Decisive:
 
 
 def write(entries: Iterable[Decisive], path: Path) -> None:
-    """Write a list of measured cures."""
+    """Write a list of measured fixes."""
     with path.open("w", encoding="utf-8", newline="") as lines:
         table = csv.writer(lines, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -238,5 +240,5 @@ def as_text(values: Sequence[Any]) -> str:
 
 
 def _short(value: float) -> str:
-    """Two digits: what is asked is on which side of 1 it lies, and how far."""
+    """Two digits, enough to show on which side of 1 it lies, and how far."""
     return f"{value:.2g}" if math.isfinite(value) else "inf"

@@ -1,7 +1,6 @@
-"""Proves reasons: the row fails, with the mechanism switched off it passes, and what others would blame does nothing.
+"""Proofs of causes: the row fails, passes with the mechanism switched off, and other explanations do not help.
 
-A reason that passes its experiments is shown to be the cause on those rows; one that fails them is wrong, however
-plausible it reads.
+A reason that passes its experiments is the cause on those rows; one that fails them is wrong, however plausible.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from validation.settings.switching import Reading, observe, reading, readings, s
 
 @dataclass(frozen=True)
 class Proof:
-    """One experiment, done.
+    """Result of one experiment.
 
     Parameters
     ----------
     before, after
-        The row as it is and with the mechanism off.
+        The row without changes and with the mechanism off.
     idle
-        The row with each of the settings that another explanation would blame.
+        The row with each setting of other explanations.
     """
 
     engine: str
@@ -40,7 +39,7 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether the experiment shows what it says."""
+        """Whether the experiment confirms the cause."""
         within = self.experiment.within
         return (
             fails(self.before, within) and passes(self.after, within) and all(fails(each, within) for each in self.idle)
@@ -48,10 +47,10 @@ class Proof:
 
     @property
     def why_not(self) -> str:
-        """What did not come out; empty if it holds."""
+        """What failed; empty if it holds."""
         within = self.experiment.within
-        said = [] if fails(self.before, within) else ["the row does not fail as it is"]
-        said += [] if passes(self.after, within) else ["it does not pass with the mechanism off"]
+        said = [] if fails(self.before, within) else ["the check does not fail without the change"]
+        said += [] if passes(self.after, within) else ["it does not pass with the mechanism switched off"]
         said += [f"it passes with {dict(each.slot.switched)}" for each in self.idle if not fails(each, within)]
         return "; ".join(said)
 
@@ -62,7 +61,7 @@ def passes(found: Reading, within: float = 0.0) -> bool:
 
 
 def fails(found: Reading, within: float = 0.0) -> bool:
-    """Measured, and outside of both: a cell without an answer proves nothing."""
+    """Measured, and outside of both: a cell without a result proves nothing."""
     return found.value is not None and found.badness > 1.0 and _off(found) > within
 
 
@@ -84,7 +83,7 @@ def prove(engine: str, experiments: Iterable[Experiment], jobs: int = 1) -> list
 
 
 def experiments_on(engine: str) -> list[Experiment]:
-    """All experiments on ``engine``: the proofs of its families, and what its package states in Python.
+    """All experiments on ``engine``: proofs of its families, and those that its package states in Python.
 
     Raises
     ------
@@ -97,7 +96,7 @@ def experiments_on(engine: str) -> list[Experiment]:
 
 
 def slot_of(engine: str, experiment: Experiment) -> Slot:
-    """The cell of an experiment's row, as the profile has it."""
+    """The cell of an experiment's row, with the profile's settings."""
     e = experiment
     return Slot(
         e.scene, tuple(sorted(e.params.items())), e.dimension, engine, e.profile, e.dt or QUICK_DT, e.iterations
@@ -105,13 +104,13 @@ def slot_of(engine: str, experiment: Experiment) -> Slot:
 
 
 def _versions(engine: str, experiment: Experiment) -> list[Slot]:
-    """The row's slot as it is, with the mechanism off, and with each idle change."""
+    """The row's slot unchanged, with the mechanism off, and with each idle change."""
     slot = slot_of(engine, experiment)
     return [slot, switched(slot, experiment.off), *(switched(slot, change) for change in experiment.idle)]
 
 
 def _cells(slot: Slot, metric: str) -> list[Slot]:
-    """Cells that a metric is read from: the slot itself, or all cells of a study."""
+    """Cells of a metric: the slot itself, or all cells of a study."""
     if study_of(slot.scene, metric) is None:
         return [slot]
     return [slot.with_params(variation.params) for variation in resolve(slot.scene).variations("standard")]
@@ -130,5 +129,5 @@ def _read(slot: Slot, metric: str, seen: dict[Slot, Observation]) -> Reading:
     assert study is not None
     found = list(results_of(study, resolve(slot.scene), [seen[cell] for cell in cells]))
     if not found:
-        return Reading(slot, readings(seen[cells[0]])[0].check, None, "the study's cells have no answer")
+        return Reading(slot, readings(seen[cells[0]])[0].check, None, "the cases of the study have no result")
     return Reading(slot, found[0].check, found[0].value, found[0].reason)

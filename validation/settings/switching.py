@@ -1,8 +1,7 @@
 """Switch one setting: run a cell with one or more settings of its profile replaced, on any engine.
 
-Tuning searches with it, proofs of reasons and cures compare with it. An experiment is a slot like any other (it runs
-in the same workers), whose `Slot.switched` names what differs. It is never listed and never shown as the profile's
-answer.
+Used by tuning, proofs of causes and fixes. An experiment is a slot like any other (it runs in the same workers), whose
+`Slot.switched` lists the changes. It is never listed and never shown as the profile's result.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from validation.workers import run_cells
 
 @dataclass(frozen=True)
 class Reading:
-    """One check of one cell: what was measured, or why nothing was.
+    """One check of one cell: its value, or why there is none.
 
-    ``badness`` is the error over the tolerance: above 1 is a FAIL; infinite where nothing was measured.
+    ``badness`` is the error over the tolerance: above 1 is a FAIL; infinite without a value.
     """
 
     slot: Slot
@@ -44,9 +43,9 @@ class Reading:
 
 
 def switched(slot: Slot, changes: Mapping[str, Any]) -> Slot:
-    """Return the slot with settings replaced, besides those that it replaces already; no change gives it back.
+    """Return the slot with further settings replaced; without changes the slot itself.
 
-    ``iterations`` is the slot's own field: an iteration count is asked for the way a user does.
+    ``iterations`` sets the slot's own field, as a user does.
     """
     changes = dict(changes)
     iterations = changes.pop("iterations", slot.iterations)
@@ -55,7 +54,7 @@ def switched(slot: Slot, changes: Mapping[str, Any]) -> Slot:
 
 
 def observe(slots: Iterable[Slot], jobs: int = 1) -> dict[Slot, Observation]:
-    """Run cells in worker processes; each slot once. What is left unfinished, as its engine hangs, counts as such."""
+    """Run cells in worker processes; each slot once. Cells whose engine hangs count as unfinished."""
     found: dict[Slot, Observation] = {}
 
     def left(slot: Slot, reason: str) -> None:
@@ -66,7 +65,7 @@ def observe(slots: Iterable[Slot], jobs: int = 1) -> dict[Slot, Observation]:
 
 
 def readings(observation: Observation) -> list[Reading]:
-    """All judged checks of an observation; a cell without an answer has readings without values."""
+    """All judged checks of an observation; without values for a cell without a result."""
     slot = observation.slot
     found = []
     for check in checks_of(observation)[1]:
@@ -94,7 +93,7 @@ def reading(observation: Observation, metric: str) -> Reading:
 
 
 def side_by_side(slot: Slot, changes: Sequence[Mapping[str, Any]], jobs: int = 1) -> list[Observation]:
-    """Observations of a slot as its profile has it, and with each of ``changes``, in this order."""
+    """Observations of a slot unchanged, and with each of ``changes``, in this order."""
     slots = [slot, *(switched(slot, change) for change in changes)]
     found = observe(slots, jobs)
     return [found[each] for each in slots]

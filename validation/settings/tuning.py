@@ -1,14 +1,14 @@
-"""Searches a tuned profile again for stock settings that do better on all scenes.
+"""Searches stock settings that improve a tuned profile on all scenes.
 
-    start       the profile as it is, on the cells of one group of scenes
+    start       the present profile, on the cells of one group of scenes
     search      every candidate value of every setting, one at a time; the best that helps is kept; again with it
     accept      a change counts if it makes fewer checks fail, or the same number come clearly nearer, and if
                 nothing that passed fails; on other cells, held out, nothing may get worse, and where a profile's
                 own iterations are cut down nothing that passed may fail
-    fairness    a value as shipped that does as well as the tuned one is reported too: nothing is tuned for its own sake
+    fairness    a shipped value that is as good as the tuned one is reported too
 
-The same cells, candidates' budget and rule for every engine. What a search finds is adopted by hand, with its reason,
-in the adapter: a profile chooses by a scene's needs, a search knows only its cells.
+Every engine has the same cells, budget of candidates and rule. A result is adopted by hand in the adapter, with its
+reason: a profile chooses by a scene's needs, a search only covers its cells.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from validation.running.plan import QUICK_DT, has_iterations
 from validation.settings.switching import Reading, observe, readings, switched
 
 Cells = tuple[tuple[str, Mapping[str, float]], ...]
-#: Least gain of the summed decades of error over tolerance that counts: a tenth of a decade is a quarter of an error.
+#: Least gain that counts, in summed decades of error over tolerance: a tenth of a decade is a quarter of an error.
 GAIN = 0.1
 #: A check this far below its tolerance cannot be improved in a way that anyone sees.
 INVISIBLE = 1e-3
-#: Most settings that a search changes, one a round: what needs more is another profile.
+#: Most settings that a search changes, one a round.
 ROUNDS = 4
 
 
@@ -44,7 +44,7 @@ class Score:
     decades: float
 
     def better_than(self, other: Score) -> bool:
-        """Fewer fails, or as many and clearly nearer."""
+        """Fewer failures, or as many with clearly smaller errors."""
         if self.failing != other.failing:
             return self.failing < other.failing
         return self.decades < other.decades - GAIN
@@ -52,7 +52,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Trial:
-    """One change that was tried: its scores, what it broke, and whether it was kept."""
+    """One tried change: its scores, broken checks, and whether it was kept."""
 
     changes: Mapping[str, Any]
     score: Score
@@ -61,9 +61,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Search:
-    """What a search of one group found.
+    """Result of a search of one group.
 
-    ``needless`` are settings whose value as shipped does as well as the profile's.
+    ``needless`` are settings whose shipped value is as good as the profile's.
     """
 
     engine: str
@@ -78,7 +78,7 @@ class Search:
 
 
 def score(found: Sequence[Reading]) -> Score:
-    """Score readings; a cell without an answer fails each of its checks, a thousand times over."""
+    """Score readings; a check without a result counts as a thousand tolerances off."""
     bad = [min(max(each.badness, INVISIBLE), 1e3) for each in found]
     return Score(sum(b > 1.0 for b in bad), sum(math.log10(b / INVISIBLE) for b in bad))
 
@@ -99,7 +99,7 @@ def groups() -> list[str]:
 
 
 def cells_of(group: str, held_out: bool = False) -> Cells:
-    """Cells of a group: those to search on, or those on which nothing may get worse.
+    """Cells of a group: those of the search, or those on which no check may get worse.
 
     Raises
     ------
@@ -126,7 +126,7 @@ class _Bench:
         self.seen: dict[Slot, Observation] = {}
 
     def prepare(self, many: Sequence[Mapping[str, Any]]) -> None:
-        """Run the cells of many changes in one go: starting workers costs more than a cell."""
+        """Run the cells of many changes together: starting workers costs more than a cell."""
         wanted = [switched(slot, changes) for changes in many for slot in self.slots]
         self.seen |= observe([slot for slot in wanted if slot not in self.seen], self.jobs)
 
@@ -199,7 +199,7 @@ def search(
 
 
 def _around(engine: str, slot: Slot, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Every change by one more setting: all candidate values but those in force."""
+    """Every change by one more setting: all candidate values except the present ones."""
     return [
         {**changes, name: value}
         for name, values in candidates_of(engine).items()
@@ -214,28 +214,28 @@ def _trial(changes: Mapping[str, Any], start: Sequence[Reading], bench: _Bench) 
 
 
 def _own(slot: Slot, name: str) -> Any:
-    """Value that the profile has for a setting, or None where it leaves it as shipped."""
+    """Value of a setting in the profile, or None where it is as shipped."""
     found = load(slot.engine)
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     return {setting.name: setting.value for setting in settings_of(found, slot, scene)}.get(name)
 
 
 def _starved(slots: Sequence[Slot]) -> list[Slot]:
-    """Cells with the fewer iterations that their scenes declare, for profiles that stop at a count.
+    """Cells with the fewer iterations that their scenes declare, for profiles with an iteration count.
 
-    A setting that needs a solution to the end is no better one.
+    A setting that needs convergence is no improvement.
     """
     counted = [(slot, CATALOGUE[slot.scene].searched) for slot in slots if has_iterations(load(slot.engine), slot)]
     return [replace(slot, iterations=n) for slot, searched in counted if searched for n in searched.starved]
 
 
 def _holds(before: Sequence[Reading], after: Sequence[Reading]) -> bool:
-    """Whether cells that were not searched with are none the worse."""
+    """Whether cells outside the search are not worse."""
     return not broken(before, after) and not score(before).better_than(score(after))
 
 
 def _needless(engine: str, bench: _Bench, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of the profile whose value as shipped does as well: same fails, nothing broken, not clearly worse."""
+    """Settings of the profile whose shipped value is as good: same failures, nothing broken, not clearly worse."""
     slot = bench.slots[0]
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     as_shipped = profile_of(engine, "shipped")

@@ -1,9 +1,9 @@
-"""What columns of bodies at rest have in common: bodies 1, 2, ... stand on each other, body 0 is the floor.
+"""Columns of bodies at rest: bodies 1, 2, ... stand on each other, body 0 is the floor.
 
 Truth, metrics and checks for a scene whose bodies start in equilibrium, each on the one before it: nothing moves, and
-interface i carries the weight of the bodies from i upwards. Where several bodies stand side by side, an interface is
-all that lies between two ``layers`` (indices of bodies, from the floor up): how its contacts share the load is not
-determined, their sum is.
+interface i carries the weight of the bodies from i upwards. Where several bodies stand side by side, an interface
+consists of all contacts between two ``layers`` (indices of bodies, from the floor up): their shares of the load are not
+determined, only the sum.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def measure(scene: Scene, trajectory: Trajectory, layers: Layers = ()) -> dict[s
         measured[f"interface_impulse[{i}]"] = mean
         scatter.append(deviation)
     known = [deviation for deviation in scatter if deviation is not None]
-    none = (None, "impulses are not available")  # those of one interface are enough: it may be the one that shakes
+    none = (None, "impulses are not available")  # those of one interface are enough, as it may be the one that shakes
     measured["impulse_scatter"] = (metrics.largest(known), "") if known and len(known) == len(scatter) else none
     return measured
 
@@ -79,16 +79,16 @@ def sampling(scene: Scene) -> Sampling:
     return Sampling(1, max(0.0, scene.duration - WINDOW))
 
 
-#: A column stands while no body is off by half a side, overlaps by a tenth of one, or moves as if it had fallen one.
+#: A column stands while no body is off by half a side, overlaps by a tenth of one, or has the energy of a fall by one.
 OFF, DEEP = 0.5, 0.1
 STANDS = (
-    "stood: no body half a side off its place at the end, none a tenth of a side inside another, and the kinetic "
-    "energy of the last second below that of a fall by a side"
+    "stood: at the end no body is half a side off its place or a tenth of a side inside another, and the kinetic "
+    "energy of the last second is below that of a fall by a side"
 )
 
 
 def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
-    """``exploded``, ``toppled``, ``sank``; empty of a column of boxes that stood, however inexactly."""
+    """``exploded``, ``toppled``, ``sank``; empty for a column that stood, however inexactly."""
     shape = scene.bodies[1].shape
     side = 2.0 * (shape.half_extents[-1] if isinstance(shape, Box) else math.nan)
     drift, overlap, energy = (found.get(name, (None, ""))[0] for name in ("drift", "penetration", "kinetic_energy"))

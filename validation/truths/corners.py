@@ -1,4 +1,4 @@
-r"""What tilted boxes that land on a corner in free space have in common.
+r"""Tilted boxes that land on a corner, without gravity.
 
           /\
          /  \           arm: from the centre to the corner that lands (along the floor, up)
@@ -6,7 +6,7 @@ r"""What tilted boxes that land on a corner in free space have in common.
         \    /  v           | -x y/I     1/m + y^2/I   |   rows and columns (normal, tangent)
     =====\/===========
 
-Nothing acts but the blow, and the box does not turn before: however late it is found, the arm is the same.
+Only the blow acts, and the box does not turn before it: the lever arm does not depend on when it is found.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-r"""What leans on its contacts and turns from rest: one angle, whose acceleration knows the angle and the spin's square.
+r"""Bodies that lean on their contacts and rotate from rest: one angle with an acceleration by angle and squared spin.
 
             /       phi'' = a(phi, phi'^2)           d(phi'^2)/d(phi) = 2 a(phi, phi'^2)
            /
-          /         time = integral of d(phi)/phi',  singular where it starts from rest:
-    =====/=====     phi = start + (end - start) s^2  takes that out
+          /         time = integral of d(phi)/phi',  singular at the start from rest:
+    =====/=====     phi = start + (end - start) s^2  removes that
 
-Ends that slide with Coulomb's friction are of this kind as long as none stops or lifts: friction is a share of a force
-that angle and spin decide. There is no energy to keep, so the square is integrated step by step.
+Ends that slide with Coulomb friction are of this kind as long as none stops or lifts: friction is a share of a force
+that depends on angle and spin. Energy is not conserved, so the square is integrated step by step.
 
-What leans and is held by friction stands, or slides down: what is measured and owed of both stands here as well.
+Metrics and checks of leaning bodies that stand or slide down are here as well.
 """
 
 from __future__ import annotations
@@ -24,30 +24,30 @@ from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.canonical import Check, Measured, Params, Variation
 
-#: Steps of the classical method of fourth order: twice as many change nothing at 1e-9.
+#: Steps of the classical Runge-Kutta method: twice as many change nothing at 1e-9.
 STEPS = 200
-#: Turn at which what slides down is told [rad], and how long it goes on [s]: whoever is late by what a step of 1/60 s
-#: may cost is told as well.
+#: Rotation of the measurement of sliding bodies [rad], and the time after it [s], for runs with a delay of the error of
+#: a step of 1/60 s.
 TOLD, AFTERMATH = math.radians(8.0), 0.2
-#: Duration of a run of what stands [s].
+#: Duration of a run of standing bodies [s].
 DURATION = 2.0
 
-#: Cells of what leans at 60 degrees with ``ratio`` times the friction that it takes: one that stands, one that slides.
+#: Cells of bodies at a lean of 60 degrees with ``ratio`` times the necessary friction: one stands, one slides.
 STANDS_AND_SLIDES: tuple[Params, ...] = ({}, {"ratio": 0.8})
 QUICK = tuple(Variation(params) for params in STANDS_AND_SLIDES)
 FULL = tuple(Variation({"ratio": r, "lean": lean}) for r in (0.5, 0.8, 1.02, 1.05, 2.0) for lean in (45.0, 60.0, 75.0))
 
 #: ``rates(angle, square)`` of an angle [rad] and the square of its rate [1/s^2]: its acceleration [rad/s^2], and
-#: something else whose integral over time is asked.
+#: another rate to integrate over time.
 Rates = Callable[[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn from rest: time [s] and |phi'| [rad/s] at its end, what was integrated on the way, and the path.
+    """A turn from rest: time [s] and |phi'| [rad/s] at its end, the further integral, and the path.
 
-    ``path`` is the integral of |phi'| d(phi) [rad^2/s]: half of it times arm and step is what steps of first order
-    carry a contact away.
+    ``path`` is the integral of |phi'| d(phi) [rad^2/s]: half of it times arm and step is the motion of a contact by
+    steps of first order.
     """
 
     time: float
@@ -61,7 +61,7 @@ def turn(rates: Rates, start: float, end: float) -> Turn | None:
     way = end - start
 
     def slopes(s: float, under: float) -> tuple[float, float, float]:
-        """Of phi'^2/s^2, of the time and of what is gathered."""
+        """Slopes of phi'^2/s^2, of the time and of the further integral."""
         acceleration, gained = rates(start + way * s * s, max(0.0, under) * s * s)
         pace = 2.0 * abs(way) / math.sqrt(under) if under > 0.0 else math.nan
         return 0.0 if s == 0.0 else (4.0 * acceleration * way - 2.0 * under) / s, pace, gained * pace
@@ -83,11 +83,11 @@ def turn(rates: Rates, start: float, end: float) -> Turn | None:
 
 
 def key(p: Params) -> tuple[tuple[str, float], ...]:
-    """Parameters as something to remember a fall by."""
+    """Parameters as the key of a cached fall."""
     return tuple(sorted(p.items()))
 
 
-# ---- what is measured ----
+# ---- metrics ----
 
 
 def sampling(scene: Scene) -> Sampling:
@@ -96,7 +96,7 @@ def sampling(scene: Scene) -> Sampling:
 
 
 def way(scene: Scene, trajectory: Trajectory, body: int) -> float:
-    """Largest way of a point of a body [m]: that of its centre, and what its turn moves its outermost point by."""
+    """Largest displacement of a point of a body [m]: of its centre plus of its outermost point by rotation."""
     pose, d = trajectory.pose[:, body], scene.dimension
     centre = float(np.linalg.norm(pose[:, :d] - pose[0, :d], axis=1).max())
     return centre + metrics.turned(pose) * metrics.reach(scene.bodies[body].shape)
@@ -109,14 +109,14 @@ def load(trajectory: Trajectory, a: int, b: int, axis: int, weight: float) -> Me
 
 
 def outcome(scene: Scene, truth: Mapping[str, float], found: Mapping[str, Measured]) -> Measured:
-    """Way of what should stand, in lengths; largest error of the times of what slides, relative to each."""
+    """Displacement of a standing body, in lengths; largest relative error of the times of a sliding one."""
     if "moved" in truth:
         value, reason = found["moved"]
         return (None, reason) if value is None else (value / scene.params["length"], "")
     return metrics.relative_error(found, truth, [name for name in truth if name.startswith("passing_time")])
 
 
-# ---- what is owed ----
+# ---- checks ----
 
 
 def checks(
@@ -128,9 +128,9 @@ def checks(
     again: Callable[[float], Turn | None],
     bent: Callable[[float, float], float],
 ) -> list[Check]:
-    """What stands may be found one step late at either end; a fall owes what steps of first order leave out.
+    """Contacts of a standing body may be found one step late at either end; a fall has an error of first order.
 
-    ``balance`` is where the loads of what stands come from; the rest as `standing_checks` and `sliding_checks`.
+    ``balance`` is the source of the loads of a standing body; the rest as in `standing_checks` and `sliding_checks`.
     """
     if "moved" in truth:
         return standing_checks(p, dt, truth, heights, balance)
@@ -141,15 +141,15 @@ def checks(
 def standing_checks(
     p: Params, dt: float, truth: Mapping[str, float], heights: Mapping[str, float], source: str
 ) -> list[Check]:
-    """What stands may be found one step late at either end.
+    """Contacts of a standing body may be found one step late at either end.
 
-    An end that nothing holds accelerates by at most 3/2 g, as that of a rod which falls about its other end; the way of
-    the centre and that of a corner by the turn are added, so that each end counts twice. ``heights`` are the loads that
-    are told, each with the share of the length over which its moment acts.
+    A free end accelerates by at most 3/2 g, as that of a rod falling about its other end; the displacement of the
+    centre and that of a corner by rotation are added, so each end counts twice. ``heights`` are the loads, each with
+    the share of the length over which its moment acts.
     """
     still = bounds.Bound(
         6.0 * p["g"] * dt * dt + bounds.ROUND_OFF * p["length"],
-        "both ends found one step late, 3/2 g dt^2 each, at the centre and by the turn",
+        "both ends found one step late, 3/2 g dt^2 each, in motion of the centre and by rotation",
     )
     found = [still.check("moved", "m", truth["moved"], "friction of the floor holds")]
     carried = bounds.carried(dt)
@@ -167,18 +167,18 @@ def sliding_checks(
     bent: Callable[[float, float], float],
     source: str,
 ) -> list[Check]:
-    """A fall owes what steps of first order leave out.
+    """A fall has the error of steps of first order.
 
-    Both ends turn about a point at most a length from either: steps carry them off by L (w dt)^2/2 each. ``again`` is
-    the fall from a lean that is so much off [rad], ``bent`` the acceleration of the lean at a lean and a spin's square.
+    Both ends rotate about a point at most a length from either: each step moves them away by L (w dt)^2/2. ``again`` is
+    the fall from a lean with an error [rad], ``bent`` the acceleration of the lean at a lean and a squared spin.
     """
     fall, length, g = again(0.0), p["length"], p["g"]
-    assert fall is not None  # whoever made the scene has refused it
+    assert fall is not None  # refused when the scene was made
     carried_away = 0.5 * length * dt * fall.path + 1.5 * g * dt * dt
     others = [again(side * carried_away / length) for side in (-1.0, 1.0)]
     start = math.radians(p["lean"])
     fast = max(abs(bent(start - TOLD, fall.spin**2)), abs(bent(start, 0.0)))
-    because = "half a step by the order of a step, one for a contact found late, and ends that steps carry away"
+    because = "half a step by the order of the scheme, one for a contact found late, and ends that steps move"
     time = 1.5 * dt + max(math.inf if other is None else abs(other.time - fall.time) for other in others)
     spin = 1.5 * dt * fast + max(math.inf if other is None else abs(other.spin - fall.spin) for other in others)
     bound = {"passing_time": ("s", bounds.Bound(time, because)), "passing_spin": ("rad/s", bounds.Bound(spin, because))}
@@ -187,6 +187,6 @@ def sliding_checks(
         unit, owed = bound[name.partition("[")[0]]
         found.append(owed.check(name, unit, truth[name], source))
     stays = bounds.Bound(
-        carried_away + bounds.ROUND_OFF * length, "steps carry the ends away, L (w dt)^2/2 each; one found a step late"
+        carried_away + bounds.ROUND_OFF * length, "steps move the ends, L (w dt)^2/2 each; one found a step late"
     )
-    return [*found, stays.check("let_go", "m", truth["let_go"], "both ends push until it is told")]
+    return [*found, stays.check("let_go", "m", truth["let_go"], "both ends push until then")]

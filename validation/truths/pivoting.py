@@ -1,4 +1,4 @@
-r"""What boxes that turn about an edge on the floor have in common: one angle, and the time it takes.
+r"""Boxes that turn about an edge on the floor: one angle, and its time.
 
        ,+.             phi: of the line from the edge to the centre against the vertical, clockwise
       +   \ c          phi'' = p^2 sin(phi),  p^2 = m g rho/(I + m rho^2) = 3 g/(4 rho) of a uniform box
@@ -7,8 +7,8 @@ r"""What boxes that turn about an edge on the floor have in common: one angle, a
          \/rho +
     ======+===========
 
-A step moves the centre along the tangent and turns the box: together they carry the edge away by rho (w dt)^2/2 a
-step, towards the centre. Gravity takes back what is up; what is along the floor stays.
+A step moves the centre along the tangent and turns the box, which moves the edge by rho (w dt)^2/2 a step towards the
+centre. Gravity reverses the upward part; the part along the floor stays.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Pivot:
         return 0.75 * self.g / self.arm
 
     def speed(self, start: float, spin: float, angle: float) -> float:
-        """|phi'| [rad/s] at ``angle``, of a box that turns with ``spin`` at ``start`` [rad]; 0 where it gets not."""
+        """|phi'| [rad/s] at ``angle``, with ``spin`` at ``start`` [rad]; 0 at angles that it does not reach."""
         return math.sqrt(max(0.0, spin**2 + 2.0 * self.rate * (math.cos(start) - math.cos(angle))))
 
     def time(self, start: float, spin: float, angle: float) -> float:
@@ -77,17 +77,17 @@ class Pivot:
         )
 
     def carried_away(self, start: float, spin: float, angle: float, dt: float) -> float:
-        """How far steps of ``dt`` [s] carry the edge away between two angles [m]: rho dt/2 by the integral of w^2."""
+        """Motion of the edge by steps of ``dt`` [s] between two angles [m]: rho dt/2 times the integral of w^2."""
         s, weight = _nodes()
         speeds = [self.speed(start, spin, start + (angle - start) * float(each)) for each in s]
         return 0.5 * self.arm * dt * abs(angle - start) * float(weight @ np.array(speeds))
 
     def spin_off(self, start: float, spin: float, angle: float, dt: float, off: float = 0.0) -> float:
-        """How far steps of ``dt`` [s] may be off in the spin at ``angle`` [rad/s], from a start with ``spin``.
+        """Error of the spin at ``angle`` [rad/s] by steps of ``dt`` [s], from a start with ``spin``.
 
-        The spin at the start may be ``off`` [rad/s], and by 1.5 steps of acceleration: half a step by the order of a
-        step, one for a contact found late. That and the edge that is carried away are energy; the spin is told as
-        coarsely where it is read.
+        The spin at the start has the error ``off`` [rad/s] and 1.5 steps of acceleration: half a step by the order of
+        the scheme, one for a contact found late. That and the motion of the edge change the energy; the spin is read
+        with the same error.
         """
         kick = off + 1.5 * dt * self.rate * math.sin(max(abs(start), abs(angle)))
         carried = self.carried_away(start, spin, angle, dt) + self.g * dt * dt
@@ -96,9 +96,9 @@ class Pivot:
         return math.sqrt(there**2 + 2.0 * energy) - there + 1.5 * dt * self.rate * abs(math.sin(angle))
 
     def time_off(self, start: float, spin: float, angle: float, dt: float, off: float = 0.0) -> float:
-        """How much longer or shorter the way takes [s] with a spin at the start as far off as `spin_off` says.
+        """Error of the time [s] for an error of the initial spin as in `spin_off`.
 
-        Infinite where a box that much slower does not get there.
+        Infinite where a box that much slower does not arrive.
         """
         kick = off + 1.5 * dt * self.rate * math.sin(max(abs(start), abs(angle)))
         kick += self.rate * (self.carried_away(start, spin, angle, dt) + self.g * dt * dt) / (self.arm * spin)
@@ -118,14 +118,13 @@ def fall_checks(
     tilted: float = 0.0,
     spin: float = 0.0,
 ) -> list[Check]:
-    """Checks of a box that falls over an edge that stays: time and spin at ``end``, way of the edge.
+    """Checks of a box that falls over a fixed edge: time and spin at ``end``, motion of the edge.
 
-    Steps of first order: what they do of a fall whose contact may be found one step late. Half a step of acceleration
-    is what the order of a step shows, and a whole one is missing where a contact is found late, at the start or after
-    the edge was carried off the floor: 1.5 dt in time, and 1.5 steps in spin. What carries the edge away raises the
-    centre or moves its arm: energy m g times that, and the torque's share of it over the arm. A start that is told to
-    ``tilted`` [rad] only takes the time of another start. One that turns with ``spin`` [rad/s] already may be as far
-    off in that (`Pivot.spin_off`), and takes the time of another spin.
+    For first-order schemes whose contact may be found one step late: half a step of acceleration by the order of the
+    scheme, and a whole one where a contact is found late, at the start or after the edge left the floor: 1.5 dt in
+    time, and 1.5 steps in spin. Motion of the edge raises the centre or changes its lever arm: energy m g times that,
+    and its share of the torque. A start with the tolerance ``tilted`` [rad] has the time of another start. One with
+    ``spin`` [rad/s] has the error of `Pivot.spin_off`, and the time of another spin.
     """
     g, passing = on.g, truth["passing_spin"]
     carried = on.carried_away(start, spin, end, dt) + g * dt * dt
@@ -139,11 +138,12 @@ def fall_checks(
     )
     time = bounds.Bound(
         1.5 * dt + truth["passing_time"] * carried / on.arm + other,
-        "half a step by the order of a step, one for a contact found late, and the torque of an edge that moved",
+        "half a step by the order of the scheme, one for a contact found late, and the torque of an edge that moved",
     )
     speed = bounds.Bound(
         sharp,
-        "half a step of the acceleration by the order of a step, one for a contact found late, and an edge that moved",
+        "half a step of the acceleration by the order of the scheme, one for a contact found late, and an edge that "
+        "moved",
     )
     source = "energy of a pendulum that is held by an edge; its integral"
     return [
@@ -153,7 +153,7 @@ def fall_checks(
     ]
 
 
-#: What these metrics mean, in words.
+#: Meaning of these metrics, in words.
 WORDS = {
     "passing_time": "falls through the angle after {value}",
     "passing_spin": "turns with {value} there",

@@ -1,4 +1,4 @@
-"""Gauss' rule, which scenes with an integral in their truth share; each rule is made once."""
+"""Gauss' rule for truths with an integral; each rule is computed once."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""What balls that slide, roll and bounce on a floor have in common: their spin seen along the motion, and its bounds.
+"""Balls that slide, roll and bounce on a floor: their spin along the motion, and bounds.
 
         -->  v            forward: the speed v of the centre and the spin w that rolls that way, w = v/r
        ( )   w r          slip:    u = v - w r, of the point that touches; friction acts against it
     =========             k = I/(m r^2): 1/2 of a disc, 2/5 of a ball
 
-A contact that is found late is found deep, and friction then acts on an arm ``a`` shorter than the radius by that
-depth. What that changes in an answer is computed from the answer's own formula.
+A contact that is found late is found with an overlap, and friction then acts on a lever arm ``a`` shorter than the
+radius by that depth. The change of a result follows from its formula.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from adapters.trajectory import Trajectory
 from validation import bounds
 from validation.scenes.parts import heading
 
-#: Arms between the shortest and the radius at which a formula is evaluated: it is smooth but for a change of regime.
+#: Number of lever arms between the shortest and the radius for a formula, which is smooth except at a change of regime.
 ARMS = 9
 
 
@@ -58,7 +58,7 @@ def struck(v: float, w: float, blow: float, mu: float, k: float, radius: float, 
     blow
         Normal impulse over the mass, (1 + e) v_n [m/s].
     k, arm
-        I/(m r^2), and the distance [m] from the centre at which friction acts: the radius, or a little less.
+        I/(m r^2), and the distance [m] of friction from the centre: the radius, or a little less.
     """
     own = k * radius**2
     grips = (v - w * arm) / (1.0 + arm**2 / own)
@@ -74,6 +74,6 @@ def of_the_arm(answer: Callable[[float], float], radius: float, depth: float) ->
 
 
 def on_a_late_arm(answer: Callable[[float], float], radius: float, depth: float, scale: float) -> bounds.Bound:
-    """Bound of an answer that is exact at every step but for the ``depth`` [m] at which its contact is found."""
-    because = "exact at every dt but for the arm of friction, shorter by the depth at which a late contact is found"
+    """Bound of a result that is exact at every step except for the ``depth`` [m] at which its contact is found."""
+    because = "exact at every dt except for the lever arm of friction, which is shorter by the depth of a late contact"
     return bounds.Bound(of_the_arm(answer, radius, depth) + bounds.ROUND_OFF * scale, because)

@@ -1,4 +1,4 @@
-"""What boxes that slide over something level until friction has stopped them have in common.
+"""Boxes that slide on a level face until friction stops them.
 
        +---+  v
        |   | -->            stops after d = v^2/(2 mu g), t = v/(mu g),
@@ -22,7 +22,7 @@ from validation import bounds, metrics
 from validation.canonical import Check, Measured, Params, Track
 from validation.scenes.parts import along, at, block, heading
 
-#: Runs on for this long after it should have stopped, as a share of the time to stop.
+#: Time of the run after the stop, as a share of the time to stop.
 AFTERMATH = 0.5
 
 
@@ -32,7 +32,7 @@ def stop(params: Params) -> float:
 
 
 def way(params: Params) -> float:
-    """Way to stop [m]."""
+    """Distance to stop [m]."""
     return params["v"] ** 2 / (2.0 * params["mu"] * params["g"])
 
 
@@ -57,7 +57,7 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Way along and across the heading, deepest and highest place of the lower face, turn against the start."""
+    """Distance along and across the heading, range of the lower face's height, rotation since the start."""
     d, line, box = scene.dimension, heading(scene), len(scene.bodies) - 1
     pose = trajectory.pose[:, box]
     moved = pose[-1, : d - 1] - pose[0, : d - 1]
@@ -85,22 +85,23 @@ def _braking(scene: Scene, trajectory: Trajectory) -> Measured:
 
 
 def checks(scene: Scene, dt: float, truth: Mapping[str, float], place: float = 0.0) -> list[Check]:
-    """Braking is constant: what a step order shows of a parabola, v dt/2, and the step within which it stops.
+    """Braking is constant: the error of the scheme in a parabola, v dt/2, and the step in which it stops.
 
-    A semi-implicit step moves by the new velocity, so that the way is short of v dt/2, or long by it, position first.
-    In the step that stops the box friction needs less than its limit; another mu g dt^2. A start that touches exactly
-    may find its contact one step late: the box does not brake in that step, v dt, and sinks by g dt^2.
+    A semi-implicit step moves by the new velocity, so the distance is v dt/2 too short, or too long with position
+    first. In the step that stops the box friction needs less than its limit; another mu g dt^2. A start that touches
+    exactly may find its contact one step late: the box does not brake in that step, v dt, and sinks by g dt^2.
 
-    ``place`` [m] is the largest coordinate to whose round-off places are told; the way, if it is less.
+    ``place`` [m] is the largest coordinate, whose round-off limits positions; at least the distance.
     """
     p = scene.params
     g, v, mu = p["g"], p["v"], p["mu"]
     place = max(place, truth["stopping_distance"])
     distance = bounds.Bound(
         1.5 * v * dt + (1.0 + mu) * g * dt * dt + bounds.ROUND_OFF * place,
-        "a step order shows v dt/2 of a parabola, a contact found one step late is v dt without brakes; and g dt^2",
+        "velocity and position half a step apart give v dt/2, a contact found one step late v dt without friction; "
+        "and g dt^2",
     )
-    stopped = bounds.Bound(bounds.STILL * g * dt, "slower than v1/100 = g dt/100 does not move")
+    stopped = bounds.Bound(bounds.STILL * g * dt, "a speed below v1/100 = g dt/100 counts as rest")
     # The window is the middle half of the slide, to a step: g dt/100 of speed within it.
     brakes = bounds.driven(g, dt, max(0.5 * stop(p) - dt, dt))
     level = bounds.found_late(g, dt, place)
@@ -132,7 +133,7 @@ def track(scene: Scene) -> Track:
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
-    """Distance of the place where it stops from where it should, over the way."""
+    """Distance of the place where it stops from the exact one, over the distance."""
     truth = way(scene.params)
     value, reason = found["stopping_distance"]
     if value is None:
@@ -141,7 +142,7 @@ def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     return math.hypot(value - truth, astray) / truth, ""
 
 
-#: What the metrics mean, in words.
+#: Meaning of the metrics, in words.
 WORDS = {
     "stopping_distance": "stops after {value}",
     "braking": "is braked by {value}",

@@ -1,11 +1,11 @@
-"""Runs cells in worker processes: an abort, a hang or a leak costs that one cell, of that one engine.
+"""Runs cells in worker processes: an abort, a hang or a leak affects only its cell.
 
-    parent (pool.py) --(slot)--> worker (process.py): execute(), then: is the process still what it was (state.py)?
+    parent (pool.py) --(slot)--> worker (process.py): execute(), then: has the process changed (state.py)?
        ^ observation, recording; or how the worker ended, with the last of what it wrote
 
-A worker serves one engine. It is a session of its own, so that what an engine starts ends with it; it has a limit of
-memory that follows from the machine and the number of workers (limits.py); it dies with its parent. After each cell
-the state that cells share is compared, and a process that an engine has changed is replaced.
+A worker runs one engine. It is a separate session, so processes that an engine starts end with it; its memory limit
+follows from the machine and the number of workers (limits.py); it ends with its parent. After each cell the state
+shared between cells is compared, and a process that an engine has changed is replaced.
 """
 
 from validation.workers.limits import LimitError

@@ -1,4 +1,4 @@
-"""The far side of a cluster (`validation.workers.cluster`): one batch of cells in a ``run-cell --batch`` process."""
+"""The remote side of a cluster (`validation.workers.cluster`): a batch of cells in a ``run-cell --batch`` process."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 
 from adapters.plain import lines
 
-#: Status of ``run-cell`` that says that cells were left after time-outs (`reports.command.statuses.INCOMPLETE`).
+#: Status of ``run-cell`` where cells were left out after time-outs (`reports.command.statuses.INCOMPLETE`).
 LEFT = 4
 
 
 def run_batch(text: str, timeout: float, topic: str, batch: str) -> dict[str, Any]:
-    """Run what ``text`` asks for, a line per cell; every answer is an event of ``topic`` at once, and in the result.
+    """Run the cells of ``text``, one a line; every result is sent as an event of ``topic`` at once, and returned.
 
     Returns
     -------
-    ``lines`` of the answers; ``left``, why cells were left, if some were; ``said``, how the process ended; ``worker``.
+    ``lines`` of results; ``left``: why cells were left out, if any; ``said``: how the process ended; ``worker``.
     """
     from distributed import get_worker
 
@@ -47,6 +47,6 @@ def run_batch(text: str, timeout: float, topic: str, batch: str) -> dict[str, An
 
 
 def _reason(answers: list[str]) -> str:
-    """The first error among the answers; empty if there is none."""
+    """The first error among the results; empty if there is none."""
     found = (json.loads(line) for line in answers)
     return next((str(data["error"]) for data in found if "error" in data), "")

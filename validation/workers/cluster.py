@@ -1,11 +1,11 @@
-"""Cells on the machines of a Dask cluster: batches of them, each a ``run-cell --batch`` process of its own.
+"""Runs cells on a Dask cluster, in batches, each in a ``run-cell --batch`` process.
 
     plan -> batches of one engine --(Dask task)--> worker: run-cell --batch --(a line per cell)--> here -> store
 
-What a cell's process does to itself costs that cell, as everywhere (`validation.workers`); Dask only moves batches.
-Each observation comes back when its cell ends, as an event of its worker, so that a worker or a scheduler that dies
-takes nothing with it that had finished. What a lost batch had not finished is asked again, in halves, by us and not by
-Dask; the journal has a line for every batch that began, was lost or ended, so no cell runs twice unrecorded.
+A crash affects only its cell, as everywhere (`validation.workers`); Dask only distributes batches. Each observation
+returns when its cell ends, as an event of its worker, so no finished cell is lost when a worker or the scheduler dies.
+Unfinished cells of a lost batch are sent again, in halves, by this module and not by Dask; the journal has a line for
+every batch that began, was lost or ended, so every repeated cell is recorded.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from typing import Any
 from uuid import uuid4
 
 from adapters.engine import EngineError
+from adapters.extras import install
 from adapters.plain import one_line
 from adapters.scene import SceneError
 from validation import posed
@@ -32,20 +33,20 @@ from validation.workers.batch import run_batch
 from validation.workers.limits import LimitError
 
 ADDRESS = re.compile(r"local:(?P<count>[1-9]\d{0,3})|(?:tcp|tls)://[^\s/]+:\d{1,5}")
-#: Batches that each worker gets if all take as long: fewer leave workers idle at the end, more start more processes.
+#: Batches per worker if all take equally long: fewer leave workers idle at the end, more start more processes.
 PER_WORKER = 4
-#: Fewest and most cells of a batch: a process takes a second or two of CPU to start, a cell some hundredths; and what a
-#: worker that is lost has not brought back is asked again.
+#: Fewest and most cells of a batch: a process takes a second or two of CPU to start, a cell some hundredths; and
+#: unfinished cells of a lost worker run again.
 LEAST, MOST = 25, 250
-#: Times that one cell may be lost with its worker before it counts as its fault.
+#: Times that a cell may be lost with its worker before it counts as the cause.
 MOST_LOST = 3
-#: Seconds until a first worker must be there, and that a scheduler may not answer.
+#: Time limit [s] for a first worker, and for an answer of the scheduler.
 PATIENCE, SILENCE = 60.0, 20.0
 
 
 @dataclass
 class _Batch:
-    """Cells that one process runs, those that are not back yet, and how often they were lost."""
+    """Cells of one process, those without a result yet, and how often they were lost."""
 
     name: str
     slots: list[Slot]
@@ -54,7 +55,7 @@ class _Batch:
 
 
 def checked(address: str) -> str:
-    """Return ``address`` if it is one of a cluster.
+    """Return ``address`` if it is valid.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def checked(address: str) -> str:
     if not ADDRESS.fullmatch(address):
         raise SceneError(f"cluster: {one_line(address, 80)!r} is neither local:N nor tcp://HOST:PORT")
     if find_spec("distributed") is None:
-        raise EngineError("cluster: distributed is missing; pip install 'contact-crosscheck[dask]'")
+        raise EngineError(f"cluster: distributed is missing; {install('dask')}")
     return address
 
 
@@ -88,12 +89,12 @@ def run_cells_on(
     journal
         File to which a line of JSON is added for every batch that begins, is lost or ends.
     leave
-        Called for every slot that is left, with the reason.
+        Called for every slot that is left out, with the reason.
 
     Raises
     ------
     LimitError
-        If no worker comes, the scheduler goes, or a worker's code or engine is not the one here.
+        If no worker appears, the scheduler ends, or a worker has other code or another engine.
     """
     checked(address)
     if not slots:
@@ -108,7 +109,8 @@ def _client(address: str, stack: ExitStack) -> Any:
     import dask
     from distributed import Client, LocalCluster
 
-    # A lost batch is asked again by us: Dask would start all of it again, and blame it for its worker's death.
+    # A lost batch is sent again by this module: Dask would start all of it again, and count its worker's death against
+    # it.
     stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0,
                                          "distributed.scheduler.worker-saturation": 1.0}))  # fmt: skip
     local = ADDRESS.fullmatch(address)
@@ -123,7 +125,7 @@ def _client(address: str, stack: ExitStack) -> Any:
 
 
 class _Driver:
-    """Hands batches to a cluster and collects what comes back."""
+    """Sends batches to a cluster and collects results."""
 
     def __init__(self, client: Any, journal: Any, timeout: float, leave: Callable[[Slot, str], None]) -> None:
         self.client, self.journal, self.timeout, self.leave = client, journal, timeout, leave
@@ -135,7 +137,7 @@ class _Driver:
         self.same: set[tuple[str, str]] = set()
 
     def run(self, slots: Sequence[Slot]) -> Iterator[Observation]:
-        """Everything, until each slot is back or left."""
+        """Run until each slot has a result or is left out."""
         try:
             self.client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError:
@@ -172,10 +174,10 @@ class _Driver:
 
     def _check(self, silent: float) -> None:
         if self.client.status == "closed" or time.monotonic() - silent > SILENCE:
-            raise LimitError("cluster: the scheduler is gone; what finished is kept, the same command resumes")
+            raise LimitError("cluster: the scheduler is gone; finished cases are kept, the same command resumes")
 
     def _heard(self, said: dict[str, Any]) -> Iterator[Observation]:
-        """A batch began, or one of its cells is back."""
+        """A batch began, or one of its cells returned."""
         batch = self.batches.get(said.get("batch", ""))
         if batch is None:
             return
@@ -186,11 +188,11 @@ class _Driver:
             yield from self._line(batch, said["line"], str(said.get("worker", "")))
 
     def _line(self, batch: _Batch, line: str, worker: str) -> Iterator[Observation]:
-        """What ``run-cell`` wrote of one cell: its observation, or why it was left."""
+        """Output of ``run-cell`` for one cell: its observation, or why it was left out."""
         try:
             data = json.loads(line)
             if "error" in data:
-                return  # a cell that was left is known by what is missing at the end
+                return  # cells that were left out are missing at the end
             observation = observation_from_dict(data)
         except (ValueError, TypeError, KeyError):
             return  # half a line of a process that died
@@ -200,24 +202,24 @@ class _Driver:
             yield observation
 
     def _compare(self, observation: Observation, worker: str) -> None:
-        """The first cell of each engine and worker: it must be the cell that would run here."""
+        """Check the first cell of each engine and worker: it must equal the cell on this machine."""
         key = (worker, observation.slot.engine)
         if key in self.same or not observation.cell:
             return
         here = prepare(observation.slot).cell
         if here.key() != observation.cell:
             said = f"{observation.slot.engine} {observation.engine_version} there, {here.engine_version} here"
-            raise LimitError(f"cluster: {worker} has other code than this machine ({said}); its rows would be others")
+            raise LimitError(f"cluster: {worker} has other code than this machine ({said}); its results would differ")
         self.same.add(key)
 
     def _ended(self, name: str) -> Iterator[Observation]:
-        """A batch is over; what it did not bring back is asked again, or left."""
+        """A batch is over; its missing cells are sent again or left out."""
         batch, future = self.batches[name], self.futures.pop(name)
         if future.status == "cancelled":
-            raise LimitError("cluster: the scheduler is gone; what finished is kept, the same command resumes")
+            raise LimitError("cluster: the scheduler is gone; finished cases are kept, the same command resumes")
         told: dict[str, Any] | None = future.result() if future.status == "finished" else None
         if told is not None:
-            for line in told["lines"]:  # what no event has brought: they come at their own time
+            for line in told["lines"]:  # cells whose events have not arrived yet
                 yield from self._line(batch, line, told["worker"])
         del self.batches[name]
         future.release()
@@ -255,7 +257,7 @@ def _why(future: Any) -> str:
 
 
 def _batches(slots: Sequence[Slot], workers: int) -> Iterator[list[Slot]]:
-    """Batches of one engine each, the engines in turn."""
+    """Batches of one engine each, alternating between engines."""
     size = max(LEAST, min(MOST, -(-len(slots) // (PER_WORKER * workers))))
     engines: dict[str, deque[Slot]] = defaultdict(deque)
     for slot in slots:

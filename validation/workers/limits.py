@@ -1,4 +1,4 @@
-"""What workers may use: as many as fit, and as much memory each as the machine and its settings allow."""
+"""Number of workers and their memory, from the machine and its settings."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import sys
 from pathlib import Path
 
 GIB = 2**30
-#: Address space that every engine gets along with [bytes]: the compiler reserves most, .65 GiB for the planar kernels.
+#: Address space that is enough for every engine [bytes]: the compiler reserves most, .65 GiB for the planar kernels.
 NEEDED = 2 * GIB
-#: Address space of a worker where there is plenty [bytes]: a leak is stopped before the machine swaps.
+#: Largest address space of a worker [bytes]: a leak is stopped before the machine swaps.
 PLENTY = 8 * GIB
-#: Memory that a worker really uses [bytes], at most: the compiler's own.
+#: Largest memory in use by a worker [bytes]: the compiler's.
 RESIDENT = GIB
-#: Workers per core beyond which they only wait for each other.
+#: Most useful number of workers per core.
 PER_CORE = 4
 
 
 class LimitError(RuntimeError):
-    """The machine allows too little; one line."""
+    """The machine's limits are too small; one line."""
 
 
 def cores() -> int:
@@ -29,7 +29,7 @@ def cores() -> int:
 
 
 def workers(asked: int, cells: int) -> int:
-    """How many workers to start for ``cells`` cells when ``asked`` were asked for (0: one per core)."""
+    """Number of workers for ``cells`` cells when a user wants ``asked`` (0: one per core)."""
     most = max(1, min(PER_CORE * cores(), installed_memory() // RESIDENT))
     return max(1, min(asked or cores(), cells, most))
 
@@ -40,7 +40,7 @@ def memory(count: int) -> int:
     Raises
     ------
     LimitError
-        If this process may not give its children what an engine needs.
+        If a child process cannot have the memory that an engine needs.
     """
     hard = _hard_limit()
     if hard is not None and hard < NEEDED:

@@ -1,4 +1,4 @@
-"""The parent's side: which worker runs which cell, for how long, and what became of it."""
+"""The parent's side: assigns cells to workers, with time limits, and collects results."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from validation.workers.process import READY, serve
 
 #: Seconds after which a cell counts as hanging: the slowest healthy one needs seconds, plus a cold compilation.
 TIMEOUT = 300.0
-#: Seconds until a worker is ready for its first cell: it imports our packages, on a busy machine and a cold disk.
+#: Time limit [s] for the start of a worker: it imports our packages, perhaps on a busy machine with a cold disk.
 START = 120.0
-#: Time-outs of one engine on one scene after which its other cells there are left: they would hang as well.
+#: Time-outs of one engine on one scene after which its other cells there are left out, as they would hang too.
 MOST_TIMEOUTS = 3
 
 
 class Unwritten(OSError):
-    """A trajectory that was to be kept could not be written."""
+    """A requested trajectory could not be written."""
 
 
 @dataclass
 class _Seat:
-    """A place for one worker; the worker changes with the engine."""
+    """A slot of the pool for one worker; the worker changes with the engine."""
 
     child: Child | None = None
     engine: str = ""
@@ -61,22 +61,21 @@ def run_cells(
 ) -> Iterator[Observation]:
     """Yield an observation per slot, in the order in which they finish.
 
-    What is raised once cells run is raised after every cell that has been asked has answered: of all cells but those
-    whose own trajectory or recording could not be kept, nothing that was computed is lost. What fails after that is not
-    told.
+    An error while cells run is raised after all running cells have ended, so that no result is lost except of cells
+    whose trajectory or recording could not be stored. Later errors are not reported.
 
     Parameters
     ----------
     jobs
-        Worker processes; fewer are started where the machine does not carry them.
+        Worker processes; fewer where the machine's memory is too small.
     timeout, memory
-        Limits per cell [s] and per worker [bytes]; None: as `validation.workers.limits` says.
+        Limits per cell [s] and per worker [bytes]; None: from `validation.workers.limits`.
     keep
         Path for the trajectory of a slot, or None.
     shown, record
-        Slots whose motion is recorded, and what is called with each recording before its observation is yielded.
+        Slots whose motion is recorded, and a function called with each recording before its observation is yielded.
     leave
-        Called for every slot that is left, with the reason: after three time-outs of its engine on its scene.
+        Called with the reason for every slot that is left out after three time-outs of its engine on its scene.
 
     Raises
     ------
@@ -85,7 +84,7 @@ def run_cells(
     IsolationError
         If no process can be started.
     Unwritten
-        If a trajectory that is to be kept cannot be written.
+        If a requested trajectory cannot be written.
     """
     if not slots:
         return
@@ -100,7 +99,7 @@ def run_cells(
     try:
         yield from _never_started(waiting)
 
-        failure: Exception | None = None  # nothing is asked any more; it is told after all that has been computed
+        failure: Exception | None = None  # no new cell is started; raised after the running ones have ended
 
         def ask(seat: _Seat, choose: Callable[[], Slot | None]) -> None:
             nonlocal failure
@@ -108,7 +107,7 @@ def run_cells(
                 slot = choose()
                 if slot is not None:
                     _ask(seat, slot, texts, timeout, keep(slot), slot in shown)
-            except Exception as error:  # no worker can be started, or the caller has no place for what comes
+            except Exception as error:  # no worker can be started, or the caller cannot store results
                 failure = failure or error
 
         while True:
@@ -130,14 +129,14 @@ def run_cells(
                     continue
                 if observation.outcome is Outcome.TIMED_OUT:
                     timeouts[slot.engine, slot.scene] += 1
-                # Before anyone looks at the answer: a worker does not wait for what is kept of it. But no worker is
-                # started meanwhile, which takes seconds.
+                # Before the result is used, so that a worker does not wait while it is stored. No worker is started
+                # meanwhile, which takes seconds.
                 if seat.child is not None and failure is None:
                     ask(seat, partial(_first, waiting.get(seat.engine, deque()), timeouts, leave))
                 if recording is not None:
                     try:
                         record(slot, recording)
-                    except Exception as error:  # as if it had not run: it is run again when its run is resumed
+                    except Exception as error:  # as if it had not run: it runs again when the run is resumed
                         failure = failure or error
                         continue
                 yield observation
@@ -147,7 +146,7 @@ def run_cells(
 
 
 def _never_started(waiting: dict[str, deque[Slot]]) -> Iterator[Observation]:
-    """Cells of plugins that are known to end or hang the process that imports them."""
+    """Cells of plugins that end or hang the process that imports them."""
     for engine in list(waiting):
         found = registry.find(engine)
         if found.fatal:
@@ -163,7 +162,7 @@ def _next(
     leave: Callable[[Slot, str], None],
     memory: int,
 ) -> Slot | None:
-    """Next cell of a free seat: of its own engine while there are any, else of the one that has most to do.
+    """Next cell of a free seat: of its engine while there are any, else of the one with the most cells left.
 
     The seat has a worker for it then.
     """
@@ -186,7 +185,7 @@ def _next(
 
 
 def _first(queue: deque[Slot], timeouts: Counter[tuple[str, str]], leave: Callable[[Slot, str], None]) -> Slot | None:
-    """Take the first cell that is worth asking; those before it are left."""
+    """Take the first cell that should run; those before it are left out."""
     while queue:
         slot = queue.popleft()
         if timeouts[slot.engine, slot.scene] < MOST_TIMEOUTS:
@@ -196,19 +195,19 @@ def _first(queue: deque[Slot], timeouts: Counter[tuple[str, str]], leave: Callab
 
 
 def _started(memory: int) -> Child:
-    """Start a worker that is ready; one that cannot even start is no engine's fault.
+    """Start a worker; a failure to start is not an engine's fault.
 
     Raises
     ------
     LimitError
-        With what it wrote last.
+        With its last output.
     """
     child = Child(serve, memory)
     try:
         if child.receive(START) == READY:
             child.written = b""
             return child
-        raise Lost("it did not say that it is ready")
+        raise Lost("it did not become ready")
     except Lost as lost:
         child.stop()
         said = child.tail().rpartition("\n")[2]
@@ -254,7 +253,7 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
             child.stop()
             seat.child = None
             return _lost(slot, Outcome.TIMED_OUT, f"no answer after {timeout:g} s", child.tail()), None
-        answer = json.loads(child.receive(5.0))  # it is there, or the child has ended
+        answer = json.loads(child.receive(5.0))  # it has arrived, or the child has ended
         if answer["unwritten"]:
             raise Unwritten(*answer["unwritten"])
         observation = observation_from_dict(answer["observation"])
@@ -266,12 +265,12 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
         return _lost(slot, Outcome.CRASHED, str(lost), child.tail()), None
     except Unwritten:
         raise
-    except Exception as error:  # an engine that rewrites our modules can spoil even the answer
+    except Exception as error:  # an engine that changes our modules can break even the answer
         child.stop()
         seat.child = None
         return _lost(slot, Outcome.CRASHED, f"its answer cannot be read: {said_by(error)}", child.tail()), None
     log = child.tail()
-    if changed:  # the next cell gets a fresh process
+    if changed:  # the next cell gets a new process
         seat.free()
     if observation.outcome is not Outcome.CRASHED:
         return observation, recording
@@ -281,7 +280,7 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
 
 
 def _lost(slot: Slot, outcome: Outcome, reason: str, log: str) -> Observation:
-    """Observation of a cell that gave none; a plugin that is broken enough has not even a cell."""
+    """Observation of a cell without a result; for a broken plugin even the cell may be unknown."""
     try:
         prepared = prepare(slot)
         key, scene_version, version = prepared.cell.key(), prepared.scene.version, prepared.cell.engine_version

@@ -1,4 +1,4 @@
-"""The worker's side: one cell after the other, each answered in plain data whatever its engine does."""
+"""The worker's side: runs one cell after the other and returns plain data, whatever the engine does."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ READY = b"ready"
 
 
 def serve(connection: Connection) -> None:
-    """Run what is asked until the other end closes."""
+    """Run cells until the other end closes."""
     from validation.running.execution import perform  # noqa: F401  (loaded before the first cell's clock starts)
 
     registry.load_engines_here()
@@ -38,9 +38,9 @@ def serve(connection: Connection) -> None:
 
 
 def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[str, Any], state.State | None]:
-    """Answer of one cell, and the look at this process that the next one is compared with, if this one left it alone.
+    """Result of one cell, and the process state for comparison with the next, if this one did not change it.
 
-    A process that a cell has changed gets no other.
+    A process that a cell has changed gets no further cell.
     """
     slot, recording, changed, unwritten = slot_from_dict(job["slot"]), None, "", None
     try:
@@ -54,9 +54,9 @@ def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[st
             _flush()
             changed = state.changed(before)
         if found.engine is None and job["installed"]:
-            reason = f"it can be loaded elsewhere, but not in its worker: {found.reason}"
+            reason = f"it can be loaded, but not in its worker process: {found.reason}"
             observation = replace(observation, outcome=Outcome.CRASHED, reason=reason)
-    except OSError as error:  # what an engine raises is an outcome by now: this is the file that was to be kept
+    except OSError as error:  # errors of an engine are outcomes by now: this is about the requested file
         unwritten = [error.errno or 0, error.strerror or said_by(error), str(error.filename or job["keep"])]
         observation = Observation(slot, "", 0, "", Outcome.CRASHED, said_by(error))
     except BaseException as error:  # an exit or an interrupt that an engine raises is a crash of its cell
@@ -76,5 +76,5 @@ def _cell(slot: Slot, job: Mapping[str, Any]) -> tuple[Observation, str | None]:
 
 def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed by an engine; the state says so
+        with contextlib.suppress(OSError, ValueError, AttributeError):  # closed by an engine, which the state shows
             stream.flush()

@@ -1,7 +1,7 @@
-"""What all cells of a process share, and whether a cell has changed it.
+"""State shared by all cells of a process, and detection of changes by a cell.
 
-An engine may set the rounding mode, close the streams, lower a limit, move to another folder, install a signal handler
-or replace a function of somebody else's module. Its own answer then is what it is; the next cell must not feel it.
+An engine may set the rounding mode, close streams, lower a limit, change the folder, install a signal handler or
+replace a function of another module. Its own result stands; the next cell must not be affected.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from typing import Any
 
 import numpy as np
 
-#: Modules whose functions and classes are watched besides our own: what measuring and judging computes with.
+#: Modules whose functions and classes are watched besides ours: those used to measure and judge.
 WATCHED = ("builtins", "math", "random", "time", "json", "os", "sys", "copy", "dataclasses", "numpy", "numpy.linalg")
 OURS = ("adapters", "validation")
-#: Files that may stay open beyond those there were before the first cell: engines keep caches and libraries open. It is
-#: a sixteenth of the 1024 that Linux allows a process.
+#: Files that may stay open beyond those before the first cell: engines keep caches and libraries open. A sixteenth of
+#: the 1024 of a Linux process.
 SPARE_FILES = 64
 OPEN_FILES = "open files"
 
 
 @dataclass(frozen=True)
 class State:
-    """One look at the process: plain facts by name, and what the names of watched modules and classes stood for.
+    """A snapshot of the process: plain facts by name, and the objects behind names of watched modules and classes.
 
-    ``sizes`` says how many names each of these places had, ``modules`` how many modules there were.
+    ``sizes`` is the number of names in each of them, ``modules`` the number of modules.
     """
 
     facts: Mapping[str, Any]
@@ -42,20 +42,20 @@ class State:
 
 
 def taken() -> State:
-    """Look at this process now."""
-    facts = {name: look() for name, look in _FACTS.items()}  # first of all: a look may import what it needs
+    """Take a snapshot of this process."""
+    facts = {name: look() for name, look in _FACTS.items()}  # first of all: a snapshot may import modules
     modules, names = len(sys.modules), _names()
     sizes = {place: len(now) for place, (now, _) in names.items()}
     return State(facts, names, sizes, modules)
 
 
 def still(before: State) -> State:
-    """What to compare the next cell with, after one that has changed nothing: the same look, which costs 3 ms.
+    """Snapshot to compare with the next cell, after one that changed nothing: the same, as a new one costs 3 ms.
 
-    If modules or names have come since, as a first cell imports what it needs, another look. Open files are counted
-    from the first look all the same: what runs out is their sum, whether one cell opened them or each a few. So a leak
-    of one a cell ends the process after `SPARE_FILES` cells, and so do libraries that slowly open as many. That blames
-    no cell: its answer stands, and the next one gets a fresh process, for a second or two.
+    A new one if modules or names were added, as by the imports of a first cell. Open files are still counted from the
+    first snapshot, because their sum is limited, whether one cell opened them or each a few. So a leak of one file a
+    cell ends the process after `SPARE_FILES` cells, and so do libraries that slowly open as many. No cell is blamed:
+    its result stands, and the next one gets a new process within a second or two.
     """
     come = len(sys.modules) != before.modules or any(
         len(now) != before.sizes[place] for place, (now, _) in before.names.items()
@@ -67,7 +67,7 @@ def still(before: State) -> State:
 
 
 def changed(before: State) -> str:
-    """What differs from ``before``, in a few words; empty if nothing does."""
+    """Differences from ``before``, in a few words; empty if there are none."""
     found = [name for name, look in _FACTS.items() if not _same(name, before.facts[name], look())]
     for place, (now, then) in before.names.items():
         replaced = [name for name, value in then.items() if now.get(name) is not value]
@@ -82,9 +82,9 @@ def _same(name: str, before: Any, now: Any) -> bool:
 
 
 def _rounding() -> tuple[Any, ...]:
-    """Rounding, denormals and traps of both floating-point units, by what arithmetic does and what C says."""
+    """Rounding, denormals and traps of both floating-point units, from arithmetic and from C."""
     one, tiny = np.array([1.0, -1.0]), np.array([2.2250738585072014e-308])
-    part = np.array([1.7e-16])  # beyond a half of each spacing beside 1: no other rounding gives all four sums
+    part = np.array([1.7e-16])  # just beyond half of each spacing next to 1: no other rounding gives all four sums
     long = np.longdouble(1.0) + np.longdouble(1e-19)
     numbers = (*(one + part), *(one - part), float((tiny * 0.5)[0]) != 0.0, long)
     said = tuple(getattr(_C, name)() for name in ("fegetround", "fegetexcept") if hasattr(_C, name))
@@ -171,7 +171,7 @@ _FACTS: dict[str, Callable[[], Any]] = {
 
 
 def _names() -> dict[str, tuple[Mapping[str, Any], dict[str, Any]]]:
-    """Functions, classes and modules by place: the live names there, and what they stand for now."""
+    """Functions, classes and modules by place: present names and their objects."""
     found: dict[str, tuple[Mapping[str, Any], dict[str, Any]]] = {}
     for name, module in list(sys.modules.items()):
         if module is None or not (name in WATCHED or name.partition(".")[0] in OURS):

@@ -98,7 +98,7 @@ def test_the_most_serious_cell_is_followed():
 
 def test_a_check_that_no_row_has_is_said():
     found = bisect(2, [SLOT], "rebound", Engine([0.5, 0.4]))
-    assert isinstance(found, Unchanged) and "no such row" in found.reason
+    assert isinstance(found, Unchanged) and "no such check" in found.reason
 
 
 @pytest.mark.parametrize(
@@ -140,9 +140,9 @@ def test_a_flip_is_followed_by_its_verdict_whatever_the_value_does():
 def test_nothing_changed_has_no_reason_and_the_end_that_is_silent_has_its_own():
     assert bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.4, 0.5])) == Unchanged("")
     first = bisect(3, [SLOT], "rebound_ratio", Engine([None, 0.5, 0.5]))
-    assert first == Unchanged("release 0 cannot be asked: no wheel")
+    assert first == Unchanged("release 0 cannot run: no wheel")
     last = bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.5, None]))
-    assert last == Unchanged("release 2 cannot be asked: no wheel")
+    assert last == Unchanged("release 2 cannot run: no wheel")
 
 
 def test_a_release_that_names_no_reason_has_that_of_its_rows():

@@ -39,10 +39,10 @@ def test_a_prerelease_that_is_named_is_known_where_its_number_lies_in_what_the_a
     found = release("e", TWO, "4.2rc1")
     assert found.requirements == ("new-name==4.2rc1", "helper==1", "numpy") and found.unknown == ""
     for outside in ("3.0rc1", "5.1rc1"):
-        assert release("e", TWO, outside).unknown == "its adapter knows >=3,<5; --try asks it all the same"
+        assert release("e", TWO, outside).unknown == "its adapter supports >=3,<5; --try runs it all the same"
     assert release("e", TWO, "3.0.5a2").requirements == ("old-name==3.0.5a2", "numpy<2")
     only = Releases((Distribution("name", ">=2"),), ">=2")
-    with pytest.raises(EngineError, match=r"^releases: no distribution of e carries 1\.9b1$"):
+    with pytest.raises(EngineError, match=r"^releases: no distribution of e has 1\.9b1$"):
         release("e", only, "1.9b1")
 
 
@@ -88,7 +88,7 @@ def test_releases_of_optional_engines_can_be_chosen(engine, distribution, inside
     """Drake and Newton have no table of releases: known are those that their extra installs."""
     known, unknown = chosen(engine, f"{inside},{outside}")[::-1]
     assert (known.distribution, known.unknown) == (distribution, "")
-    assert unknown.unknown.endswith("--try asks it all the same")
+    assert unknown.unknown.endswith("--try runs it all the same")
 
 
 def test_a_registry_that_does_not_answer_is_one_line(toy, monkeypatch, tmp_path):

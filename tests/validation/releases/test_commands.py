@@ -92,7 +92,7 @@ def test_environments_are_listed_checked_and_removed(call, own_cache):
     assert row["packages"]["toyphysics"] == "1.0.0" and row["wrong"] == "" and row["bytes"] > 1e6
     (made,) = environments.found()
     next(made.path.glob("lib/python*/site-packages/toyphysics.py")).write_text("")
-    assert "not those that were installed" in call("releases", "--environments", status=1).stdout
+    assert "have changed since it was installed" in call("releases", "--environments", status=1).stdout
     assert "there is no environment" in call("releases", "--remove", "another", status=2).output
     call("releases", "--environments", "--remove", row["name"])
     assert environments.found() == []

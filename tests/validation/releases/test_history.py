@@ -155,7 +155,7 @@ def test_a_release_is_told_by_its_name_its_rows_and_its_times():
     fails = [row for row in release.rows if row.physics == "fail"]
     assert release.count(Physics.FAIL) == len(fails) < len(release.rows)
     nothing = told_by("toy", "2", [])
-    assert (nothing.rows, nothing.reason, nothing.times) == ((), "it was not asked", {})
+    assert (nothing.rows, nothing.reason, nothing.times) == ((), "it was not run", {})
 
 
 def test_an_invalid_release_has_answered_and_needs_no_reason():
@@ -372,7 +372,8 @@ def test_without_notes_everything_is_unexplained():
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [('release = "2.5"', 'release = "two"', "release 'two' is no version"), ('["*"]', '"*"', "profiles must be a list"),
+    [('release = "2.5"', 'release = "two"', "release 'two' is not a version"),
+     ('["*"]', '"*"', "profiles must be a list"),
      ("says", "tells", "needs exactly"), ('"notes of 2.5"', '" "', "source is missing"),
      ("[[change]]", "[[change]", ":")],
 )  # fmt: skip

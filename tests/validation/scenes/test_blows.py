@@ -160,7 +160,7 @@ def test_a_bar_that_meets_the_ball_once_more_or_before_is_refused_and_only_that(
 
 
 def test_a_bar_that_gives_way_faster_than_the_ball_comes_is_refused():
-    with pytest.raises(SceneError, match=r"off_centre.whirl: with 7 rad/s the bar gives way"):
+    with pytest.raises(SceneError, match=r"off_centre.whirl: with 7 rad/s the bar recedes"):
         CATALOGUE["off_centre"].scene(2, {"whirl": 7.0})
 
 
@@ -418,7 +418,7 @@ def test_touching_balls_are_judged_by_what_both_laws_conserve():
     assert set(truth) == {"momentum_defect", "energy_defect"}
     # It has no speed that is right, so the bench plots none: it was an error of the largest of no errors.
     found = canonical.measure(scene, ended(scene, [(0, 0, 0.0), (1, 0, 0.0), (2, 0, v)]))
-    assert canonical.primary.error(scene, 1 / 240, found) == (None, "a touching row has no one answer")
+    assert canonical.primary.error(scene, 1 / 240, found) == (None, "a touching row has no unique solution")
 
 
 # ---- the digits of pi ----

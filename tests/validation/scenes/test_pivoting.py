@@ -140,7 +140,7 @@ def test_a_box_that_does_not_get_there_has_no_time():
     canonical, scene = made("pivot")
     still = fallen(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))
-    assert canonical.measure(scene, still)["passing_time"] == (None, "it never gets there")
+    assert canonical.measure(scene, still)["passing_time"] == (None, "it never arrives there")
 
 
 @pytest.mark.parametrize(

@@ -116,4 +116,4 @@ def test_a_board_that_stays_has_no_swings():
     canonical, scene = made()
     still = integrated(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0), twist=0.0 * still.twist)
-    assert canonical.measure(scene, still)["swing_time"] == (None, "it never gets there")
+    assert canonical.measure(scene, still)["swing_time"] == (None, "it never arrives there")

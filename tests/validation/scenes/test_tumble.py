@@ -102,4 +102,4 @@ def test_a_box_that_does_not_turn_over_has_no_time():
     canonical, scene = made()
     times = np.arange(10) * DT
     steady = recorded(times, np.tile([1.0, 0.0, 0.0, 0.0], (10, 1)), np.tile([0.0, 3.0, 0.0], (10, 1)), DT)
-    assert canonical.measure(scene, steady)["flip_time"] == (None, "it never gets there")
+    assert canonical.measure(scene, steady)["flip_time"] == (None, "it never arrives there")

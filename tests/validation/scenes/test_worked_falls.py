@@ -199,8 +199,8 @@ def test_what_is_measured_on_a_tilted_table():
         "moved": (pytest.approx(0.3 + 0.01 * corner), ""),
         "acceleration": (pytest.approx((8.0**2 - 4.0**2) * DT**2 / (4.0 * DT)), ""),
         "turned": (pytest.approx(0.01 * corner), ""),
-        "passing_time": (None, "it never gets there"),
-        "passing_spin": (None, "it never gets there"),
+        "passing_time": (None, "it never arrives there"),
+        "passing_spin": (None, "it never arrives there"),
         "edge_moved": (pytest.approx(0.3), ""),
     }
     # Turned by a tenth about its own centre, the edge goes a tenth of its distance from there, 1.17 m.

@@ -189,7 +189,7 @@ def test_what_is_measured_of_a_rocking_board():
     stopped = Trajectory(t, pose.copy(), twist.copy(), None, DT, "completed")
     stopped.pose[t > 0.8 * swing] = stopped.pose[np.argmax(t > 0.8 * swing)]
     stopped.twist[t > 0.8 * swing] = 0.0
-    assert canonical.measure(scene, stopped)["swing_time"] == (None, "it never gets there")
+    assert canonical.measure(scene, stopped)["swing_time"] == (None, "it never arrives there")
 
 
 def swinging(scene, period, share):
@@ -214,4 +214,4 @@ def test_a_board_that_is_level_at_the_wrong_time_has_no_swings():
     """In three quarters of its time it is level the third time before the last swing has begun; then no more."""
     canonical, scene = made("rocker", **BOARD)
     fast = swinging(scene, 0.75 * canonical.exact(scene)["swing_time"], np.ones_like)
-    assert canonical.measure(scene, fast)["swing_time"] == (None, "it never gets there")
+    assert canonical.measure(scene, fast)["swing_time"] == (None, "it never arrives there")

@@ -1,0 +1,29 @@
+"""What to install where a package is missing: no registry has this project, so an extra is named by its packages."""
+
+from __future__ import annotations
+
+import shlex
+from importlib.metadata import PackageNotFoundError, requires
+
+from packaging.requirements import Requirement
+
+#: Distribution whose metadata lists the packages of each extra.
+PROJECT = "contact-crosscheck"
+
+
+def packages(extra: str) -> list[str]:
+    """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not."""
+    try:
+        told = [Requirement(line) for line in requires(PROJECT) or ()]
+    except PackageNotFoundError:
+        return []
+    return sorted(
+        f"{each.name}{each.specifier}"
+        for each in told
+        if each.marker and "extra" in str(each.marker) and each.marker.evaluate({"extra": extra})
+    )
+
+
+def install(extra: str) -> str:
+    """Command that installs the packages of an extra; where no metadata lists them, the one for a checkout."""
+    return shlex.join(["pip", "install", *(packages(extra) or ["-e", f".[{extra}]"])])

@@ -1,0 +1,126 @@
+"""Whether the textbook step became slower: its time over that of naive sweeps which never change.
+
+    python -m validation.bench.guard      under a minute; exits with 1 if a step costs over 1.6 times what it did
+
+A time of its own says little: machines differ, and others use them. Both sides are clocked in turn in one process, and
+the median of the ratios is compared with the one in guard.toml, where it stands how to renew it.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters import registry
+from adapters.stepping import step_count
+from validation.bench.statistics import Spread, spread
+from validation.bench.units import PILE_DT, prepared
+from validation.cells import Slot
+
+TABLE = Path(__file__).with_name("guard.toml")
+#: Pairs of laps, one of each side: a median of so many passes over those that something else disturbed.
+ROUNDS = 15
+#: Time until a heap has fallen and lies [s].
+REST = 0.75
+#: Rows of a point: its normal, and one or two of friction.
+MU = 0.5
+
+Array = NDArray[np.float64]
+
+
+@numba.njit
+def naive(sweeps: int, bodies: NDArray[np.uint64], arms: Array, impulse: Array, velocity: Array) -> None:
+    """Gauss-Seidel sweeps as a textbook writes them; do not tune.
+
+    Parameters
+    ----------
+    bodies
+        Of each point (p, 2), unsigned.
+    arms
+        Rows of the constraints (p, r, 2, f), of bodies with unit mass and moments; the first row of a point is normal.
+    impulse, velocity
+        (p, r) and (n, f), changed in place.
+    """
+    points, rows, _, freedoms = arms.shape
+    for _ in range(sweeps):
+        for p in range(points):
+            for r in range(rows):
+                speed, mass = 0.0, 0.0
+                for side in range(2):
+                    for f in range(freedoms):
+                        speed += arms[p, r, side, f] * velocity[bodies[p, side], f]
+                        mass += arms[p, r, side, f] ** 2
+                old = impulse[p, r]
+                new = old - speed / mass
+                bound = MU * impulse[p, 0]
+                new = max(new, 0.0) if r == 0 else min(max(new, -bound), bound)
+                impulse[p, r] = new
+                for side in range(2):
+                    for f in range(freedoms):
+                        velocity[bodies[p, side], f] += arms[p, r, side, f] * (new - old)
+
+
+def sweeping(points: int, dimension: int, sweeps: int) -> Callable[[int], None]:
+    """Return what sweeps ``points`` drawn contacts of a chain of bodies; its argument is how many steps of it."""
+    rng, freedoms = np.random.default_rng(points), 3 * (dimension - 1)
+    count = max(2, points // 2)
+    first = np.arange(points) % (count - 1)
+    bodies = np.stack([first, first + 1], 1).astype(np.uint64)
+    arms = rng.normal(size=(points, dimension, 2, freedoms))
+    start = rng.normal(size=(count, freedoms))
+
+    def steps(number: int) -> None:
+        for _ in range(number):
+            naive(sweeps, bodies, arms, np.zeros((points, dimension)), start.copy())
+
+    return steps
+
+
+def ratio(told: Mapping[str, Any], sweeps: int) -> Spread:
+    """CPU time of our step over that of the naive sweeps: median and interval over `ROUNDS`."""
+    solver = registry.solver()
+    params = tuple(sorted((name, float(value)) for name, value in told["params"].items()))
+    profile = registry.profile_of(solver, "textbook") or ""
+    engine, scene, settings, _ = prepared(
+        Slot(told["scene"], params, told["dimension"], solver, profile, PILE_DT, sweeps)
+    )
+    simulation = engine.build(scene, PILE_DT, settings)
+    simulation.advance(step_count(REST, PILE_DT))
+    plain = sweeping(told["points"], told["dimension"], sweeps)
+    plain(1)  # compiles
+    found = []
+    for _ in range(ROUNDS):
+        laps = []
+        for side in (simulation.advance, plain):
+            start = time.process_time()
+            side(told["steps"])
+            laps.append(time.process_time() - start)
+        found.append(laps[0] / laps[1])
+    simulation.close()
+    return spread(found)
+
+
+def main(path: Path = TABLE) -> int:
+    """Print a line for each step that is watched; 1 if one is too slow."""
+    data, slow = tomllib.loads(path.read_text(encoding="utf-8")), False
+    for told in data["steps"]:
+        found = ratio(told, data["sweeps"])
+        is_slow = found.median > data["margin"] * told["ratio"]
+        slow |= is_slow
+        print(
+            f"{told['title']:<30} {found.median:5.2f} [{found.low:.2f} {found.high:.2f}] times the naive sweeps, "
+            f"kept {told['ratio']:g}: {'TOO SLOW' if is_slow else 'ok'}"
+        )
+    return int(slow)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
