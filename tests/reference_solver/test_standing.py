@@ -10,7 +10,8 @@ G = 9.81
 
 def boxes(places):
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
-    return Model(2, [floor, *(Body(Box((0.5, 0.5)), 1.0, 1 / 6, (*place, 0.0)) for place in places)], (0.0, -G), 0.0, 0.5)
+    cubes = [Body(Box((0.5, 0.5)), 1.0, 1 / 6, (*place, 0.0)) for place in places]
+    return Model(2, [floor, *cubes], (0.0, -G), 0.0, 0.5)
 
 
 def column(n):
