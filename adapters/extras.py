@@ -5,14 +5,14 @@ from __future__ import annotations
 import shlex
 from importlib.metadata import PackageNotFoundError, requires
 
-from packaging.requirements import Requirement
-
 #: Distribution whose metadata lists the packages of each extra.
 PROJECT = "contact-crosscheck"
 
 
 def packages(extra: str) -> list[str]:
     """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not."""
+    from packaging.requirements import Requirement  # environments of releases have none
+
     try:
         told = [Requirement(line) for line in requires(PROJECT) or ()]
     except PackageNotFoundError:

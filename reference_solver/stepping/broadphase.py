@@ -142,7 +142,8 @@ def width_of(boxes: Boxes, i: int) -> float:
 @inner_kernel
 def cell_at(place: float, size: float) -> int:
     """Cell of a coordinate."""
-    return math.floor(min(max(place / size, -FARTHEST), FARTHEST))
+    cells = place / size
+    return math.floor(math.copysign(min(abs(cells), FARTHEST), cells))
 
 
 @inner_kernel
@@ -172,7 +173,8 @@ def fill_grid(boxes: Boxes) -> tuple[float, int]:
             continue
         level = LEVELS - 1
         if width > 0.0:
-            level = min(max(math.frexp(widest / (width * (1.0 + 0.5 * ROOM)))[1] - 1, 0), level)
+            halvings = math.frexp(widest / (width * (1.0 + 0.5 * ROOM)))[1] - 1  # at least 0: no body is as wide
+            level = min(halvings, level)
         boxes.cell[i, 0] = level
         occupied |= 1 << level
         size = math.ldexp(widest, -level)
