@@ -10,12 +10,15 @@ PROJECT = "contact-crosscheck"
 
 
 def packages(extra: str) -> list[str]:
-    """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not."""
-    from packaging.requirements import Requirement  # environments of releases have none
+    """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not.
 
+    None either where nothing can read the metadata: environments of releases have neither it nor `packaging`.
+    """
     try:
+        from packaging.requirements import Requirement
+
         told = [Requirement(line) for line in requires(PROJECT) or ()]
-    except PackageNotFoundError:
+    except (PackageNotFoundError, ModuleNotFoundError):
         return []
     return sorted(
         f"{each.name}{each.specifier}"
