@@ -5,17 +5,20 @@ from __future__ import annotations
 import shlex
 from importlib.metadata import PackageNotFoundError, requires
 
-from packaging.requirements import Requirement
-
 #: Distribution whose metadata lists the packages of each extra.
 PROJECT = "contact-crosscheck"
 
 
 def packages(extra: str) -> list[str]:
-    """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not."""
+    """Packages of an extra that this system takes, as ``pip`` reads them; none of an extra that there is not.
+
+    None either where nothing can read the metadata: environments of releases have neither it nor `packaging`.
+    """
     try:
+        from packaging.requirements import Requirement
+
         told = [Requirement(line) for line in requires(PROJECT) or ()]
-    except PackageNotFoundError:
+    except (PackageNotFoundError, ModuleNotFoundError):
         return []
     return sorted(
         f"{each.name}{each.specifier}"

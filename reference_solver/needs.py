@@ -8,7 +8,7 @@ import numpy as np
 
 from reference_solver.model import Array, Body, Box, Capsule, Model, Polygon
 
-#: Up to this many bodies all pairs are tested; sorting pays off beyond (performance notes: indifferent to ~100).
+#: Up to this many bodies all pairs are tested; a grid pays off beyond.
 ALL_PAIRS_LIMIT = 64
 
 

@@ -268,7 +268,7 @@ def test_no_engine_of_one_s_own_takes_the_name_of_an_installed_one(own):
     class Taken(ToyEngine):
         facts = EngineFacts("mujoco", "Mine", "numpy", frozenset({3}), Scheme("none", 1), 1 / 60)
 
-    with pytest.raises(EngineError, match="an installed engine is called 'mujoco'; name yours otherwise"):
+    with pytest.raises(EngineError, match="'mujoco' is the name of an installed engine; choose another"):
         cc.run("bounce", engine=Taken)
 
 

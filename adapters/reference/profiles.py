@@ -26,7 +26,8 @@ REASONS = {
     "relaxation": "1 is plain projected Gauss-Seidel; null estimates the best factor from the residuals",
     "position_correction": "split: overlap is corrected through pseudo-velocities that carry no energy",
     "beta": "share of an overlap that is corrected per step",
-    "slop": "overlap that is left alone [m]",
+    "slop": "gap or overlap that is left alone [m]; classical: twice what the load closes in a step, g dt^2, so that a "
+    "corner that an unfinished solve lifts stays a contact and boxes do not rock",
     "warm_starting": "each contact starts from its impulse of the step before, matched by feature",
     "solver": "scalar: equation after equation, as in textbooks; block: those of a manifold together, which "
     "does not stall",
@@ -45,7 +46,7 @@ def classical_profile(needs: Needs, dt: float) -> list[Setting]:
     """Fixed sweeps."""
     from reference_solver import Settings
 
-    return _as_settings(Settings.classical(dt))
+    return _as_settings(Settings.classical(dt, pull=needs.pull))
 
 
 def reference_profile(needs: Needs, dt: float) -> list[Setting]:

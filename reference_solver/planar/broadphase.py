@@ -7,7 +7,7 @@ import math
 from reference_solver.compilation import inner_kernel
 from reference_solver.planar.columns import COS, EXTENT, REACH, SHAPE, SIN, SIZE
 from reference_solver.planar.state import BOX, CANDIDATES, CAPSULE, HALF_SPACE, Bodies, Pairs, Rows
-from reference_solver.stepping.broadphase import pair_bodies
+from reference_solver.stepping.broadphase import bound_along, pair_bodies
 from reference_solver.stepping.options import Options
 
 
@@ -35,6 +35,13 @@ def bound_bodies(bodies: Bodies, pairs: Pairs, options: Options) -> None:
 def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill the candidates of `Pairs.boxes`; False if there is no room."""
     bound_bodies(bodies, pairs, options)
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, SHAPE] == HALF_SPACE:
+            c, s = bodies.real[i, COS], bodies.real[i, SIN]
+            x, y = bodies.real[i, SIZE], bodies.real[i, SIZE + 1]
+            normal = (c * x - s * y, s * x + c * y)
+            for k in range(2):
+                bound_along(pairs.boxes, i, k, normal[k], bodies.pose[i, k] + bodies.real[i, SIZE + 2] * normal[k])
     return find_overlaps(bodies, pairs, rows, options)
 
 

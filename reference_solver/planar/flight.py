@@ -112,3 +112,15 @@ def bound_flight(bodies: Bodies, pairs: Pairs, sub: SubStep, options: Options, t
             boxes.low[i, k] -= way
             boxes.high[i, k] += way
     return moves
+
+
+@inner_kernel
+def push_bodies(bodies: Bodies, dt: float) -> None:
+    """Advance x += h pseudo-velocity for everything that is not fixed (E16)."""
+    for i in range(len(bodies.kind)):
+        if bodies.kind[i, MOTION] != FIXED:
+            for k in range(3):
+                bodies.pose[i, k] += dt * bodies.pseudo[i, k]
+            if bodies.pseudo[i, 2] != 0.0:
+                bodies.real[i, COS] = math.cos(bodies.pose[i, 2])
+                bodies.real[i, SIN] = math.sin(bodies.pose[i, 2])

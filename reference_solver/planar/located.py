@@ -58,7 +58,7 @@ from reference_solver.planar.state import (
     SubStep,
     World,
 )
-from reference_solver.planar.step import copy_contacts, move, step
+from reference_solver.planar.step import copy_contacts, step
 from reference_solver.stepping import operations
 from reference_solver.stepping.broadphase import boxes_part
 from reference_solver.stepping.clock import BRIEF, HELD, JAMMED, MOST_SOFT, ROCKING, UNSETTLED
@@ -67,7 +67,6 @@ from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.lasting import BODIES
 from reference_solver.stepping.ledger import Buffer, copy_ledger
 from reference_solver.stepping.noise import SHORT
-from reference_solver.stepping.options import BLOCK
 from reference_solver.stepping.paths import Paths
 from reference_solver.stepping.phase import NO_PHASE
 from reference_solver.stepping.vectors import copy_vectors
@@ -107,8 +106,7 @@ def weigh_clusters(island: Island) -> None:
 def begin_solve(island: Island) -> None:
     """Rows that touch, their blocks, and the velocities of the start."""
     impact.keep_touching(island.bodies, island.pairs, island.rows, island.sub, island.options.dt)
-    if island.options.solver == BLOCK:
-        prepare_blocks(island.bodies, island.rows)
+    prepare_blocks(island.bodies, island.rows)
     copy_vectors(island.bodies.twist, island.sub.before)
 
 
@@ -212,7 +210,7 @@ def follow_path(island: Island, length: float, end: float, curved: bool) -> floa
         pushed = rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally)
         flight.move_along(bodies, sub, end, end == length)
         if pushed:
-            move(bodies, bodies.pseudo, options.dt)
+            flight.push_bodies(bodies, options.dt)
     remember_forces(bodies, rows, length, options.dt)
     if end < length:
         press.cut_work(bodies, rows, sub, tally, end, end / length)
@@ -300,8 +298,7 @@ def find_loaded(island: Island) -> int:
         return -1
     if not impact.keep_loaded(island.bodies, island.pairs, island.rows):
         return 0
-    if island.options.solver == BLOCK:
-        prepare_blocks(island.bodies, island.rows)
+    prepare_blocks(island.bodies, island.rows)
     return int(island.rows.counts[CONTACTS]) if has_room(island) else -1
 
 
@@ -395,11 +392,10 @@ def gather(whole: Island, world: World, count: int) -> Island:
             local.kind[k, d] = bodies.kind[i, d]
         for d in range(4):
             world.limit[k, d] = islands.limit[i, d]
-        world.order[k] = k
     whole.sub.lasting.size[BODIES] = count
     whole.rows.counts[REMEMBERED] = 0
     laws = whole.pairs
-    pairs = Pairs(laws.restitution, laws.friction, boxes_part(laws.boxes, world.order, count))
+    pairs = Pairs(laws.restitution, laws.friction, boxes_part(laws.boxes, count))
     return Island(
         bodies_part(local, count),
         pairs,

@@ -16,10 +16,10 @@ from reference_solver.planar.state import (
     PAST,
     REMEMBERED,
     Bodies,
-    Indices,
     Pairs,
     Rows,
 )
+from reference_solver.stepping.broadphase import bodies_of
 from reference_solver.stepping.noise import TOUCHING
 from reference_solver.stepping.options import BLOCK, FIXED_STEP, Options
 
@@ -33,12 +33,11 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """
     if not find_candidates(bodies, pairs, rows, options):
         return False
-    n = len(bodies.kind)
     contacts, manifolds = 0, 0
     for k in range(rows.counts[CANDIDATES]):
         if contacts + 2 > len(rows.real):
             return False
-        a, b = pairs.boxes.candidate[k] // n, pairs.boxes.candidate[k] % n
+        a, b = bodies_of(pairs.boxes.candidate[k])
         # What flies towards a rebound must not be slowed down before it gets there (E8).
         bounces = options.scheme == FIXED_STEP and options.restitution and pairs.restitution[a, b] > 0.0
         # The textbook asks for gaps alone; it keeps its bits.
@@ -68,32 +67,22 @@ def row_key(bodies: Bodies, rows: Rows, c: int) -> int:
 
 
 @inner_kernel
-def place_of(keys: Indices, count: int, key: int) -> int:
-    """First of ``count`` ascending keys that is not less than ``key``: halving."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if keys[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@inner_kernel
 def recall(bodies: Bodies, rows: Rows, options: Options) -> None:
-    """Give each row the impulse of the same feature one sub-step or one step before."""
+    """Give each row the impulse of the same feature one sub-step or one step before: a merge of ascending lists."""
+    old, past = 0, 0
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PN] = rows.real[c, PT] = 0.0
         if not options.warm_starting:
             continue
         key = row_key(bodies, rows, c)
-        old = place_of(rows.old_key, rows.counts[REMEMBERED], key)
+        while old < rows.counts[REMEMBERED] and rows.old_key[old] < key:
+            old += 1
         if old < rows.counts[REMEMBERED] and rows.old_key[old] == key:
             rows.real[c, PN] = rows.old_impulse[old, 0]
             rows.real[c, PT] = rows.old_impulse[old, 1]
             continue
-        past = place_of(rows.past_key, rows.counts[PAST], key)
+        while past < rows.counts[PAST] and rows.past_key[past] < key:
+            past += 1
         if past < rows.counts[PAST] and rows.past_key[past] == key:
             rows.real[c, PN] = rows.past_impulse[past, 0]
             rows.real[c, PT] = rows.past_impulse[past, 1]

@@ -53,7 +53,7 @@ from reference_solver.stepping.lasting import CONTACTS as HELD_CONTACTS
 from reference_solver.stepping.lasting import Lasting
 from reference_solver.stepping.midpoint import CLOSED, CLOSING_SWEEPS, FAR_ABOVE, GAP_SHARE, LEFT_OVER, LEVERAGE
 from reference_solver.stepping.noise import NOISE
-from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.options import Options
 from reference_solver.stepping.sweeps import CHECK_INTERVAL
 from reference_solver.stepping.vectors import copy_vectors
 from reference_solver.tally import CONTACT_WORK, SURFACE_WORK
@@ -82,8 +82,7 @@ def turn_rows(bodies: Bodies, rows: Rows, sub: SubStep, options: Options, length
         first += count
     for c in range(rows.counts[CONTACTS]):
         prepare_masses(bodies, rows, c)
-    if options.solver == BLOCK:
-        prepare_blocks(bodies, rows)
+    prepare_blocks(bodies, rows)
 
 
 @inner_kernel
@@ -111,8 +110,7 @@ def levers_of_start(bodies: Bodies, rows: Rows, options: Options) -> None:
     exchange_levers(rows)
     for c in range(rows.counts[CONTACTS]):
         prepare_masses(bodies, rows, c)
-    if options.solver == BLOCK:
-        prepare_blocks(bodies, rows)
+    prepare_blocks(bodies, rows)
 
 
 @inner_kernel
@@ -202,7 +200,7 @@ def close_gaps(bodies: Bodies, rows: Rows, sub: SubStep, options: Options) -> bo
         rows.real[c, TARGET], rows.real[c, SPEED] = -closable(bodies, rows, c), widest
         rows.real[c, FRICTION] = 0.0
     for k in range(CLOSING_SWEEPS):
-        sweep(bodies, rows, options, 1.0)
+        sweep(bodies, rows, options, 1.0, 0, 0)
         if k % CHECK_INTERVAL == 0 and natural_map(bodies, rows, options) <= CLOSED:
             break
     farthest = 0.0

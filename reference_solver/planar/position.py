@@ -5,12 +5,12 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_block_pushes
-from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, A, B
+from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, TARGET, A, B
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.sequential_impulses import sweep_pushes
 from reference_solver.planar.state import CONTACTS, Bodies, Rows
 from reference_solver.stepping.noise import ROUND_OFF
-from reference_solver.stepping.options import BLOCK, FIXED_STEP, SPLIT, Options
+from reference_solver.stepping.options import BLOCK, FIXED_STEP, SPLIT, Options, pushes_along
 from reference_solver.tally import PROJECTED
 
 #: With a residual stop, sweeps end when no row misses its correction by more than this share of the largest.
@@ -22,8 +22,11 @@ PUSH_SWEEPS = 1000
 
 @inner_kernel
 def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
-    """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest."""
-    largest = 0.0
+    """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest.
+
+    Solved along with the velocities it must be known before them: the motion is what the velocity rows ask for.
+    """
+    largest, along = 0.0, pushes_along(options)
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PUSH] = 0.0
         extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
@@ -31,7 +34,8 @@ def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
         if options.scheme == FIXED_STEP:
             # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
             # Located impacts happen at a gap of zero; an overlap left by turning bodies would outlast the rebound.
-            after += options.dt * max(normal_velocity(bodies.twist, rows, c), 0.0)
+            parting = rows.real[c, TARGET] if along else normal_velocity(bodies.twist, rows, c)
+            after += options.dt * max(parting, 0.0)
         excess = -after - options.slop
         if abs(excess) <= ROUND_OFF * extent:
             excess = 0.0
@@ -51,14 +55,23 @@ def missing_push(bodies: Bodies, rows: Rows) -> float:
 
 
 @inner_kernel
+def begin_pushes(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> float:
+    """Set targets and start at rest; the largest target, 0 where nothing is pushed."""
+    if options.correction != SPLIT:
+        return 0.0
+    largest = set_push_targets(bodies, rows, options)
+    if largest > 0.0:
+        bodies.pseudo[:] = 0.0
+        tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
+    return largest
+
+
+@inner_kernel
 def correct_positions(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> bool:
     """Solve for pseudo-velocities where anything overlaps too far; True if there are any."""
-    if options.correction != SPLIT:
-        return False
-    largest = set_push_targets(bodies, rows, options)
+    largest = begin_pushes(bodies, rows, options, tally)
     if largest <= 0.0:
         return False
-    bodies.pseudo[:] = 0.0
     sweeps = options.iterations if options.residual < 0.0 else PUSH_SWEEPS
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     for s in range(sweeps):
@@ -68,5 +81,4 @@ def correct_positions(bodies: Bodies, rows: Rows, options: Options, tally: Array
             sweep_pushes(bodies, rows, relaxation)
         if options.residual >= 0.0 and s % 4 == 3 and missing_push(bodies, rows) <= PUSH_TOLERANCE * largest:
             break
-    tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
     return True

@@ -161,7 +161,6 @@ class World(NamedTuple):
     islands: Islands
     bodies: Bodies  # (n,)
     limit: Array  # (n, 4): see `SubStep`
-    order: Indices  # (n,): see `Boxes`
     tally: Array  # (SIZE,): to go back to where a step is made again
     before: Array  # (SIZE,): the same of an island
 
@@ -226,7 +225,8 @@ def _core(body: Body) -> tuple[tuple[float, float], ...]:
 
 def allocate_pairs(model: Model, capacity: int) -> Pairs:
     """Return the pair tables, and room for ``capacity`` candidates."""
-    return Pairs(pair_table(model.restitution), pair_table(model.friction), allocate_boxes(model, capacity))
+    boxes = allocate_boxes(len(model.bodies), 2, capacity)
+    return Pairs(pair_table(model.restitution), pair_table(model.friction), boxes)
 
 
 def allocate_rows(capacity: int) -> Rows:
@@ -276,7 +276,7 @@ def allocate_world(bodies: Bodies, candidates: int) -> World:
     n = len(bodies.pose)
     local = Bodies._make(array.copy() for array in bodies)._replace(vertex=bodies.vertex)
     islands = allocate_islands(2, n, candidates)
-    return World(islands, local, np.zeros((n, 4)), np.zeros(n, np.int64), np.zeros(TALLY_SIZE), np.zeros(TALLY_SIZE))
+    return World(islands, local, np.zeros((n, 4)), np.zeros(TALLY_SIZE), np.zeros(TALLY_SIZE))
 
 
 def grown(rows: Rows) -> Rows:

@@ -12,14 +12,14 @@ from reference_solver.direct.problem import Problem
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
-from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SIN, A, B
+from reference_solver.planar.columns import COS, FEATURE, GAP, LOAD, MOTION, NX, NY, PN, POINT, PT, SHAPE, SIN, A, B
 from reference_solver.planar.manifolds import detect, remember
-from reference_solver.planar.position import correct_positions
+from reference_solver.planar.position import begin_pushes, correct_positions
 from reference_solver.planar.rows import prepare, warm_start
-from reference_solver.planar.state import CONTACTS, FIXED, FREE, Bodies, Pairs, Rows
+from reference_solver.planar.state import CONTACTS, DISC, FIXED, FREE, Bodies, Pairs, Rows
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.ledger import Buffer
-from reference_solver.stepping.options import BLOCK, Options
+from reference_solver.stepping.options import Options, pushes_along
 
 
 @inner_kernel
@@ -32,15 +32,21 @@ def accelerate(bodies: Bodies, options: Options) -> None:
 
 
 @inner_kernel
-def move(bodies: Bodies, twist: Array, dt: float) -> None:
-    """Advance x += h v for everything that is not fixed (E17)."""
+def move(bodies: Bodies, dt: float, pushed: bool) -> None:
+    """Advance x += h (v + pseudo-velocity) for everything that is not fixed (E17); a disc has no use for its angle."""
     for i in range(len(bodies.kind)):
-        if bodies.kind[i, MOTION] != FIXED:
-            for k in range(3):
-                bodies.pose[i, k] += dt * twist[i, k]
-            if twist[i, 2] != 0.0:
-                bodies.real[i, COS] = math.cos(bodies.pose[i, 2])
-                bodies.real[i, SIN] = math.sin(bodies.pose[i, 2])
+        if bodies.kind[i, MOTION] == FIXED:
+            continue
+        turns = False
+        for k in range(3):
+            way = dt * bodies.twist[i, k]
+            if pushed:
+                way += dt * bodies.pseudo[i, k]
+            bodies.pose[i, k] += way
+            turns = way != 0.0
+        if turns and bodies.kind[i, SHAPE] != DISC:
+            bodies.real[i, COS] = math.cos(bodies.pose[i, 2])
+            bodies.real[i, SIN] = math.sin(bodies.pose[i, 2])
 
 
 @inner_kernel
@@ -50,17 +56,21 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, options: Op
         return False
     if rows.counts[CONTACTS] > 0:
         prepare(bodies, pairs, rows, options)
-        if options.solver == BLOCK:
-            prepare_blocks(bodies, rows)
+        prepare_blocks(bodies, rows)
     accelerate(bodies, options)
-    open_solve(bodies, options.dt, tally)
+    if options.certified:
+        open_solve(bodies, options.dt, tally)
+    pushed = False
     if rows.counts[CONTACTS] > 0:
+        if pushes_along(options):
+            pushed = begin_pushes(bodies, rows, options, tally) > 0.0
         warm_start(bodies, rows, options)
-        solve_velocities(bodies, rows, problem, options, tally)
-        certify(bodies, rows, options, tally)
-    move(bodies, bodies.twist, options.dt)
-    if rows.counts[CONTACTS] > 0 and correct_positions(bodies, rows, options, tally):
-        move(bodies, bodies.pseudo, options.dt)
+        solve_velocities(bodies, rows, problem, options, tally, int(pushed))
+        if options.certified:
+            certify(bodies, rows, options, tally)
+        if not pushes_along(options):
+            pushed = correct_positions(bodies, rows, options, tally)
+    move(bodies, options.dt, pushed)
     remember(bodies, rows)
     return True
 

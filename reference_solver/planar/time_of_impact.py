@@ -12,6 +12,7 @@ from reference_solver.planar.impact import describe, gap_noise, soft_speed
 from reference_solver.planar.kinematics import normal_velocity
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.state import CANDIDATES, MANIFOLDS, Bodies, Pairs, Rows, SubStep
+from reference_solver.stepping.broadphase import bodies_of, pair_of
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS
@@ -109,21 +110,21 @@ def next_impact(bodies: Bodies, pairs: Pairs, rows: Rows, sub: SubStep, options:
     if not find_overlaps(bodies, pairs, rows, options):
         return -1.0
     begin_paths(bodies, sub, end)
-    n = len(bodies.kind)
     m = 0
     for k in range(rows.counts[CANDIDATES]):
-        key = pairs.boxes.candidate[k]
-        while m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) < key:
+        pair = pairs.boxes.candidate[k]
+        a, b = bodies_of(pair)
+        while m < rows.counts[MANIFOLDS] and pair_of_manifold(rows, m) < pair:
             m += 1
-        own = m if m < rows.counts[MANIFOLDS] and manifold_key(rows, m, n) == key else -1
-        t = pair_impact(rows, sub, key // n, key % n, own, end)
+        own = m if m < rows.counts[MANIFOLDS] and pair_of_manifold(rows, m) == pair else -1
+        t = pair_impact(rows, sub, a, b, own, end)
         if t < end and sub.clock[HELD] > 0.0:
-            t = hard_impact(bodies, sub, options, key // n, key % n, t, end)
+            t = hard_impact(bodies, sub, options, a, b, t, end)
         end = min(end, t)
     return end
 
 
 @inner_kernel
-def manifold_key(rows: Rows, m: int, n: int) -> int:
+def pair_of_manifold(rows: Rows, m: int) -> int:
     """Pair of manifold m as one integer, like candidates."""
-    return rows.integer[rows.manifold[m], A] * n + rows.integer[rows.manifold[m], B]
+    return pair_of(rows.integer[rows.manifold[m], A], rows.integer[rows.manifold[m], B])

@@ -35,11 +35,11 @@ class World(SteppedWorld):
 
     typical = 2
 
-    def __init__(self, model: Model, settings: Settings, needs: Needs) -> None:
+    def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool = True) -> None:
         # A body of similar size has at most six neighbours, each pair counted once; arrays grow when that fails.
         n = len(model.bodies)
         room = 8 * n + 64
-        super().__init__(model, settings, needs, room)
+        super().__init__(model, settings, needs, certified, room)
         self._bodies = allocate_bodies(model, needs)
         self._pairs = allocate_pairs(model, room)
         self._rows = allocate_rows(room)

@@ -8,8 +8,9 @@ import numpy as np
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.state import BOX, CANDIDATES, CAPSULE, FREE, HALF_SPACE, Bodies, Detection
+from reference_solver.spatial.vector import row, times
 from reference_solver.stepping import operations
-from reference_solver.stepping.broadphase import Boxes, pair_bodies
+from reference_solver.stepping.broadphase import Boxes, bound_along, pair_bodies
 from reference_solver.stepping.options import Options
 
 
@@ -44,6 +45,11 @@ def is_free(bodies: Bodies, i: int) -> bool:
 def find_candidates(bodies: Bodies, detection: Detection, options: Options) -> bool:
     """Fill the candidates of `Detection.boxes`; False if there is no room."""
     bound_bodies(bodies, detection.boxes, options)
+    for i in range(len(bodies)):
+        if bodies.kind[i] == HALF_SPACE:
+            normal = times(bodies.axes, i, row(bodies.geometry, i, 0))
+            for d in range(3):
+                bound_along(detection.boxes, i, d, normal[d], bodies.pose[i, d] + bodies.geometry[i, 3] * normal[d])
     return find_overlaps(bodies, detection, options)
 
 

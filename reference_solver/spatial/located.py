@@ -465,7 +465,6 @@ def gather(whole: Island, world: World, count: int) -> Island:
         world.bodies[k] = whole.bodies[i]
         for d in range(6):
             world.limit[k, d] = world.islands.limit[i, d]
-        world.order[k] = k
     whole.sub.lasting.size[BODIES] = count
     whole.detection.found[REMEMBERED] = -1
     laws = whole.detection
@@ -473,7 +472,7 @@ def gather(whole: Island, world: World, count: int) -> Island:
         laws.found,
         laws.restitution,
         laws.friction,
-        boxes_part(laws.boxes, world.order, count),
+        boxes_part(laws.boxes, count),
         laws.polygon,
         laws.polygon_edge,
     )

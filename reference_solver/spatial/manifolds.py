@@ -19,6 +19,7 @@ from reference_solver.spatial.state import (
     Memory,
 )
 from reference_solver.spatial.vector import dot, row, tangents
+from reference_solver.stepping.broadphase import bodies_of
 from reference_solver.stepping.noise import TOUCHING
 from reference_solver.stepping.options import BLOCK, Options
 
@@ -38,12 +39,11 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
     """
     if not find_candidates(bodies, detection, options):
         return -1
-    n = len(bodies)
     m = 0
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
-        a, b = detection.boxes.candidate[k] // n, detection.boxes.candidate[k] % n
+        a, b = bodies_of(detection.boxes.candidate[k])
         # What flies towards a rebound must not be slowed down before it gets there (E8).
         bounces = options.restitution and restitution_of(bodies, detection, a, b) > 0.0
         # The textbook asks for gaps alone; it keeps its bits.

@@ -339,7 +339,7 @@ def close_gaps(bodies: Bodies, manifolds: Manifolds, options: Options) -> bool:
             manifolds.impulse[m, p, 2] = FAR_ABOVE * widest / manifolds.matrix[m, p, 5]
             manifolds.target[m, p], manifolds.speed[m, p] = -closable(bodies, manifolds, m, p), widest
     for k in range(CLOSING_SWEEPS):
-        sweep_points(bodies, manifolds, options, 1.0)
+        sweep_points(bodies, manifolds, options, 1.0, 0, 0)
         if k % CHECK_INTERVAL == 0 and natural_map(bodies, manifolds, options) <= CLOSED:
             break
     farthest = 0.0

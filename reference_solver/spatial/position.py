@@ -8,7 +8,7 @@ from reference_solver.spatial.kinematics import relative_twist, velocity_at
 from reference_solver.spatial.sequential_impulses import sweep_pushes
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.stepping.noise import ROUND_OFF
-from reference_solver.stepping.options import FIXED_STEP, SPLIT, Options
+from reference_solver.stepping.options import FIXED_STEP, SPLIT, Options, pushes_along
 from reference_solver.tally import PROJECTED
 
 #: With a residual stop, sweeps end when no row misses its law by more than this share of the largest target. Tighter
@@ -20,8 +20,11 @@ PUSH_SWEEPS = 1000
 
 @inner_kernel
 def set_push_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -> float:
-    """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest."""
-    largest = 0.0
+    """Pseudo-velocity each contact needs beyond the motion it already has; returns the largest.
+
+    Solved along with the velocities it must be known before them: the motion is what the velocity rows ask for.
+    """
+    largest, along = 0.0, pushes_along(options)
     for m in range(len(manifolds)):
         v, w = relative_twist(bodies.twist, manifolds, m, options.rotation)
         extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
@@ -31,7 +34,7 @@ def set_push_targets(bodies: Bodies, manifolds: Manifolds, options: Options) -> 
             if options.scheme == FIXED_STEP:
                 # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
                 # Located impacts happen at a gap of zero; an overlap left by turning bodies would outlast the rebound.
-                parting = max(velocity_at(v, w, manifolds, m, p)[2], 0.0)
+                parting = max(manifolds.target[m, p] if along else velocity_at(v, w, manifolds, m, p)[2], 0.0)
             excess = -(manifolds.gap[m, p] + options.dt * parting) - options.slop
             if abs(excess) <= ROUND_OFF * extent:
                 excess = 0.0
@@ -54,21 +57,29 @@ def push_residual(bodies: Bodies, manifolds: Manifolds, options: Options) -> flo
 
 
 @inner_kernel
+def begin_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> float:
+    """Set targets and start at rest; the largest target, 0 where nothing is pushed."""
+    if options.correction != SPLIT:
+        return 0.0
+    largest = set_push_targets(bodies, manifolds, options)
+    if largest > 0.0:
+        for i in range(len(bodies)):
+            for d in range(6):
+                bodies.pseudo[i, d] = 0.0
+        tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
+    return largest
+
+
+@inner_kernel
 def correct_positions(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> bool:
     """Solve for pseudo-velocities where anything overlaps too far; True if there are any."""
-    if options.correction != SPLIT:
-        return False
-    largest = set_push_targets(bodies, manifolds, options)
+    largest = begin_pushes(bodies, manifolds, options, tally)
     if largest <= 0.0:
         return False
-    for i in range(len(bodies)):
-        for d in range(6):
-            bodies.pseudo[i, d] = 0.0
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     for s in range(options.iterations if options.residual < 0.0 else PUSH_SWEEPS):
         sweep_pushes(bodies, manifolds, options, relaxation)
         if options.residual >= 0.0 and s % 4 == 3:
             if push_residual(bodies, manifolds, options) <= PUSH_TOLERANCE * largest:
                 break
-    tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
     return True

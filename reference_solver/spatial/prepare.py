@@ -28,7 +28,7 @@ def prepare(bodies: Bodies, detection: Detection, manifolds: Manifolds, options:
             set_response(bodies, manifolds, m, p, options)
             u = velocity_at(v, w, manifolds, m, p)
             set_target(bodies, manifolds, m, p, u[2], restitution_of(bodies, detection, a, b), options)
-            set_speed(bodies, manifolds, m, p, u, options.dt)
+            set_speed(bodies, manifolds, m, p, u, options)
 
 
 @inner_kernel
@@ -92,13 +92,16 @@ def set_target(
 
 
 @inner_kernel
-def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, dt: float) -> None:
+def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, options: Options) -> None:
     """Speed that the residual of this point is measured against (E14), and which impulses may be warm started.
 
     Points that meet or part faster than the loads of one step explain are in an impact: the impulse of the step
     before does not guess this step's, nor this one the next (E9).
     """
-    push = measure_speed(bodies, manifolds, m, p, u, dt)
+    if options.certified:
+        push = measure_speed(bodies, manifolds, m, p, u, options.dt)
+    else:
+        push = load_speed(bodies, manifolds, m, p, options.dt)
     manifolds.impact[m, p] = 1 if abs(u[2]) > push else 0
     if u[2] > push:
         for k in range(3):

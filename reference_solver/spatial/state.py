@@ -215,7 +215,7 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
         found=np.zeros(FOUND, np.int64),
         restitution=pair_table(model.restitution),
         friction=pair_table(model.friction),
-        boxes=allocate_boxes(model, capacity),
+        boxes=allocate_boxes(len(model.bodies), 3, capacity),
         polygon=np.zeros((2, 16, 5)),
         polygon_edge=np.zeros((2, 16), np.int64),
     )
@@ -268,7 +268,6 @@ class World(NamedTuple):
     bodies: Bodies  # (n,)
     end: Bodies  # (n,): all bodies where the step ends
     limit: Array  # (n, 6): see `SubStep`
-    order: Indices  # (n,): see `Boxes`
     kept: Memory  # for the next step
     tally: Array  # (SIZE,): to go back to where a step is made again
     before: Array  # (SIZE,): the same of an island
@@ -306,7 +305,6 @@ def allocate_world(bodies: Bodies, manifolds: int, candidates: int) -> World:
         bodies=np.zeros(n, BODY).view(np.recarray),
         end=np.zeros(n, BODY).view(np.recarray),
         limit=np.zeros((n, 6)),
-        order=np.zeros(n, np.int64),
         kept=allocate_memory(manifolds),
         tally=np.zeros(TALLY_SIZE),
         before=np.zeros(TALLY_SIZE),

@@ -11,13 +11,13 @@ from reference_solver.model import Array
 from reference_solver.spatial.certificate import certify, open_solve
 from reference_solver.spatial.manifolds import detect, recall, remember, world_component
 from reference_solver.spatial.motion import accelerate, displace, move
-from reference_solver.spatial.position import correct_positions
+from reference_solver.spatial.position import begin_pushes, correct_positions
 from reference_solver.spatial.prepare import prepare, warm_start
 from reference_solver.spatial.state import Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.sticking import prepare_wrenches
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.ledger import Buffer
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.options import BLOCK, Options, pushes_along
 
 
 @inner_kernel
@@ -38,15 +38,21 @@ def step(
     recall(bodies, detection, manifolds, memory, options)
     prepare(bodies, detection, manifolds, options)
     accelerate(bodies, options.dt)
-    open_solve(bodies, options.dt, tally)
+    if options.certified:
+        open_solve(bodies, options.dt, tally)
     pushed = False
     if found > 0:
-        prepare_wrenches(bodies, manifolds, options)
-        warm_start(bodies, manifolds, options)
-        solve_velocities(bodies, manifolds, problem, options, tally)
-        certify(bodies, manifolds, options, tally)
         # Pushes belong to the poses at which contacts were found, and so come before bodies move.
-        pushed = correct_positions(bodies, manifolds, options, tally)
+        if pushes_along(options):
+            pushed = begin_pushes(bodies, manifolds, options, tally) > 0.0
+        if options.solver == BLOCK:
+            prepare_wrenches(bodies, manifolds, options)
+        warm_start(bodies, manifolds, options)
+        solve_velocities(bodies, manifolds, problem, options, tally, int(pushed))
+        if options.certified:
+            certify(bodies, manifolds, options, tally)
+        if not pushes_along(options):
+            pushed = correct_positions(bodies, manifolds, options, tally)
     move(bodies, options)
     if pushed:
         displace(bodies, options.dt)

@@ -14,6 +14,7 @@ from reference_solver.spatial.manifolds import set_world_points
 from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.state import CANDIDATES, Bodies, Detection, Manifolds, SubStep
 from reference_solver.spatial.vector import Vector, dot, row, sub
+from reference_solver.stepping.broadphase import bodies_of, pair_of
 from reference_solver.stepping.clock import HELD
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.paths import COEFFICIENTS, Paths
@@ -141,14 +142,13 @@ def next_impact(
     if not find_overlaps(bodies, detection, options):
         return -1.0
     begin_paths(bodies, sub_step.meeting.paths, end)
-    n = len(bodies)
     m = 0
     for k in range(detection.found[CANDIDATES]):
-        key = detection.boxes.candidate[k]
-        a, b = key // n, key % n
-        while m < len(manifolds) and manifolds.body_a[m] * n + manifolds.body_b[m] < key:
+        pair = detection.boxes.candidate[k]
+        a, b = bodies_of(pair)
+        while m < len(manifolds) and pair_of(manifolds.body_a[m], manifolds.body_b[m]) < pair:
             m += 1
-        own = m if m < len(manifolds) and manifolds.body_a[m] * n + manifolds.body_b[m] == key else -1
+        own = m if m < len(manifolds) and pair_of(manifolds.body_a[m], manifolds.body_b[m]) == pair else -1
         t = pair_impact(bodies, manifolds, sub_step, a, b, own, end)
         if t < end and sub_step.clock[HELD] > 0.0:
             t = hard_impact(bodies, detection, sub_step, options, a, b, t, end)

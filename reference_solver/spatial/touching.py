@@ -20,6 +20,7 @@ from reference_solver.spatial.narrowphase import collide
 from reference_solver.spatial.prepare import set_response
 from reference_solver.spatial.state import CANDIDATES, MANIFOLDS, PAST, REMEMBERED, Bodies, Detection, Manifolds, Memory
 from reference_solver.spatial.vector import dot, row, sub, times
+from reference_solver.stepping.broadphase import bodies_of
 from reference_solver.stepping.clock import HELD, LEFT, UNSETTLED
 from reference_solver.stepping.noise import LATE, NEARLY, NO_GAP
 from reference_solver.stepping.options import Options
@@ -43,7 +44,6 @@ def detect_touching(
     """
     if not find_candidates(bodies, detection, options):
         return -1
-    n = len(bodies)
     m, old = 0, 0
     memory = own[: max(detection.found[REMEMBERED], 0)]
     if detection.found[REMEMBERED] < 0:  # the first sub-step: the step before counts
@@ -52,19 +52,19 @@ def detect_touching(
     for k in range(detection.found[CANDIDATES]):
         if m == len(manifolds):
             return -1
-        key = detection.boxes.candidate[k]
-        pair = pair_key(bodies, key // n, key % n)
+        a, b = bodies_of(detection.boxes.candidate[k])
+        pair = pair_key(bodies, a, b)
         while old < len(memory) and memory.pair[old] < pair:
             old += 1
         known = old if old < len(memory) and memory.pair[old] == pair else -1
-        if collide(bodies, detection, key // n, key % n, options.margin, options.dt, advantage, manifolds, m) == 0:
+        if collide(bodies, detection, a, b, options.margin, options.dt, advantage, manifolds, m) == 0:
             continue
         sort_points(manifolds, m)
         set_world_points(bodies, manifolds, m)
         if clock[UNSETTLED] > 0.0:
             keep_loaded(bodies, manifolds, m, memory, known)
         else:
-            may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, key // n, key % n) == 0.0
+            may_close = clock[HELD] > 0.0 and restitution_of(bodies, detection, a, b) == 0.0
             late = NEARLY * options.dt if clock[HELD] > 0.0 else LATE * clock[LEFT]
             keep_points(bodies, manifolds, m, memory, known, late, options.dt if may_close else 0.0)
         if manifolds.points[m] > 0:

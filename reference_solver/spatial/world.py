@@ -38,11 +38,11 @@ class World(SteppedWorld):
 
     typical = POINTS
 
-    def __init__(self, model: Model, settings: Settings, needs: Needs) -> None:
+    def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool = True) -> None:
         # A body of similar size has at most twelve neighbours, each pair counted once; arrays grow when that fails.
         n = len(model.bodies)
         room, candidates = 4 * n + 16, 8 * n + 64
-        super().__init__(model, settings, needs, POINTS * room)
+        super().__init__(model, settings, needs, certified, POINTS * room)
         self._bodies = allocate_bodies(model, needs)
         self._detection = allocate_detection(model, candidates)
         self._manifolds = allocate_manifolds(room)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
+from reference_solver.stepping.broadphase import bodies_of
 from reference_solver.stepping.operations import Bodies, is_free
 from reference_solver.structures import structure
 
@@ -190,11 +191,11 @@ def least_height(islands: Islands, f: int, s: int) -> float:
 
 @inner_kernel
 def join_candidates(bodies: Bodies, islands: Islands, candidate: Indices, count: int) -> None:
-    """Join the free bodies of the first ``count`` candidates, a n + b, that may meet; list what forces do not move."""
-    n, met = len(islands.label), 0
+    """Join the free bodies of the first ``count`` candidates that may meet; list what forces do not move."""
+    met = 0
     open_islands(islands)
     for k in range(count):
-        a, b = candidate[k] // n, candidate[k] % n
+        a, b = bodies_of(candidate[k])
         if may_meet(islands, a, b):
             candidate[met] = candidate[k]
             met += 1
@@ -203,7 +204,7 @@ def join_candidates(bodies: Bodies, islands: Islands, candidate: Indices, count:
     count = met
     link_members(bodies, islands)
     for k in range(count):
-        a, b = candidate[k] // n, candidate[k] % n
+        a, b = bodies_of(candidate[k])
         if not is_free(bodies, a):
             list_unmoved(islands, root(islands, b), a)
         elif not is_free(bodies, b):

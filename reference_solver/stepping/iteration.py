@@ -37,12 +37,12 @@ from reference_solver.tally import UNCONVERGED
 
 
 @inner_kernel
-def sweep(bodies: Bodies, rows: Any, options: Options, relaxation: float) -> None:
-    """One sweep of the solver chosen."""
+def sweep(bodies: Bodies, rows: Any, options: Options, relaxation: float, backwards: int, push: int) -> None:
+    """One sweep of the solver chosen; ``backwards``, ``push``: see `operations.sweep_rows`."""
     if options.solver == BLOCK:
         sweep_blocks(bodies, rows, options, relaxation)
     else:
-        sweep_rows(bodies, rows, options, relaxation)
+        sweep_rows(bodies, rows, options, relaxation, backwards, push)
 
 
 @inner_kernel
@@ -68,7 +68,7 @@ def sweep_to_residual(bodies: Bodies, rows: Any, problem: Problem, options: Opti
             mend_velocities(bodies, rows, options)
             residual, stale = natural_map(bodies, rows, options), False
             continue
-        sweep(bodies, rows, options, relaxation)
+        sweep(bodies, rows, options, relaxation, 0, 0)
         problem.size[HELD], stale = 0, handed
         sweeps += 1
         if sweeps > 2 and sweeps % CHECK_INTERVAL != 0:
@@ -110,12 +110,14 @@ def hand_over(bodies: Bodies, rows: Any, problem: Problem, options: Options, tal
 
 
 @inner_kernel
-def solve_velocities(bodies: Bodies, rows: Any, problem: Problem, options: Options, tally: Array) -> None:
-    """Sweep as `Options` asks and enter residual and sweeps in the tally."""
+def solve_velocities(
+    bodies: Bodies, rows: Any, problem: Problem, options: Options, tally: Array, push: int = 0
+) -> None:
+    """Sweep as `Options` says and enter residual and sweeps in the tally; ``push``: see `operations.sweep_rows`."""
     if options.residual >= 0.0:
         sweep_to_residual(bodies, rows, problem, options, tally)
         return
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
-    for _ in range(options.iterations):
-        sweep(bodies, rows, options, relaxation)
-    enter(tally, natural_map(bodies, rows, options), options.iterations)
+    for k in range(options.iterations):
+        sweep(bodies, rows, options, relaxation, int(2 * k >= options.iterations), push)
+    enter(tally, natural_map(bodies, rows, options) if options.certified else 0.0, options.iterations)

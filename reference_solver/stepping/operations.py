@@ -120,8 +120,8 @@ def sweep_blocks(bodies: Bodies, rows: Any, options: Any, relaxation: float) -> 
 
 
 @operation
-def sweep_rows(bodies: Bodies, rows: Any, options: Any, relaxation: float) -> None:
-    """One sweep, row after row (E10, E11)."""
+def sweep_rows(bodies: Bodies, rows: Any, options: Any, relaxation: float, backwards: int, push: int) -> None:
+    """One sweep, row after row (E10, E11); with the points of a manifold ``backwards``, with ``push`` rows (E16)."""
     raise NotImplementedError
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from reference_solver.compilation import inner_kernel
 from reference_solver.needs import Needs
 from reference_solver.settings import Settings
 from reference_solver.structures import structure
@@ -34,6 +35,14 @@ class Options(NamedTuple):
     restitution: int
     broadphase: int
     scheme: int
+    certified: int  # whether each contact solve is measured (E14, E60 to E63)
+
+
+@inner_kernel
+def pushes_along(options: Options) -> bool:
+    """Whether positions are corrected in the sweeps of velocities (E16)."""
+    fixed = options.solver == SCALAR and options.scheme == FIXED_STEP
+    return fixed and options.residual < 0.0 and options.correction == SPLIT
 
 
 def uses_direct(settings: Settings) -> bool:
@@ -41,8 +50,8 @@ def uses_direct(settings: Settings) -> bool:
     return settings.direct and settings.solver == "block" and settings.residual is not None
 
 
-def options(settings: Settings, needs: Needs) -> Options:
-    """Return settings and needs as plain numbers."""
+def options(settings: Settings, needs: Needs, certified: bool) -> Options:
+    """Return settings and needs as plain numbers; what sweeps to a residual or locates events is always certified."""
     return Options(
         dt=float(settings.dt),
         iterations=settings.iterations,
@@ -61,4 +70,5 @@ def options(settings: Settings, needs: Needs) -> Options:
         restitution=int(needs.restitution),
         broadphase=int(needs.broadphase),
         scheme={"fixed": FIXED_STEP, "located": LOCATED, "midpoint": MIDPOINT}[settings.scheme],
+        certified=int(certified or settings.residual is not None or settings.scheme != "fixed"),
     )

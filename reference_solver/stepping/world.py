@@ -32,10 +32,10 @@ class SteppedWorld:
     #: Tables of the laws of pairs: nothing writes to them.
     _laws: tuple[Array, Array]
 
-    def __init__(self, model: Model, settings: Settings, needs: Needs, contacts: int) -> None:
+    def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool, contacts: int) -> None:
         n, d = len(model.bodies), model.dimension
         self._dimension = d
-        self._options, self._accuracy = options(settings, needs), settings.accuracy
+        self._options, self._accuracy = options(settings, needs, certified), settings.accuracy
         self._ledger = allocate_ledger(d, contacts)
         self._problem = allocate_problem(d, n, contacts, uses_direct(settings))
         self.tally = new_tally()

@@ -20,6 +20,7 @@ from adapters.reference.profiles import REASONS
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
+from reference_solver.simulation import UNCERTIFIED
 
 ENGINE = ReferenceEngine()
 PROFILES = ("classical", "reference")
@@ -157,10 +158,9 @@ def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) 
     column = make(floor(dimension), *boxes, mu=0.5, g=9.81, T=0.1)
     solved, starved = drive(ball, "reference").certificate, drive(column, "classical", iterations=1).certificate
     assert solved["converged"] is True and solved["residual"] <= 1e-13
-    assert starved["residual"] > 1e-6 and starved["worst_sweeps"] == 1 and starved["sweeps"] == 24
     assert solved["certified"] is True and solved["reasons"] == []
-    assert starved["holds"] is False and starved["reasons"]
-    assert "certified" not in starved  # a fixed number of sweeps promises no solution
+    # A fixed number of sweeps promises no solution: nothing is measured but the sweeps and how far bodies were pushed.
+    assert starved["worst_sweeps"] == 1 and starved["sweeps"] == 24 and set(starved) == {*UNCERTIFIED}
     assert json.loads(json.dumps(solved)) == solved
 
 

@@ -142,7 +142,7 @@ def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty, tm
     assert [o.slot for o in found if o.outcome is Outcome.TIMED_OUT] == hanging[:MOST_TIMEOUTS]
     assert len(found) == MOST_TIMEOUTS + 1
     assert not run.finished
-    assert "left: 2 cells, faulty has timed out 3 times on impact" in said.getvalue()
+    assert "not run: 2 cases, faulty has timed out 3 times on impact" in said.getvalue()
     assert "the same command resumes it" in said.getvalue()
 
 

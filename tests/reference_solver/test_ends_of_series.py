@@ -50,7 +50,7 @@ def test_what_turns_counts_over_ten_thousand_steps_or_until_it_has_turned():
     assert turns_aside(1e-6, 1e-4, 0.0, 1e-3) == 0.0
 
 
-#: A box that comes to rest on a corner (planar seed 0 of `certify --random`), with series that end at ``sys.argv[1]``
+#: A body that comes to rest on a floor (planar seed 23 of `certify --random`), with series that end at ``sys.argv[1]``
 #: times what is the lowest energy of a rebound; functions read the constant anew where they are plain ones.
 PLANTED = """
 import json, sys
@@ -60,7 +60,7 @@ from reference_solver.verification.fuzz.scenes import STRIDE, scene
 from reference_solver.stepping import impacts
 
 impacts.LOWEST *= float(sys.argv[1])
-drawn = scene(0, 2)
+drawn = scene(23, 2)
 record = Simulation(drawn.model, Settings.reference(1.0 / drawn.rate)).record(drawn.steps, STRIDE, pieces=True)
 ends, at_once, onward = ends_of_series(drawn.model, record, 1.0 / drawn.rate)
 print(json.dumps([record.pose.tolist(), (at_once + onward * (record.t[-1] - ends)).sum()]))
@@ -83,7 +83,7 @@ def test_a_series_that_is_ended_too_early_is_off_by_no_more_than_its_record_tell
     """At a thousand times the speed: all steps leave out the same, so that other ones do not show it."""
     (pose, left_out), (other, told) = planted(1), planted(1e6)
     assert left_out < 1e-10
-    assert 1e-7 < np.abs(other - pose).max() < told
+    assert 1e-8 < np.abs(other - pose).max() < told
 
 
 def bounced(height, speed, spin, radius, share, e, mu, slope, times):

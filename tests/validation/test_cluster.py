@@ -158,7 +158,7 @@ def test_a_scheduler_that_dies_loses_nothing_and_the_same_command_goes_on(cluste
     kept = finished_cells(out)
     assert 3 <= kept < len({row["cells"][0] for row in undisturbed})
     done = CliRunner().invoke(main, [*SWEEP, "--jobs", "1", "--out", str(out)])  # or on another cluster, or here
-    assert done.exit_code == 0 and f"{kept} of 40 cells done" in done.stderr
+    assert done.exit_code == 0 and f"{kept} of 40 cases done" in done.stderr
     assert bits(out) == undisturbed
 
 
@@ -171,7 +171,7 @@ def test_a_parent_that_is_killed_goes_on_where_it_was(undisturbed, tmp_path):
     run.wait()
     done = CliRunner().invoke(main, [*SWEEP, "--cluster", "local:1", "--out", str(out)])
     assert done.exit_code == 0, done.output
-    assert "cells done" in done.stderr and bits(out) == undisturbed
+    assert "cases done" in done.stderr and bits(out) == undisturbed
 
 
 def test_scene_files_need_not_be_on_the_workers(tmp_path):

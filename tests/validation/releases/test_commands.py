@@ -71,7 +71,7 @@ def test_an_end_that_does_not_answer_is_incomplete(call):
 def test_releases_says_what_moved_and_that_one_did_not_answer(call):
     done = call("releases", "toy", "1.0.0..1.2.0", "impact", *CELL, status=4)
     assert re.search(r"1\.1\.0 +- +- +- +- +- +cannot be imported", done.stdout)
-    assert "moved in 1.2.0, after 1.0.0" in done.stdout and "rebound_ratio" in done.stdout
+    assert "changed in 1.2.0, after 1.0.0" in done.stdout and "rebound_ratio" in done.stdout
     told = json.loads(call("releases", "toy", "1.0.0..1.2.0", "impact", *CELL, "--json", status=4).stdout)
     assert [each["release"] for each in told["releases"]] == ["toy==1.0.0", "toy==1.1.0", "toy==1.2.0"]
     assert told["releases"][0]["fails"] == 0 and told["releases"][2]["fails"] > 0

@@ -160,7 +160,7 @@ def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatc
     (panel,) = [panel for panel in panels(store, tmp_path) if panel.over == "releases"]
     assert panel.opponent == "a loop of Python" and all(point.ratio for point in panel.points)
     text = call("--times").stdout
-    assert "time: the first release" in text and "x1" in text
+    assert "time: relative to the first release" in text and "x1" in text
     assert len([run for run in store.runs() if run.title.endswith(": times")]) == 2  # what is stored is not timed again
     store.close()
 
