@@ -136,7 +136,7 @@ def test_a_blow_has_friction_if_its_gap_is_below_a_share_of_the_size_the_engine_
 def test_a_world_for_another_size_is_refused_while_one_lives():
     scene = resting()
     one = ENGINE.build(scene, DT, settings(scene))
-    with pytest.raises(EngineError, match=r"^tolerance_length: 2 m, while a world .* 0\.1 m$"):
+    with pytest.raises(EngineError, match=r"^tolerance_length: 2 m, while another world .* 0\.1 m$"):
         ENGINE.build(scene, DT, settings(scene, tolerance_length=2.0))
     one.close()
     ENGINE.build(scene, DT, settings(scene, tolerance_length=2.0)).close()

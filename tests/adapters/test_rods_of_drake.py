@@ -104,7 +104,7 @@ def test_what_a_rod_can_meet_decides():
     scene = Scene("rods", 1, 3, (lying, ball), (Pair(),), (0.0, 0.0, -9.81), 1.0)
     assert ENGINE.refuses(scene, "default") is None
     met = replace(scene, bodies=(FLOOR, lying, ball))
-    said = "rod.shape: Drake's contact of a capsule is exact with balls alone, it can meet floor"
+    said = "rod.shape: Drake's contact of a capsule is exact with balls only, and it can touch floor"
     assert [ENGINE.refuses(met, profile) for profile in ENGINE.profiles] == [said] * 4
     assert ENGINE.refuses(met, "model") is None  # a model's author has chosen so
     box = replace(ball, name="box", shape=Box((0.25, 0.25, 0.25)))

@@ -192,10 +192,10 @@ TILTED = "<collision name='c'><pose>0 0 0 .5 0 0</pose><geometry><box><size>1 1 
 TALL = INERTIAL.replace("<izz>.1", "<izz>.05")
 #: What has no place by what Drake's parser made of it, and the bodies that ``--drop`` leaves; None: it is refused too.
 REFUSED = [
-    (model(link("l") + link("k", INERTIAL)), "<link> 'k': has no shape that touches", ["m"]),
+    (model(link("l") + link("k", INERTIAL)), "<link> 'k': has no shape that collides", ["m"]),
     (model(link("l") + link("k", INERTIAL + BALL + BALL.replace("'c'", "'d'"))), "<link> 'k': has several", ["m"]),
-    (model(link("l") + link("k"), fixed("l", "k"), COLLIDE), "<joint> 'j': holds two links together", ["m"]),
-    (model(link("l") + link("k")), "<model> 'm': its links pass through each other", ["m::l", "m::k"]),
+    (model(link("l") + link("k"), fixed("l", "k"), COLLIDE), "<joint> 'j': connects two moving links", ["m"]),
+    (model(link("l") + link("k")), "<model> 'm': its links do not collide with each other", ["m::l", "m::k"]),
     (model(link("l") + link("k", HIGH + BALL), "", COLLIDE), "<link> 'k': its centre of mass", ["m"]),
     (model(link("l") + link("k", TALL + TILTED), "", COLLIDE), "<link> 'k': its principal axes", ["m"]),
     (model(link("l") + link("k", INERTIAL + BALL.replace(SPHERE, PLANE)), "", COLLIDE),
@@ -210,7 +210,7 @@ REFUSED = [
     (model(""), "Drake does not read it: ", None),
     ("<sdf version='1.9'/>", "Drake does not read it: line 1: ", None),
     ("<sdf version='9.9'><model name='m'/></sdf>", "Drake does not read it: Unable to convert", None),
-    (model(link("l", INERTIAL + BALL.replace(SPHERE, PLANE.replace("1", "0")))), "<normal>: is no direction", None),
+    (model(link("l", INERTIAL + BALL.replace(SPHERE, PLANE.replace("1", "0")))), "<normal>: is not a direction", None),
     (model(link("l", INERTIAL + BALL.replace(SPHERE, PLANE.replace("1", "1e-99")))), "Drake does not read it: ", None),
 ]  # fmt: skip
 
@@ -301,7 +301,7 @@ def test_a_world_runs_as_made_on_drake_and_rigid_elsewhere(tmp_path):
     assert kinds == {(engine, profile, dimension, dt) for dimension in (2, 3) for engine, profile, dt in (
         ("drake", "model", 0.001), ("drake", "default", 1 / 240), ("mujoco", "default", 1 / 240))}  # fmt: skip
     assert {row["outcome"] for row in rows} == {"ok"}
-    assert "drake/model runs it with its own contacts, solver and step" in done.stderr
+    assert "drake/model runs it with the model's own contacts, solver and step" in done.stderr
 
 
 def test_what_is_refused_is_one_line_of_the_command_and_nothing_runs(tmp_path):
