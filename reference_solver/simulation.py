@@ -74,7 +74,7 @@ class Simulation:
         Leave nothing out, whatever the model needs; the answer must be the same (for tests).
     certified
         Measure how good each contact solve is (`certificate`). A fixed number of sweeps at fixed steps can do without:
-        the motion has the same bits, and a step takes about two thirds of the time. All else is always certified.
+        the motion has the same bits, and a step takes less time. All else is always certified.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Simulation:
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
         package = import_module(WORLDS[model.dimension])
         self._certified = certified or settings.residual is not None or settings.scheme != "fixed"
-        self._world: World = package.World(model, settings, self.needs, certified)
+        self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0
 
     def advance(self, steps: int) -> None:

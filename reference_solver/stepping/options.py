@@ -51,7 +51,7 @@ def uses_direct(settings: Settings) -> bool:
 
 
 def options(settings: Settings, needs: Needs, certified: bool) -> Options:
-    """Return settings and needs as plain numbers; what sweeps to a residual or locates events is always certified."""
+    """Return settings and needs as plain numbers."""
     return Options(
         dt=float(settings.dt),
         iterations=settings.iterations,
@@ -70,5 +70,5 @@ def options(settings: Settings, needs: Needs, certified: bool) -> Options:
         restitution=int(needs.restitution),
         broadphase=int(needs.broadphase),
         scheme={"fixed": FIXED_STEP, "located": LOCATED, "midpoint": MIDPOINT}[settings.scheme],
-        certified=int(certified or settings.residual is not None or settings.scheme != "fixed"),
+        certified=int(certified),
     )

@@ -78,7 +78,7 @@ CASES = (
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
 def test_the_grid_finds_what_all_pairs_have(dimension, case):
-    rng, n = np.random.default_rng(hash((dimension, len(case))) % 2**32), 150
+    rng, n = np.random.default_rng(CASES.index(case)), 150
     bodies, free = world(dimension, n)
     boxes = allocate_boxes(n, dimension, n * n)
     for count in (n, ALL_PAIRS_LIMIT + 1, 100):

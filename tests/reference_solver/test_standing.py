@@ -24,7 +24,7 @@ def pyramid(rows, gap):
 
 @pytest.mark.parametrize("rate", [60, 240])
 def test_a_column_of_ten_stands_for_a_minute(rate):
-    """Within .1 m sideways: Chipmunk 7 as shipped stays within .12 m at 1/60 s. In one order of corners it falls."""
+    """Within .1 m sideways, a tenth of a box. In one order of corners it falls."""
     simulation = Simulation(column(10), Settings.classical(1.0 / rate))
     start, farthest = simulation.pose, 0.0
     for _ in range(60):

@@ -30,7 +30,7 @@ TABLE = Path(__file__).with_name("guard.toml")
 ROUNDS = 15
 #: Time until a heap has fallen and lies [s].
 REST = 0.75
-#: Rows of a point: its normal, and one or two of friction.
+#: Friction coefficient of the naive sweeps: that of the stack.
 MU = 0.5
 
 Array = NDArray[np.float64]
