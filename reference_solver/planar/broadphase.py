@@ -34,6 +34,13 @@ def bound_bodies(bodies: Bodies, pairs: Pairs, options: Options) -> None:
 @inner_kernel
 def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill the candidates of `Pairs.boxes`; False if there is no room."""
+    bound_closely(bodies, pairs, options)
+    return find_overlaps(bodies, pairs, rows, options)
+
+
+@inner_kernel
+def bound_closely(bodies: Bodies, pairs: Pairs, options: Options) -> None:
+    """Bounds as of `bound_bodies`, and half-spaces bounded where their face is along an axis."""
     bound_bodies(bodies, pairs, options)
     for i in range(len(bodies.kind)):
         if bodies.kind[i, SHAPE] == HALF_SPACE:
@@ -42,7 +49,6 @@ def find_candidates(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) 
             normal = (c * x - s * y, s * x + c * y)
             for k in range(2):
                 bound_along(pairs.boxes, i, k, normal[k], bodies.pose[i, k] + bodies.real[i, SIZE + 2] * normal[k])
-    return find_overlaps(bodies, pairs, rows, options)
 
 
 @inner_kernel

@@ -9,6 +9,7 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
+from reference_solver.lanes import any_of, where
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
@@ -32,21 +33,24 @@ def accelerate(bodies: Bodies, options: Options) -> None:
 
 
 @inner_kernel
+def way(bodies: Bodies, i: int, k: int, dt: float, pushed: bool) -> float:
+    """How far coordinate k of body i goes (E17)."""
+    own = dt * bodies.twist[i, k]
+    return where(pushed, own + dt * bodies.pseudo[i, k], own)
+
+
+@inner_kernel
 def move(bodies: Bodies, dt: float, pushed: bool) -> None:
     """Advance x += h (v + pseudo-velocity) for everything that is not fixed (E17); a disc has no use for its angle."""
     for i in range(len(bodies.kind)):
         if bodies.kind[i, MOTION] == FIXED:
             continue
-        turns = False
         for k in range(3):
-            way = dt * bodies.twist[i, k]
-            if pushed:
-                way += dt * bodies.pseudo[i, k]
-            bodies.pose[i, k] += way
-            turns = way != 0.0
-        if turns and bodies.kind[i, SHAPE] != DISC:
-            bodies.real[i, COS] = math.cos(bodies.pose[i, 2])
-            bodies.real[i, SIN] = math.sin(bodies.pose[i, 2])
+            bodies.pose[i, k] += way(bodies, i, k, dt, pushed)
+        turns = way(bodies, i, 2, dt, pushed) != 0.0
+        if any_of(turns) and bodies.kind[i, SHAPE] != DISC:
+            bodies.real[i, COS] = where(turns, math.cos(bodies.pose[i, 2]), bodies.real[i, COS])
+            bodies.real[i, SIN] = where(turns, math.sin(bodies.pose[i, 2]), bodies.real[i, SIN])
 
 
 @inner_kernel

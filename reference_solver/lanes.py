@@ -1,0 +1,230 @@
+"""A number of kernels that is several: one for each of `LANES` worlds that are stepped side by side.
+
+`Lanes` is a vector of the processor. Kernels calculate with it as with a float, so that one source serves a single
+world and several: each lane holds, to the bit, what the same operations give for the world alone. What a float decides
+by a branch, lanes decide by `where`; `any_of` and `all_of` allow for what no lane, or each, needs.
+
+numba's means of extension are public: types, data models, lowering (its manual, "Low-level extension API").
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from inspect import Parameter, Signature
+from itertools import product
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.typeconv import Conversion
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    lower_cast,
+    models,
+    register_model,
+    type_callable,
+)
+
+#: Worlds side by side: eight doubles fill a register of AVX-512, two of AVX2.
+LANES = 8
+
+
+def where(condition: Any, one: Any, other: Any) -> Any:
+    """``one`` where the condition holds, else ``other``; for each lane by itself."""
+    return one if condition else other
+
+
+def any_of(condition: Any) -> bool:
+    """Whether a condition holds in any lane."""
+    return bool(condition)
+
+
+def all_of(condition: Any) -> bool:
+    """Whether a condition holds in each lane."""
+    return bool(condition)
+
+
+class LanesType(types.Type):
+    """One float for each lane."""
+
+    def __init__(self) -> None:
+        super().__init__(f"lanes{LANES}")
+
+    def can_convert_from(self, typingctx: Any, other: Any) -> Any:
+        """Return how a float becomes lanes: all are the same."""
+        return Conversion.safe if isinstance(other, types.Float) else None
+
+    def unify(self, typingctx: Any, other: Any) -> Any:
+        """A variable that is a float here and lanes there is lanes."""
+        return self if isinstance(other, types.Float) else None
+
+
+class MaskType(types.Type):
+    """One truth for each lane."""
+
+    def __init__(self) -> None:
+        super().__init__(f"mask{LANES}")
+
+
+LANE, MASK = LanesType(), MaskType()
+FLOAT = types.float64
+DOUBLES, BITS = ir.VectorType(ir.DoubleType(), LANES), ir.VectorType(ir.IntType(1), LANES)
+NONE, ALL = ir.IntType(LANES)(0), ir.IntType(LANES)(2**LANES - 1)
+
+
+@register_model(LanesType)
+class LanesModel(models.PrimitiveModel):
+    """A vector of doubles."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, DOUBLES)
+
+
+@register_model(MaskType)
+class MaskModel(models.PrimitiveModel):
+    """A vector of bits."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, BITS)
+
+
+def splat(builder: Any, value: Any) -> Any:
+    """Return a vector of one number."""
+    first = builder.insert_element(ir.Constant(DOUBLES, ir.Undefined), value, ir.IntType(32)(0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(first, ir.Constant(DOUBLES, ir.Undefined), zeros)
+
+
+@lower_cast(types.Float, LanesType)
+def from_float(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:
+    """A float is the same in all lanes."""
+    return splat(builder, context.cast(builder, value, source, FLOAT))
+
+
+def of_lanes(function: Any, takes: tuple[Any, ...], gives: Any, write: Callable[..., Any]) -> None:
+    """Let kernels call ``function`` with lanes, some of which may be floats; ``write`` writes its instructions."""
+
+    @type_callable(function)
+    def typed(context: Any) -> Any:
+        def typer(*given: Any) -> Any:
+            if len(given) != len(takes) or (LANE in takes and not any(each in (LANE, MASK) for each in given)):
+                return None
+            pairs = zip(given, takes, strict=True)
+            fits = (each == wanted or (wanted == LANE and isinstance(each, types.Float)) for each, wanted in pairs)
+            return gives if all(fits) else None
+
+        named = [Parameter(f"value{k}", Parameter.POSITIONAL_ONLY) for k in range(len(takes))]
+        typer.pysig = Signature(named)  # type: ignore[attr-defined]
+        return typer
+
+    def lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        told = zip(values, sig.args, takes, strict=True)
+        return write(context, builder, *(context.cast(builder, *each) for each in told))
+
+    for chosen in product(*((LANE, FLOAT) if wanted == LANE else (wanted,) for wanted in takes)):
+        if LANE not in takes or LANE in chosen or MASK in chosen:
+            lower_builtin(function, *chosen)(lowered)
+
+
+def instruction(name: str, *told: Any) -> Callable[..., Any]:
+    """Write one instruction."""
+    return lambda context, builder, *values: getattr(builder, name)(*told, *values)
+
+
+def call(name: str) -> Callable[..., Any]:
+    """Write a call of what LLVM has for vectors."""
+
+    def write(context: Any, builder: Any, *values: Any) -> Any:
+        kind = ir.FunctionType(DOUBLES, [DOUBLES] * len(values))
+        found = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64")
+        return builder.call(found, values)
+
+    return write
+
+
+def each_lane(function: Any) -> Callable[..., Any]:
+    """Call a function of a float for one lane after the other: the same bits as of a float."""
+
+    def write(context: Any, builder: Any, value: Any) -> Any:
+        found = context.get_function(function, FLOAT(FLOAT))
+        result = ir.Constant(DOUBLES, ir.Undefined)
+        for k in map(ir.IntType(32), range(LANES)):
+            one = found(builder, [builder.extract_element(value, k)])
+            result = builder.insert_element(result, one, k)
+        return result
+
+    return write
+
+
+def better(comparison: str) -> Callable[..., Any]:
+    """Write `max` (``>``) or `min` (``<``) as of floats: the second number only where it is better."""
+
+    def write(context: Any, builder: Any, one: Any, other: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(comparison, other, one), other, one)
+
+    return write
+
+
+def bits(builder: Any, mask: Any) -> Any:
+    """Return a mask as an integer of one bit for each lane."""
+    return builder.bitcast(mask, ir.IntType(LANES))
+
+
+def compared(comparison: str) -> Callable[..., Any]:
+    """Write a comparison: like that of floats it is false of what is no number, and ``!=`` is true."""
+    method = "fcmp_unordered" if comparison == "!=" else "fcmp_ordered"
+    return lambda context, builder, one, other: getattr(builder, method)(comparison, one, other)
+
+
+for name, operations in {
+    "fadd": (operator.add, operator.iadd),
+    "fsub": (operator.sub, operator.isub),
+    "fmul": (operator.mul, operator.imul),
+    "fdiv": (operator.truediv,),
+}.items():
+    for operation in operations:
+        of_lanes(operation, (LANE, LANE), LANE, instruction(name))
+for operation, sign in (
+    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="), (operator.ne, "!="),
+):  # fmt: skip
+    of_lanes(operation, (LANE, LANE), MASK, compared(sign))
+for operation, name in ((operator.and_, "and_"), (operator.or_, "or_")):
+    of_lanes(operation, (MASK, MASK), MASK, instruction(name))
+of_lanes(operator.invert, (MASK,), MASK, instruction("not_"))
+of_lanes(operator.neg, (LANE,), LANE, instruction("fneg"))
+of_lanes(max, (LANE, LANE), LANE, better(">"))
+of_lanes(min, (LANE, LANE), LANE, better("<"))
+of_lanes(abs, (LANE,), LANE, call("fabs"))
+of_lanes(math.sqrt, (LANE,), LANE, call("sqrt"))
+of_lanes(math.copysign, (LANE, LANE), LANE, call("copysign"))
+of_lanes(math.cos, (LANE,), LANE, each_lane(math.cos))
+of_lanes(math.sin, (LANE,), LANE, each_lane(math.sin))
+of_lanes(where, (MASK, LANE, LANE), LANE, instruction("select"))
+of_lanes(where, (types.boolean, FLOAT, FLOAT), FLOAT, instruction("select"))
+of_lanes(any_of, (MASK,), types.boolean, lambda c, builder, mask: builder.icmp_unsigned("!=", bits(builder, mask), NONE))
+of_lanes(all_of, (MASK,), types.boolean, lambda c, builder, mask: builder.icmp_unsigned("==", bits(builder, mask), ALL))
+of_lanes(any_of, (types.boolean,), types.boolean, lambda context, builder, truth: truth)
+of_lanes(all_of, (types.boolean,), types.boolean, lambda context, builder, truth: truth)
+
+
+@intrinsic
+def lanes(typingctx: Any, array: Any) -> Any:
+    """An array of floats, the last axis of which are lanes, as an array of `Lanes` with one axis less."""
+    seen = types.Array(LANE, array.ndim - 1, array.layout, aligned=False)
+
+    def write(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        given = context.make_array(sig.args[0])(context, builder, values[0])
+        made = context.make_array(seen)(context, builder)
+        made.meminfo, made.parent = given.meminfo, given.parent
+        made.nitems = builder.udiv(given.nitems, given.nitems.type(LANES))
+        made.itemsize = given.itemsize.type(8 * LANES)
+        made.data = builder.bitcast(given.data, made.data.type)
+        for name in ("shape", "strides"):
+            setattr(made, name, cgutils.pack_array(builder, cgutils.unpack_tuple(builder, getattr(given, name))[:-1]))
+        return impl_ret_borrowed(context, builder, seen, made._getvalue())
+
+    return seen(array), write
