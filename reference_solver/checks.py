@@ -29,6 +29,12 @@ def require_positive(name: str, value: float) -> None:
         raise ValueError(f"{name}: {value!r} must be positive")
 
 
+def require_count(name: str, value: int, least: int) -> None:
+    """Raise ValueError unless ``value`` is a whole number of at least ``least``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise ValueError(f"{name}: {value!r} must be a whole number of at least {least}")
+
+
 def require_moments(name: str, moments: tuple[float, ...]) -> None:
     """Raise ValueError unless three principal moments fulfil the triangle inequality.
 

@@ -79,8 +79,8 @@ else:
         return function
 
 
-#: No hidden branches for divisions by zero: zero denominators are excluded by validation.
-OPTIONS: Any = {"error_model": "numpy"}
+#: No hidden branches for divisions by zero: zero denominators are excluded by validation. Threads may run side by side.
+OPTIONS: Any = {"error_model": "numpy", "nogil": True}
 #: How kernels are compiled that only kernels call.
 INNER_OPTIONS: Any = OPTIONS | INNER
 

@@ -9,6 +9,7 @@ and what they did to it is taken back.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ from numpy.lib.stride_tricks import as_strided
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.lanes import LANES, all_of, any_of, lanes, where
-from reference_solver.model import Array
+from reference_solver.model import Array, Model
+from reference_solver.needs import needs
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.broadphase import bound_closely
 from reference_solver.planar.columns import (
@@ -43,11 +45,25 @@ from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.position import begin_pushes
 from reference_solver.planar.rows import prepare_masses, set_target
 from reference_solver.planar.sequential_impulses import push_pair, push_point, sweep_pair, sweep_point
-from reference_solver.planar.state import BOX, CONTACTS, COUNTS, HALF_SPACE, MANIFOLDS, Bodies, Indices, Pairs, Rows, allocate_rows
+from reference_solver.planar.state import (
+    BOX,
+    CONTACTS,
+    COUNTS,
+    HALF_SPACE,
+    MANIFOLDS,
+    Bodies,
+    Indices,
+    Pairs,
+    Rows,
+    allocate_bodies,
+    allocate_pairs,
+    allocate_rows,
+)
 from reference_solver.planar.step import accelerate, move
+from reference_solver.settings import Settings
 from reference_solver.stepping.broadphase import Boxes, allocate_boxes, bodies_of, doubled, pair_bodies
 from reference_solver.stepping.noise import TOUCHING
-from reference_solver.stepping.options import Options
+from reference_solver.stepping.options import Options, options
 from reference_solver.structures import structure
 from reference_solver.tally import SIZE as TALLY_SIZE
 
@@ -378,6 +394,36 @@ def run_group(group: Group, pose: Array, twist: Array, first: int, steps: int, s
                     for lane in range(LANES):
                         pose[s, i, d, lane], twist[s, i, d, lane] = group.pose[i, d, lane], group.twist[i, d, lane]
     return steps
+
+
+class Together:
+    """Up to `LANES` models whose bodies are alike, stepped in one (`worlds.Members`)."""
+
+    def __init__(self, models: Sequence[Model], settings: Settings) -> None:
+        self.count = len(models)
+        found = needs(models[0])
+        # A lane that is left over steps the last world once more.
+        padded = [*models, *[models[-1]] * (LANES - len(models))]
+        worlds = [(allocate_bodies(each, found), allocate_pairs(each, 0)) for each in padded]
+        # A body of similar size has at most six neighbours, each pair counted once; columns and piles have fewer.
+        self.group = allocate_group(worlds, options(settings, found, False), 4 * len(models[0].bodies) + 16)
+
+    def states(self) -> tuple[Array, Array]:
+        """See `Members.states`."""
+        return self._by_world(self.group.pose), self._by_world(self.group.twist)
+
+    def run(self, steps: int, stride: int) -> tuple[Array, Array]:
+        """See `Members.run`."""
+        samples = steps // stride if stride else 0
+        pose, twist = (np.empty((samples, *self.group.pose.shape)) for _ in range(2))
+        done = 0
+        while (done := run_group(self.group, pose, twist, done, steps, stride)) < steps:
+            self.group = grown(self.group)
+        return self._by_world(pose), self._by_world(twist)
+
+    def _by_world(self, array: Array) -> Array:
+        """World first, without those that are left over."""
+        return np.moveaxis(array, -1, 0)[: self.count].copy()
 
 
 def allocate_group(worlds: list[tuple[Bodies, Pairs]], options: Options, contacts: int) -> Group:
