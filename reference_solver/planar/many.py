@@ -25,6 +25,7 @@ from reference_solver.planar.broadphase import bound_closely
 from reference_solver.planar.columns import (
     APPROACH,
     ARM_A,
+    COS,
     EXTENT,
     FEATURE,
     FRICTION,
@@ -34,23 +35,23 @@ from reference_solver.planar.columns import (
     PUSH,
     ROW_INTEGERS,
     ROW_REALS,
-    SHAPE,
+    SIN,
     VERTICES,
     A,
     B,
 )
 from reference_solver.planar.kinematics import apply_normal, apply_tangent, load_speed, normal_velocity
-from reference_solver.planar.many_boxes import GEOMETRY, NONE, half_space_and_box, two_boxes
+from reference_solver.planar.manifolds import contact_key
+from reference_solver.planar.many_contacts import GEOMETRY, NONE, are_found_at_once, collide_at_once
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.position import begin_pushes
 from reference_solver.planar.rows import prepare_masses, set_target
 from reference_solver.planar.sequential_impulses import push_pair, push_point, sweep_pair, sweep_point
 from reference_solver.planar.state import (
-    BOX,
     CONTACTS,
     COUNTS,
-    HALF_SPACE,
     MANIFOLDS,
+    REMEMBERED,
     Bodies,
     Indices,
     Pairs,
@@ -60,6 +61,7 @@ from reference_solver.planar.state import (
     allocate_rows,
 )
 from reference_solver.planar.step import accelerate, move
+from reference_solver.planar.world import World
 from reference_solver.settings import Settings
 from reference_solver.stepping.broadphase import Boxes, allocate_boxes, bodies_of, doubled, pair_bodies
 from reference_solver.stepping.noise import TOUCHING
@@ -141,9 +143,7 @@ def bodies_of_group(group: Group) -> Bodies:
 def pairs_of_group(group: Group) -> Pairs:
     """Laws of the pairs in all worlds, and bounds of the bodies in each."""
     b = group.boxes
-    boxes = Boxes(
-        lanes(group.low), lanes(group.high), b.candidate, b.found, b.begin, b.cell, b.bucket, b.after
-    )
+    boxes = Boxes(lanes(group.low), lanes(group.high), b.candidate, b.found, b.begin, b.cell, b.bucket, b.after)
     return Pairs(lanes(group.restitution), lanes(group.friction), boxes)
 
 
@@ -188,23 +188,19 @@ def find_pairs(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
 
 @inner_kernel
 def detect(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> None:
-    """Write the points of all pairs in all worlds: of boxes in all at once, else world by world."""
+    """Write the points of all pairs in all worlds, of simple shapes in all at once."""
     options, found, feature = group.options, lanes(group.found), lanes(group.feature)
     apart = False
     for m in range(rows.counts[MANIFOLDS]):
         c = rows.manifold[m]
         a, b = rows.integer[c, A], rows.integer[c, B]
-        if not is_box_pair(group.kind, a, b):
+        if not are_found_at_once(bodies, a, b):
             apart = True
             continue
         bounces = pairs.restitution[a, b] > (0.0 if options.restitution else math.inf)
         extent = min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
         reach, near = where(bounces, TOUCHING, options.margin) * extent, overlap(pairs.boxes, a, b)
-        if group.kind[a, SHAPE] == group.kind[b, SHAPE]:
-            found[m] = two_boxes(bodies, a, b, reach, near, rows, feature, c)
-        else:
-            f, s = (b, a) if group.kind[a, SHAPE] == BOX else (a, b)
-            found[m] = half_space_and_box(bodies, f, s, reach, near, rows, feature, c)
+        found[m] = collide_at_once(bodies, a, b, reach, near, rows, feature, c)
     if apart:
         for lane in range(LANES):
             detect_in(group, lane)
@@ -227,9 +223,11 @@ def detect_in(group: Group, lane: int) -> None:
     for m in range(group.counts[MANIFOLDS]):
         first, found = group.manifold[m], 0
         a, b = group.integer[first, A], group.integer[first, B]
-        if is_box_pair(group.kind, a, b):
+        if are_found_at_once(bodies, a, b):
             continue
-        near = low[a, 0] <= high[b, 0] and low[b, 0] <= high[a, 0] and low[a, 1] <= high[b, 1] and low[b, 1] <= high[a, 1]
+        near = (
+            low[a, 0] <= high[b, 0] and low[b, 0] <= high[a, 0] and low[a, 1] <= high[b, 1] and low[b, 1] <= high[a, 1]
+        )
         if near:
             bounces = options.restitution and group.restitution[a, b, lane] > 0.0
             found = collide(bodies, a, b, TOUCHING if bounces else options.margin, 0.0, probe, 0)
@@ -238,13 +236,6 @@ def detect_in(group: Group, lane: int) -> None:
             for k in GEOMETRY:
                 group.row[first + i, k, lane] = probe.real[i, k] if i < found else 0.0
             group.feature[first + i, lane] = probe.integer[i, FEATURE] if i < found else NONE
-
-
-@inner_kernel
-def is_box_pair(kind: Indices, a: int, b: int) -> bool:
-    """Whether contacts of two bodies are found in all worlds at once: of two boxes, or of a box and a half-space."""
-    one, other = min(kind[a, SHAPE], kind[b, SHAPE]), max(kind[a, SHAPE], kind[b, SHAPE])
-    return bool(other == BOX and (one == BOX or one == HALF_SPACE))
 
 
 @inner_kernel
@@ -307,9 +298,7 @@ def warm_start(group: Group, bodies: Bodies, rows: Rows, found: Array) -> None:
 
 
 @inner_kernel
-def sweep(
-    group: Group, bodies: Bodies, rows: Rows, found: Array, relaxation: float, backwards: int, push: int
-) -> None:
+def sweep(group: Group, bodies: Bodies, rows: Rows, found: Array, relaxation: float, backwards: int, push: int) -> None:
     """See `sequential_impulses.sweep_rows`."""
     options = group.options
     for m in range(rows.counts[MANIFOLDS]):
@@ -396,34 +385,86 @@ def run_group(group: Group, pose: Array, twist: Array, first: int, steps: int, s
     return steps
 
 
+@kernel
+def hand_over(group: Group, lane: int, bodies: Bodies, rows: Rows) -> None:
+    """Write the state of one world, and what it remembers, where it is to go on alone."""
+    for i in range(len(group.kind)):
+        for k in range(3):
+            bodies.pose[i, k], bodies.twist[i, k] = group.pose[i, k, lane], group.twist[i, k, lane]
+        bodies.real[i, COS], bodies.real[i, SIN] = group.real[i, COS, lane], group.real[i, SIN, lane]
+    count = 0
+    for m in range(group.old_count[0]):
+        a, b = bodies_of(group.old_pair[m])
+        for c in range(group.old_first[m], group.old_first[m + 1]):
+            feature, pn, pt = group.old[c, OLD_FEATURE, lane], group.old[c, OLD_N, lane], group.old[c, OLD_T, lane]
+            if feature != GONE:
+                rows.old_key[count] = contact_key(a, b, int(feature))
+                rows.old_impulse[count, 0], rows.old_impulse[count, 1] = pn, pt
+                count += 1
+    rows.counts[REMEMBERED] = count
+
+
+#: Steps between two looks at whether worlds still fit together.
+STEPS_BETWEEN_LOOKS = 64
+
+
 class Together:
-    """Up to `LANES` models whose bodies are alike, stepped in one (`worlds.Members`)."""
+    """Up to `LANES` models whose bodies are alike, stepped in one while they touch alike (`worlds.Members`)."""
 
     def __init__(self, models: Sequence[Model], settings: Settings) -> None:
-        self.count = len(models)
-        found = needs(models[0])
+        self.models, self.settings, self.needs = models, settings, needs(models[0])
         # A lane that is left over steps the last world once more.
         padded = [*models, *[models[-1]] * (LANES - len(models))]
-        worlds = [(allocate_bodies(each, found), allocate_pairs(each, 0)) for each in padded]
-        # A body of similar size has at most six neighbours, each pair counted once; columns and piles have fewer.
-        self.group = allocate_group(worlds, options(settings, found, False), 4 * len(models[0].bodies) + 16)
+        worlds = [(allocate_bodies(each, self.needs), allocate_pairs(each, 0)) for each in padded]
+        # A body of similar size has at most six neighbours, each pair counted once; columns have fewer.
+        room = 4 * len(models[0].bodies) + 16
+        self.group = allocate_group(worlds, options(settings, self.needs, False), room)
+        self.apart: list[World] = []
 
     def states(self) -> tuple[Array, Array]:
         """See `Members.states`."""
+        if self.apart:
+            return np.stack([each.pose for each in self.apart]), np.stack([each.twist for each in self.apart])
         return self._by_world(self.group.pose), self._by_world(self.group.twist)
 
     def run(self, steps: int, stride: int) -> tuple[Array, Array]:
         """See `Members.run`."""
         samples = steps // stride if stride else 0
         pose, twist = (np.empty((samples, *self.group.pose.shape)) for _ in range(2))
+        part = stride * max(1, STEPS_BETWEEN_LOOKS // stride) if stride else STEPS_BETWEEN_LOOKS
         done = 0
-        while (done := run_group(self.group, pose, twist, done, steps, stride)) < steps:
-            self.group = grown(self.group)
-        return self._by_world(pose), self._by_world(twist)
+        while done < steps and not self.apart:
+            end = min(done + part, steps)
+            while (done := run_group(self.group, pose, twist, done, end, stride)) < end:
+                self.group = grown(self.group)
+            if not self._fit():
+                self.apart = [self._alone(lane) for lane in range(len(self.models))]
+        sampled = done // stride if stride else 0
+        found = self._by_world(pose[:sampled]), self._by_world(twist[:sampled])
+        if not self.apart:
+            return found
+        rest = [each.run(steps - done, stride, False) for each in self.apart]
+        last = np.stack([each.pose for each in rest]), np.stack([each.twist for each in rest])
+        return np.concatenate([found[0], last[0]], axis=1), np.concatenate([found[1], last[1]], axis=1)
 
     def _by_world(self, array: Array) -> Array:
         """World first, without those that are left over."""
-        return np.moveaxis(array, -1, 0)[: self.count].copy()
+        return np.moveaxis(array, -1, 0)[: len(self.models)].copy()
+
+    def _fit(self) -> bool:
+        """Whether at least half of the bodies and pairs that are stepped are there: lanes cost what two worlds cost.
+
+        A pair that touches in one world is solved in all of them. Piles of different discs soon have little in common.
+        """
+        pairs, bodies = self.group.counts[MANIFOLDS], len(self.group.kind)
+        touching = np.count_nonzero(self.group.found[:pairs, : len(self.models)])
+        return bool(2 * (touching + len(self.models) * bodies) >= LANES * (pairs + bodies))
+
+    def _alone(self, lane: int) -> World:
+        """A world that goes on from the state of one lane."""
+        world = World(self.models[lane], self.settings, self.needs, False)
+        hand_over(self.group, lane, *world.opened(len(self.group.old)))
+        return world
 
 
 def allocate_group(worlds: list[tuple[Bodies, Pairs]], options: Options, contacts: int) -> Group:

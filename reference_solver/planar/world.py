@@ -12,7 +12,9 @@ from reference_solver.planar.problem import assemble, pose_problem
 from reference_solver.planar.state import (
     CANDIDATES,
     CONTACTS,
+    Bodies,
     Island,
+    Rows,
     allocate_bodies,
     allocate_pairs,
     allocate_rows,
@@ -47,6 +49,12 @@ class World(SteppedWorld):
         self._world = allocate_world(self._bodies, room)
         self._laws = self._pairs.restitution, self._pairs.friction
 
+    def opened(self, contacts: int) -> tuple[Bodies, Rows]:
+        """Arrays to write a state into, with room for ``contacts`` to remember."""
+        while contacts > len(self._rows.old_key):
+            self._grow_rows()
+        return self._bodies, self._rows
+
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step, as a fixed step poses it; the world stays what it is."""
         trial = self.copy()
@@ -73,6 +81,9 @@ class World(SteppedWorld):
         elif self._ledger.used[0] + self._rows.counts[CONTACTS] > len(self._ledger.real):
             self._grow_ledger()
         else:
-            self._rows = grown(self._rows)
-            self._sub = self._sub._replace(lasting=allocate_lasting(2, len(self.pose), len(self._rows.real)))
-            self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))
+            self._grow_rows()
+
+    def _grow_rows(self) -> None:
+        self._rows = grown(self._rows)
+        self._sub = self._sub._replace(lasting=allocate_lasting(2, len(self.pose), len(self._rows.real)))
+        self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))

@@ -1,7 +1,7 @@
-"""Contacts of boxes in several worlds at once: `box_box.box_box` and `narrowphase.half_space_box` without branches.
+"""Contacts of discs, boxes and half-spaces in several worlds at once: `narrowphase` and `box_box` without branches.
 
 Each lane holds, to the bit, what those find for its world: the same operations in the same order, with `where` for what
-they decide by a branch. Other pairs than these two are looked at world by world.
+they decide by a branch. Other pairs, a disc and a box too, are looked at world by world.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.lanes import any_of, where
 from reference_solver.model import Array
 from reference_solver.planar.box_box import axis_separation
-from reference_solver.planar.columns import ARM_A, ARM_B, COS, EXTENT, GAP, NX, NY, SIN, SIZE
+from reference_solver.planar.columns import ARM_A, ARM_B, COS, EXTENT, GAP, NX, NY, SHAPE, SIN, SIZE
 from reference_solver.planar.points import share_of_gap
 from reference_solver.planar.separating_axis import AXIS_ADVANTAGE
-from reference_solver.planar.state import Bodies, Rows
+from reference_solver.planar.state import BOX, DISC, HALF_SPACE, Bodies, Rows
 
 #: What is found of a point.
 GEOMETRY = (NX, NY, ARM_A, ARM_A + 1, ARM_B, ARM_B + 1, GAP)
@@ -25,8 +25,63 @@ NONE = -2.0
 
 
 @inner_kernel
+def collide_at_once(bodies: Bodies, a: int, b: int, reach: Any, near: Any, rows: Rows, feature: Array, c: int) -> Any:
+    """Write the points of a < b at rows c, c + 1; how many there are in each world, of those that are ``near``."""
+    f, s = (b, a) if bodies.kind[a, SHAPE] > bodies.kind[b, SHAPE] else (a, b)
+    if bodies.kind[s, SHAPE] == DISC:
+        if bodies.kind[f, SHAPE] == DISC:
+            return two_discs(bodies, f, s, reach, near, rows, feature, c)
+        return half_space_and_disc(bodies, f, s, reach, near, rows, feature, c)
+    if bodies.kind[f, SHAPE] == BOX:
+        return two_boxes(bodies, f, s, reach, near, rows, feature, c)
+    return half_space_and_box(bodies, f, s, reach, near, rows, feature, c)
+
+
+@inner_kernel
+def are_found_at_once(bodies: Bodies, a: int, b: int) -> bool:
+    """Whether `collide_at_once` knows the shapes of two bodies."""
+    f, s = bodies.kind[a, SHAPE], bodies.kind[b, SHAPE]
+    first, second = min(f, s), max(f, s)
+    return bool((second == DISC or second == BOX) and (first == second or first == HALF_SPACE))
+
+
+@inner_kernel
+def half_space_and_disc(
+    bodies: Bodies, f: int, s: int, reach: Any, near: Any, rows: Rows, feature: Array, c: int
+) -> Any:
+    """See `narrowphase.half_space_disc`."""
+    nx, ny = normal_of(bodies, f)
+    dx, dy = bodies.pose[s, 0] - bodies.pose[f, 0], bodies.pose[s, 1] - bodies.pose[f, 1]
+    radius = bodies.real[s, SIZE]
+    gap = nx * dx + ny * dy - bodies.real[f, SIZE + 2] - radius
+    at_f, at_s = (dx - radius * nx, dy - radius * ny), (-radius * nx, -radius * ny)
+    write(rows, c, f < s, (nx, ny), at_f, at_s, gap)
+    return settle_one(rows, feature, c, near & ~(gap > reach))
+
+
+@inner_kernel
+def normal_of(bodies: Bodies, f: int) -> tuple[Any, Any]:
+    """Normal of half-space f."""
+    co, si, x, y = bodies.real[f, COS], bodies.real[f, SIN], bodies.real[f, SIZE], bodies.real[f, SIZE + 1]
+    return co * x - si * y, si * x + co * y
+
+
+@inner_kernel
+def two_discs(bodies: Bodies, f: int, s: int, reach: Any, near: Any, rows: Rows, feature: Array, c: int) -> Any:
+    """See `narrowphase.disc_disc`."""
+    dx, dy = bodies.pose[s, 0] - bodies.pose[f, 0], bodies.pose[s, 1] - bodies.pose[f, 1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    gap = distance - bodies.real[f, SIZE] - bodies.real[s, SIZE]
+    nx, ny = where(distance > 0.0, dx / distance, 1.0), where(distance > 0.0, dy / distance, 0.0)
+    share = share_of_gap(bodies, f, s)
+    here, far = bodies.real[f, SIZE] + share * gap, bodies.real[s, SIZE] + (1.0 - share) * gap
+    write(rows, c, f < s, (nx, ny), (here * nx, here * ny), (-far * nx, -far * ny), gap)
+    return settle_one(rows, feature, c, near & ~(gap > reach))
+
+
+@inner_kernel
 def two_boxes(bodies: Bodies, a: int, b: int, reach: Any, near: Any, rows: Rows, feature: Array, c: int) -> Any:
-    """Write the points of boxes a < b at rows c, c + 1; how many there are in each world, of those that are ``near``."""
+    """See `box_box.box_box`."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
     dy = bodies.pose[b, 1] - bodies.pose[a, 1]
     advantage = AXIS_ADVANTAGE * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
@@ -104,12 +159,9 @@ def face_vector(co: Any, si: Any, first: Any, length: Any, nx: Any, ny: Any) -> 
 def half_space_and_box(
     bodies: Bodies, f: int, s: int, reach: Any, near: Any, rows: Rows, feature: Array, c: int
 ) -> Any:
-    """See `narrowphase.half_space_box`; how many points there are in each world, of those that are ``near``."""
-    co, si = bodies.real[f, COS], bodies.real[f, SIN]
-    nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
-    ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
-    dx = bodies.pose[s, 0] - bodies.pose[f, 0]
-    dy = bodies.pose[s, 1] - bodies.pose[f, 1]
+    """See `narrowphase.half_space_box`."""
+    nx, ny = normal_of(bodies, f)
+    dx, dy = bodies.pose[s, 0] - bodies.pose[f, 0], bodies.pose[s, 1] - bodies.pose[f, 1]
     height = nx * dx + ny * dy - bodies.real[f, SIZE + 2]
     cs, ss = bodies.real[s, COS], bodies.real[s, SIN]
     along_x, along_y = nx * cs + ny * ss, ny * cs - nx * ss
@@ -123,7 +175,7 @@ def half_space_and_box(
         gap = height + along_x * qx + along_y * qy
         found = found[1], near & (gap <= reach)
         ax, ay = cs * qx - ss * qy, ss * qx + cs * qy
-        write(rows, c + end, near | ~near if f < s else near & ~near, (nx, ny), (dx + ax, dy + ay), (ax, ay), gap)
+        write(rows, c + end, f < s, (nx, ny), (dx + ax, dy + ay), (ax, ay), gap)
         feature[c + end] = where(qx > 0.0, 2.0, 0.0) + where(qy > 0.0, 1.0, 0.0)
     return settle(rows, feature, c, found[0], found[1])
 
@@ -136,6 +188,15 @@ def write(rows: Rows, c: int, ordered: Any, n: Any, at_f: Any, at_s: Any, gap: A
         rows.real[c, NX + k] = where(ordered, n[k], -n[k])
         rows.real[c, ARM_A + k] = where(ordered, at_f[k], at_s[k])
         rows.real[c, ARM_B + k] = where(ordered, at_s[k], at_f[k])
+
+
+@inner_kernel
+def settle_one(rows: Rows, feature: Array, c: int, there: Any) -> Any:
+    """Clear the point of row c where it is not ``there``; return how many there are."""
+    for k in GEOMETRY:
+        rows.real[c, k] = where(there, rows.real[c, k], 0.0)
+    feature[c] = where(there, 0.0, NONE)
+    return where(there, 1.0, 0.0)
 
 
 @inner_kernel
