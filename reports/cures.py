@@ -254,20 +254,20 @@ def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
 
 @dataclass(frozen=True)
 class Told:
-    """What is said of a cure, piece by piece; what does not apply is empty.
+    """Words about a fix, piece by piece; pieces that do not apply are empty.
 
     Parameters
     ----------
     settings
         Names and values in the engine's own words.
     check, at
-        The check that tells it, and its parameters.
+        The check that shows it, and its parameters.
     before, after, truth, unit
-        Its values; the truth only where it is neither 0 nor the value after.
+        Its values; the truth only if it is neither 0 nor the value after.
     left
         How many checks still fail.
     times
-        Cost in times of that before.
+        Cost relative to that before.
     """
 
     settings: list[tuple[str, str]]
@@ -282,7 +282,7 @@ class Told:
 
 
 def told(cure: Cure) -> Told:
-    """The pieces of which terminal and page say a cure."""
+    """The pieces from which terminal and page describe a fix."""
     before, after, truth = told_apart(cure.before, cure.after, cure.truth)
     return Told(
         changes_in_words(cure, cure.changes),

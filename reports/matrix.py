@@ -117,9 +117,9 @@ def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Profiles whose planar scenes leave the plane, number of cells, and the worst; one line, or none.
+    """Profiles whose planar scenes leave the plane, number of cases, and the worst; one line, or none.
 
-    All other rows of such a cell measure the motion in the plane only, even if they pass.
+    All other rows of such a case measure the motion in the plane only, even if they pass.
     """
     cells: dict[tuple[str, str], list[tuple[bool, float, str]]] = defaultdict(list)
     for row in rows:
@@ -138,9 +138,9 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:
     """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
 
-    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table. A profile
-    with settings of a user's own has a line for each of them where its name leaves no room for a scene. With ``roles``
-    what a profile is stands beside its first line, where its name does not say so.
+    Equal fields of both dimensions share a line. Scenes that do not fit beside each other make a further table. A
+    profile with a user's own settings has a line for each of them if its name leaves no room for a scene. With
+    ``roles`` the role of a profile follows its first line, unless its name says it.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
     body = list(_body(matrix, scenes, versions, roles))

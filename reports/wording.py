@@ -42,7 +42,7 @@ STATUS = {
 }  # fmt: skip
 
 
-#: What a profile is called for people, by its role.
+#: Name of a profile for people, by its role.
 ROLE_WORDS: dict[str, str] = {
     "shipped": "as shipped", "tuned": "tuned", "one": "compromise", "textbook": "textbook", "solution": "exact",
     "matched": "custom loop",
@@ -50,20 +50,20 @@ ROLE_WORDS: dict[str, str] = {
 
 
 def word_of(engine: str, profile: str) -> str:
-    """What a profile is called for people beside its name; empty where that is its name, or where it has no role."""
+    """Name of a profile for people, beside its own; empty if both are equal or it has no role."""
     told = facts(engine)
     word = ROLE_WORDS.get(told.roles.get(profile.partition("+")[0], "") if told else "", "")
     return "" if word == profile else word
 
 
 def roles_line(columns: Iterable[tuple[str, str]]) -> str:
-    """What the profiles of ``(engine, profile)`` are, in one line, where their names do not say so; else empty."""
+    """Roles of the profiles of ``(engine, profile)`` in one line, if their names do not say them; else empty."""
     named = {profile.partition("+")[0]: word for engine, profile in columns if (word := word_of(engine, profile))}
     return f"Profiles: {'; '.join(f'{name}: {word}' for name, word in named.items())}." if named else ""
 
 
 def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
-    """Profiles that words name on engines: by name, or by role (``shipped``, ``as shipped``); else the word itself."""
+    """Profiles on engines by name or by role (``shipped``, ``as shipped``); an unknown word stays itself."""
     roles = [told.roles for engine in engines if (told := facts(engine))]
     found: dict[str, None] = {}
     for word in words:
@@ -113,7 +113,7 @@ def at(out: Path | None, run: str = "") -> str:
 
 
 def profile_words(slot: Slot) -> list[str]:
-    """Words that ask for the profile of a slot, with the settings that replace its own."""
+    """Options that select the profile of a slot, with the settings that replace its own."""
     sets = [word for name, value in slot.switched for word in ("--set", f"{name}={text_of(value)}")]
     return ["--profile", slot.base, *sets]
 

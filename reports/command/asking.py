@@ -26,7 +26,7 @@ from validation.posed import resolve
 from validation.settings.cures import Cure, cures_of
 from validation.settings.switching import Reading
 
-#: Scenes that are named beside the best one.
+#: Largest number of scenes that are named beside the best one.
 OTHERS = 3
 
 
@@ -135,7 +135,7 @@ def _show(found: list[Finding], commands: bool) -> None:
 
 
 def _broken(source: str, width: int) -> str:
-    """``owner/repository#number``, on two lines if it is wider than its column: a number in halves finds nothing."""
+    """``owner/repository#number``, on two lines if it is wider than its column: half a number cannot be searched."""
     return source if len(source) < width else source.replace("/", "/\n", 1)
 
 

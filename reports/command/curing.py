@@ -1,4 +1,4 @@
-"""``cure``: which stock settings mend what an engine gets wrong on a scene, and at what cost."""
+"""``cure``: stock settings that fix the errors of an engine on a scene, and their cost."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def cure(
     `explain` and the report.
     """
     if profile_of(engine, "shipped") is None:
-        load(engine)  # says that there is no such engine, if so
+        load(engine)  # raises if there is no such engine
         raise EngineError(f"cure: {engine} has no profile as shipped that could be fixed")
     version = load(engine).version()
     names = scene_names_of(scenes)
@@ -87,7 +87,7 @@ def cure(
 
 
 def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
-    """Write the table after every scene: a search of all takes long, and what is found is not lost."""
+    """Write the table after every scene: a search of all takes long and may be interrupted."""
     folder = folder_of(engine)
     if folder is None:
         raise EngineError(f"cure: {engine} has no folder of its own to keep {CURES} in")

@@ -1,4 +1,4 @@
-"""``certify --random N``: random scenes against variants of themselves, in processes that may hang or die."""
+"""``certify --random N``: compares random scenes with variants of themselves, in processes that may hang or die."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ from adapters.isolation import Child, Lost
 from reference_solver.verification.fuzz.trial import attack
 from reports.wording import number
 
-#: Processes side by side, and seconds that one scene may take: compiling kernels is part of the first.
+#: Number of processes, and time limit for a scene [s], which for the first one includes compilation.
 WORKERS, LIMIT = 2, 900.0
-#: What a process says once it has imported us, and seconds until then, on a busy machine and a cold disk.
+#: Message of a process that has imported our packages, and time limit for it [s]: enough on a busy machine with a cold
+#: disk.
 READY, START = b"ready", 120.0
-#: Seeds that a line names.
+#: Largest number of seeds in a line.
 NAMED = 6
-#: Distance from runs with other steps beyond which a refused answer counts as wrong, not only as refused [m].
+#: Distance from runs with other steps beyond which a refused result counts as wrong [m].
 WRONG = 1e-6
 
-#: Seed, dimension and, unless any scene will do, the kind that is drawn.
+#: Seed, dimension, and optionally the kind of scene that is drawn.
 Job = tuple[int, int] | tuple[int, int, str]
 
 
@@ -42,7 +43,7 @@ class _Seat:
 
 
 def serve(connection: Connection) -> None:
-    """Attack one scene after the other until the other end closes."""
+    """Compare one scene after the other until the other end closes."""
     connection.send_bytes(READY)
     while True:
         try:
@@ -51,7 +52,7 @@ def serve(connection: Connection) -> None:
             return
         try:
             answer = attack(seed, dimension, *kind).as_dict()
-        except Exception as error:  # a scene that breaks the solver is a find like any other
+        except Exception as error:  # a scene that breaks the solver is a result too
             answer = {"seed": seed, "dimension": dimension, "broken": said_by(error)}
         connection.send_bytes(json.dumps(answer).encode())
 
@@ -59,7 +60,7 @@ def serve(connection: Connection) -> None:
 def show_random(
     console: Console, as_json: bool, count: int, seed: int, dimensions: Sequence[int], chains: bool = False
 ) -> int:
-    """Print what became of random scenes; 1 if one is certified and differs, or has no answer, else 0."""
+    """Print the results of random scenes; return 1 for a certified one that differs or a missing one, else 0."""
     found: list[dict[str, Any]] = []
     seeds = range(seed, seed + count)
     jobs: list[Job] = [(s, d, "chains") if chains else (s, d) for d in dimensions for s in seeds]
@@ -77,7 +78,7 @@ def show_random(
 
 
 def attacked(jobs: Sequence[Job], limit: float = LIMIT) -> Iterator[dict[str, Any]]:
-    """Yield what became of each scene (seed, dimension), in the order in which they end."""
+    """Yield the result of each scene (seed, dimension) as soon as it ends."""
     waiting, seats = deque(jobs), [_Seat() for _ in range(min(WORKERS, len(jobs)))]
     try:
         while True:
@@ -110,12 +111,12 @@ def attacked(jobs: Sequence[Job], limit: float = LIMIT) -> Iterator[dict[str, An
 
 
 def _started() -> Child:
-    """Return a process that is ready; its scenes' clocks start then.
+    """Return a process that is ready, so that the time limits of its scenes do not include its start.
 
     Raises
     ------
     Lost
-        If it does not even start.
+        If it does not start.
     """
     child = Child(serve)
     child.receive(START)
@@ -123,7 +124,7 @@ def _started() -> Child:
 
 
 def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
-    """Print one dimension; how many of its scenes are defects."""
+    """Print the results of one dimension; return the number of defects."""
     broken = [answer for answer in found if "broken" in answer]
     made = [answer for answer in found if "broken" not in answer]
     held = [answer for answer in made if answer["certified"]]
@@ -153,7 +154,7 @@ def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> 
 
 
 def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
-    """What refused, most frequent first; of each condition how many scenes it refused alone, and which were wrong."""
+    """Conditions that refused scenes, most frequent first: scenes, those refused by it alone, and wrong ones."""
     scenes: dict[str, list[dict[str, Any]]] = defaultdict(list)
     alone: Counter[str] = Counter()
     for answer in refused:
@@ -179,7 +180,7 @@ def _tenth(values: Any) -> float:
 
 
 def _finite(value: Any) -> Any:
-    """JSON has no nan and no infinity: null."""
+    """Value with null for nan and infinity, which JSON does not have."""
     if isinstance(value, dict):
         return {k: _finite(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""``merge``, ``prune``: results of several machines, and results that may go."""
+"""``merge`` and ``prune``: join results of several machines, delete old ones."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
     """
     told = {}
     for source in sources:
-        Store(source, create=False).close()  # all of them must be there before the first is merged
+        Store(source, create=False).close()  # all must exist before the first is merged
     store = Store(out)
     try:
         for source in sources:

@@ -1,4 +1,4 @@
-"""``bench --piles``: what a step of a pile costs, cut at events and fixed, over the number of bodies."""
+"""``bench --piles``: cost of a step in a pile, cut at events or fixed, over the number of bodies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from validation.bench.statistics import Fit, Spread
 
 
 def show_piles(console: Console, as_json: bool, most: int, seed: int) -> None:
-    """Clock piles of all kinds with up to ``most`` bodies and print cost, ratio and exponents."""
+    """Time piles of all kinds with up to ``most`` bodies; print cost, ratio and exponents."""
     found: list[Lap] = []
     for kind in KINDS:
         for lap in laps(kind, most, seed):
@@ -37,7 +37,7 @@ def _costs(told: list[Row]) -> Table:
     for heading in ("pile", "bodies"):
         table.add_column(heading, no_wrap=True)
     for heading in ("located", "fixed_step", "ratio"):
-        table.add_column(heading)  # an interval goes below its median where there is no room beside it
+        table.add_column(heading)  # without room beside its median, an interval is below it
     for row in told:
         seconds = (_seconds(row.reference), _seconds(row.fixed_step))
         ratio = f"{row.ratio.median:.2g} [{row.ratio.low:.2g}, {row.ratio.high:.2g}]"

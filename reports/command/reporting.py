@@ -1,4 +1,4 @@
-"""``report``, ``dashboard``, ``bundle``: a page about a run, a page about all, and everything as one archive."""
+"""``report``, ``dashboard``, ``bundle``: a page about one run, a page about all runs, and a run as one archive."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
 
 
 def _made(commits: Sequence[str]) -> str:
-    """At which commits what is shown was run, oldest first; nothing outside a checkout."""
+    """Commits of the shown runs, oldest first; empty outside a checkout."""
     known = list(dict.fromkeys(filter(None, commits)))
     if len(known) <= 1:
         return "".join(f" of commit {name}" for name in known)
@@ -116,7 +116,7 @@ def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
 
 @contextmanager
 def extra(command: str, name: str = "report") -> Iterator[None]:
-    """Say how to get what is missing: libraries that only some commands need are extras."""
+    """Turn a missing library of an extra into an error that says how to install it."""
     try:
         yield
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""``bench --targets``: how many times as fast as each engine, at 10 sweeps and at equal error, against what is owed."""
+"""``bench --targets``: ratios of time to each engine, at 10 sweeps and at equal error, with floors and targets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HEADINGS = (
     ("against", " ratio at", " ratio at", "our", "our error", "their error", "floor/", ""),
     ("", " 10 sweeps", " equal error", "sw.", "(10 sweeps)", "(10 sweeps)", "target", ""),
 )
-#: Errors are shown in thousandths of these.
+#: Units with a prefix: errors are shown in thousandths.
 SMALL = {"m": "mm", "J": "mJ"}
 KEY = """\
 Ratio: their CPU time of a step over ours in the same round, median [95 % interval]; above 1 ours
@@ -47,7 +47,7 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
     Raises
     ------
     SceneError
-        For a scene that the table does not have.
+        For a scene that is not in the table.
     """
     asked = _chosen(targets.table(), scenes)
     seed = seed if seed is not None else random.SystemRandom().randrange(10**6)
@@ -70,7 +70,7 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
 
 
 def _chosen(asked: Table, scenes: Sequence[str]) -> Table:
-    """Only the rows of ``scenes``, of all where none is named."""
+    """The table with only the rows of ``scenes``; all if none is named."""
     known = list(dict.fromkeys(case.scene for case in asked.cases))
     for name in scenes:
         if name not in known:
@@ -85,7 +85,7 @@ def _absent(asked: Table) -> dict[str, str]:
 
 
 def _lead(out: Path, asked: Table) -> list[Row]:
-    """The row that is read from the newest benchmark in ``out``, if there is one."""
+    """The row that is computed from the newest benchmark in ``out``, if there is one."""
     try:
         store = Store(out, create=False)
     except MissingError:
@@ -118,7 +118,7 @@ def _line(cells: Sequence[Any]) -> str:
 
 
 def _names(rows: Sequence[Row]) -> str:
-    """Names of a scene's errors with the units that they are shown in; of the share what it is a share of."""
+    """Names of a scene's errors with their shown units; for the share of levels the numbers behind it."""
     counts = rows[0].counts
     if "levels" in counts:
         return f": {counts['ahead']} of {counts['levels']}; {counts['only_ours']} more are reached by ours only"
@@ -133,7 +133,7 @@ def _parts(name: str) -> tuple[str, str]:
 
 
 def _cells(pair: Mapping[str, Row]) -> list[str]:
-    """Cells of one opponent from its rows by what they compare at."""
+    """Columns of one opponent, from its rows by way of comparison."""
     first = next(iter(pair.values()))
     judged = next((row for row in pair.values() if row.floor is not None), first)
     errors = pair.get(AT_SWEEPS, first)

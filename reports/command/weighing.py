@@ -1,4 +1,4 @@
-"""``residuals``: how far the impulses that engines report break the laws of contact."""
+"""``residuals``: violations of the laws of contact by the impulses that engines report."""
 
 from __future__ import annotations
 
