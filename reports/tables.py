@@ -195,7 +195,7 @@ def _measured(row: Plain) -> str:
 
 
 def _said_of(fact: Plain) -> str:
-    """The cell that shows a fact with its number, the test that asserts it, or the reason for neither."""
+    """The case that shows a fact with its number, the test that asserts it, or the reason for neither."""
     chosen = f"; chosen afterwards: {fact['chosen']}" if fact["chosen"] else ""
     if not fact["scene"]:
         return str(fact["test"] or fact["unasked"]) + chosen
@@ -272,7 +272,7 @@ def health(data: Plain, console: Console) -> None:
 def sensitivity(
     entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], blind: Sequence[BlindSpot], console: Console
 ) -> None:
-    """Print the size from which each check and receipt notices a planted fault, faults noticed by no check, and why."""
+    """Print the smallest planted fault that each check or property check notices; unnoticed faults with reasons."""
     table = grid("check or property check", "smallest fault that it notices")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]

@@ -96,7 +96,7 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     """Command that runs exactly this slot."""
     words = ["crosscheck", "run", slot["scene"]]
     first = resolve(slot["scene"]).parameters[:1]
-    # A parameter selects one cell instead of the suite's variations, so one is always given.
+    # A parameter selects one case instead of the suite's variations, so one is always given.
     for name, value in (slot["params"] or {p.name: p.default for p in first}).items():
         words += ["--param", f"{name}={value:.17g}" if float(f"{value:.12g}") != value else f"{name}={value:.12g}"]
     words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], *profile_words(slot_from_dict(slot))]
@@ -137,7 +137,7 @@ def measured(row: Mapping[str, Any], digits: int = 4) -> str:
 
 
 def missing_text(missing: int, planned: int) -> str:
-    """Text for a run with missing cells."""
+    """Text for a run with missing cases."""
     return (
         f"{missing} of {planned} planned cases have no result and are left out here. The command that started the "
         "run resumes it."

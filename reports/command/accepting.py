@@ -1,4 +1,4 @@
-"""``accept``: shows how a run would change the list of known failures, cause by cause, and asks for each reason."""
+"""``accept``: shows how a run would change the list of known failures, cause by cause, and prompts for reasons."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     units in the last place; if the scatter is too wide to notice an improvement, from twelve more.
 
     The command shows the causes whose lists would change. Those named by --family are accepted. On a terminal you are
-    asked about the others; without a terminal they stay as they are. Refused are checks that a law of the engine should
-    predict and does not, cases whose property checks fail, and failures of an exact profile. What did not run stays
-    as it is.
+    asked about the others; without a terminal they stay as they are. The command refuses checks that a law of the
+    engine should predict and does not, cases whose property checks fail, and failures of an exact profile. It changes
+    no entry of a case that did not run.
 
     Exits with 1 if a check is refused, a changed cause is not accepted, or another check is new or changed. Read the
     diff before you commit it: a known failure is listed to be shown, not to be hidden.
@@ -66,7 +66,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     registry.find(engine)
     console = terminal(stderr=True)
     findings = findings_of(engine)
-    about = _about(families, findings)
+    about = _selection(families, findings)
     rows, draws = _rows_with_scatter(out, run, engine, jobs, console, about)
     proposal = propose(rows, engine, findings, about, draws)
     unknown = set(families) - {change.family.id for change in proposal.changes}
@@ -85,9 +85,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     left = [change.family.id for change in changed if change.family.id not in chosen]
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
-        said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
+        result = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
         counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
-        click.echo(json.dumps({**said, **counts, "not_accepted": left}, indent=1))
+        click.echo(json.dumps({**result, **counts, "not_accepted": left}, indent=1))
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
         click.echo(f"{engine}: {counted} listed in {folder / MEMBERS}")
@@ -99,7 +99,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
 
 
-def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
+def _selection(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
     """Rows to list: all on a terminal; without one, those of the named causes, if any are named."""
     chosen = set(families)
     if findings is None or not chosen or not chosen <= set(findings.families) or _on_a_terminal():

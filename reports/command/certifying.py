@@ -122,9 +122,9 @@ def show_orders(console: Console, as_json: bool) -> None:
 def show_self_test(console: Console, as_json: bool) -> int:
     """Print which planted corruptions are noticed at which size; return 1 if too few are at the judged size, else 0."""
     with console.status("planting corruptions"):
-        made = list(trials())
+        found = list(trials())
     if as_json:
-        rows = [(trial.corruption, trial.size, trial.seen) for trial in made]
+        rows = [(trial.corruption, trial.size, trial.seen) for trial in found]
         plain = [
             {"family": c.family, "corruption": c.name, "scene": c.scene, "size": size, "caught": bool(seen), "by": seen}
             for c, size, seen in rows
@@ -133,12 +133,12 @@ def show_self_test(console: Console, as_json: bool) -> int:
     table = Table(title="Planted corruptions: noticed by", title_justify="left")
     for heading in ("family", "what is corrupted", "scene", *(f"{size:g}" for size in SIZES), "where missed"):
         table.add_column(heading)
-    for corruption, group in groupby(made, lambda trial: trial.corruption):
+    for corruption, group in groupby(found, lambda trial: trial.corruption):
         seen = [trial.seen[0] if trial.seen else "MISSED" for trial in group]
         why = corruption.missed if "MISSED" in seen else ""
         table.add_row(corruption.family, corruption.name, corruption.scene, *seen, why)
     console.print(table)
-    judged = [trial for trial in made if trial.size == JUDGED]
+    judged = [trial for trial in found if trial.size == JUDGED]
     caught = sum(bool(trial.seen) for trial in judged)
     console.print(f"{caught} of {len(judged)} noticed at size {JUDGED:g}, {PROMISED:.0%} required")
     for trial in judged:

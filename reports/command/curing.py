@@ -139,5 +139,5 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
 
 
 def _alternatives(found: Cure) -> str:
-    told = (changes_in_words(found, each) for each in found.others)
-    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in told)
+    texts = (changes_in_words(found, each) for each in found.others)
+    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in texts)

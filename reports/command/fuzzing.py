@@ -36,7 +36,7 @@ Job = tuple[int, int] | tuple[int, int, str]
 
 
 @dataclass
-class _Seat:
+class _Worker:
     child: Child | None = None
     job: Job | None = None
     until: float = 0.0
@@ -73,41 +73,45 @@ def show_random(
         click.echo(json.dumps([{k: _finite(v) for k, v in answer.items()} for answer in found], indent=1))
     bad = 0
     for d in dimensions:
-        bad += _tell(console, d, [answer for answer in found if answer["dimension"] == d])
+        bad += _print_results(console, d, [answer for answer in found if answer["dimension"] == d])
     return 1 if bad else 0
 
 
 def attacked(jobs: Sequence[Job], limit: float = LIMIT) -> Iterator[dict[str, Any]]:
     """Yield the result of each scene (seed, dimension) as soon as it ends."""
-    waiting, seats = deque(jobs), [_Seat() for _ in range(min(WORKERS, len(jobs)))]
+    waiting, workers = deque(jobs), [_Worker() for _ in range(min(WORKERS, len(jobs)))]
     try:
         while True:
-            for seat in seats:
-                if seat.job is None and waiting:
-                    seat.child = seat.child or _started()
-                    seat.job, seat.until = waiting.popleft(), time.monotonic() + limit
-                    seat.child.send(json.dumps(seat.job).encode())
-            busy = [(seat, seat.child, seat.job) for seat in seats if seat.child is not None and seat.job is not None]
+            for worker in workers:
+                if worker.job is None and waiting:
+                    worker.child = worker.child or _started()
+                    worker.job, worker.until = waiting.popleft(), time.monotonic() + limit
+                    worker.child.send(json.dumps(worker.job).encode())
+            busy = [
+                (worker, worker.child, worker.job)
+                for worker in workers
+                if worker.child is not None and worker.job is not None
+            ]
             if not busy:
                 return
             watched = [item for _, child, _ in busy for item in child.sentinels]
-            wait(watched, max(0.0, min(seat.until for seat, _, _ in busy) - time.monotonic()))
-            for seat, child, job in busy:
-                late = time.monotonic() > seat.until
+            wait(watched, max(0.0, min(worker.until for worker, _, _ in busy) - time.monotonic()))
+            for worker, child, job in busy:
+                late = time.monotonic() > worker.until
                 if child.has_answer() or child.ended() or late:
                     try:
                         answer = json.loads(child.receive(0.0))
                     except Lost as lost:
                         child.stop()
-                        seat.child = None
+                        worker.child = None
                         why = f"no answer after {limit:g} s" if late else str(lost)
                         answer = {"seed": job[0], "dimension": job[1], "broken": why}
-                    seat.job = None
+                    worker.job = None
                     yield answer
     finally:
-        for seat in seats:
-            if seat.child is not None:
-                seat.child.stop()
+        for worker in workers:
+            if worker.child is not None:
+                worker.child.stop()
 
 
 def _started() -> Child:
@@ -123,24 +127,26 @@ def _started() -> Child:
     return child
 
 
-def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
+def _print_results(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
     """Print the results of one dimension; return the number of defects."""
     broken = [answer for answer in found if "broken" in answer]
-    made = [answer for answer in found if "broken" not in answer]
-    held = [answer for answer in made if answer["certified"]]
-    refused = [answer for answer in made if not answer["certified"]]
-    differs = [answer for answer in held if answer["defects"]]
+    answered = [answer for answer in found if "broken" not in answer]
+    certified = [answer for answer in answered if answer["certified"]]
+    refused = [answer for answer in answered if not answer["certified"]]
+    differs = [answer for answer in certified if answer["defects"]]
     console.print(
-        f"{dimension}-D: {len(found)} scenes, {len(held)} certified, {len(refused)} refused, "
+        f"{dimension}-D: {len(found)} scenes, {len(certified)} certified, {len(refused)} refused, "
         f"{len(differs)} certified but different from a variant, {len(broken)} without an answer"
     )
-    if held:
-        bounds, off = (np.array([answer[name] for answer in held]) for name in ("bound", "off"))
-        share = off / bounds
-        told = f"bound X of the certified [m]: half below {np.median(bounds):.1e}, nine tenths {_tenth(bounds):.1e}"
-        console.print(f"{told}, all {bounds.max():.1e}")
-        told = f"farthest variant over X: half below {np.median(share):.2g}, nine tenths {_tenth(share):.2g}"
-        console.print(f"{told}, all {share.max():.2g}")
+    if certified:
+        bounds, distances = (np.array([answer[name] for answer in certified]) for name in ("bound", "off"))
+        share = distances / bounds
+        text = (
+            f"bound X of the certified [m]: half below {np.median(bounds):.1e}, nine tenths {_ninth_decile(bounds):.1e}"
+        )
+        console.print(f"{text}, all {bounds.max():.1e}")
+        text = f"farthest variant over X: half below {np.median(share):.2g}, nine tenths {_ninth_decile(share):.2g}"
+        console.print(f"{text}, all {share.max():.2g}")
     if refused:
         console.print(_refusals(refused))
     for answer in differs:
@@ -175,7 +181,7 @@ def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def _tenth(values: Any) -> float:
+def _ninth_decile(values: Any) -> float:
     return float(np.quantile(values, 0.9))
 
 

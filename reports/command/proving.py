@@ -70,18 +70,18 @@ def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
 
 def lines(proof: Proof) -> list[Text]:
     """One experiment as text: its cause, the check before and after, changes without effect, the command to run it."""
-    slot, told = proof.before.slot, proof.experiment
+    slot, experiment = proof.before.slot, proof.experiment
     where = f"{proof.engine}/{slot.profile} {slot.scene} {slot.dimension}-D {params_text(dict(slot.params))}".strip()
     where += f" at {slot.iterations} iterations" if slot.iterations is not None else ""
     mark = "PROVEN" if proof.holds else "NOT PROVEN"
-    said = [Text(f"{mark}  {told.family}: {told.says}"), Text(f"  {where}: {_value(proof.before)}")]
-    said.append(Text(f"    with {_changes(told.off)}: {_value(proof.after)}"))
-    for change, each in zip(told.idle, proof.idle, strict=True):
-        said.append(Text(f"    with {_changes(change)} alone: {_value(each)}"))
+    found = [Text(f"{mark}  {experiment.family}: {experiment.says}"), Text(f"  {where}: {_value(proof.before)}")]
+    found.append(Text(f"    with {_changes(experiment.off)}: {_value(proof.after)}"))
+    for change, each in zip(experiment.idle, proof.idle, strict=True):
+        found.append(Text(f"    with {_changes(change)} alone: {_value(each)}"))
     if not proof.holds:
-        said.append(Text(f"    {proof.why_not}"))
-    said.append(Text(f"    {reproduce(slot.as_dict())}"))
-    return said
+        found.append(Text(f"    {proof.why_not}"))
+    found.append(Text(f"    {reproduce(slot.as_dict())}"))
+    return found
 
 
 def _changes(changes: Any) -> str:

@@ -100,17 +100,17 @@ def releases(
         raise SceneError("releases: name an engine and its releases, such as: crosscheck releases ENGINE 3.0.0..3.2.7")
     asked, wanted, effort, console = _prepared(engine, which, options, out)
     store = Store(out)
-    told = [_drive(store, release, wanted, effort, console, times) for release in asked]
-    told = _with_floors(store, asked, wanted, told, effort, console)
+    results = [_drive(store, release, wanted, effort, console, times) for release in asked]
+    results = _with_floors(store, asked, wanted, results, effort, console)
     store.close()
-    moved = history.steps(told)
+    moved = history.steps(results)
     if as_json:
-        click.echo(rendering.as_json(told, moved))
+        click.echo(rendering.as_json(results, moved))
     elif markdown:
-        click.echo(rendering.as_markdown(told, moved), nl=False)
+        click.echo(rendering.as_markdown(results, moved), nl=False)
     else:
-        rendering.as_text(told, moved, terminal(), out)
-    sys.exit(statuses.INCOMPLETE if any(each.reason for each in told) else statuses.FINE)
+        rendering.as_text(results, moved, terminal(), out)
+    sys.exit(statuses.INCOMPLETE if any(each.reason for each in results) else statuses.FINE)
 
 
 def _prepared(
@@ -166,14 +166,14 @@ def _with_floors(
     store: Store,
     asked: Sequence[Release],
     wanted: Sequence[Slot],
-    told: Sequence[history.Told],
+    results: Sequence[history.Told],
     effort: Effort,
     console: Console,
 ) -> list[history.Told]:
     """Results of releases, with the noise floors of all values that changed between them."""
-    starts, out = moved_starts(told), []
+    starts, out = moved_starts(results), []
     again = replace(effort, fresh=False)  # results of a moment ago are stored
-    for release, before in zip(asked, told, strict=True):
+    for release, before in zip(asked, results, strict=True):
         if release.version in starts:
             before = _drive(store, release, [*wanted, *starts[release.version]], again, console)
         out.append(before)
@@ -195,8 +195,8 @@ def bisect_(
     """Find the release that changed a check.
 
     Searches the releases A to B of ENGINE for the one in which CHECK of SCENE begins or ceases to fail, or changes by
-    more than its noise. Of several cases the one with the largest change is followed. Of n releases log2(n) run; those
-    whose results are in OUT do not run again. Exits with 4 if A or B cannot run.
+    more than its noise. If there are several cases, it follows the one with the largest change. It runs log2(n) of n
+    releases, and none whose results are in OUT already. Exits with 4 if A or B cannot run.
     """
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     store = Store(out)

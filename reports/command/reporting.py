@@ -62,8 +62,8 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
 def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None:
     """Write one HTML page about all runs and releases.
 
-    The page shows errors, times, and where they moved, for all runs in OUT. Runs are judged once; what was judged is
-    kept beside the results.
+    The page shows errors, times, and where they moved, for all runs in OUT. Each run is judged once; its
+    verdicts are stored beside the results.
     """
     path = writable(output or out / "dashboard.html", "output")
     with extra("dashboard"):
@@ -80,8 +80,8 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(render(found, f"{plural(len(found), 'panel')}{made}", reports), encoding="utf-8")
     moved = sum(len(events(panel)) for panel in found)
-    told = {"path": str(path), "panels": len(found), "moved": moved}
-    click.echo(json.dumps(told) if as_json else str(path))
+    result = {"path": str(path), "panels": len(found), "moved": moved}
+    click.echo(json.dumps(result) if as_json else str(path))
     if show and not webbrowser.open(path.resolve().as_uri()):
         click.echo(f"crosscheck: open: no browser was found; the dashboard is {path}", err=True)
 

@@ -172,7 +172,7 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
         if not line.strip():
             continue
         try:
-            if batch and _handed(line):
+            if batch and _has_scene_texts(line):
                 continue
             cells.setdefault(_slot(line), number)
         except (SceneError, EngineError) as error:
@@ -193,7 +193,7 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     sys.exit(statuses.WRONG_CALL if wrong else statuses.INCOMPLETE if left else statuses.FINE)
 
 
-def _handed(line: str) -> bool:
+def _has_scene_texts(line: str) -> bool:
     """Whether a line contains texts of scene files, which are then known."""
     if not line.lstrip().startswith('{"scenes"'):
         return False

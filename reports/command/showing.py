@@ -139,8 +139,8 @@ def _opened(out: Path) -> Iterator[Store]:
 
 def _kept(store: Store, run: str) -> Kept:
     chosen = store.run(run)
-    told = which(store, chosen, run)
-    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), told)
+    shown = which(store, chosen, run)
+    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), shown)
 
 
 def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
@@ -336,9 +336,9 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
     with the largest error there; SCENE may be a scene file, by its path or its name. With --set, PROFILE has these
     settings of your own. RUN is an id that `list runs` prints; the latest by default.
     """
-    asked, row = row, _with_own(row, set)
+    asked, row = row, _with_settings(row, set)
     kept = observed(out, named or run)
-    observations = _where(kept.observations, row)
+    observations = _needed(kept.observations, row)
     rows = judged(kept.run, observations)
     try:
         found = find_row(rows, row)
@@ -368,7 +368,7 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
             )
         )
         return
-    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, again, terminal())
+    _print_explanation(found, _out_of_plane_text(rows, found), better, (paste, said), differing, again, terminal())
 
 
 def explanation(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain, again: str) -> str:
@@ -376,11 +376,11 @@ def explanation(rows: Sequence[Plain], observations: Sequence[Observation], row:
     better, paste, said, differing = _cure(rows, observations, row)
     console = terminal(width=TEXT)
     with console.capture() as captured:
-        _print_explanation(row, _beside_the_plane(rows, row), better, (paste, said), differing, again, console)
+        _print_explanation(row, _out_of_plane_text(rows, row), better, (paste, said), differing, again, console)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
-def _with_own(row: str, sets: Sequence[str]) -> str:
+def _with_settings(row: str, sets: Sequence[str]) -> str:
     """The row's name, in which the profile has these settings.
 
     Raises
@@ -408,7 +408,7 @@ def _check_own(row: str, sets: Sequence[str], scenes: Collection[str]) -> None:
         slots(Request((named["scene"],), (named["engine"],), (named["profile"],), sets=given(sets)))
 
 
-def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
+def _needed(observations: Sequence[Observation], name: str) -> list[Observation]:
     """Observations that have to be judged to find the row ``name``: all profiles of its engine on its scene.
 
     Raises
@@ -461,14 +461,14 @@ def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
 
 def ids_of(observations: Sequence[Observation]) -> Iterator[tuple[str, Slot]]:
     """Id and slot of every row that judging the observations would give."""
-    owed: dict[Any, list[str]] = {}
+    metrics: dict[Any, list[str]] = {}
     for observation in observations:
         slot = observation.slot
-        asked = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
-        if asked not in owed:
-            owed[asked] = [check.metric for check in checks_of(observation)[1]]
+        key = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
+        if key not in metrics:
+            metrics[key] = [check.metric for check in checks_of(observation)[1]]
         plain = slot.as_dict()
-        for metric in () if slot.ulp else owed[asked]:
+        for metric in () if slot.ulp else metrics[key]:
             yield row_id({"slot": plain, "metric": metric}), slot
     for study in results(observations):
         yield row_id({"slot": study.slot.as_dict(), "metric": study.check.metric}), study.slot
@@ -526,7 +526,7 @@ def _why(change: Change) -> str:
     return f"{change.because}; {change.role}" if change.role else change.because
 
 
-def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
+def _out_of_plane_text(rows: Sequence[Plain], row: Plain) -> str:
     """Distance by which the case of a row leaves its plane, if it does: the row sees only the motion in the plane."""
     if row["metric"] == OUT_OF_PLANE:
         return ""

@@ -61,8 +61,8 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
     protocol = {"seed": seed, "machine": machine(), "load_before": load, "load_after": os.getloadavg()}
     protocol["versions"] = {name: registry.find(name).version for name in [registry.solver(), *asked.opponents]}
     if as_json:
-        told = [{**asdict(row), "mark": row.mark} for row in rows]
-        click.echo(json.dumps({"protocol": protocol, "rows": told}, indent=1, allow_nan=False))
+        plain = [{**asdict(row), "mark": row.mark} for row in rows]
+        click.echo(json.dumps({"protocol": protocol, "rows": plain}, indent=1, allow_nan=False))
         return
     for line in lines(rows):
         click.echo(line)
@@ -99,14 +99,14 @@ def _lead(out: Path, asked: Table) -> list[Row]:
 
 def lines(rows: Sequence[Row]) -> list[str]:
     """The table as text: a line for each scene with the names of its errors, below it a line for each opponent."""
-    told = [*map(_line, HEADINGS), "-" * (sum(WIDTHS) + len(WIDTHS) - 1)]
+    table = [*map(_line, HEADINGS), "-" * (sum(WIDTHS) + len(WIDTHS) - 1)]
     for scene, those in groupby(rows, lambda row: row.scene):
         members = list(those)
-        told.append(f"{scene}{_names(members)}")
+        table.append(f"{scene}{_names(members)}")
         for _, pair in groupby(members, lambda row: row.against):
-            told.append(_line(_cells({row.at: row for row in pair})))
+            table.append(_line(_cells({row.at: row for row in pair})))
     profiles = dict.fromkeys(row.against for row in rows if "/" in row.against)
-    return [*told, "", *KEY.splitlines(), f"Profiles: {', '.join([_ours(), *profiles])}"]
+    return [*table, "", *KEY.splitlines(), f"Profiles: {', '.join([_ours(), *profiles])}"]
 
 
 def _ours() -> str:
@@ -145,7 +145,7 @@ def _cells(pair: Mapping[str, Row]) -> list[str]:
         f"x{equal.sweeps}" if equal and equal.sweeps else "",
         _errors(errors.our_error),
         _errors(errors.their_error),
-        _owed(judged),
+        _floor_and_target(judged),
         MARKS.get(judged.mark, judged.mark),
     ]
 
@@ -170,7 +170,7 @@ def _errors(errors: Mapping[str, float]) -> str:
     return ", ".join(shown)
 
 
-def _owed(row: Row) -> str:
+def _floor_and_target(row: Row) -> str:
     if row.floor is None:
         return ""
     if row.at == AT_END:

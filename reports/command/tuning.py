@@ -72,11 +72,11 @@ def tune(
     found = []
     for name in group or groups():
 
-        def said(changes: Mapping[str, Any], score: Score) -> None:
+        def print_trial(changes: Mapping[str, Any], score: Score) -> None:
             console.print(f"  {_text(changes)}: {_score(score)}", markup=False, highlight=False, style="dim")
 
         console.print(f"{engine}/{profile} on {name}", markup=False, highlight=False)
-        result = search(engine, profile, name, jobs, dimensions, said)
+        result = search(engine, profile, name, jobs, dimensions, print_trial)
         found.append(result)
         for line in _lines(result):
             console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -45,22 +45,22 @@ _CONFIG: dict[str, Any] = {
     "rule": {"color": "currentColor"},
 }  # fmt: skip
 #: Parts that screen readers skip, because a chart is a picture with one name, and attributes that are defaults of SVG.
-_UNREAD = re.compile(
+_SKIPPED = re.compile(
     r' (?:class|role|aria-hidden|aria-roledescription|pointer-events|stroke-miterlimit|font-family)="[^"]*"'
     r'| (?:opacity|fill-opacity|stroke-width)="1"| transform="translate\(0,0\)"| aria-label="[XY]-axis[^"]*"'
     r'|<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>'
 )
 #: Attributes with places and lengths; tenths of a pixel are visible, smaller digits are not.
-_PLACE = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
-_LONG = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
+_PLACES = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
+_DIGITS = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
 
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
     spec = chart.to_dict(validate=False)  # validation takes a tenth of a second each; a wrong one would not draw
     spec["config"] = _CONFIG
-    text = _UNREAD.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
-    text = _PLACE.sub(lambda place: _LONG.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
+    text = _SKIPPED.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
+    text = _PLACES.sub(lambda place: _DIGITS.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
     return Markup(text.replace("<svg", f'<svg role="img" aria-label="{Markup.escape(title)}"', 1))
 
 

@@ -108,8 +108,8 @@ def speed(source: Source) -> Speed | None:
 
 def _timed(source: Source, tables: Mapping[str, pd.DataFrame]) -> list[tuple[str, str]]:
     """Timed columns of the page, in its order: profiles without a rank run, but are not timed."""
-    told = [tables[name] for name in ("work_points", "scaling") if len(tables[name])]
-    timed = {who for table in told for who in zip(table["engine"], table["profile"], strict=True)}
+    timed_tables = [tables[name] for name in ("work_points", "scaling") if len(tables[name])]
+    timed = {who for table in timed_tables for who in zip(table["engine"], table["profile"], strict=True)}
     return [column for column in source.columns if column in timed]
 
 
@@ -301,14 +301,14 @@ def _overhead(table: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> Sequen
 def _protocol(bench: Bench) -> list[tuple[str, str]]:
     """The stored protocol, one line each, with nested tables flattened; headline errors are in the scenes' sections."""
     kept = {k: v for k, v in bench.protocol.items() if k != "primary" and v not in (None, "", [], {})}
-    return [(name.replace("_", " "), _said(value)) for name, value in kept.items()]
+    return [(name.replace("_", " "), _as_text(value)) for name, value in kept.items()]
 
 
-def _said(value: Any) -> str:
+def _as_text(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "; ".join(f"{k}: {_said(v)}" for k, v in value.items())
+        return "; ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
     if isinstance(value, list):
-        return "; ".join(_said(item) for item in value)
+        return "; ".join(_as_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

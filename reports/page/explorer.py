@@ -170,7 +170,7 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
         diagonal.mark_line(color="currentColor", opacity=0.25, strokeWidth=wide, aria=False).encode(x=x, y=y),
         alt.Chart(on).mark_point(filled=True, size=14, color="currentColor", opacity=0.6)
         .encode(x=x, y=y, description="label:N"),
-        _words(_stayed(on, off), x, y, "currentColor"),
+        _labels(_diagonal_label(on, off), x, y, "currentColor"),
     ]  # fmt: skip
     style = styled(table)
     if off:
@@ -181,21 +181,21 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
         layers.append(
             alt.Chart(left).mark_point(strokeWidth=POINT, size=60).encode(x=x, y=y, description="label:N", **style)
         )
-    layers += [_words(told, x, y, colour) for told, colour in _names(left)]
+    layers += [_labels(told, x, y, colour) for told, colour in _end_labels(left)]
     chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"
     caption = f"{title}, scene {scene}. Grey band: what is measured is what was set, to within {BAND:g}."
     return Figure(f"fig-map-{speed:g}", title, caption, svg(chart, f"Restitution that was set and measured. {title}"))
 
 
-def _words(told: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
+def _labels(places: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
     """Text that ends at given places of a panel."""
-    table = pd.DataFrame(told, columns=["asked", "got", "text"])
+    table = pd.DataFrame(places, columns=["asked", "got", "text"])
     mark = alt.Chart(table).mark_text(align="right", fontSize=13, fontWeight=600, color=colour, opacity=0.9, aria=False)
     return mark.encode(x=x, y=y, text="text:N")
 
 
-def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
+def _end_labels(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
     """Names of lines above their right ends, one line of text above the other, with their colours."""
     ends = left.sort_values("asked").drop_duplicates("who", keep="last").sort_values("got")
     found: list[tuple[list[tuple[float, float, str]], str]] = []
@@ -208,17 +208,17 @@ def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str
     return found
 
 
-def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
+def _diagonal_label(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
     """The engines on the diagonal, in two lines of text to the left of it."""
-    stayed = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
+    kept = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
     if not off:
-        said = ["every engine", "and profile"]
-    elif not stayed:
-        said = ["as it should be"]
+        texts = ["every engine", "and profile"]
+    elif not kept:
+        texts = ["as it should be"]
     else:
-        tuned = [column for column in (*stayed, *off) if role_of(column[1]) in SECOND]
-        shipped = [called(engine) for engine, profile in stayed if word_of(profile) == "as shipped"]
+        tuned = [column for column in (*kept, *off) if role_of(column[1]) in SECOND]
+        shipped = [called(engine) for engine, profile in kept if word_of(profile) == "as shipped"]
         others = f"{shipped[0] if len(shipped) == 1 else f'{len(shipped)} engines'} as shipped" if shipped else ""
-        mended = bool(tuned) and not set(tuned) & set(off)
-        said = [text for text in ("every tuned profile" if mended else "", others) if text] or ["everybody else"]
-    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(said)]
+        tuning_fixes = bool(tuned) and not set(tuned) & set(off)
+        texts = [text for text in ("every tuned profile" if tuning_fixes else "", others) if text] or ["everybody else"]
+    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(texts)]

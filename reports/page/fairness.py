@@ -126,10 +126,10 @@ def _once(every: Iterable[Cure]) -> list[Cure]:
     Lines to paste are left out where they equal those of the scene with the table.
     """
     first: dict[tuple[str, str], Cure] = {}
-    told: dict[tuple[str, tuple[Change, ...]], Cure] = {}
+    first_with: dict[tuple[str, tuple[Change, ...]], Cure] = {}
     for cure in every:
         if (cure.engine, cure.scene) not in first:
-            same = told.setdefault((cure.engine, tuple(cure.changes)), cure)
+            same = first_with.setdefault((cure.engine, tuple(cure.changes)), cure)
             if same is not cure:
                 cure = replace(cure, like=same.scene, paste="" if cure.paste == same.paste else cure.paste)
             first[cure.engine, cure.scene] = cure

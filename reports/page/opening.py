@@ -38,7 +38,7 @@ class Half:
 @cache
 def called(engine: str) -> str:
     """Name of an engine for people: the first word of its title; if others begin so too, all before a bracket."""
-    titles = {name: told.title for name in names() if (told := facts(name))}
+    titles = {name: known.title for name in names() if (known := facts(name))}
     if engine not in titles:
         return engine
     short = titles[engine].split()[0]
@@ -71,14 +71,16 @@ def shares(rows: Iterable[Plain]) -> dict[tuple[str, str], float]:
 
 def shown(source: Source, series: bool) -> tuple[str, Restitution] | None:
     """First scene of the run that shows restitution as a series of heights, or as a ratio of speeds."""
-    told = ((scene, resolve(scene).restitution) for scene in source.scenes)
-    return next(((scene, found) for scene, found in told if found and bool(found.heights) is series), None)
+    declared = ((scene, resolve(scene).restitution) for scene in source.scenes)
+    return next(((scene, found) for scene, found in declared if found and bool(found.heights) is series), None)
 
 
 def rebounds(source: Source) -> list[Plain]:
     """Rows that measure a restitution in the scenes for which the page shows it."""
-    told = filter(None, (shown(source, series) for series in (True, False)))
-    return [r for scene, found in told for r in source.of(scene=scene) if family_of(r["metric"]) == found.metric]
+    restitutions = filter(None, (shown(source, series) for series in (True, False)))
+    return [
+        r for scene, found in restitutions for r in source.of(scene=scene) if family_of(r["metric"]) == found.metric
+    ]
 
 
 def headline(source: Source) -> str:
@@ -88,7 +90,7 @@ def headline(source: Source) -> str:
     rebound = shares(rebounds(source))
     wrong = [e for e in source.engines if rebound.get((e, "as shipped"), 0.0) > MOST]
     if not wrong:
-        return _most(source)
+        return _most_failures(source)
     scenes = list(dict.fromkeys(row["scene"] for row in rebounds(source)))
     return f"{_rebounds(wrong, rebound)} ({'scene' if len(scenes) == 1 else 'scenes'} {joined(scenes)})"
 
@@ -96,20 +98,20 @@ def headline(source: Source) -> str:
 def _rebounds(wrong: Sequence[str], rebound: dict[tuple[str, str], float]) -> str:
     tuned = [e for e in wrong if (e, "tuned") in rebound]
     mended = [e for e in tuned if rebound[e, "tuned"] == 0.0]
-    said = f"{joined(map(called, wrong))} {_do(wrong)} not rebound as set"
+    said = f"{joined(map(called, wrong))} {_verb(wrong)} not rebound as set"
     if len(tuned) == len(wrong) and not mended:
         return f"{said}, neither as shipped nor tuned"
     if not mended:
         return f"As shipped, {said}"
     who = {1: "it", 2: "both"}.get(len(wrong), "all") if mended == wrong else joined(map(called, mended))
-    return f"As shipped, {said}; tuned, {who} {_do(mended)}"
+    return f"As shipped, {said}; tuned, {who} {_verb(mended)}"
 
 
-def _do(engines: Sequence[str]) -> str:
+def _verb(engines: Sequence[str]) -> str:
     return "does" if len(engines) == 1 else "do"
 
 
-def _most(source: Source) -> str:
+def _most_failures(source: Source) -> str:
     """If all engines rebound as set, or none ran such a scene: most failures as shipped, and those when tuned."""
     found = shares(source.rows)
     shipped = {engine: part for (engine, word), part in found.items() if word == "as shipped"}

@@ -48,7 +48,7 @@ MEANINGS = {
     "new": "fails or has no value; not on record",
     "drifted": "fails by another amount than is on record or predicted",
     "diverged": "the state exploded or stopped being finite",
-    "invalid": "the profile does not realise what it declares (see receipts)",
+    "invalid": "the profile does not realise what it declares (see its property checks)",
     "crashed": "the engine raised an error or killed its process",
     "timed_out": "no answer in time",
     "missing": "planned, but the run has nothing of it",
@@ -242,11 +242,15 @@ def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
             marks = [mark or Mark("unsupported", "") for mark in own]
             overview.append((column, slug(scene, dimension, *column), marks))
     anchor = slug(scene, dimension)
-    guesses = _guesses(source, scene, dimension, [block.family for block in blocks])
-    return SceneVerdicts(scene, dimension, anchor, _summed(rows), asked, ", ".join(refused), overview, blocks, guesses)
+    guesses = _trivial_answers(source, scene, dimension, [block.family for block in blocks])
+    return SceneVerdicts(
+        scene, dimension, anchor, _scene_mark(rows), asked, ", ".join(refused), overview, blocks, guesses
+    )
 
 
-def _guesses(source: Source, scene: str, dimension: int, families: Sequence[str]) -> list[tuple[str, list[str]]]:
+def _trivial_answers(
+    source: Source, scene: str, dimension: int, families: Sequence[str]
+) -> list[tuple[str, list[str]]]:
     """Per trivial answer and kind of check the largest error in units of the tolerance; a dash if it has none."""
     worst: dict[str, dict[str, float]] = defaultdict(dict)
     for row in source.nulls:
@@ -261,7 +265,7 @@ def _guesses(source: Source, scene: str, dimension: int, families: Sequence[str]
     ]
 
 
-def _summed(rows: Sequence[Plain]) -> Mark:
+def _scene_mark(rows: Sequence[Plain]) -> Mark:
     """Worst mark at the profiles' own iteration counts, and the number of profiles that pass everything."""
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for row in rows:

@@ -84,24 +84,24 @@ def sweeping(points: int, dimension: int, sweeps: int) -> Callable[[int], None]:
     return steps
 
 
-def ratio(told: Mapping[str, Any], sweeps: int) -> Spread:
+def ratio(step: Mapping[str, Any], sweeps: int) -> Spread:
     """CPU time of our step over that of the naive sweeps: median and interval over `ROUNDS`."""
     solver = registry.solver()
-    params = tuple(sorted((name, float(value)) for name, value in told["params"].items()))
+    params = tuple(sorted((name, float(value)) for name, value in step["params"].items()))
     profile = registry.profile_of(solver, "textbook") or ""
     engine, scene, settings, _ = prepared(
-        Slot(told["scene"], params, told["dimension"], solver, profile, PILE_DT, sweeps)
+        Slot(step["scene"], params, step["dimension"], solver, profile, PILE_DT, sweeps)
     )
     simulation = engine.build(scene, PILE_DT, settings)
     simulation.advance(step_count(REST, PILE_DT))
-    plain = sweeping(told["points"], told["dimension"], sweeps)
+    plain = sweeping(step["points"], step["dimension"], sweeps)
     plain(1)  # compiles
     found = []
     for _ in range(ROUNDS):
         laps = []
         for side in (simulation.advance, plain):
             start = time.process_time()
-            side(told["steps"])
+            side(step["steps"])
             laps.append(time.process_time() - start)
         found.append(laps[0] / laps[1])
     simulation.close()
@@ -111,13 +111,13 @@ def ratio(told: Mapping[str, Any], sweeps: int) -> Spread:
 def main(path: Path = TABLE) -> int:
     """Print one line per step in the table; return 1 if any is too slow, else 0."""
     data, slow = tomllib.loads(path.read_text(encoding="utf-8")), False
-    for told in data["steps"]:
-        found = ratio(told, data["sweeps"])
-        is_slow = found.median > data["margin"] * told["ratio"]
+    for step in data["steps"]:
+        found = ratio(step, data["sweeps"])
+        is_slow = found.median > data["margin"] * step["ratio"]
         slow |= is_slow
         print(
-            f"{told['title']:<30} {found.median:5.2f} [{found.low:.2f} {found.high:.2f}] times the naive sweeps, "
-            f"kept {told['ratio']:g}: {'TOO SLOW' if is_slow else 'ok'}"
+            f"{step['title']:<30} {found.median:5.2f} [{found.low:.2f} {found.high:.2f}] times the naive sweeps, "
+            f"kept {step['ratio']:g}: {'TOO SLOW' if is_slow else 'ok'}"
         )
     return int(slow)
 

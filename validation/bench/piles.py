@@ -97,12 +97,12 @@ def _lap(kind: str, bodies: int, model: Model, falling: Simulation, random: np.r
 def rows(found: Sequence[Lap]) -> list[Row]:
     """Summarize laps by kind and size."""
     keys = list(dict.fromkeys((lap.kind, lap.bodies) for lap in found))
-    told = []
+    summary = []
     for key in keys:
         those = [lap for lap in found if (lap.kind, lap.bodies) == key]
         columns = ([lap.reference for lap in those], [lap.fixed_step for lap in those], [lap.ratio for lap in those])
-        told.append(Row(*key, *(spread(column) for column in columns)))
-    return told
+        summary.append(Row(*key, *(spread(column) for column in columns)))
+    return summary
 
 
 def exponents(found: Sequence[Row]) -> dict[str, tuple[Fit | None, Fit | None]]:

@@ -159,10 +159,12 @@ def table(path: Path = TABLE) -> Table:
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     sweeps = data["sweeps"]
     opponents = {
-        name: Opponent(name, **{**told, "sweeps": sweeps if told["sweeps"] else None})
-        for name, told in data["opponents"].items()
+        name: Opponent(name, **{**entry, "sweeps": sweeps if entry["sweeps"] else None})
+        for name, entry in data["opponents"].items()
     }
-    cases = (Case(**{"sweeps": sweeps, **told, "dt": parse_dt(told.get("dt", data["dt"]))}) for told in data["scenes"])
+    cases = (
+        Case(**{"sweeps": sweeps, **entry, "dt": parse_dt(entry.get("dt", data["dt"]))}) for entry in data["scenes"]
+    )
     return Table(tuple(cases), opponents, tuple(data["equal_error"]["twice"]))
 
 
@@ -315,14 +317,16 @@ class _Errors:
         own, other = timings.get(case.ours(count), {}) if count else {}, timings.get(slot, {})
         # Their step over ours: above 1 ours is faster.
         found = ratio(other, own)
-        told = (found.median, found.low, found.high) if found else (None, None, None)
+        interval = (found.median, found.low, found.high) if found else (None, None, None)
         counts: dict[str, Any] = {"rounds": found.n if found else 0}
         for side, rounds in (("our", own), ("their", other)):
             for timing in list(rounds.values())[-1:]:
                 counts |= {"bodies": timing.bodies, "steps": timing.steps, f"{side}_state": timing.state_hash}
                 counts[f"{side}_step_s"] = spread([each.seconds / each.steps for each in rounds.values()]).median
         floor, target = (asked[0], asked[1]) if asked else (None, None)
-        return self._row(slot, at, count, ours, told, (floor, target), counts, why or ("" if found else "not timed"))
+        return self._row(
+            slot, at, count, ours, interval, (floor, target), counts, why or ("" if found else "not timed")
+        )
 
     def _row(
         self,
@@ -330,7 +334,7 @@ class _Errors:
         at: str,
         count: int | None,
         ours: Found,
-        told: tuple[float | None, float | None, float | None],
+        interval: tuple[float | None, float | None, float | None],
         asked: tuple[float | None, float | None],
         counts: Mapping[str, Any],
         reason: str,
@@ -341,7 +345,7 @@ class _Errors:
             self.case.title,
             f"{slot.engine}/{slot.profile}",
             at,
-            *told,
+            *interval,
             *asked,
             ours.errors,
             theirs.errors,
@@ -366,6 +370,6 @@ def lead(points: pd.DataFrame, twice: tuple[float, float]) -> Row:
     ahead = int((2.0 * reached["ours"] <= reached["theirs"]).sum())
     share = ahead / len(reached) if len(reached) else math.nan
     counts = {"ahead": ahead, "levels": len(reached), "only_ours": int(both["theirs"].isna().sum())}
-    told = share if math.isfinite(share) else None
+    value = share if math.isfinite(share) else None
     title = "levels of error in the stored bench where ours is twice as fast"
-    return Row(title, "others", AT_ERROR, told, None, None, *twice, {}, {}, None, counts)
+    return Row(title, "others", AT_ERROR, value, None, None, *twice, {}, {}, None, counts)
