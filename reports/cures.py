@@ -108,8 +108,8 @@ def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, st
     loaded = registry.adapter(slot.engine)
     made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     words = loaded.words(settings, made, slot.dt) if loaded else {}
-    told = {name: words.get(name, (name, value)) for name, value in settings.items()}
-    return {name: (word, setting_text(value)) for name, (word, value) in told.items() if word}
+    named = {name: words.get(name, (name, value)) for name, value in settings.items()}
+    return {name: (word, setting_text(value)) for name, (word, value) in named.items() if word}
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
@@ -214,8 +214,8 @@ def _listed(row: Mapping[str, Any]) -> Cure | None:
 
 def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
     kinds = cure.mends or (cure.metric.partition("[")[0],)
-    told = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
-    return told or row["metric"].partition("[")[0] in kinds
+    same_check = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
+    return same_check or row["metric"].partition("[")[0] in kinds
 
 
 def is_standard(row: Mapping[str, Any]) -> bool:

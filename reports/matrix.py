@@ -110,9 +110,9 @@ def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
     """One line for each profile that is shown but not ranked: its meaning."""
     lines = []
     for engine, profile in columns:
-        told = facts(engine)
-        if told is not None and not is_ranked(engine, profile):
-            lines.append(f"{engine}/{profile}: {ROLES[told.roles[profile]]}")
+        known = facts(engine)
+        if known is not None and not is_ranked(engine, profile):
+            lines.append(f"{engine}/{profile}: {ROLES[known.roles[profile]]}")
     return lines
 
 
@@ -126,13 +126,13 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
         if row["metric"] == OUT_OF_PLANE and row["iterations"] is None and row["value"] is not None:
             found = row["physics"] == "fail", row["value"], row["scene"]
             cells[row["engine"], row["profile"]].append(found)
-    told = []
+    counts = []
     for (engine, profile), of_it in cells.items():
         outside = sorted(each for each in of_it if each[0])
         if outside:
             _, most, scene = outside[-1]
-            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
-    return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(told)}"] if told else []
+            counts.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
+    return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(counts)}"] if counts else []
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:

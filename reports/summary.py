@@ -52,9 +52,9 @@ def show(
     short = overview.table_of(grouped, list(families))
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
     if long and _fits(short, console) and not every:
-        told = overview.table_of(grouped, list(families), roles=True)
-        roles = [] if _fits(told, console) else [roles_line(matrix.columns)]
-        _show_families(rows, families, short if roles else told, roles, console, place)
+        with_roles = overview.table_of(grouped, list(families), roles=True)
+        roles = [] if _fits(with_roles, console) else [roles_line(matrix.columns)]
+        _show_families(rows, families, short if roles else with_roles, roles, console, place)
         _where(rows, console, files, place, {"crosscheck show --all": "the same for every scene"})
         return
     # Roles of profiles follow their names if that needs no further table, else they are in a line below.

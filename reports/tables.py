@@ -61,10 +61,10 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
-        told = {name: _field(entry, name) for _, name in columns}
-        if "because" in told:  # equal reasons are printed once
-            told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
-        table.add_row(*map(Text, told.values()))
+        shown = {name: _field(entry, name) for _, name in columns}
+        if "because" in shown:  # equal reasons are printed once
+            shown["because"], last = "as above" if shown["because"] == last else shown["because"], shown["because"]
+        table.add_row(*map(Text, shown.values()))
     console.print(table)
     if what == "checks" and not reasons:
         console.print(Text("Reasons of tolerances: --reasons, or crosscheck describe SCENE."))

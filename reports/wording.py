@@ -51,8 +51,8 @@ ROLE_WORDS: dict[str, str] = {
 
 def word_of(engine: str, profile: str) -> str:
     """Name of a profile for people, beside its own; empty if both are equal or it has no role."""
-    told = facts(engine)
-    word = ROLE_WORDS.get(told.roles.get(profile.partition("+")[0], "") if told else "", "")
+    known = facts(engine)
+    word = ROLE_WORDS.get(known.roles.get(profile.partition("+")[0], "") if known else "", "")
     return "" if word == profile else word
 
 
@@ -64,7 +64,7 @@ def roles_line(columns: Iterable[tuple[str, str]]) -> str:
 
 def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
     """Profiles on engines by name or by role (``shipped``, ``as shipped``); an unknown word stays itself."""
-    roles = [told.roles for engine in engines if (told := facts(engine))]
+    roles = [known.roles for engine in engines if (known := facts(engine))]
     found: dict[str, None] = {}
     for word in words:
         own = [

@@ -97,8 +97,8 @@ def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
 def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, console: Console) -> None:
     head = Text(f"{engine} {scene} {dimension}-D: ", style="bold")
     if isinstance(found, Unsearched):
-        told = "as shipped nothing is to be fixed" if found.asked else "cannot run"
-        console.print(head + Text(f"{told}: {found.reason}", style=""), soft_wrap=True)
+        text = "as shipped nothing is to be fixed" if found.asked else "cannot run"
+        console.print(head + Text(f"{text}: {found.reason}", style=""), soft_wrap=True)
         return
     console.print(head + Text(f"{found.failing} of {found.judged} checks fail as shipped"), soft_wrap=True)
     if not found.helps:
@@ -116,9 +116,9 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
     console.print(table, highlight=False)
     if found.alone:
-        told = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
+        text = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
         left = f"{found.metric} {number(found.before, 4)} -> {number(found.alone_after, 4)}"
-        console.print(f"one setting alone: {told}: {left}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"one setting alone: {text}: {left}", markup=False, highlight=False, soft_wrap=True)
         alone = replace(found, changes=found.alone)
         console.print(Text(cure_paste(alone) or nothing_to_paste(alone)), soft_wrap=True)
         console.print(

@@ -93,8 +93,8 @@ def _value(found: Reading) -> str:
         return f"no {found.check.metric}: {found.reason}"
     mark = "PASS" if found.badness <= 1.0 else "FAIL"
     check = found.check
-    told = f"{quantity(found.value, check.unit, 6)} of {number(check.truth)} +- {number(check.bound)}"
-    return f"{mark} {check.metric} {told}"
+    text = f"{quantity(found.value, check.unit, 6)} of {number(check.truth)} +- {number(check.bound)}"
+    return f"{mark} {check.metric} {text}"
 
 
 def _plain(proof: Proof) -> dict[str, Any]:

@@ -157,9 +157,9 @@ def _drive(
             say(console, "interrupted: finished cases are kept; the same command resumes")
             raise
     taken = history.times(store, release.engine, release.version)
-    told = history.told_by(release.engine, release.version, found, taken)
-    say(console, f"{release.name}: {told.reason or plural(len(found), 'case')}")
-    return told
+    result = history.told_by(release.engine, release.version, found, taken)
+    say(console, f"{release.name}: {result.reason or plural(len(found), 'case')}")
+    return result
 
 
 def _with_floors(

@@ -485,7 +485,7 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
     if "/" in name:
         named = named_by(name, {row["scene"] for row in rows})
         metric = named.pop("metric", "")
-        fits = [row for row in rows if all(row[key] == told for key, told in named.items())]
+        fits = [row for row in rows if all(row[key] == value for key, value in named.items())]
         if metric:
             fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
         if not fits:
@@ -578,8 +578,8 @@ def _print_explanation(
         if idle:
             lines.append(("", "not needed: " + ", ".join(f"{c.name} {c.before} -> {c.after}" for c in idle)))
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
-    told = told_cure(row) if mark_of(row) != "pass" else ""
-    lines += [("smallest fix" if better else "fix", told)] if told else []
+    recorded = told_cure(row) if mark_of(row) != "pass" else ""
+    lines += [("smallest fix" if better else "fix", recorded)] if recorded else []
     lines.append(("run again", again))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))

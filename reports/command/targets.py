@@ -81,7 +81,7 @@ def _chosen(asked: Table, scenes: Sequence[str]) -> Table:
 def _absent(asked: Table) -> dict[str, str]:
     """Opponents that are not installed, and why."""
     found = {name: registry.find(name) for name in asked.opponents}
-    return {name: told.reason for name, told in found.items() if told.engine is None}
+    return {name: engine.reason for name, engine in found.items() if engine.engine is None}
 
 
 def _lead(out: Path, asked: Table) -> list[Row]:

@@ -186,13 +186,13 @@ def again(command: str, title: str) -> str:
     scenes, options, narrowing = words.partition(" --")
     if scenes.split() == list(CATALOGUE):
         scenes = ""
-    told = (
+    parts = (
         f"crosscheck {command}",
         scenes,
         f"{options}{narrowing}".strip(),
         f"--{suite if suite in SUITES else 'quick'}",
     )
-    return " ".join([*filter(None, told), "--out again"])
+    return " ".join([*filter(None, parts), "--out again"])
 
 
 def package_version() -> str:

@@ -57,7 +57,7 @@ _DIGITS = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
-    spec = chart.to_dict(validate=False)  # validation takes a tenth of a second each; a wrong one would not draw
+    spec = chart.to_dict(validate=False)  # validation takes a tenth of a second each; a wrong spec would not draw
     spec["config"] = _CONFIG
     text = _SKIPPED.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
     text = _PLACES.sub(lambda place: _DIGITS.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)

@@ -229,15 +229,15 @@ def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list
     groups: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
     for finding in found:
         groups[finding.engine, finding.profile, without_prediction(finding.reason)].append(finding)
-    said = []
+    grouped = []
     for (engine, profile, reason), members in groups.items():
         by_cure: dict[str, list[str]] = defaultdict(list)
         for scene in dict.fromkeys(member.scene for member in members):
             by_cure[cured.get((engine, profile, scene), "")].append(scene)
-        told = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
+        fixes = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
         anchor = why_anchor(mark, engine, profile, reason)
-        said.append(Reasoned(anchor, engine, profile, reason, told, _lines(members)))
-    return said
+        grouped.append(Reasoned(anchor, engine, profile, reason, fixes, _lines(members)))
+    return grouped
 
 
 def _lines(found: Iterable[FindingFamily]) -> tuple[Member, ...]:

@@ -216,7 +216,7 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
     table = named(table)
     on_front = table[table["best"]].sort_values("cost")
     best = alt.Chart(on_front)
-    told = on_front.drop_duplicates("shown")  # points that cost more for the same error have no step beside them
+    labelled = on_front.drop_duplicates("shown")  # points that cost more for the same error have no step beside them
     thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7)
     points = alt.Chart(table).mark_point(strokeWidth=POINT, size=40)
     detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}
@@ -233,7 +233,7 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
         thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), **detail),
         intervals(table, x, y, style["color"]),
         points.encode(x=x, y=y, description="label:N", **style),
-        *(_steps(own, bool(side)).encode(x=x, y=y) for side, own in told.groupby("right")),
+        *(_steps(own, bool(side)).encode(x=x, y=y) for side, own in labelled.groupby("right")),
     ).properties(width=215, height=180)
     title = f"{scene} {dimension}-D"
     return Figure(f"fig-multiple-{title}", title, "", svg(chart, f"Work and precision, {title}"))

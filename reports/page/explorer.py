@@ -181,7 +181,7 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
         layers.append(
             alt.Chart(left).mark_point(strokeWidth=POINT, size=60).encode(x=x, y=y, description="label:N", **style)
         )
-    layers += [_labels(told, x, y, colour) for told, colour in _end_labels(left)]
+    layers += [_labels(places, x, y, colour) for places, colour in _end_labels(left)]
     chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"
     caption = f"{title}, scene {scene}. Grey band: what is measured is what was set, to within {BAND:g}."
