@@ -335,6 +335,15 @@ class Engine(ABC):
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; ``settings`` holds every setting of the profile by name, ``iterations`` included."""
 
+    def build_many(
+        self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
+    ) -> Simulation | None:
+        """Make a world of each scene, all stepped by one call on ``threads`` threads; None if the engine cannot.
+
+        Scenes have the same bodies and differ in their numbers. What is read is the state of the first.
+        """
+        return None
+
     @abstractmethod
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """What the profile realises on the probes, where that differs from the scene's values.

@@ -188,9 +188,14 @@ for name, operations in {
 }.items():
     for operation in operations:
         of_lanes(operation, (LANE, LANE), LANE, instruction(name))
-for operation, sign in (
-    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="), (operator.ne, "!="),
-):  # fmt: skip
+for sign, operation in {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}.items():
     of_lanes(operation, (LANE, LANE), MASK, compared(sign))
 for operation, name in ((operator.and_, "and_"), (operator.or_, "or_")):
     of_lanes(operation, (MASK, MASK), MASK, instruction(name))

@@ -34,7 +34,7 @@ from reference_solver.tally import OPENED, merge, new_tally
 from reference_solver.tally_summary import columns, summary
 
 if TYPE_CHECKING:
-    from reference_solver.worlds import Worlds
+    from reference_solver.many.worlds import Worlds
 
 
 class World(Protocol):
@@ -116,7 +116,7 @@ class Simulation:
         ValueError
             If there is no set of parameters, models differ in dimension or number of bodies, or ``threads`` is below 1.
         """
-        from reference_solver.worlds import worlds  # it steps what does not fit together by simulations
+        from reference_solver.many.worlds import worlds  # it steps what does not fit together by simulations
 
         return worlds(model, parameters, settings, threads)
 

@@ -9,7 +9,7 @@ approximates them. [MuJoCo documentation: computation, modeling/solver parameter
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
@@ -26,7 +26,7 @@ from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD, SMALLEST_FRICTION
-from adapters.mujoco.simulation import MujocoSimulation
+from adapters.mujoco.simulation import MujocoSimulation, MujocoWorlds
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
@@ -154,6 +154,14 @@ class MujocoEngine(Engine):
         if moved(scene) and settings["integrator"] == "RK4":
             raise EngineError("integrator: RK4 detects contacts within a step, where moving faces have no velocity")
         return MujocoSimulation(scene, dt, settings)
+
+    def build_many(
+        self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
+    ) -> Simulation | None:
+        """See `Engine.build_many`: ``mujoco.rollout``; None where this adapter acts between steps."""
+        if any(body.motion == "prescribed" or any(body.force) for body in scenes[0].bodies) or "rounds" in settings:
+            return None
+        return MujocoWorlds(scenes, dt, settings, threads)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Rebound as shipped, over all phases of a step; friction of a box that hops; sums of forces; RK4's fall."""

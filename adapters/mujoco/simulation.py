@@ -7,7 +7,7 @@ older than the pose.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -21,7 +21,6 @@ from adapters.mujoco.spec import Spec, has_joint, rotation, start
 from adapters.scene import Scene
 
 
-@final
 class MujocoSimulation(Simulation):
     """One MuJoCo model and its data."""
 
@@ -187,3 +186,33 @@ class MujocoSimulation(Simulation):
         warnings = {mj.mju_warningText(k, 0): int(w.number) for k, w in enumerate(data.warning) if w.number}
         found = {"residual": float(residual), "newton_steps": data.solver_niter.tolist(), "warnings": warnings}
         return found | (self._matched.told() if self._matched else {})
+
+
+@final
+class MujocoWorlds(MujocoSimulation):
+    """Many models by ``mujoco.rollout``; what is read is the state of the first."""
+
+    def __init__(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> None:
+        from mujoco import rollout
+
+        super().__init__(scenes[0], dt, settings)
+        mj = self._mujoco
+        self._rollout = rollout.Rollout(nthread=threads)
+        self._models = [self._model, *(Spec(scene, dt, settings).compile() for scene in scenes[1:])]
+        self._workers = [mj.MjData(self._model) for _ in range(threads)]
+        self._kind = mj.mjtState.mjSTATE_FULLPHYSICS
+        state = np.empty(mj.mj_stateSize(self._model, self._kind))
+        mj.mj_getState(self._model, self._data, state, self._kind)
+        self._states = np.tile(state, (len(scenes), 1))
+
+    def advance(self, steps: int) -> None:
+        """Make ``steps`` steps of all worlds."""
+        if not steps:
+            return
+        states, _ = self._rollout.rollout(self._models, self._workers, self._states, nstep=steps)
+        self._states = states[:, -1].copy()
+        self._mujoco.mj_setState(self._model, self._data, self._states[0], self._kind)
+
+    def close(self) -> None:
+        """End the threads."""
+        self._rollout.close()

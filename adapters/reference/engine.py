@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -27,7 +27,7 @@ from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
 from adapters.reference.profiles import KINDS, PROFILES, SOURCE
 from adapters.reference.script import python
-from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
+from adapters.reference.simulation import ReferenceSimulation, ReferenceWorlds, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
 
@@ -120,6 +120,10 @@ class ReferenceEngine(Engine):
         except OverflowError as error:
             wrong = [name for name, value in settings.items() if isinstance(value, float) and not math.isfinite(value)]
             raise EngineError(f"{', '.join(wrong) or 'scene'}: {error}") from None
+
+    def build_many(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> Simulation:
+        """See `Engine.build_many`: `reference_solver.Simulation.many`."""
+        return ReferenceWorlds(scenes, _checked(settings, dt), threads)
 
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array

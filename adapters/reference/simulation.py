@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -129,6 +130,36 @@ class ReferenceSimulation(Simulation):
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
         return found if self.settings.residual is None else {**found, "certified": found["holds"]}
+
+
+class ReferenceWorlds(ReferenceSimulation):
+    """Many worlds by `reference_solver.Simulation.many`; what is read is the state of the first."""
+
+    def __init__(self, scenes: Sequence[Scene], settings: Any, threads: int) -> None:
+        from reference_solver import Simulation as Solver
+
+        super().__init__(scenes[0], solver_model(scenes[0]), settings)
+        told = [{"scene": scene} for scene in scenes]
+        self.worlds = Solver.many(solver_model, told, settings, threads)
+
+    def advance(self, steps: int) -> None:
+        """Make ``steps`` steps of all worlds."""
+        self.worlds.advance(steps)
+
+    def pose(self) -> Array:
+        """Poses of the first world."""
+        return np.asarray(self.worlds.pose[0], float)
+
+    def twist(self) -> Array:
+        """Twists of the first world."""
+        return np.asarray(self.worlds.twist[0], float)
+
+    def contacts(self) -> Contacts:
+        """Not recorded of many worlds."""
+        return Contacts.from_rows([], self.scene.dimension)
+
+    def record(self, samples: int, stride: int, contacts: bool) -> None:
+        """Not in one call."""
 
 
 def _contacts(found: Any) -> Contacts:

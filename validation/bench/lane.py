@@ -225,7 +225,9 @@ def _timing(unit: Unit, opponent: Unit, round_: int, order: int, process: int, f
         found.state_hash,
         found.error,
         found.void,
-        kernel=found.kernel,
+        unit.worlds,
+        unit.threads,
+        found.kernel,
     )
 
 

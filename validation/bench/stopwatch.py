@@ -11,18 +11,20 @@ import gc
 import hashlib
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Simulation
+from adapters.engine import Array, Engine, Simulation
 from adapters.foreign import said_by
 from adapters.lift import lower_pose, lower_twist
 from adapters.registry import find
+from adapters.scene import Scene
 from adapters.stepping import advances
-from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_of
+from validation.bench.units import COLLAPSED, Unit, many, own_error, prepared, scene_of
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
         twin = engine.build(scene, dt, settings)
         twin.advance(unit.steps)
         twin.close()
-    simulation = engine.build(scene, dt, settings)
+    simulation, worlds = _built(unit, engine, scene, settings)
     try:
         view = Lowered(simulation) if lifted else simulation
         start = np.array(view.pose())
@@ -94,9 +96,18 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
             error = own_error(scene_of(unit.slot), (unit.warm_up + unit.steps) * dt, start, pose)
         elif not np.isfinite(pose).all():
             error = math.inf
-        return seconds, wall, state, error, str(simulation.certificate().get("kernel", ""))
+        return seconds / worlds, wall / worlds, state, error, str(simulation.certificate().get("kernel", ""))
     finally:
         simulation.close()
+
+
+def _built(unit: Unit, engine: Engine, scene: Scene, settings: Mapping[str, Any]) -> tuple[Simulation, int]:
+    """Simulation of a unit, and the number of worlds that it steps."""
+    if unit.worlds > 1:
+        found = engine.build_many(many(scene, unit.worlds), unit.slot.dt, settings, unit.threads)
+        if found is not None:
+            return found, unit.worlds
+    return engine.build(scene, unit.slot.dt, settings), 1
 
 
 def _clock(simulation: Simulation, view: Any, steps: int, sampled: bool) -> tuple[float, float]:

@@ -52,7 +52,7 @@ TIMED_ONLY = "not run for its errors, which would take minutes"
 class Opponent:
     """Profile of an engine by its role, its sweeps (None: the profile's own), and the comparison with floor and target.
 
-    ``contacts`` is whether its contacts are counted.
+    ``contacts`` is whether its contacts are counted, ``worlds`` the most worlds in one call (None: no limit).
     """
 
     engine: str
@@ -60,6 +60,7 @@ class Opponent:
     sweeps: int | None
     floor: str
     contacts: bool = True
+    worlds: int | None = None
 
     @property
     def profile(self) -> str:
@@ -83,6 +84,8 @@ class Case:
     clock: tuple[float, float] | None = None
     drift: float | None = None
     timed_only: Sequence[str] = ()
+    worlds: int = 1
+    threads: int = 1
 
     def slot(self, engine: str, profile: str, sweeps: int | None) -> Slot:
         """Slot of this scene on an engine."""
@@ -226,6 +229,10 @@ class Ours:
         return self.at(sweeps).is_within(theirs)
 
 
+#: Timings of each slot and number of worlds, by round.
+Timings = Mapping[tuple[Slot, int], Mapping[int, Timing]]
+
+
 def measure(
     asked: Table, seed: int, tell: Callable[[str], None] = lambda text: None, limits: Limits = LIMITS
 ) -> Iterator[Row]:
@@ -233,24 +240,36 @@ def measure(
     lane = Lane(limits.patience)
     lane.start()
     try:
-        errors = [_Errors(case, asked, lane, tell) for case in asked.cases]
+        known = dict[Any, Found]()
+        errors = [_Errors(case, asked, lane, tell, known) for case in asked.cases]
     finally:
         lane.stop()
-    timings: dict[Slot, dict[int, Timing]] = defaultdict(dict)
+    timings: dict[tuple[Slot, int], dict[int, Timing]] = defaultdict(dict)
     units = [unit for each in errors for unit in each.units()]
     for timing in run_lane(units, limits, seed):
         tell(f"clocking, round {timing.round + 1}: {timing.slot.scene} on {timing.slot.engine}")
         if not timing.void:
-            timings[timing.slot][timing.round] = timing
+            timings[timing.slot, timing.worlds][timing.round] = timing
     for each in errors:
         yield from each.rows(timings)
 
 
 class _Errors:
-    """Errors of one scene: theirs, ours at all tried sweeps, and our sweeps at equal error."""
+    """Errors of one scene: theirs, ours at all tried sweeps, and our sweeps at equal error.
 
-    def __init__(self, case: Case, asked: Table, lane: Lane, tell: Callable[[str], None]) -> None:
+    Two cases can have the same runs; ``known`` keeps them.
+    """
+
+    def __init__(
+        self, case: Case, asked: Table, lane: Lane, tell: Callable[[str], None], known: dict[Any, Found]
+    ) -> None:
         def ask(slot: Slot, contacts: bool = True) -> Found:
+            key = case.errors, slot, case.seconds, contacts
+            if key not in known:
+                known[key] = run(slot, contacts)
+            return known[key]
+
+        def run(slot: Slot, contacts: bool) -> Found:
             tell(f"errors: {case.title}, {slot.engine}{f' at {slot.iterations} sweeps' if slot.iterations else ''}")
             found, reason = lane.ask(partial(errors_of, case.errors, slot, case.seconds, contacts))
             return found or Found({}, {}, None, 0, 0.0, reason)
@@ -284,9 +303,18 @@ class _Errors:
         slots = [case.ours(count) for count in sweeps] + [
             slot for slot, found in self.theirs.items() if found.reason in ("", TIMED_ONLY)
         ]
-        return [Unit("work", slot, "", bodies, warm_up, step_count(lasting, case.dt)) for slot in slots]
+        steps = step_count(lasting, case.dt)
+        return [
+            Unit("work", slot, "", bodies, warm_up, steps, worlds=self._worlds(slot), threads=case.threads)
+            for slot in slots
+        ]
 
-    def rows(self, timings: Mapping[Slot, Mapping[int, Timing]]) -> Iterator[Row]:
+    def _worlds(self, slot: Slot) -> int:
+        """Worlds in one call: at most as many as the engine gets."""
+        most = next((each.worlds for each, found in self.opponents if found == slot), None)
+        return min(self.case.worlds, most or self.case.worlds)
+
+    def rows(self, timings: Timings) -> Iterator[Row]:
         """Rows of this scene."""
         case, sweeps = self.case, self.case.sweeps
         for opponent, slot in self.opponents:
@@ -310,11 +338,12 @@ class _Errors:
         count: int | None,
         why: str,
         asked: Sequence[float],
-        timings: Mapping[Slot, Mapping[int, Timing]],
+        timings: Timings,
     ) -> Row:
         case = self.case
         ours = self.ours.at(count or max(self.ours.known))
-        own, other = timings.get(case.ours(count), {}) if count else {}, timings.get(slot, {})
+        own = timings.get((case.ours(count), case.worlds), {}) if count else {}
+        other = timings.get((slot, self._worlds(slot)), {})
         # Their step over ours: above 1 ours is faster.
         found = ratio(other, own)
         interval = (found.median, found.low, found.high) if found else (None, None, None)

@@ -99,15 +99,24 @@ def two_boxes(bodies: Bodies, a: int, b: int, reach: Any, near: Any, rows: Rows,
         across = across | wins if k == 1 else across & ~wins
         of_a = of_a | wins if candidate < 2 else of_a & ~wins
     if any_of(near):
-        return clip(bodies, a, b, (dx, dy), (of_a, across, side), reach, near, rows, feature, c)
+        return clip(bodies, (a, b), (dx, dy), (of_a, across, side), reach, near, rows, feature, c)
     return settle(rows, feature, c, near, near)
 
 
 @inner_kernel
 def clip(
-    bodies: Bodies, a: int, b: int, way: Any, face: Any, reach: Any, near: Any, rows: Rows, feature: Array, c: int
+    bodies: Bodies,
+    pair: tuple[int, int],
+    way: Any,
+    face: Any,
+    reach: Any,
+    near: Any,
+    rows: Rows,
+    feature: Array,
+    c: int,
 ) -> Any:
     """See `box_box.clip_edge`; ``face``: whether the reference face is of a, along the second axis, and its side."""
+    a, b = pair
     of_a, across, side = face
     dx, dy = where(of_a, way[0], -way[0]), where(of_a, way[1], -way[1])
     cr, sr = either(bodies, of_a, a, b, COS), either(bodies, of_a, a, b, SIN)

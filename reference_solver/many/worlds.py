@@ -2,7 +2,7 @@
 
     models -> those whose bodies are alike -> groups of `LANES` -> threads
 
-Planar models under a fixed number of row-by-row sweeps are stepped eight in one (`planar.many`), all others each by
+Planar models under a fixed number of row-by-row sweeps are stepped eight in one (`many.planar`), all others each by
 itself. Each world has, to the bit, the states that `Simulation` gives it alone, with any number of threads.
 """
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from reference_solver.checks import require_count
 from reference_solver.compilation import config
+from reference_solver.lanes import LANES
 from reference_solver.model import Array, Model
 from reference_solver.needs import needs
 from reference_solver.settings import Settings
@@ -83,10 +84,10 @@ class Worlds:
             if isinstance(kind, int):
                 self._members.append((found, Alone(models[kind], settings)))
                 continue
-            many = import_module("reference_solver.planar.many")
-            for first in range(0, len(found), many.LANES):
-                chosen = found[first : first + many.LANES]
-                self._members.append((chosen, many.Together([models[w] for w in chosen], settings)))
+            groups = import_module("reference_solver.many.groups")  # its kernels are loaded where they are needed
+            for first in range(0, len(found), LANES):
+                chosen = found[first : first + LANES]
+                self._members.append((chosen, groups.Together([models[w] for w in chosen], settings)))
 
     def __len__(self) -> int:
         return sum(len(chosen) for chosen, _ in self._members)
@@ -130,7 +131,8 @@ class Worlds:
         first, start = self._steps, (self.pose[:, None], self.twist[:, None])
         found = self._run(steps, stride)
         pose, twist = (np.concatenate([start[k], self._together(k, found)], axis=1) for k in range(2))
-        return Motions((first + stride * np.arange(pose.shape[1])) * self.settings.dt, pose, twist)
+        t = np.multiply(first + stride * np.arange(pose.shape[1]), self.settings.dt, dtype=np.float64)
+        return Motions(t, pose, twist)
 
     def _run(self, steps: int, stride: int) -> list[tuple[list[int], tuple[Array, Array]]]:
         """Run all members, each in the thread that is free first."""
