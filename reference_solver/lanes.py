@@ -219,8 +219,7 @@ of_lanes(any_of, (types.boolean,), types.boolean, lambda context, builder, truth
 of_lanes(all_of, (types.boolean,), types.boolean, lambda context, builder, truth: truth)
 
 
-@intrinsic
-def lanes(typingctx: Any, array: Any) -> Any:
+def _seen_in_lanes(typingctx: Any, array: Any) -> Any:
     """An array of floats, the last axis of which are lanes, as an array of `Lanes` with one axis less."""
     seen = types.Array(LANE, array.ndim - 1, array.layout, aligned=False)
 
@@ -236,3 +235,6 @@ def lanes(typingctx: Any, array: Any) -> Any:
         return impl_ret_borrowed(context, builder, seen, made._getvalue())
 
     return seen(array), write
+
+
+lanes: Any = intrinsic(_seen_in_lanes)

@@ -96,7 +96,7 @@ class ReferenceSimulation(Simulation):
         """See `Simulation.contacts`."""
         return _contacts(self.solver.contacts())
 
-    def record(self, samples: int, stride: int, contacts: bool) -> Recorded:
+    def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
         """See `Simulation.record`: one call of compiled code takes all samples."""
         found = self.solver.record(samples * stride, stride, contacts)
         counts = np.diff(found.offset)[1:]  # the first sample is the state before

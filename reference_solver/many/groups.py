@@ -99,28 +99,22 @@ def allocate_group(worlds: list[tuple[Bodies, Pairs]], options: Options, contact
     worlds
         Bodies and pairs of each world, as `state.allocate_bodies` and `state.allocate_pairs` make them.
     """
-    bodies = [each for each, _ in worlds]
+    bodies, pairs = [each for each, _ in worlds], [each for _, each in worlds]
     n = len(bodies[0].kind)
-
-    def stacked(field: str) -> Array:
-        return np.stack([getattr(each, field) for each in bodies], axis=-1)
-
-    def room(*shape: int) -> Array:
-        return np.zeros((*shape, LANES))
-
+    fields = ("pose", "twist", "pseudo", "real", "vertex")
+    numbers: dict[str, Any] = {name: np.stack([getattr(each, name) for each in bodies], axis=-1) for name in fields}
     return Group(
-        *(stacked(field) for field in ("pose", "twist", "pseudo", "real")),
-        bodies[0].kind,
-        stacked("vertex"),
-        laws([pairs.restitution for _, pairs in worlds]),
-        laws([pairs.friction for _, pairs in worlds]),
-        room(n, 2),
-        room(n, 2),
-        allocate_boxes(n, 2, contacts),
+        **numbers,
+        restitution=laws([each.restitution for each in pairs]),
+        friction=laws([each.friction for each in pairs]),
         **rooms(contacts),
+        kind=bodies[0].kind,
+        low=np.zeros((n, 2, LANES)),
+        high=np.zeros((n, 2, LANES)),
+        boxes=allocate_boxes(n, 2, contacts),
         probe=allocate_rows(2),
-        saved=room(15),
-        tally=room(TALLY_SIZE),
+        saved=np.zeros((15, LANES)),
+        tally=np.zeros((TALLY_SIZE, LANES)),
         options=options,
     )
 
