@@ -238,3 +238,53 @@ def _seen_in_lanes(typingctx: Any, array: Any) -> Any:
 
 
 lanes: Any = intrinsic(_seen_in_lanes)
+
+
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """Vectors of rows as vectors of columns, of as many rows as lanes."""
+    step = 1
+    while step < LANES:
+        for i in (i for i in range(LANES) if not i & step):
+            one, other = rows[i], rows[i + step]
+            for k, start in ((i, 0), (i + step, step)):
+                picked = [(j & ~step) + start + (LANES if j & step else 0) for j in range(LANES)]
+                mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), picked)
+                rows[k] = builder.shuffle_vector(one, other, mask)
+        step *= 2
+    return rows
+
+
+def _row(builder: Any, array: Any, index: Any) -> Any:
+    """Address of a row of an array (n, LANES), as that of a vector."""
+    stride, _ = cgutils.unpack_tuple(builder, array.strides)
+    place = builder.bitcast(array.data, ir.IntType(8).as_pointer())
+    return builder.bitcast(builder.gep(place, [builder.mul(stride, index)]), DOUBLES.as_pointer())
+
+
+def _moved(into: bool) -> Any:
+    """Intrinsic that moves rows of an array into lanes, or out of them: (from, which rows, to)."""
+
+    def move(typingctx: Any, source: Any, index: Any, target: Any) -> Any:
+        def write(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            given, which, wanted = (
+                context.make_array(kind)(context, builder, value) for kind, value in zip(sig.args, values, strict=True)
+            )
+            vectors, rows = (wanted, given) if into else (given, wanted)
+            places = [builder.load(builder.gep(which.data, [ir.IntType(64)(k)])) for k in range(LANES)]
+            outside = [_row(builder, rows, place) for place in places]
+            inside = [builder.gep(vectors.data, [ir.IntType(64)(k)]) for k in range(LANES)]
+            start, end = (outside, inside) if into else (inside, outside)
+            moved = _transposed(builder, [builder.load(place, align=8) for place in start])
+            for place, value in zip(end, moved, strict=True):
+                builder.store(value, place, align=8)
+            return context.get_dummy_value()
+
+        return types.none(source, index, target), write
+
+    return intrinsic(move)
+
+
+#: ``into_lanes(array, rows, columns)``: lane l of ``columns[k]`` is ``array[rows[l], k]``; both have `LANES` columns.
+into_lanes: Any = _moved(into=True)
+#: ``from_lanes(columns, rows, array)``: the inverse.
+from_lanes: Any = _moved(into=False)

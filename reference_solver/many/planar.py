@@ -139,7 +139,7 @@ def rows_of_group(group: Group) -> Rows:
     p = group.probe
     return Rows(
         group.counts, group.integer, lanes(group.row), group.manifold, lanes(group.block), p.local,
-        p.old_key, p.old_impulse, p.past_key, p.past_impulse, p.kept_key, p.kept_impulse,
+        p.old_key, p.old_impulse, p.past_key, p.past_impulse, p.kept_key, p.kept_impulse, p.wide,
     )  # fmt: skip
 
 
@@ -296,7 +296,7 @@ def sweep(group: Group, bodies: Bodies, rows: Rows, found: Array, relaxation: fl
                 keep(group, bodies, rows, first)
             sweep_pair(bodies, rows, m, backwards, options, relaxation)
             if push:
-                push_pair(bodies, rows, first + backwards, first + 1 - backwards, relaxation)
+                push_pair(bodies, rows, m, backwards, relaxation)
             if not whole:
                 take_back(group, bodies, rows, first, two)
         if any_of(one):

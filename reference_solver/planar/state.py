@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.direct.problem import Problem
+from reference_solver.lanes import LANES
 from reference_solver.model import (
     Array,
     Body,
@@ -45,6 +46,7 @@ from reference_solver.planar.columns import (
     SIN,
     SIZE,
     VERTICES,
+    WIDE_REALS,
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.shapes import MOST_VERTICES
@@ -99,6 +101,28 @@ class Pairs(NamedTuple):
 
 
 @structure
+class Narrow(NamedTuple):
+    """No room to sweep several manifolds at once."""
+
+    blocks: int
+
+
+@structure
+class Wide(NamedTuple):
+    """Room for manifolds in blocks of `LANES`, see `wide`. Slots: one for each lane of each block."""
+
+    last: Indices  # (n,): level of a body's last manifold, plus 1
+    level: Indices  # (m,): of each manifold
+    begin: Indices  # (2 m + 1,): first slot of each level, its manifolds of one point before those of two
+    order: Indices  # (slots,): manifold of each slot, -1 where there is none
+    body: Indices  # (blocks, 2, LANES): rows of `velocity` of A and B
+    velocity: Array  # (n + 1, 8): velocities of each body as `wide` has them; the last stands for none
+    point: Array  # (2 blocks, WIDE_REALS, LANES): what of `Rows.real` a sweep needs
+    block: Array  # (blocks, 4, 4, LANES): `Rows.block`
+    pair: Array  # (2, 8, LANES): velocities of the bodies of a block
+
+
+@structure
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
@@ -114,6 +138,7 @@ class Rows(NamedTuple):
     past_impulse: Array  # (c, 2)
     kept_key: Indices  # (c,): and for the next one
     kept_impulse: Array  # (c, 2)
+    wide: Any  # `Narrow` or `Wide`
 
 
 @structure
@@ -229,8 +254,25 @@ def allocate_pairs(model: Model, capacity: int) -> Pairs:
     return Pairs(pair_table(model.restitution), pair_table(model.friction), boxes)
 
 
-def allocate_rows(capacity: int) -> Rows:
-    """Return room for ``capacity`` contact points."""
+def allocate_wide(n: int, capacity: int) -> Wide:
+    """Return room for ``capacity`` manifolds of ``n`` bodies in blocks at least half of whose lanes are in use."""
+    blocks = 2 * -(-capacity // LANES)
+    count = np.int64
+    return Wide(
+        last=np.zeros(n, count),
+        level=np.zeros(capacity, count),
+        begin=np.zeros(2 * capacity + 3, count),
+        order=np.zeros(blocks * LANES, count),
+        body=np.zeros((blocks, 2, LANES), count),
+        velocity=np.zeros((n + 1, LANES)),
+        point=np.zeros((2 * blocks, WIDE_REALS, LANES)),
+        block=np.zeros((blocks, 4, 4, LANES)),
+        pair=np.zeros((2, LANES, LANES)),
+    )
+
+
+def allocate_rows(capacity: int, wide: int = 0) -> Rows:
+    """Return room for ``capacity`` contact points; ``wide``: bodies, where manifolds shall be swept several at once."""
     return Rows(
         counts=np.zeros(COUNTS, np.int64),
         integer=np.zeros((capacity, ROW_INTEGERS), np.int64),
@@ -244,6 +286,7 @@ def allocate_rows(capacity: int) -> Rows:
         past_impulse=np.zeros((capacity, 2)),
         kept_key=np.zeros(capacity, np.int64),
         kept_impulse=np.zeros((capacity, 2)),
+        wide=allocate_wide(wide, capacity) if wide else Narrow(0),
     )
 
 
@@ -281,7 +324,7 @@ def allocate_world(bodies: Bodies, candidates: int) -> World:
 
 def grown(rows: Rows) -> Rows:
     """Return twice the room, with what is remembered of the step before; the current step must be redone."""
-    bigger = allocate_rows(2 * len(rows.real))
+    bigger = allocate_rows(2 * len(rows.real), len(rows.wide.last) if isinstance(rows.wide, Wide) else 0)
     bigger.counts[:] = rows.counts
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse

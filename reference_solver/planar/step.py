@@ -18,6 +18,7 @@ from reference_solver.planar.manifolds import detect, remember
 from reference_solver.planar.position import begin_pushes, correct_positions
 from reference_solver.planar.rows import prepare, warm_start
 from reference_solver.planar.state import CONTACTS, DISC, FIXED, FREE, Bodies, Pairs, Rows
+from reference_solver.planar.wide import solve_at_once
 from reference_solver.stepping.iteration import solve_velocities
 from reference_solver.stepping.ledger import Buffer
 from reference_solver.stepping.options import Options, pushes_along
@@ -69,7 +70,8 @@ def step(bodies: Bodies, pairs: Pairs, rows: Rows, problem: Problem, options: Op
         if pushes_along(options):
             pushed = begin_pushes(bodies, rows, options, tally) > 0.0
         warm_start(bodies, rows, options)
-        solve_velocities(bodies, rows, problem, options, tally, int(pushed))
+        if not solve_at_once(bodies, rows, options, tally, int(pushed)):
+            solve_velocities(bodies, rows, problem, options, tally, int(pushed))
         if options.certified:
             certify(bodies, rows, options, tally)
         if not pushes_along(options):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from reference_solver.compilation import config
 from reference_solver.direct.problem import allocate_problem
 from reference_solver.model import Model
-from reference_solver.needs import Needs
+from reference_solver.needs import ALL_PAIRS_LIMIT, Needs
 from reference_solver.planar.meeting import allocate_meeting
 from reference_solver.planar.problem import assemble, pose_problem
 from reference_solver.planar.state import (
@@ -44,7 +45,8 @@ class World(SteppedWorld):
         super().__init__(model, settings, needs, certified, room)
         self._bodies = allocate_bodies(model, needs)
         self._pairs = allocate_pairs(model, room)
-        self._rows = allocate_rows(room)
+        textbook = settings.scheme == "fixed" and settings.solver == "scalar" and settings.residual is None
+        self._rows = allocate_rows(room, n if textbook and n > ALL_PAIRS_LIMIT and not config.DISABLE_JIT else 0)
         self._sub = allocate_sub_step(n, room, allocate_meeting(self._bodies))
         self._world = allocate_world(self._bodies, room)
         self._laws = self._pairs.restitution, self._pairs.friction

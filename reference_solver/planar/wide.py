@@ -1,0 +1,169 @@
+"""Sweeps of many manifolds at once, one in each lane (`reference_solver.lanes`), with the bits of one after the other.
+
+Manifolds that share no free body change nothing of each other. A manifold therefore has a level, one more than that of
+the last manifold before it that shares a body with it: those of a level are solved together, level after level, and
+every one meets the velocities that it meets in the order of `sequential_impulses.sweep_rows`. Blocks of `LANES`
+manifolds are laid out once a step. Worth it where levels are wide, as in piles; a column has as many levels as boxes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reference_solver.compilation import inner_kernel
+from reference_solver.lanes import LANES, from_lanes, into_lanes, lanes
+from reference_solver.model import Array
+from reference_solver.planar.columns import INVERSE_INERTIA, INVERSE_MASS, MOTION, PN, PT, PUSH, WIDE_REALS, A, B
+from reference_solver.planar.residual import natural_map
+from reference_solver.planar.sequential_impulses import solve_pair, solve_point, solve_push, solve_pushes
+from reference_solver.planar.state import FREE, MANIFOLDS, Bodies, Narrow, Rows, Wide
+from reference_solver.stepping.operations import operation, provide
+from reference_solver.stepping.options import Options
+from reference_solver.stepping.sweeps import enter
+
+#: Fewer manifolds are not worth laying out.
+LEAST_MANIFOLDS = 64
+#: Columns of `Wide.velocity`: velocity and inverse mass, pseudo-velocity and inverse moment of inertia.
+MASS, PSEUDO, INERTIA = 3, 4, 7
+
+
+@inner_kernel
+def solve_at_once(bodies: Bodies, rows: Rows, options: Options, tally: Array, push: int) -> bool:
+    """See `iteration.solve_velocities`; False, with nothing done, where that is faster or there is a residual stop."""
+    if options.residual >= 0.0 or not sweep_at_once(rows.wide, bodies, rows, options, push):
+        return False
+    enter(tally, natural_map(bodies, rows, options) if options.certified else 0.0, options.iterations)
+    return True
+
+
+@operation
+def sweep_at_once(wide: Any, bodies: Bodies, rows: Rows, options: Options, push: int) -> bool:
+    """Make all sweeps with `LANES` manifolds at once; False, with nothing done, where that is not worth it."""
+    raise NotImplementedError
+
+
+@inner_kernel
+def sweep_narrow(wide: Narrow, bodies: Bodies, rows: Rows, options: Options, push: int) -> bool:
+    """See `sweep_at_once`: there is no room for it."""
+    return False
+
+
+@inner_kernel
+def sweep_wide(wide: Wide, bodies: Bodies, rows: Rows, options: Options, push: int) -> bool:
+    """See `sweep_at_once`."""
+    if rows.counts[MANIFOLDS] < LEAST_MANIFOLDS:
+        return False
+    blocks = find_blocks(wide, bodies, rows)
+    if blocks == 0:
+        return False
+    lay_out(wide, bodies, rows, blocks)
+    relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
+    for k in range(options.iterations):
+        sweep_blocks(wide, rows, blocks, options, relaxation, int(2 * k >= options.iterations), push)
+    put_back(wide, bodies, rows, blocks)
+    return True
+
+
+@inner_kernel
+def find_blocks(wide: Wide, bodies: Bodies, rows: Rows) -> int:
+    """Give each manifold a slot; the number of blocks, 0 where more than half of their lanes would be empty."""
+    count, levels = rows.counts[MANIFOLDS], 0
+    wide.last[:] = 0
+    for m in range(count):
+        c = rows.manifold[m]
+        a, b = rows.integer[c, A], rows.integer[c, B]
+        level = max(wide.last[a], wide.last[b])
+        for i in (a, b):
+            if bodies.kind[i, MOTION] == FREE:
+                wide.last[i] = level + 1
+        wide.level[m] = 2 * level + rows.manifold[m + 1] - c - 1
+        levels = max(levels, level + 1)
+    wide.begin[: 2 * levels + 1] = 0
+    for m in range(count):
+        wide.begin[wide.level[m] + 1] += 1
+    for k in range(2 * levels):
+        slots = LANES * ((wide.begin[k + 1] + LANES - 1) // LANES)
+        wide.begin[k + 1] = wide.begin[k] + slots
+    slots = wide.begin[2 * levels]
+    if slots > 2 * count:
+        return 0
+    wide.order[:slots] = -1
+    for m in range(count):
+        wide.order[wide.begin[wide.level[m]]] = m
+        wide.begin[wide.level[m]] += 1
+    return slots // LANES
+
+
+@inner_kernel
+def lay_out(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
+    """Copy what a sweep needs: velocities in a row for each body, rows and W in a lane for each manifold."""
+    n = len(bodies.kind)
+    for i in range(n):
+        for k in range(3):
+            wide.velocity[i, k], wide.velocity[i, PSEUDO + k] = bodies.twist[i, k], bodies.pseudo[i, k]
+        wide.velocity[i, MASS] = bodies.real[i, INVERSE_MASS]
+        wide.velocity[i, INERTIA] = bodies.real[i, INVERSE_INERTIA]
+    for q in range(blocks):
+        for lane in range(LANES):
+            m = wide.order[LANES * q + lane]
+            if m < 0:
+                wide.body[q, 0, lane] = wide.body[q, 1, lane] = n
+                for k in range(WIDE_REALS):
+                    wide.point[2 * q, k, lane] = wide.point[2 * q + 1, k, lane] = 0.0
+                continue
+            c = rows.manifold[m]
+            points = rows.manifold[m + 1] - c
+            wide.body[q, 0, lane], wide.body[q, 1, lane] = rows.integer[c, A], rows.integer[c, B]
+            for i in range(points):
+                for k in range(WIDE_REALS):
+                    wide.point[2 * q + i, k, lane] = rows.real[c + i, k]
+            if points == 2:
+                for i in range(4):
+                    for j in range(4):
+                        wide.block[q, i, j, lane] = rows.block[m, i, j]
+
+
+@inner_kernel
+def sweep_blocks(
+    wide: Wide, rows: Rows, blocks: int, options: Options, relaxation: float, backwards: int, push: int
+) -> None:
+    """See `sequential_impulses.sweep_rows`."""
+    one, other = lanes(wide.pair[0]), lanes(wide.pair[1])
+    va, vb, pa, pb = one[:MASS], other[:MASS], one[PSEUDO:INERTIA], other[PSEUDO:INERTIA]
+    point, block, friction = lanes(wide.point), lanes(wide.block), options.friction
+    for q in range(blocks):
+        m = wide.order[LANES * q]
+        into_lanes(wide.velocity, wide.body[q, 0], one)
+        into_lanes(wide.velocity, wide.body[q, 1], other)
+        mobile = (one[MASS], other[MASS], one[INERTIA], other[INERTIA])
+        if rows.manifold[m + 1] - rows.manifold[m] == 1:
+            solve_point(point[2 * q], va, vb, mobile, friction, relaxation)
+            if push:
+                solve_push(point[2 * q], pa, pb, mobile, relaxation)
+        else:
+            first, second = point[2 * q + backwards], point[2 * q + 1 - backwards]
+            solve_pair(first, second, block[q], va, vb, mobile, backwards, friction, relaxation)
+            if push:
+                solve_pushes(first, second, pa, pb, mobile, relaxation)
+        from_lanes(one, wide.body[q, 0], wide.velocity)
+        from_lanes(other, wide.body[q, 1], wide.velocity)
+
+
+@inner_kernel
+def put_back(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
+    """Copy velocities and impulses back."""
+    for i in range(len(bodies.kind)):
+        for k in range(3):
+            bodies.twist[i, k], bodies.pseudo[i, k] = wide.velocity[i, k], wide.velocity[i, PSEUDO + k]
+    for slot in range(LANES * blocks):
+        m, q, lane = wide.order[slot], slot // LANES, slot % LANES
+        if m < 0:
+            continue
+        for i in range(rows.manifold[m + 1] - rows.manifold[m]):
+            c = rows.manifold[m] + i
+            rows.real[c, PN], rows.real[c, PT] = wide.point[2 * q + i, PN, lane], wide.point[2 * q + i, PT, lane]
+            rows.real[c, PUSH] = wide.point[2 * q + i, PUSH, lane]
+
+
+provide(sweep_at_once, Narrow, sweep_narrow)
+provide(sweep_at_once, Wide, sweep_wide)
