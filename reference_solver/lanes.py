@@ -16,6 +16,7 @@ from inspect import Parameter, Signature
 from itertools import product
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.imputils import impl_ret_borrowed
@@ -28,9 +29,18 @@ from numba.extending import (
     register_model,
     type_callable,
 )
+from numpy.typing import NDArray
 
 #: Worlds side by side: eight doubles fill a register of AVX-512, two of AVX2.
 LANES = 8
+
+
+def room(*shape: int) -> NDArray[np.float64]:
+    """Zeros of a shape whose last axis are lanes, where each vector is in one line of the cache (64 bytes)."""
+    size = math.prod(shape)
+    memory = np.zeros(size + 8)
+    first = -memory.ctypes.data % 64 // 8
+    return memory[first : first + size].reshape(shape)
 
 
 def where(condition: Any, one: Any, other: Any) -> Any:
@@ -255,8 +265,8 @@ def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 def _row(builder: Any, array: Any, index: Any) -> Any:
-    """Address of a row of an array (n, LANES), as that of a vector."""
-    stride, _ = cgutils.unpack_tuple(builder, array.strides)
+    """Address of the first numbers of ``array[index]``, as that of a vector."""
+    stride = cgutils.unpack_tuple(builder, array.strides)[0]
     place = builder.bitcast(array.data, ir.IntType(8).as_pointer())
     return builder.bitcast(builder.gep(place, [builder.mul(stride, index)]), DOUBLES.as_pointer())
 
@@ -284,7 +294,7 @@ def _moved(into: bool) -> Any:
     return intrinsic(move)
 
 
-#: ``into_lanes(array, rows, columns)``: lane l of ``columns[k]`` is ``array[rows[l], k]``; both have `LANES` columns.
+#: ``into_lanes(array, rows, columns)``: lane l of ``columns[k]`` is ``array[rows[l], k]``, for the first `LANES` k.
 into_lanes: Any = _moved(into=True)
 #: ``from_lanes(columns, rows, array)``: the inverse.
 from_lanes: Any = _moved(into=False)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from reference_solver.lanes import LANES
+from reference_solver.lanes import LANES, room
 from reference_solver.many.planar import Group, hand_over, run_group
 from reference_solver.model import Array, Model
 from reference_solver.needs import needs
@@ -102,39 +102,45 @@ def allocate_group(worlds: list[tuple[Bodies, Pairs]], options: Options, contact
     bodies, pairs = [each for each, _ in worlds], [each for _, each in worlds]
     n = len(bodies[0].kind)
     fields = ("pose", "twist", "pseudo", "real", "vertex")
-    numbers: dict[str, Any] = {name: np.stack([getattr(each, name) for each in bodies], axis=-1) for name in fields}
+    numbers: dict[str, Any] = {name: stacked([getattr(each, name) for each in bodies]) for name in fields}
     return Group(
         **numbers,
         restitution=laws([each.restitution for each in pairs]),
         friction=laws([each.friction for each in pairs]),
         **rooms(contacts),
         kind=bodies[0].kind,
-        low=np.zeros((n, 2, LANES)),
-        high=np.zeros((n, 2, LANES)),
+        low=room(n, 2, LANES),
+        high=room(n, 2, LANES),
         boxes=allocate_boxes(n, 2, contacts),
         probe=allocate_rows(2),
-        saved=np.zeros((15, LANES)),
-        tally=np.zeros((TALLY_SIZE, LANES)),
+        saved=room(15, LANES),
+        tally=room(TALLY_SIZE, LANES),
         options=options,
     )
+
+
+def stacked(arrays: list[Array]) -> Array:
+    """Arrays of one shape side by side."""
+    result = room(*arrays[0].shape, len(arrays))
+    return np.stack(arrays, axis=-1, out=result)
 
 
 def rooms(contacts: int) -> dict[str, Any]:
     """Arrays of a `Group` that grow."""
     count = np.int64
     return {
-        "row": np.zeros((contacts, ROW_REALS, LANES)),
+        "row": room(contacts, ROW_REALS, LANES),
         "integer": np.zeros((contacts, ROW_INTEGERS), count),
         "counts": np.zeros(COUNTS, count),
         "manifold": np.zeros(contacts + 1, count),
-        "block": np.zeros((contacts, 4, 4, LANES)),
-        "found": np.zeros((contacts, LANES)),
-        "feature": np.zeros((contacts, LANES)),
-        "impact": np.zeros((contacts, LANES)),
+        "block": room(contacts, 4, 4, LANES),
+        "found": room(contacts, LANES),
+        "feature": room(contacts, LANES),
+        "impact": room(contacts, LANES),
         "old_pair": np.zeros(contacts, count),
         "old_first": np.zeros(contacts + 1, count),
         "old_count": np.zeros(1, count),
-        "old": np.zeros((contacts, 3, LANES)),
+        "old": room(contacts, 3, LANES),
     }
 
 
@@ -142,8 +148,8 @@ def laws(tables: list[Array]) -> Array:
     """Tables of pairs side by side; one number for each world where each has one number for all pairs."""
     n = len(tables[0])
     if all(table.strides == (0, 0) for table in tables):
-        return as_strided(np.array([table[0, 0] for table in tables]), (n, n, LANES), (0, 0, 8))
-    padded = np.zeros((n, n + 1, LANES))
+        return as_strided(stacked([table[:1, 0] for table in tables])[0], (n, n, LANES), (0, 0, 8))
+    padded = room(n, n + 1, LANES)
     padded[:, :n] = np.stack(tables, axis=-1)
     return padded[:, :n]
 

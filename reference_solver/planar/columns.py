@@ -69,8 +69,8 @@ APPROACH = 13
 SPEED = 14
 #: Accumulated pseudo-impulse, and the pseudo-velocity it must reach (E16).
 PUSH, PUSH_TARGET = 15, 16
-#: Columns that a sweep reads: those up to here.
-WIDE_REALS = 17
+#: A sweep reads the columns up to here and no others; a multiple of the lanes.
+WIDE_REALS = 24
 #: Separation [m], < 0 overlap.
 GAP = 17
 #: Contact point minus centre of A and of B [m]: two columns each.

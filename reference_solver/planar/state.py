@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.direct.problem import Problem
-from reference_solver.lanes import LANES
+from reference_solver.lanes import LANES, room
 from reference_solver.model import (
     Array,
     Body,
@@ -114,8 +114,9 @@ class Wide(NamedTuple):
     last: Indices  # (n,): level of a body's last manifold, plus 1
     level: Indices  # (m,): of each manifold
     begin: Indices  # (2 m + 1,): first slot of each level, its manifolds of one point before those of two
-    order: Indices  # (slots,): manifold of each slot, -1 where there is none
+    order: Indices  # (blocks, LANES): manifold of each slot, -1 where there is none
     body: Indices  # (blocks, 2, LANES): rows of `velocity` of A and B
+    row: Indices  # (blocks, 2, LANES): rows of `Rows.real`
     velocity: Array  # (n + 1, 8): velocities of each body as `wide` has them; the last stands for none
     point: Array  # (2 blocks, WIDE_REALS, LANES): what of `Rows.real` a sweep needs
     block: Array  # (blocks, 4, 4, LANES): `Rows.block`
@@ -262,12 +263,13 @@ def allocate_wide(n: int, capacity: int) -> Wide:
         last=np.zeros(n, count),
         level=np.zeros(capacity, count),
         begin=np.zeros(2 * capacity + 3, count),
-        order=np.zeros(blocks * LANES, count),
+        order=np.zeros((blocks, LANES), count),
         body=np.zeros((blocks, 2, LANES), count),
-        velocity=np.zeros((n + 1, LANES)),
-        point=np.zeros((2 * blocks, WIDE_REALS, LANES)),
-        block=np.zeros((blocks, 4, 4, LANES)),
-        pair=np.zeros((2, LANES, LANES)),
+        row=np.zeros((blocks, 2, LANES), count),
+        velocity=room(n + 1, LANES),
+        point=room(2 * blocks, WIDE_REALS, LANES),
+        block=room(blocks, 4, 4, LANES),
+        pair=room(2, LANES, LANES),
     )
 
 

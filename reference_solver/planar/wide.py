@@ -13,10 +13,10 @@ from typing import Any
 from reference_solver.compilation import inner_kernel
 from reference_solver.lanes import LANES, from_lanes, into_lanes, lanes
 from reference_solver.model import Array
-from reference_solver.planar.columns import INVERSE_INERTIA, INVERSE_MASS, MOTION, PN, PT, PUSH, WIDE_REALS, A, B
+from reference_solver.planar.columns import INVERSE_INERTIA, INVERSE_MASS, MOTION, WIDE_REALS, A, B
 from reference_solver.planar.residual import natural_map
 from reference_solver.planar.sequential_impulses import solve_pair, solve_point, solve_push, solve_pushes
-from reference_solver.planar.state import FREE, MANIFOLDS, Bodies, Narrow, Rows, Wide
+from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, Bodies, Narrow, Rows, Wide
 from reference_solver.stepping.operations import operation, provide
 from reference_solver.stepping.options import Options
 from reference_solver.stepping.sweeps import enter
@@ -25,6 +25,8 @@ from reference_solver.stepping.sweeps import enter
 LEAST_MANIFOLDS = 64
 #: Columns of `Wide.velocity`: velocity and inverse mass, pseudo-velocity and inverse moment of inertia.
 MASS, PSEUDO, INERTIA = 3, 4, 7
+#: The impulses of a row are in the `LANES` columns from here.
+SOLVED = 8
 
 
 @inner_kernel
@@ -51,7 +53,7 @@ def sweep_narrow(wide: Narrow, bodies: Bodies, rows: Rows, options: Options, pus
 @inner_kernel
 def sweep_wide(wide: Wide, bodies: Bodies, rows: Rows, options: Options, push: int) -> bool:
     """See `sweep_at_once`."""
-    if rows.counts[MANIFOLDS] < LEAST_MANIFOLDS:
+    if rows.counts[MANIFOLDS] < LEAST_MANIFOLDS or rows.counts[CONTACTS] == len(rows.real):
         return False
     blocks = find_blocks(wide, bodies, rows)
     if blocks == 0:
@@ -87,9 +89,10 @@ def find_blocks(wide: Wide, bodies: Bodies, rows: Rows) -> int:
     slots = wide.begin[2 * levels]
     if slots > 2 * count:
         return 0
-    wide.order[:slots] = -1
+    wide.order[: slots // LANES] = -1
     for m in range(count):
-        wide.order[wide.begin[wide.level[m]]] = m
+        slot = wide.begin[wide.level[m]]
+        wide.order[slot // LANES, slot % LANES] = m
         wide.begin[wide.level[m]] += 1
     return slots // LANES
 
@@ -103,24 +106,31 @@ def lay_out(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
             wide.velocity[i, k], wide.velocity[i, PSEUDO + k] = bodies.twist[i, k], bodies.pseudo[i, k]
         wide.velocity[i, MASS] = bodies.real[i, INVERSE_MASS]
         wide.velocity[i, INERTIA] = bodies.real[i, INVERSE_INERTIA]
+    none, point, block = rows.counts[CONTACTS], lanes(wide.point), lanes(wide.block)
+    rows.real[none] = 0.0
+    wide.velocity[n] = 0.0
     for q in range(blocks):
+        body, row = wide.body[q], wide.row[q]
         for lane in range(LANES):
-            m = wide.order[LANES * q + lane]
+            m = wide.order[q, lane]
+            c = rows.manifold[m] if m >= 0 else none
+            row[0, lane], row[1, lane] = c, c + 1
+            body[0, lane], body[1, lane] = (rows.integer[c, A], rows.integer[c, B]) if m >= 0 else (n, n)
             if m < 0:
-                wide.body[q, 0, lane] = wide.body[q, 1, lane] = n
-                for k in range(WIDE_REALS):
-                    wide.point[2 * q, k, lane] = wide.point[2 * q + 1, k, lane] = 0.0
-                continue
-            c = rows.manifold[m]
-            points = rows.manifold[m + 1] - c
-            wide.body[q, 0, lane], wide.body[q, 1, lane] = rows.integer[c, A], rows.integer[c, B]
-            for i in range(points):
-                for k in range(WIDE_REALS):
-                    wide.point[2 * q + i, k, lane] = rows.real[c + i, k]
-            if points == 2:
-                for i in range(4):
-                    for j in range(4):
-                        wide.block[q, i, j, lane] = rows.block[m, i, j]
+                row[1, lane], wide.order[q, lane] = none, wide.order[q, 0]
+        for i in range(points_of(wide, rows, q)):
+            for k in range(0, WIDE_REALS, LANES):
+                into_lanes(rows.real[:, k:], row[i], point[2 * q + i, k:])
+        if points_of(wide, rows, q) == 2:
+            for k in range(0, 4, 2):
+                into_lanes(rows.block[:, k:], wide.order[q], block[q, k:])
+
+
+@inner_kernel
+def points_of(wide: Wide, rows: Rows, q: int) -> int:
+    """Points of each manifold of a block."""
+    m = wide.order[q, 0]
+    return int(rows.manifold[m + 1] - rows.manifold[m])
 
 
 @inner_kernel
@@ -132,11 +142,10 @@ def sweep_blocks(
     va, vb, pa, pb = one[:MASS], other[:MASS], one[PSEUDO:INERTIA], other[PSEUDO:INERTIA]
     point, block, friction = lanes(wide.point), lanes(wide.block), options.friction
     for q in range(blocks):
-        m = wide.order[LANES * q]
         into_lanes(wide.velocity, wide.body[q, 0], one)
         into_lanes(wide.velocity, wide.body[q, 1], other)
         mobile = (one[MASS], other[MASS], one[INERTIA], other[INERTIA])
-        if rows.manifold[m + 1] - rows.manifold[m] == 1:
+        if points_of(wide, rows, q) == 1:
             solve_point(point[2 * q], va, vb, mobile, friction, relaxation)
             if push:
                 solve_push(point[2 * q], pa, pb, mobile, relaxation)
@@ -155,14 +164,10 @@ def put_back(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
     for i in range(len(bodies.kind)):
         for k in range(3):
             bodies.twist[i, k], bodies.pseudo[i, k] = wide.velocity[i, k], wide.velocity[i, PSEUDO + k]
-    for slot in range(LANES * blocks):
-        m, q, lane = wide.order[slot], slot // LANES, slot % LANES
-        if m < 0:
-            continue
-        for i in range(rows.manifold[m + 1] - rows.manifold[m]):
-            c = rows.manifold[m] + i
-            rows.real[c, PN], rows.real[c, PT] = wide.point[2 * q + i, PN, lane], wide.point[2 * q + i, PT, lane]
-            rows.real[c, PUSH] = wide.point[2 * q + i, PUSH, lane]
+    point = lanes(wide.point)
+    for q in range(blocks):
+        for i in range(points_of(wide, rows, q)):
+            from_lanes(point[2 * q + i, SOLVED:], wide.row[q, i], rows.real[:, SOLVED:])
 
 
 provide(sweep_at_once, Narrow, sweep_narrow)
