@@ -296,7 +296,7 @@ def sweep(group: Group, bodies: Bodies, rows: Rows, found: Array, relaxation: fl
                 keep(group, bodies, rows, first)
             sweep_pair(bodies, rows, m, backwards, options, relaxation)
             if push:
-                push_pair(bodies, rows, m, backwards, relaxation)
+                push_pair(bodies, rows, first + backwards, first + 1 - backwards, relaxation)
             if not whole:
                 take_back(group, bodies, rows, first, two)
         if any_of(one):

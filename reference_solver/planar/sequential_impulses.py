@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.coulomb import into_interval
-from reference_solver.model import Array
 from reference_solver.planar.columns import (
     AN,
     AT,
@@ -55,35 +54,22 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, 
         else:
             sweep_pair(bodies, rows, m, backwards, options, relaxation)
             if push:
-                push_pair(bodies, rows, m, backwards, relaxation)
-
-
-@inner_kernel
-def mobility(bodies: Bodies, a: int, b: int) -> tuple[float, float, float, float]:
-    """Inverse masses of a and b, and their inverse moments of inertia."""
-    one, other = bodies.real[a], bodies.real[b]
-    return one[INVERSE_MASS], other[INVERSE_MASS], one[INVERSE_INERTIA], other[INVERSE_INERTIA]
+                push_pair(bodies, rows, first + backwards, first + 1 - backwards, relaxation)
 
 
 @inner_kernel
 def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation: float) -> None:
     """Rows of a manifold of one point."""
-    a, b = rows.integer[c, A], rows.integer[c, B]
-    solve_point(rows.real[c], bodies.twist[a], bodies.twist[b], mobility(bodies, a, b), options.friction, relaxation)
-
-
-@inner_kernel
-def solve_point(
-    row: Array, va: Array, vb: Array, mobile: tuple[float, float, float, float], friction: int, relaxation: float
-) -> None:
-    """The same from the row of the point, the velocities of its bodies and their `mobility`."""
-    mass_a, mass_b, ia, ib = mobile
+    a, b, row = rows.integer[c, A], rows.integer[c, B], rows.real[c]
+    va, vb = bodies.twist[a], bodies.twist[b]
+    mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
+    ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
     nx, ny, an, bn, at, bt = row[NX], row[NY], row[AN], row[BN], row[AT], row[BT]
     x, y = vb[0] - va[0], vb[1] - va[1]
     old_n, old_t, relaxed = row[PN], row[PT], relaxation * row[NORMAL_MASS]
     n = max(old_n - relaxed * (nx * x + ny * y + (bn * vb[2] - an * va[2]) - row[TARGET]), 0.0)
     row[PN], t = n, old_t
-    if friction:
+    if options.friction:
         relaxed, k = relaxation * row[TANGENT_MASS], row[COUPLING]
         rest = old_t - relaxed * (nx * y - ny * x + (bt * vb[2] - at * va[2]) - k * old_n)
         t = into_interval(rest - relaxed * k * n, row[FRICTION] * n)
@@ -104,33 +90,17 @@ def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Opti
     In p := max(p - (u - b) / k, 0) the velocity u is that at the start plus W times what impulses have changed since.
     All that is known at the start is taken together first (``rest``), so that a row waits for little.
     """
-    c, d = rows.manifold[m] + backwards, rows.manifold[m] + 1 - backwards
+    c, d, i, j = rows.manifold[m] + backwards, rows.manifold[m] + 1 - backwards, 2 * backwards, 2 - 2 * backwards
     a, b, one, two, w = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d], rows.block[m]
-    va, vb, mobile = bodies.twist[a], bodies.twist[b], mobility(bodies, a, b)
-    solve_pair(one, two, w, va, vb, mobile, backwards, options.friction, relaxation)
-
-
-@inner_kernel
-def solve_pair(
-    one: Array,
-    two: Array,
-    w: Array,
-    va: Array,
-    vb: Array,
-    mobile: tuple[float, float, float, float],
-    backwards: int,
-    friction: int,
-    relaxation: float,
-) -> None:
-    """The same from the rows of the points in this order, W, velocities of the bodies and their `mobility`."""
-    i, j = 2 * backwards, 2 - 2 * backwards
-    mass_a, mass_b, ia, ib = mobile
+    va, vb = bodies.twist[a], bodies.twist[b]
+    mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
+    ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
     nx, ny, x, y, wa, wb = one[NX], one[NY], vb[0] - va[0], vb[1] - va[1], va[2], vb[2]
     along, across = nx * x + ny * y, nx * y - ny * x
     an1, bn1, an2, bn2 = one[AN], one[BN], two[AN], two[BN]
     at1, bt1, at2, bt2 = one[AT], one[BT], two[AT], two[BT]
     old_n1, old_t1, old_n2, old_t2 = one[PN], one[PT], two[PN], two[PT]
-    t1, t2 = old_t1, old_t2
+    t1, t2, friction = old_t1, old_t2, options.friction
     relaxed = relaxation * one[NORMAL_MASS]
     n1 = max(old_n1 - relaxed * (along + (bn1 * wb - an1 * wa) - one[TARGET]), 0.0)
     if friction:
@@ -163,41 +133,28 @@ def solve_pair(
 @inner_kernel
 def push_point(bodies: Bodies, rows: Rows, c: int, relaxation: float) -> None:
     """Pseudo-velocity row of a manifold of one point (E16)."""
-    a, b = rows.integer[c, A], rows.integer[c, B]
-    solve_push(rows.real[c], bodies.pseudo[a], bodies.pseudo[b], mobility(bodies, a, b), relaxation)
-
-
-@inner_kernel
-def solve_push(row: Array, va: Array, vb: Array, mobile: tuple[float, float, float, float], relaxation: float) -> None:
-    """The same from the row of the point, the pseudo-velocities of its bodies and their `mobility`."""
-    mass_a, mass_b, ia, ib = mobile
+    a, b, row = rows.integer[c, A], rows.integer[c, B], rows.real[c]
+    va, vb = bodies.pseudo[a], bodies.pseudo[b]
     un = row[NX] * (vb[0] - va[0]) + row[NY] * (vb[1] - va[1]) + (row[BN] * vb[2] - row[AN] * va[2])
     old = row[PUSH]
     row[PUSH] = max(old - relaxation * (un - row[PUSH_TARGET]) * row[NORMAL_MASS], 0.0)
     p = row[PUSH] - old
     px, py = p * row[NX], p * row[NY]
-    va[0] -= mass_a * px
-    va[1] -= mass_a * py
-    va[2] -= ia * (row[AN] * p)
-    vb[0] += mass_b * px
-    vb[1] += mass_b * py
-    vb[2] += ib * (row[BN] * p)
+    va[0] -= bodies.real[a, INVERSE_MASS] * px
+    va[1] -= bodies.real[a, INVERSE_MASS] * py
+    va[2] -= bodies.real[a, INVERSE_INERTIA] * (row[AN] * p)
+    vb[0] += bodies.real[b, INVERSE_MASS] * px
+    vb[1] += bodies.real[b, INVERSE_MASS] * py
+    vb[2] += bodies.real[b, INVERSE_INERTIA] * (row[BN] * p)
 
 
 @inner_kernel
-def push_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, relaxation: float) -> None:
+def push_pair(bodies: Bodies, rows: Rows, c: int, d: int, relaxation: float) -> None:
     """Pseudo-velocity rows of a manifold of two points (E16)."""
-    c, d = rows.manifold[m] + backwards, rows.manifold[m] + 1 - backwards
     a, b, one, two = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d]
-    solve_pushes(one, two, bodies.pseudo[a], bodies.pseudo[b], mobility(bodies, a, b), relaxation)
-
-
-@inner_kernel
-def solve_pushes(
-    one: Array, two: Array, va: Array, vb: Array, mobile: tuple[float, float, float, float], relaxation: float
-) -> None:
-    """The same from the rows of the points in this order, pseudo-velocities of the bodies and their `mobility`."""
-    mass_a, mass_b, ia, ib = mobile
+    va, vb = bodies.pseudo[a], bodies.pseudo[b]
+    mass_a, mass_b = bodies.real[a, INVERSE_MASS], bodies.real[b, INVERSE_MASS]
+    ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
     nx, ny = one[NX], one[NY]
     along = nx * (vb[0] - va[0]) + ny * (vb[1] - va[1])
     an1, bn1, an2, bn2 = one[AN], one[BN], two[AN], two[BN]
@@ -226,4 +183,4 @@ def sweep_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
         if rows.manifold[m + 1] - first == 1:
             push_point(bodies, rows, first, relaxation)
         else:
-            push_pair(bodies, rows, m, 0, relaxation)
+            push_pair(bodies, rows, first, first + 1, relaxation)

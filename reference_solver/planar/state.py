@@ -47,6 +47,7 @@ from reference_solver.planar.columns import (
     SIZE,
     VERTICES,
     WIDE_REALS,
+    B,
 )
 from reference_solver.planar.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
 from reference_solver.shapes import MOST_VERTICES
@@ -120,7 +121,11 @@ class Wide(NamedTuple):
     velocity: Array  # (n + 1, 8): velocities of each body as `wide` has them; the last stands for none
     point: Array  # (2 blocks, WIDE_REALS, LANES): what of `Rows.real` a sweep needs
     block: Array  # (blocks, 4, 4, LANES): `Rows.block`
-    pair: Array  # (2, 8, LANES): velocities of the bodies of a block
+    points: Indices  # (blocks,): of each manifold of a block
+    pair: Array  # (2, 8, LANES): rows of `velocity` of the bodies of a block
+    kind: Indices  # (2, BODY_INTEGERS): nothing of those bodies
+    integer: Indices  # (2 blocks, ROW_INTEGERS): that each row is between them
+    manifold: Indices  # (blocks + 1,): first row of each block
 
 
 @structure
@@ -269,7 +274,11 @@ def allocate_wide(n: int, capacity: int) -> Wide:
         velocity=room(n + 1, LANES),
         point=room(2 * blocks, WIDE_REALS, LANES),
         block=room(blocks, 4, 4, LANES),
+        points=np.zeros(blocks, count),
         pair=room(2, LANES, LANES),
+        kind=np.zeros((2, BODY_INTEGERS), count),
+        integer=np.tile(np.eye(1, ROW_INTEGERS, B, dtype=count), (2 * blocks, 1)),
+        manifold=np.arange(0, 2 * blocks + 1, 2),
     )
 
 

@@ -15,7 +15,7 @@ from reference_solver.lanes import LANES, from_lanes, into_lanes, lanes
 from reference_solver.model import Array
 from reference_solver.planar.columns import INVERSE_INERTIA, INVERSE_MASS, MOTION, WIDE_REALS, A, B
 from reference_solver.planar.residual import natural_map
-from reference_solver.planar.sequential_impulses import solve_pair, solve_point, solve_push, solve_pushes
+from reference_solver.planar.sequential_impulses import push_pair, push_point, sweep_pair, sweep_point
 from reference_solver.planar.state import CONTACTS, FREE, MANIFOLDS, Bodies, Narrow, Rows, Wide
 from reference_solver.stepping.operations import operation, provide
 from reference_solver.stepping.options import Options
@@ -23,8 +23,9 @@ from reference_solver.stepping.sweeps import enter
 
 #: Fewer manifolds are not worth laying out.
 LEAST_MANIFOLDS = 64
-#: Columns of `Wide.velocity`: velocity and inverse mass, pseudo-velocity and inverse moment of inertia.
-MASS, PSEUDO, INERTIA = 3, 4, 7
+#: Columns of `Wide.velocity`: velocity, pseudo-velocity, inverse mass and, as in `Bodies.real`, moment of inertia.
+PSEUDO, MASS = 3, 6
+INERTIA = MASS + INVERSE_INERTIA - INVERSE_MASS
 #: The impulses of a row are in the `LANES` columns from here.
 SOLVED = 8
 
@@ -61,7 +62,7 @@ def sweep_wide(wide: Wide, bodies: Bodies, rows: Rows, options: Options, push: i
     lay_out(wide, bodies, rows, blocks)
     relaxation = options.relaxation if options.relaxation > 0.0 else 1.0
     for k in range(options.iterations):
-        sweep_blocks(wide, rows, blocks, options, relaxation, int(2 * k >= options.iterations), push)
+        sweep_blocks(wide, blocks, options, relaxation, int(2 * k >= options.iterations), push)
     put_back(wide, bodies, rows, blocks)
     return True
 
@@ -118,44 +119,45 @@ def lay_out(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
             body[0, lane], body[1, lane] = (rows.integer[c, A], rows.integer[c, B]) if m >= 0 else (n, n)
             if m < 0:
                 row[1, lane], wide.order[q, lane] = none, wide.order[q, 0]
-        for i in range(points_of(wide, rows, q)):
+        m = wide.order[q, 0]
+        wide.points[q] = rows.manifold[m + 1] - rows.manifold[m]
+        for i in range(wide.points[q]):
             for k in range(0, WIDE_REALS, LANES):
                 into_lanes(rows.real[:, k:], row[i], point[2 * q + i, k:])
-        if points_of(wide, rows, q) == 2:
+        if wide.points[q] == 2:
             for k in range(0, 4, 2):
                 into_lanes(rows.block[:, k:], wide.order[q], block[q, k:])
 
 
 @inner_kernel
-def points_of(wide: Wide, rows: Rows, q: int) -> int:
-    """Points of each manifold of a block."""
-    m = wide.order[q, 0]
-    return int(rows.manifold[m + 1] - rows.manifold[m])
+def sweep_blocks(wide: Wide, blocks: int, options: Options, relaxation: float, backwards: int, push: int) -> None:
+    """See `sequential_impulses.sweep_rows`: bodies 0 and 1 are those of a block, row 2 q is the first of block q."""
+    pair = lanes(wide.pair)
+    bodies = Bodies(pair, pair, pair[:, PSEUDO:], pair[:, MASS - INVERSE_MASS :], wide.kind, pair, pair, pair)
+    rows = rows_of_blocks(wide)
+    for q in range(blocks):
+        into_lanes(wide.velocity, wide.body[q, 0], pair[0])
+        into_lanes(wide.velocity, wide.body[q, 1], pair[1])
+        if wide.points[q] == 1:
+            sweep_point(bodies, rows, 2 * q, options, relaxation)
+            if push:
+                push_point(bodies, rows, 2 * q, relaxation)
+        else:
+            sweep_pair(bodies, rows, q, backwards, options, relaxation)
+            if push:
+                push_pair(bodies, rows, 2 * q + backwards, 2 * q + 1 - backwards, relaxation)
+        from_lanes(pair[0], wide.body[q, 0], wide.velocity)
+        from_lanes(pair[1], wide.body[q, 1], wide.velocity)
 
 
 @inner_kernel
-def sweep_blocks(
-    wide: Wide, rows: Rows, blocks: int, options: Options, relaxation: float, backwards: int, push: int
-) -> None:
-    """See `sequential_impulses.sweep_rows`."""
-    one, other = lanes(wide.pair[0]), lanes(wide.pair[1])
-    va, vb, pa, pb = one[:MASS], other[:MASS], one[PSEUDO:INERTIA], other[PSEUDO:INERTIA]
-    point, block, friction = lanes(wide.point), lanes(wide.block), options.friction
-    for q in range(blocks):
-        into_lanes(wide.velocity, wide.body[q, 0], one)
-        into_lanes(wide.velocity, wide.body[q, 1], other)
-        mobile = (one[MASS], other[MASS], one[INERTIA], other[INERTIA])
-        if points_of(wide, rows, q) == 1:
-            solve_point(point[2 * q], va, vb, mobile, friction, relaxation)
-            if push:
-                solve_push(point[2 * q], pa, pb, mobile, relaxation)
-        else:
-            first, second = point[2 * q + backwards], point[2 * q + 1 - backwards]
-            solve_pair(first, second, block[q], va, vb, mobile, backwards, friction, relaxation)
-            if push:
-                solve_pushes(first, second, pa, pb, mobile, relaxation)
-        from_lanes(one, wide.body[q, 0], wide.velocity)
-        from_lanes(other, wide.body[q, 1], wide.velocity)
+def rows_of_blocks(wide: Wide) -> Rows:
+    """Rows of all blocks, as a sweep takes them."""
+    none, impulse = wide.points, wide.velocity
+    return Rows(
+        none, wide.integer, lanes(wide.point), wide.manifold, lanes(wide.block), impulse,
+        none, impulse, none, impulse, none, impulse, Narrow(0),
+    )  # fmt: skip
 
 
 @inner_kernel
@@ -166,7 +168,7 @@ def put_back(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
             bodies.twist[i, k], bodies.pseudo[i, k] = wide.velocity[i, k], wide.velocity[i, PSEUDO + k]
     point = lanes(wide.point)
     for q in range(blocks):
-        for i in range(points_of(wide, rows, q)):
+        for i in range(wide.points[q]):
             from_lanes(point[2 * q + i, SOLVED:], wide.row[q, i], rows.real[:, SOLVED:])
 
 
