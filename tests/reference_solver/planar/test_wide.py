@@ -1,0 +1,109 @@
+"""Sweeps of many manifolds at once have the bits of sweeps of one after the other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver.compilation import config
+from reference_solver.lanes import LANES
+from reference_solver.planar.state import MANIFOLDS, Narrow, Wide, allocate_rows
+
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: there are no lanes")
+
+DT = 1.0 / 240.0
+
+
+def heap(seed, count=90, layers=6, shapes="disc"):
+    """Bodies of many sizes that fall onto each other, some of them fixed or driven."""
+    rng, bodies = np.random.default_rng(seed), [Body(HalfSpace((0.0, 1.0)), motion="fixed")]
+    across = count // layers
+    for k in range(count):
+        size = float(rng.uniform(0.3, 0.5))
+        shape = {
+            "disc": Disc(size),
+            "box": Box((size, 0.8 * size)),
+            "capsule": Capsule(0.5 * size, 0.5 * size),
+        }[str(rng.choice(shapes.split()))]
+        place = (float(k % across + rng.uniform(-0.05, 0.05)), float(0.5 + k // across), float(rng.normal()))
+        motion = "free" if k >= across else str(rng.choice(["free", "free", "fixed", "prescribed"]))
+        inert = {"mass": float(rng.uniform(0.5, 2.0)), "inertia": 0.1} if motion == "free" else {}
+        twist = (0.0, 0.0, 0.5) if motion == "prescribed" else (0.0, 0.0, 0.0)
+        bodies.append(Body(shape, motion=motion, pose=place, twist=twist, **inert))
+    table = np.triu(rng.uniform(0.0, 0.5, (count + 1, count + 1)) * rng.integers(0, 2, (count + 1, count + 1)), 1)
+    return Model(2, bodies, gravity=(0.0, -9.81), restitution=table + table.T, friction=0.5)
+
+
+def wall(rows):
+    floor, boxes = Body(HalfSpace((0.0, 1.0)), motion="fixed"), []
+    for row in range(rows):
+        for k in range(rows - row):
+            place = (1.1 * (k - 0.5 * (rows - row - 1)), 0.5 + row, 0.0)
+            boxes.append(Body(Box((0.5, 0.5)), mass=1.0, inertia=1.0 / 6.0, pose=place))
+    return Model(2, [floor, *boxes], gravity=(0.0, -9.81), restitution=0.0, friction=0.5)
+
+
+def narrow(model, settings, certified):
+    """A simulation that sweeps one manifold after the other."""
+    simulation = Simulation(model, settings, certified=certified)
+    world = simulation._world
+    assert isinstance(world._rows.wide, Wide)
+    world._rows = allocate_rows(len(world._rows.real))
+    assert isinstance(world._rows.wide, Narrow)
+    return simulation
+
+
+@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize(
+    ("model", "changes"),
+    [
+        (heap(1), {}),
+        (heap(2, shapes="disc box capsule"), {"iterations": 7}),
+        (heap(3, 150, 5, "box"), {"position_correction": "baumgarte", "relaxation": 1.2}),
+        (heap(4, 150, 5), {"position_correction": "none", "warm_starting": False}),
+        (replace(heap(5), friction=np.zeros((91, 91))), {}),
+        (wall(13), {}),
+    ],
+    ids=["discs", "three shapes", "boxes with Baumgarte", "no correction", "no friction", "wall"],
+)
+def test_bits_are_those_of_one_manifold_after_the_other(model, changes, certified):
+    settings = replace(Settings.classical(DT), **changes)
+    wide, plain = Simulation(model, settings, certified=certified), narrow(model, settings, certified)
+    blocks = 0
+    for _ in range(12):
+        wide.advance(20)
+        plain.advance(20)
+        assert wide.pose.tobytes() == plain.pose.tobytes() and wide.twist.tobytes() == plain.twist.tobytes()
+        for name in ("impulse", "gap", "feature", "body_a"):
+            assert getattr(wide.contacts(), name).tobytes() == getattr(plain.contacts(), name).tobytes()
+        assert wide.certificate == plain.certificate
+        blocks += wide._world._rows.wide.points.any()
+    assert blocks > 0  # it was used
+
+
+def test_manifolds_of_a_block_share_no_free_body_and_keep_their_order():
+    simulation = Simulation(heap(6), Settings.classical(DT), certified=False)
+    simulation.advance(150)
+    rows, kind = simulation._world._rows, simulation._world._bodies.kind
+    wide, count = rows.wide, int(rows.counts[MANIFOLDS])
+    slots, done = [], []
+    for block in wide.order.tolist():
+        if len(done) < count:  # slots without a manifold repeat the first of their block
+            slots.append([m for j, m in enumerate(block) if j == 0 or m != block[0]])
+            done += slots[-1]
+    assert sorted(done) == list(range(count)) and len(slots) < 2 * count / LANES
+    bodies = {m: {b for b in rows.integer[rows.manifold[m], :2].tolist() if kind[b, 1] == 1} for m in done}
+    for block in slots:
+        assert sum(len(bodies[m]) for m in block) == len(set().union(*(bodies[m] for m in block)))
+        assert len({int(rows.manifold[m + 1] - rows.manifold[m]) for m in block}) == 1
+    place = {m: k for k, block in enumerate(slots) for m in block}
+    for b in range(len(kind)):
+        met = [place[m] for m in sorted(done) if b in bodies[m]]
+        assert met == sorted(set(met))
+
+
+def test_small_scenes_and_solves_to_a_residual_have_no_room_for_it():
+    small = Simulation(wall(4), Settings.classical(DT))
+    exact = Simulation(wall(13), Settings.fixed_step(DT))
+    assert all(isinstance(each._world._rows.wide, Narrow) for each in (small, exact))
