@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -48,7 +49,10 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     if not found:
         told = f"nothing is known of {said!r}; see crosscheck list scenes, and crosscheck field for known reports"
         raise click.BadParameter(told, param_hint="WORDS")
-    best, others = found[0], [other.scene for other in found[1:] if other.scene][:OTHERS]
+    best = found[0]
+    # Beside the best: what has as many of the words, or one that it does not have.
+    near = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
+    others = [match.scene for match in near if match.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
     fixes = recorded_fixes(best.scene, about or registry.names())
     missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
@@ -67,13 +71,13 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     if best.report:
         console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
     if best.scene:
-        _show_fixes(best.scene, about, fixes, console)
+        _show_fixes(best.scene, about, fixes, text, console)
     if others:
         near = (f"{name} ({resolve(name).title.lower()})" for name in others)
         console.print(Text(f"or: {'; '.join(near)}", style="dim"))
 
 
-def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console: Console) -> None:
+def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], text: str, console: Console) -> None:
     for fix in fixes:
         console.print()
         console.print(Text(f"{fix.engine} as shipped: {fix.failing} of {fix.judged} checks fail", style="bold"))
@@ -86,11 +90,16 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console
             console.print(
                 Text(f"{engine}: {'no failure is on record' if cures_of(engine) else 'has no table of fixes'}")
             )
+    if not fixes and not named:
+        console.print(Text("no failure of an engine as shipped is on record"))
     console.print()
     console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
     helped = [fix.engine for fix in fixes if fix.helps and fix.engine not in named]
     if helped:
-        console.print(Text(f"for lines to paste, add the engine: {', '.join(helped)}"))
+        engines = " or ".join(dict.fromkeys(helped))
+        console.print(
+            Text(f"lines to paste: name {engines}, as in: crosscheck ask {shlex.join(text.split())} {helped[0]}")
+        )
 
 
 @main.command("field", epilog="Example: crosscheck field stack")

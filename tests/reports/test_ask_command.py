@@ -67,7 +67,7 @@ def test_an_engine_that_is_named_gets_its_numbers_and_the_lines_to_paste():
     assert all(line in said for line in cure_paste(fix).splitlines()), "as `cure` prints them, unbroken"
     assert said.count("\n") <= 24, "one screen"
     without = asked("grip", "slips")
-    assert cure_paste(fix).splitlines()[0] not in without and "add the engine: bullet, mujoco" in without
+    assert cure_paste(fix).splitlines()[0] not in without and "crosscheck ask grip slips bullet" in without
 
 
 def test_names_of_packages_are_names_of_engines():

@@ -220,7 +220,7 @@ def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     store.close()
     result = call("list", "runs", "--out", tmp_path)
     many, few = (line for line in result.stdout.splitlines() if "quick:" in line)
-    assert "quick: scene0 scene1 scene2 scene3 and 42 more --dim 2" in many and "scene4" not in many
+    assert "quick: scene0, scene1, scene2, scene3 and 42 more --dim 2" in many and "scene4" not in many
     assert "quick: scene0 scene1 scene2 scene3 " in few and "more" not in few
     plain = json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)
     assert plain[0]["title"].split()[1:-2] == names and plain[0]["date"][:16].replace("T", " ") in many

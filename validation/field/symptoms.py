@@ -12,8 +12,9 @@ from validation.field import Note, notes
 
 #: Words without meaning for contact.
 IDLE = frozenset(re.findall(r"\w+", """
-    a an and are as at be by can do does don every for from have how i in is it its just keep my not of off on one or
-    should so some than that the them they thing this to too up we what when which why with
+    a after an and are as at be before by can cant do does doesnt dont every for from get gets go goes have how i in is
+    isnt it its just keep my not object of off on one or should so some than that the them they thing this to too up we
+    what when which while why with wont
 """))  # fmt: skip
 ENDINGS = re.compile(r"(?:ions?|ing|ed|es|er|s|e|y)$")
 #: Symptoms that no scene shows, with the command that helps.
@@ -60,7 +61,7 @@ def stem(word: str) -> str:
 
 def stems(text: str) -> dict[str, str]:
     """Meaningful words of a text, by their stem."""
-    words = re.findall(r"[a-z0-9#]+", text.lower())
+    words = re.findall(r"[a-z0-9#]+", re.sub("['\N{RIGHT SINGLE QUOTATION MARK}]", "", text.lower()))
     return {stem(word): word for word in words if word not in IDLE}
 
 
