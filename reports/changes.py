@@ -166,7 +166,8 @@ def _size(change: Change) -> str:
 
 def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
     """Both sides, the headline, and the largest change of each family, one line each."""
-    lines = [*header(a, b), headline(changes)]
+    apart = b.rows and sum(change.kind is Kind.ADDED for change in changes) == len(b.rows)
+    lines = [*header(a, b), headline(changes) + ("; no check is in both" if apart else "")]
     for family in families(change for change in changes if change.kind not in ONE_SIDED):
         change, more = family.first, len(family.changes) - 1
         flips = change.kind is Kind.FLIP

@@ -83,7 +83,7 @@ def _field(entry: Plain, name: str) -> str:
         return ", ".join(map(str, value))
     if name == "date":
         return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
-    if name == "title":
+    if name == "title" and "finished" in entry:  # a run's, which names scenes
         return title_of(str(value))
     return setting_text(value) if value is not None else "-"
 

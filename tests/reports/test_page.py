@@ -493,7 +493,7 @@ def test_a_page_is_made_of_whatever_there_is(page_source, missing):
         source = Source(page_source.run, page_source.rows, page_source.observations, **kept)
     page = render(source)
     said = {
-        "bench": "no bench in this store yet",
+        "bench": "This folder has no bench yet",
         "replays": "kept no recordings",
         "everything": "No check has a result",
     }
