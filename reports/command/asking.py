@@ -51,8 +51,8 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
         raise click.BadParameter(told, param_hint="WORDS")
     best = found[0]
     # Beside the best: what has as many of the words, or one that it does not have.
-    near = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
-    others = [match.scene for match in near if match.scene][:OTHERS]
+    beside = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
+    others = [match.scene for match in beside if match.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
     fixes = recorded_fixes(best.scene, about or registry.names())
     missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
