@@ -38,6 +38,7 @@ def write(folder: Path) -> None:
         "number": number,
         "unset": unset_text,
     }
+    environment.globals["word_of"] = word_of
     passes = passed()
     for name, values in made(passes):
         template = name.split("/")[0] if "index" not in name else name.replace("/", "-")
@@ -113,8 +114,7 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     engines = [name for name in registry.names() if registry.find(name).engine is not None]
     for name in engines:
         told = describe(name)
-        words = {profile: word_of(name, profile) for profile in told["profiles"]}
-        yield f"engines/{name}", told | {"settings": settings(told["profiles"]), "words": words}
+        yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
     yield (
         "engines/index",
         {
