@@ -21,7 +21,7 @@ from reports.command.selection import WORKERS
 from reports.cures import cure_paste, cure_text, nothing_to_paste, recorded_fixes
 from reports.terminal import terminal
 from reports.wording import number, reproduce
-from validation.field import Finding, ask, matching
+from validation.field import CURED, Finding, ask, matching
 from validation.field.symptoms import matches, stems
 from validation.posed import resolve
 from validation.settings.cures import Cure, cures_of
@@ -150,12 +150,16 @@ def _broken(source: str, width: int) -> str:
 
 def _said(each: Finding) -> str:
     note = each.note
-    text = each.now + ("" if each.as_said else f" (the report says: {note.said})")
+    text = _word(each.now) + ("" if each.as_said else f" (the report says: {_word(note.said)})")
     if each.before is not None:
         text += f"\n{note.engine}/{note.profile} {note.scene} {note.dimension}-D: {note.metric} {_number(each.before)}"
     if each.after is not None:
         text += f"; with {note.cure_text}: {_number(each.after)}"
     return text
+
+
+def _word(said: str) -> str:
+    return "fixed" if said == CURED else said
 
 
 def _number(found: Reading) -> str:

@@ -22,7 +22,7 @@ from reports import speed
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.proving import prove_and_show
+from reports.command.proving import proof_of, prove_and_show
 from reports.command.selection import SET
 from reports.cures import ROLES, Change, changes, fix, how_measured, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
@@ -592,6 +592,7 @@ def _print_explanation(
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     told = told_cure(row) if mark_of(row) != "pass" else ""
     lines += [("smallest fix" if better else "fix", told)] if told else []
+    lines += [("test cause", proof)] if mark_of(row) == "known" and (proof := proof_of(row)) else []
     lines.append(("run again", again))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))
