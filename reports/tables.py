@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reports.cures import setting_text
-from reports.wording import FEW, first_of, number, quantity
+from reports.wording import FEW, first_of, number, quantity, roles_line, word_of
 from validation.cells import format_dt
 from validation.questions.detection import BlindSpot
 
@@ -64,6 +64,8 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
             told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
         table.add_row(*map(Text, told.values()))
     console.print(table)
+    if what == "engines" and (line := roles_line((e["name"], name) for e in entries for name in e["profiles"])):
+        console.print(Text(line))
     if what == "suites":
         console.print(Text("Numbers of cases: each in 2-D and in 3-D where the scene has both."))
     if what == "checks" and not reasons:
@@ -144,7 +146,8 @@ def _engine(data: Plain, console: Console) -> None:
     _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
     _unset(data, console)
     for profile, scenes in data["profiles"].items():
-        _heading(f"Profile {profile}", console)
+        word = word_of(data["name"], profile)
+        _heading(f"Profile {profile}" + (f" ({word})" if word else ""), console)
         _settings(scenes, console)
     if data["settable"]:
         _heading("What can be set (--set NAME=VALUE)", console)

@@ -68,7 +68,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     console.print(Text(best.command or f"{best.scene}: {resolve(best.scene).title}", style="bold"), soft_wrap=True)
     if missed:
         console.print(Text(f"no match for: {', '.join(missed)}", style="dim"))
-    if best.report:
+    if best.report and (not about or {best.report.engine, best.report.about} & set(about)):
         console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
     if best.scene:
         _show_fixes(best.scene, about, fixes, text, console)

@@ -21,7 +21,8 @@ ENDINGS = re.compile(r"(?:ions?|ing|ed|es|er|s|e|y)$")
 COMMANDS = {
     "results changed with a release, version, upgrade or update of the engine":
         "crosscheck bisect ENGINE OLD..NEW SCENE names the release that changed them",
-    "it is slow, too expensive, costs too much time, speed": "crosscheck bench SCENE shows error against time",
+    "the simulation or sim is slow, too expensive, costs too much time, speed":
+        "crosscheck bench SCENE shows error against time",
 }  # fmt: skip
 
 
@@ -101,4 +102,4 @@ def matches(words: str, engines: Sequence[str] = ()) -> list[Match]:
             said = tuple(asked[word] for word in asked if word in common)
             scene = name if name in CATALOGUE else ""
             found.append(Match(scene, score, said, report, COMMANDS.get(name, "")))
-    return sorted(found, key=lambda match: -match.score)
+    return sorted(found, key=lambda match: (-match.score, bool(match.scene)))
