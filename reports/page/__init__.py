@@ -175,7 +175,7 @@ def cite(source: Source) -> dict[str, str]:
     lines.append(again("run", run.title))
     if source.bench is not None:
         lines.append(again("bench", source.bench.run.title.removeprefix("bench ")))
-    lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]
+    lines += ["crosscheck report --out again", "crosscheck compare FOLDER again   # FOLDER: that of this run"]
     return {"text": text, "commands": "\n".join(lines if clean else lines[1:])}
 
 

@@ -95,6 +95,11 @@ def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
     assert said == ["PROVEN", "NOT"] and "1 of 2 experiments confirm their cause" in result.stdout
 
 
+def test_a_name_with_a_slip_is_answered_with_the_nearest_and_not_with_all(page_folder):
+    said = run("--out", str(page_folder), "--scene", "bounc").stderr
+    assert said.endswith("this run has no check of 'bounc', did you mean 'bounce'?\n")
+
+
 def test_a_ratio_is_told_without_its_unit_of_one():
     pytest.importorskip("pybullet", reason="pybullet is an optional engine")
     said = run("--prove", "bounce-interval-blurred").output
