@@ -4,10 +4,10 @@
 
     result = cc.run("bounce", engine="mujoco", profile="tuned", e=0.7)
 
-Importing this package loads nothing else; each function loads what it needs when it is used first. The packages behind
-it have plain names (`adapters`, `validation`, `reports`) that other distributions and a user's own folders may have as
-well. Before any of them is loaded, `check` makes sure that they are ours, and refuses with one line that names a
-foreign one and where it lies.
+Importing this package loads nothing else; each function loads what it needs when it is first used. The packages behind
+it have plain names (`adapters`, `validation`, `reports`), which other distributions and a user's own folders may have
+too. Before any of them is loaded, `check` makes sure that they are ours. If not, it raises one line with the name and
+the place of the foreign package.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = [
     "scenes",
     "sweep",
 ]
-#: Public names that are loaded when they are used first, and the module of each.
+#: Public names that are loaded at their first use, and the module of each.
 LATE = {
     "run": "contact_crosscheck.cases",
     "Result": "contact_crosscheck.cases",
@@ -68,7 +68,7 @@ class ForeignPackage(ImportError):
 
 
 def foreign() -> dict[str, str]:
-    """Packages of our names that are not ours, with where they lie; ``nowhere`` for one that is not found."""
+    """Foreign packages with names of ours, and their places; the place of one that is not found is ``nowhere``."""
     found = {}
     for name in PACKAGES:
         loaded = sys.modules.get(name)
@@ -85,7 +85,7 @@ def check() -> None:
     Raises
     ------
     ForeignPackage
-        One line that names the foreign packages and where they lie.
+        One line with the names of the foreign packages and their places.
     """
     wrong = foreign()
     if wrong:
@@ -97,7 +97,7 @@ def check() -> None:
 
 
 def __getattr__(name: str) -> Any:
-    """Load what a public name means, once it is used."""
+    """Load a public name at its first use."""
     if name == "__version__":
         from importlib.metadata import version
 
@@ -114,7 +114,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Names for completion, those that are not loaded yet included."""
+    """Names for completion, including those that are not loaded yet."""
     return sorted({*globals(), *LATE, "__version__"})
 
 
@@ -124,7 +124,7 @@ def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool
     Parameters
     ----------
     folder
-        What ``crosscheck run --out`` was given.
+        Folder of the results (``crosscheck run --out``).
     run
         Id of the run, as ``crosscheck list runs`` prints it.
     nulls
@@ -158,7 +158,7 @@ def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool
 
 
 def main() -> None:
-    """Run the command; exits with 2 and one line if the packages on the path are not ours."""
+    """Run the command; exit with 2 and one line if the packages on the path are not ours."""
     try:
         check()
     except ForeignPackage as error:
@@ -177,7 +177,7 @@ def pytest_addoption(parser: Any) -> None:
 
 
 def pytest_configure(config: Any) -> None:
-    """Load the tests if they are asked for."""
+    """Load the tests if ``--crosscheck`` is given."""
     if config.getoption("--crosscheck"):
         check()
         from reports import testing

@@ -1,4 +1,4 @@
-"""Processes that a script's call starts, without running the script again."""
+"""Start worker processes from a script without running the script again."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from types import ModuleType
 
 @contextmanager
 def apart() -> Iterator[None]:
-    """Let processes start that do not import the script which is running.
+    """Let processes start without importing the running script.
 
-    ``multiprocessing`` starts a process by importing the caller's main module, so that a script without
-    ``if __name__ == "__main__":`` would run a second time. What we start needs nothing of that module: meanwhile an
-    empty one stands in its place.
+    ``multiprocessing`` starts a process by importing the caller's main module, so a script without
+    ``if __name__ == "__main__":`` would run a second time. Our workers need nothing from that module. Inside this
+    context an empty module replaces it.
     """
     caller = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")

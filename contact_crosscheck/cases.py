@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 #: An engine by its name, or one that the caller has written.
 AnyEngine = str | Engine | type[Engine]
-#: What is said once per call where nothing protects the caller from an engine.
+#: Warning, once per call, if nothing protects the caller from crashes of an engine.
 UNPROTECTED = (
     "engine: {} runs in this process, without a time limit, and its crash would end Python; crosscheck new-adapter "
     "makes a package of an engine, which runs in processes of its own"
@@ -64,8 +64,8 @@ def run(
 ) -> Result:
     """Run one case and judge it.
 
-    Engines of this project, and one of your own, run in this process: without a time limit, and a crash ends Python.
-    Those of other packages run in a process of their own.
+    Engines of this project, and your own, run in this process: without a time limit, and a crash ends Python. Those of
+    other packages run in a process of their own.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ def run(
     engine
         Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`.
     profile
-        Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. By
-        default as shipped; on our own solver exact; on its own engine a model runs as its author made it (``model``).
+        Set of settings, by name or by role: ``as shipped``, ``tuned``, ``compromise``, ``textbook``, ``exact``. The
+        default is as shipped; on our own solver exact; for a model on its own engine as its author made it (``model``).
     dimension
         2 or 3; by default the first of the scene's that the engine has itself. A 2-D scene is embedded in 3-D for an
         engine that has 3-D only.
@@ -91,7 +91,7 @@ def run(
     Returns
     -------
     Result
-        Also where the engine refuses the scene, diverges or fails: its checks say so.
+        Also if the engine refuses the scene, diverges or fails: its checks then have no value, with the reason.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def run(
     >>> result.frame()[["metric", "value", "truth", "tolerance", "physics"]]
     >>> print(result.explain())
     """
-    # An engine of the caller's own may need its module: only processes of others are kept from it.
+    # An engine of the caller may need the caller's module, so it is hidden only for engines that are given by name.
     with apart() if isinstance(engine, str) else nullcontext():
         slot = slot_of(scene, engine_named(engine), profile, dimension, dt, iterations, settings, params)
     with TemporaryDirectory() as folder:
@@ -117,11 +117,11 @@ def run(
 
 
 def observe(slot: Slot, path: Path | None = None) -> Observation:
-    """Run a slot here, or where other people's plugins run; keep its trajectory at ``path``."""
+    """Run a slot: engines of other packages in their own process, others here; store the trajectory at ``path``."""
     entry = registry.entry(slot.engine)
     if entry is None or registry.is_ours(entry):
         observation = execute(slot, path)
-        # Whatever ends a case is its outcome; only here somebody may have asked for all of it to end.
+        # An error that ends a case is its outcome, except here for Ctrl-C: it has to end the caller too.
         if observation.outcome is Outcome.CRASHED and observation.reason.startswith(KeyboardInterrupt.__name__):
             raise KeyboardInterrupt
         return observation
@@ -132,15 +132,15 @@ def observe(slot: Slot, path: Path | None = None) -> Observation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """What came out of one case.
+    """Result of one case.
 
     Parameters
     ----------
     observation
-        What was measured, with the settings that were used.
+        Measured quantities, with the settings of the case.
     trajectory
         Times ``t`` (s,) [s], poses ``pose`` (s, n, 3 or 7), velocities ``twist`` (s, n, 3 or 6) and ``contacts`` of all
-        bodies; None where the engine gave none.
+        bodies; None if the engine returned none.
 
     Examples
     --------
@@ -154,13 +154,13 @@ class Result:
 
     @property
     def bodies(self) -> list[str]:
-        """Names of the bodies, in the order in which the trajectory has them."""
+        """Names of the bodies, in the order of the trajectory."""
         return [body.name for body in self._scene().bodies]
 
     @cached_property
     def rows(self) -> list[Row]:
         """The judged checks."""
-        with apart():  # laws of another package are looked at from outside first
+        with apart():  # laws of another package are first examined in a process
             return with_skill(rows_of("", [self.observation]))
 
     def frame(self) -> pd.DataFrame:
@@ -177,13 +177,12 @@ class Result:
     def explain(self, metric: str | None = None) -> str:
         """Explain one check: value, truth, tolerance, cause and fix.
 
-        Where the check fails, the case runs once more with the engine's profile ``tuned``, to see whether that fixes
-        it.
+        If the check fails, the case runs once more with the engine's profile ``tuned``, to see whether that fixes it.
 
         Parameters
         ----------
         metric
-            Name of the check; by default the one that is farthest off.
+            Name of the check; by default the one with the largest error in units of its tolerance.
 
         Raises
         ------
@@ -212,7 +211,7 @@ class Result:
 
     @cached_property
     def _tuned(self) -> Observation | None:
-        """The same case with the best stock settings; None where it has them, or has settings or a count of its own."""
+        """The same case with the tuned profile; None if that is its profile, or with own settings or iterations."""
         slot = self.observation.slot
         tuned = registry.profile_of(slot.engine, "tuned")
         if tuned in (None, slot.profile) or slot.switched or slot.iterations is not None:
@@ -225,7 +224,7 @@ class Result:
         Parameters
         ----------
         what
-            ``checks``: the error of each check over its tolerance. Or a component of the free bodies against time:
+            ``checks``: the error of each check over its tolerance. Or a component of the free bodies over time:
             ``x``, ``y``, ``z``, ``angle`` (planar), ``vx``, ``vy``, ``vz``, ``speed``.
 
         Raises
@@ -280,12 +279,12 @@ class Result:
 
 
 def engine_named(engine: AnyEngine) -> str:
-    """Name of an engine that can be asked; one of the caller's own is made known here, with a warning.
+    """Name of an installed engine; one that the caller has written is registered here, with a warning.
 
     Raises
     ------
     EngineError
-        If it is unknown or not installed, or no engine.
+        If it is unknown, not installed, or no engine.
     """
     if isinstance(engine, str):
         found = registry.find(engine)
@@ -309,12 +308,12 @@ def slot_of(
     settings: Mapping[str, Any] | None,
     params: Mapping[str, Any],
 ) -> Slot:
-    """Say what is asked as `run-cell` would read it; see `run`.
+    """Slot of the arguments of `run`, read as `run-cell` would read it.
 
     Raises
     ------
     SceneError, EngineError
-        Naming what is wrong.
+        For a wrong argument, with its name.
     """
     name = scene_named(scene)
     canonical = resolve(name)
@@ -331,7 +330,7 @@ def slot_of(
     }
     try:
         slot = slot_from_dict(data)
-    except SceneError as error:  # who calls knows no slot
+    except SceneError as error:  # callers do not know slots
         raise SceneError(str(error).removeprefix("slot.")) from None
     prepared = prepare(slot)
     if name not in CATALOGUE:
@@ -341,7 +340,7 @@ def slot_of(
 
 
 def settings_from(settings: Mapping[str, Any] | None) -> tuple[tuple[str, Any], ...]:
-    """Settings of the caller's own, sorted by name.
+    """The caller's own settings, sorted by name.
 
     Raises
     ------
@@ -354,15 +353,15 @@ def settings_from(settings: Mapping[str, Any] | None) -> tuple[tuple[str, Any], 
 
 
 def own_of(slot: Slot, asked: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, Any], ...]:
-    """Settings of the caller's own as the engine takes them."""
+    """The caller's own settings, converted and checked for the engine."""
     engine = registry.find(slot.engine).engine
-    assert engine is not None  # `engine_named` has looked
+    assert engine is not None  # `engine_named` has checked it
     scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     return own(engine, asked, settings_of(engine, slot, scene))
 
 
 def profile_named(engine: str, profile: str | None, scene: CanonicalScene) -> str:
-    """Name of a profile that is given by its name or its role; by default as shipped, or as the model's author made it.
+    """Name of a profile given by name or role; by default as shipped, or a model as its author made it.
 
     Raises
     ------
@@ -385,7 +384,7 @@ def profile_named(engine: str, profile: str | None, scene: CanonicalScene) -> st
 
 
 def dimension_for(engine: str, scene: CanonicalScene) -> int:
-    """First dimension of a scene that the engine has itself; the scene's first where it has none of them."""
+    """First dimension of a scene that the engine has itself; if there is none, the scene's first."""
     facts = registry.facts(engine)
     own_ones = facts.dimensions if facts else frozenset()
     return next((each for each in scene.dimensions if each in own_ones), scene.dimensions[0])

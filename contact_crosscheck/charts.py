@@ -22,13 +22,13 @@ with extra("plot"):
     import altair as alt
     import vl_convert  # noqa: F401  (writes PDF, SVG and PNG; asked for before anything is drawn)
 
-#: Most samples of a motion that are drawn: more than a page has points.
+#: Largest number of drawn samples of a motion; a page has fewer points.
 MOST_SAMPLES = 4000
-#: Smallest error on a logarithmic axis: what is exact lies there.
+#: Smallest error on a logarithmic axis; smaller ones are drawn there.
 EXACT = 1e-16
-#: Smallest share of a tolerance that is told apart from less: nobody chooses an engine by it.
+#: Smallest drawn share of a tolerance; below it, differences do not matter for the choice of an engine.
 LEAST = 1e-3
-#: Colours of what is within and beyond its tolerance, told apart under the common kinds of colour blindness.
+#: Colours of checks within and beyond their tolerance, distinct in the common kinds of colour blindness.
 VERDICTS = {"pass": "#3b75af", "fail": "#d4504e"}
 
 
@@ -64,7 +64,7 @@ def checks_chart(rows: Sequence[Mapping[str, Any]], title: str) -> alt.LayerChar
 
 
 def motion_chart(scene: Scene, trajectory: Trajectory | None, what: str, title: str) -> alt.Chart:
-    """Draw a component of the pose or the velocity of each free body against time.
+    """Draw a component of the pose or the velocity of each free body over time.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def components(trajectory: Trajectory) -> dict[str, tuple[Array, str]]:
 
 
 def work_chart(points: pd.DataFrame) -> alt.FacetChart:
-    """Error against cost of all work points, a panel for each dimension.
+    """Error over cost of all work points, one panel for each dimension.
 
     Raises
     ------
@@ -152,5 +152,5 @@ def work_chart(points: pd.DataFrame) -> alt.FacetChart:
 
 
 def _data(records: Sequence[Mapping[str, Any]]) -> alt.InlineData:
-    """Data inside the chart, however many rows they are."""
+    """Data inside the chart, for any number of rows."""
     return alt.InlineData(values=list(records))

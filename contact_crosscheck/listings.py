@@ -1,4 +1,4 @@
-"""What there is: engines and scenes as tables."""
+"""Available engines and scenes as tables."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def engines() -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row for each engine: ``name``, ``version``, ``status``, ``profiles`` (list of names), ``reason`` why it is
-        not there.
+        One row for each engine: ``name``, ``version``, ``status``, ``profiles`` (list of names), ``reason`` if it is
+        not available.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Scenes of a user's own: files of this project, and models that people have for an engine."""
+"""A user's own scenes: files of this project, and models of an engine."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class Scene:
     Parameters
     ----------
     name
-        Name in the catalogue; of a file its path and the hash of its text, so that it stays what was read.
+        Name in the catalogue; for a file its path and the hash of its text, so later changes of the file have no
+        effect.
 
     Examples
     --------
@@ -40,12 +41,13 @@ class Scene:
         Parameters
         ----------
         drop
-            Whether to leave out what has no place in a scene; `notes` lists what was left out. Otherwise it is refused.
+            Whether to leave out elements that a scene cannot have; `notes` lists them. Otherwise such a file is
+            refused.
 
         Raises
         ------
         SceneError
-            If the file cannot be read, or naming the element that has no place in a scene.
+            If the file cannot be read; or for an element that a scene cannot have, with its name.
         EngineError
             If the engine that reads such models is not installed.
 
@@ -103,7 +105,7 @@ class Scene:
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return resolve(self.name).title
 
     @property
@@ -121,12 +123,12 @@ class Scene:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was read as what, and what was left out."""
+        """How elements of the file were read, and which were left out."""
         return tuple(resolve(self.name).notes)
 
 
 def scene_named(scene: str | os.PathLike[str] | Scene) -> str:
-    """Name of a scene that stays what it is; a file is read.
+    """Name of a scene that no later change of a file affects; a file is read.
 
     Raises
     ------

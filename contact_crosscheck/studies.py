@@ -1,4 +1,4 @@
-"""Many cases: over parameters, and error against time."""
+"""Many cases: over parameters, and error over time."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     **params: float | Sequence[float],
 ) -> pd.DataFrame:
-    """Run a scene with every combination of the values of its parameters, in processes of their own.
+    """Run a scene with every combination of the values of its parameters, in worker processes.
 
     Parameters
     ----------
@@ -75,13 +75,13 @@ def sweep(
     jobs
         Processes; 0: one per core. An engine of your own runs in this process instead.
     timeout
-        Longest time of a case [s].
+        Time limit per case [s].
     out
-        Folder that keeps the results, so that the same call goes on where it was interrupted, and `load` and the
-        command ``crosscheck`` read them; by default nothing is kept.
+        Folder for the results: the same call then resumes after an interruption, and `load` and the command
+        ``crosscheck`` read them. By default nothing is kept.
     **params
-        Parameters of the scene: a number is the same in all cases; of a list, a range or an array each value is run,
-        with each value of the others.
+        Parameters of the scene: a number is the same in all cases; each value of a list, a range or an array runs with
+        each value of the others.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def _request(
     settings: Mapping[str, Any] | None,
     fixed: Mapping[str, float],
 ) -> Request:
-    """What one engine is asked in a sweep."""
+    """Request of a sweep for one engine."""
     wanted = dimension_for(engine, canonical) if dimension is None else dimension
     if wanted not in canonical.dimensions:
         raise SceneError(f"{canonical.name}.dimension: {dimension!r} is not one of {canonical.dimensions}")
@@ -171,7 +171,7 @@ def _values(name: str, value: Any) -> list[float]:
 
 @contextmanager
 def _store(out: str | os.PathLike[str] | None) -> Iterator[Store]:
-    """Store in a folder that is kept, or in one that is not."""
+    """Store in the folder ``out``, or in a temporary one."""
     with TemporaryDirectory() as passing:
         store = Store(Path(passing if out is None else out))
         try:
@@ -190,7 +190,7 @@ class Bench:
         All tables by name: ``work_points``, ``time_at_equal_error``, ``error_at_equal_time``, ``scaling``,
         ``scaling_fits``, ``overhead``, ``ratios``, ``timings``.
     quality
-        How well the times are known, in a line.
+        Quality of the timings, in one line.
 
     Examples
     --------
@@ -214,7 +214,7 @@ class Bench:
         return self.tables["work_points"]
 
     def plot(self) -> alt.FacetChart:
-        """Draw the error against the time; lines join the best points of each profile, steps stand at them.
+        """Draw error over time; lines join the best points of each profile, labelled with their steps.
 
         Raises
         ------
@@ -251,28 +251,28 @@ def bench(
     out: str | os.PathLike[str] | None = None,
     **params: float,
 ) -> Bench:
-    """Measure error against time, as ``crosscheck bench`` does.
+    """Measure error over time, as ``crosscheck bench`` does.
 
-    Errors come first, in processes side by side; then everything is timed one after the other in a process of its own.
-    Times mean something only while the machine has nothing else to do.
+    Errors are measured first, in several worker processes. Then everything is timed, one case at a time, in one
+    process. Times mean something only if the machine does nothing else.
 
     Parameters
     ----------
     scene
-        A scene that declares an error, or one from a file; see `run`. The error on a file is the distance from the
-        certified run of our own solver at the end.
+        A scene with a headline error, or one from a file; see `run`. The error of a scene from a file is its distance
+        from the certified run of our own solver at the end.
     engines
         Names of engines; by default all that are installed and not optional.
     profiles
         Names of profiles; by default all that are ranked.
     dimension
-        2 or 3; by default both, where the scene has both.
+        2 or 3; by default all dimensions of the scene.
     dts, iterations
         Steps [s] and iteration counts; by default the scene's own.
     full
-        Whether all steps of the scene are run and timed until the intervals are narrow, which takes up to two hours.
+        Whether to run all steps of the scene and to time until the intervals are narrow, which takes up to two hours.
     seed
-        Of the order in which cases are timed.
+        Seed of the random order of timings.
     jobs, timeout, out
         As in `sweep`.
     **params
@@ -281,11 +281,11 @@ def bench(
     Raises
     ------
     SceneError
-        For a scene that declares no error, one from a file without a certified run, an unknown parameter, or if no
+        For a scene without a headline error, one from a file without a certified run, an unknown parameter, or if no
         case has a result.
     EngineError
-        For an unknown engine or profile, one that is not installed, or one of your own, which has no package that the
-        process that measures could load.
+        For an unknown engine or profile, one that is not installed, or one of your own: the timing process can load
+        only engines that are in a package.
 
     Examples
     --------

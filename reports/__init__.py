@@ -1,5 +1,5 @@
-"""Everything shown: the command line, tables, exports, reports. Reads the store and never imports an engine."""
+"""Everything shown: the command line, tables, exports, reports. It reads the store and never imports an engine."""
 
 import contact_crosscheck
 
-contact_crosscheck.check()  # every entry leads through here; `contact_crosscheck` says why
+contact_crosscheck.check()  # every entry point leads through here; `contact_crosscheck` says why

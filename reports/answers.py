@@ -324,7 +324,7 @@ def _worst(kind: str, rows: Sequence[Plain]) -> str:
 
 
 def _apart(row: Plain, as_size: bool) -> str:
-    """``2.0e-10 more than 1``, of numbers that are alike at a glance; of sizes where the direction is told in words."""
+    """``2.0e-10 more than 1``, for nearly equal numbers; for their sizes if words give the direction."""
     value, truth = (abs(row[name]) if as_size else row[name] for name in ("value", "truth"))
     than = f"{'more' if value > truth else 'less'} than {quantity(truth, row['unit'], 3)}"
     return f"{'-' if as_size else ''}{quantity(abs(value - truth), row['unit'], 2)} {than}"

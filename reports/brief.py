@@ -1,4 +1,4 @@
-"""Summary of a run: primary error and number of failed checks of each cell. Stored beside the results.
+"""Summary of a run: primary error and number of failed checks of each case. Stored beside the results.
 
 Judging a run of the quick suite takes seconds and a dashboard shows hundreds, so each is judged once: a run at its end
 stores a summary in ``OUT/dashboard.sqlite`` under its name and the hash of the judging code. The file may be deleted at
@@ -28,7 +28,7 @@ from validation.running.plan import QUICK_DT
 FILE = "dashboard.sqlite"
 #: Outcomes about an engine's physics.
 ANSWERED = ("ok", "diverged")
-#: Brief of one cell: error or None, checks that fail, checks that are judged, checks that fail for sure: a start moved
+#: Brief of one case: error or None, checks that fail, checks that are judged, checks that fail for sure: a start moved
 #: by the last place mends the others.
 Brief = tuple[float | None, int, int, int]
 #: Key of a panel.
@@ -37,7 +37,7 @@ Key = tuple[str, str, str, int]
 
 @dataclass(frozen=True)
 class Summary:
-    """Cells of a run by panel, each under a key that is equal in all runs with the same case.
+    """Cases of a run by panel, each under a key that is equal in all runs with the same case.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def from_text(text: str) -> Summary:
 
 @lru_cache(maxsize=100_000)
 def _panel(text: str) -> tuple[Key, Mapping[str, Brief]]:
-    """Cells of a panel; engines are repeatable, so hundreds of runs have few different texts."""
+    """Cases of a panel; engines are repeatable, so hundreds of runs have few different texts."""
     *asked, briefs = json.loads(text)
     return _key(*asked), {slot: (error, fails, judged, sure) for slot, (error, fails, judged, sure) in briefs.items()}
 
@@ -77,7 +77,7 @@ def _key(engine: object, profile: object, scene: object, dimension: int) -> Key:
 
 
 def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = None) -> Summary:
-    """Judge observations and return the data of a dashboard: cells at the quick step with a profile's own settings.
+    """Judge observations and return the data of a dashboard: cases at the quick step with a profile's own settings.
 
     ``rows`` are theirs, if already judged.
     """
@@ -108,7 +108,7 @@ def summarise(observations: Iterable[Observation], rows: Iterable[Row] | None = 
 
 
 def _mended(row: Row, moved: Iterable[Observation]) -> bool:
-    """Whether one of the same cell's moved starts passes the check that this row fails."""
+    """Whether one of the same case's moved starts passes the check that this row fails."""
     if row.truth is None or row.tolerance is None:
         return False
     values = (observation.metrics.get(row.metric, (None, ""))[0] for observation in moved)
@@ -121,7 +121,7 @@ def _shown(slot: Slot) -> bool:
 
 
 def _error(observation: Observation) -> float | None:
-    """Primary error of one cell [unit of the primary], if its scene declares one and it can be computed there."""
+    """Primary error of one case [unit of the primary], if its scene declares one and it can be computed there."""
     if observation.outcome.value not in ANSWERED or not observation.metrics:
         return None
     canonical = resolve(observation.slot.scene)
@@ -129,7 +129,7 @@ def _error(observation: Observation) -> float | None:
     if primary is None:
         return None
     scene = canonical.scene(observation.slot.dimension, dict(observation.slot.params))
-    with suppress(KeyError, ArithmeticError, ValueError):  # a cell of another kind than the primary's
+    with suppress(KeyError, ArithmeticError, ValueError):  # a case of another kind than the primary's
         return primary.error(scene, observation.slot.dt, observation.metrics)[0]
     return None
 

@@ -2,7 +2,7 @@
 
 README.txt           contents
 environment.json     machine, Python, packages, commit, plan
-observations.jsonl   raw measurements, one cell per line; verdicts are derived from them
+observations.jsonl   raw measurements, one case per line; verdicts are derived from them
 rows.jsonl, rows.csv every judged value
 timings.csv          raw timings of the benchmark, if there is one
 scenes/              scene files of the run, as at its start

@@ -76,8 +76,8 @@ def _load_release(out: Path, engine: str, version: str) -> Side:
         if not runs:
             known = ", ".join(versions(store, engine)) or "none"
             raise MissingError(f"run: {store.path} has no release {engine}=={version}; it has {known}")
-        (told,) = told_by_releases(store, engine, [version])
-        return Side([row.as_dict() for row in told.rows], [], told.name, runs[-1].date, runs[-1].commit)
+        (result,) = told_by_releases(store, engine, [version])
+        return Side([row.as_dict() for row in result.rows], [], result.name, runs[-1].date, runs[-1].commit)
     finally:
         store.close()
 

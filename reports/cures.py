@@ -51,9 +51,9 @@ def shown_cell(
     profile: str,
     params: Mapping[str, float] | None = None,
 ) -> Observation | None:
-    """The representative cell of a profile on a scene, else the first one with settings.
+    """The representative case of a profile on a scene, else the first one with settings.
 
-    ``params`` (differences from the scene's defaults) selects another cell.
+    ``params`` (differences from the scene's defaults) selects another case.
     """
     own = [
         o for o in observations
@@ -77,7 +77,7 @@ def changes(
 ) -> list[Change]:
     """Settings that differ between profiles ``after`` and ``before``, in the engine's own words.
 
-    They are those of the cell of ``params``, see `shown_cell`.
+    They are those of the case of ``params``, see `shown_cell`.
     """
     cells = [shown_cell(observations, scene, dimension, engine, profile, params) for profile in (before, after)]
     old, new = ({s["name"]: s for s in cell.settings} if cell else {} for cell in cells)
@@ -95,7 +95,7 @@ def changes(
 
 
 def _in_words(cell: Observation) -> dict[str, tuple[str, str]]:
-    """Settings of a cell, by name: the engine's own names, and their values as text."""
+    """Settings of a case, by name: the engine's own names, and their values as text."""
     settings = {s["name"]: s["value"] for s in cell.settings}
     return in_words(cell.slot, settings)
 
@@ -108,8 +108,8 @@ def in_words(slot: Slot, settings: Mapping[str, Any]) -> dict[str, tuple[str, st
     loaded = registry.adapter(slot.engine)
     made = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
     words = loaded.words(settings, made, slot.dt) if loaded else {}
-    told = {name: words.get(name, (name, value)) for name, value in settings.items()}
-    return {name: (word, setting_text(value)) for name, (word, value) in told.items() if word}
+    named = {name: words.get(name, (name, value)) for name, value in settings.items()}
+    return {name: (word, setting_text(value)) for name, (word, value) in named.items() if word}
 
 
 def decided_by(engine: str, version: str, scene: str, dimensions: Sequence[int], before: str, after: str) -> str:
@@ -169,12 +169,12 @@ def _recorded(cure: Cure, where: str) -> str:
 def told_cure(row: Mapping[str, Any]) -> str:
     """Measured fix of the check of one row, or that there is none, or no search.
 
-    A fix belongs to the cells and the step of its search; for another case the text names the search command.
+    A fix belongs to the cases and the step of its search; for another case the text names the search command.
     """
     cure = _listed(row)
     if cure is None:
         return f"none was searched for in this case; to search: {search_command(row)}" if can_be_searched(row) else ""
-    kinds = cure.mends or (cure.metric.partition("[")[0],)  # its own metric if no kind is fixed in all cells
+    kinds = cure.mends or (cure.metric.partition("[")[0],)  # its own metric if no kind is fixed in all cases
     if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
     return f"none is known for this check; for {', '.join(kinds)} in this scene, {cure_text(cure)}"
@@ -196,7 +196,7 @@ def cure_of(row: Mapping[str, Any]) -> Cure | None:
 
 
 def can_be_searched(row: Mapping[str, Any]) -> bool:
-    """Whether a row belongs to the start profile of `search`, in a cell with its own iterations."""
+    """Whether a row belongs to the start profile of `search`, in a case with its own iterations."""
     brought = resolve(row["scene"]).brings.get(row["engine"])
     start = brought.profile if brought else registry.profile_of(row["engine"], "shipped")
     ran = row.get("outcome") not in ("unsupported", "not_installed") and row.get("iterations") is None
@@ -214,8 +214,8 @@ def _listed(row: Mapping[str, Any]) -> Cure | None:
 
 def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
     kinds = cure.mends or (cure.metric.partition("[")[0],)
-    told = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
-    return told or row["metric"].partition("[")[0] in kinds
+    same_check = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
+    return same_check or row["metric"].partition("[")[0] in kinds
 
 
 def is_standard(row: Mapping[str, Any]) -> bool:
@@ -254,20 +254,20 @@ def _minimal(row: Mapping[str, Any]) -> tuple[tuple[str, float], ...]:
 
 @dataclass(frozen=True)
 class Told:
-    """What is said of a cure, piece by piece; what does not apply is empty.
+    """Words about a fix, piece by piece; pieces that do not apply are empty.
 
     Parameters
     ----------
     settings
         Names and values in the engine's own words.
     check, at
-        The check that tells it, and its parameters.
+        The check that shows it, and its parameters.
     before, after, truth, unit
-        Its values; the truth only where it is neither 0 nor the value after.
+        Its values; the truth only if it is neither 0 nor the value after.
     left
         How many checks still fail.
     times
-        Cost in times of that before.
+        Cost relative to that before.
     """
 
     settings: list[tuple[str, str]]
@@ -282,7 +282,7 @@ class Told:
 
 
 def told(cure: Cure) -> Told:
-    """The pieces of which terminal and page say a cure."""
+    """The pieces from which terminal and page describe a fix."""
     before, after, truth = told_apart(cure.before, cure.after, cure.truth)
     return Told(
         changes_in_words(cure, cure.changes),
@@ -336,7 +336,7 @@ def changes_in_words(cure: Cure, changes: Mapping[str, Any]) -> list[tuple[str, 
 
 
 def _slot(cure: Cure, changes: Mapping[str, Any]) -> Slot:
-    """The cell of a fix, with settings replaced."""
+    """The case of a fix, with settings replaced."""
     params = tuple(sorted(cure.params.items()))
     return switched(Slot(cure.scene, params, cure.dimension, cure.engine, cure.shipped, cure.dt), changes)
 
@@ -361,7 +361,7 @@ def cure_paste(cure: Cure) -> str:
 
 
 def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
-    """One sentence: decisive settings of a fix, checks, cells and release; or that there is no measurement."""
+    """One sentence: decisive settings of a fix, checks, cases and release; or that there is no measurement."""
     measured = decisive(engine, scene, dimension, before, after)
     if measured is None:
         return "Which of these settings matter was not measured; they are all that differs between the profiles."
@@ -381,7 +381,7 @@ def pasteable(
 ) -> str:
     """The changes as lines in the engine's own language, ready to paste; empty if its adapter writes none.
 
-    Values that depend on material or step are those of the cell of ``params``, see `shown_cell`.
+    Values that depend on material or step are those of the case of ``params``, see `shown_cell`.
     """
     cell = shown_cell(observations, scene, dimension, engine, after, params)
     loaded = registry.adapter(engine)

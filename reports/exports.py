@@ -25,7 +25,7 @@ Plain = Mapping[str, Any]
 def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:
     """Rows of a run as a DataFrame, judged with today's checks, laws and findings.
 
-    With ``nulls`` also rows of the null answers, which need no engine (engine ``none``). Its ``attrs`` are
+    With ``nulls`` also rows of the trivial answers, which need no engine (engine ``none``). Its ``attrs`` are
     those of `described`.
 
     Raises

@@ -18,9 +18,9 @@ from validation.posed import is_file
 Plain = Mapping[str, Any]
 #: Marks with exit status 1 of the command.
 ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
-#: Outcomes of cells that were not run, and their words.
+#: Outcomes of cases that were not run, and their words.
 REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
-#: Marks of cells without a valid result: their rows have one reason, and no worst metric.
+#: Marks of cases without a valid result: their rows have one reason, and no worst metric.
 WHOLE = ("crashed", "timed_out", "missing", "invalid")
 #: Marks in display order.
 ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
@@ -71,8 +71,8 @@ def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
 class Family:
     """Rows of one engine, profile, scene, kind of metric and standing, the worst first.
 
-    Cells without a result form one family for each reason, of all metrics (``"*"``); INVALID ones for each receipt, and
-    for the certificate.
+    Cases without a result form one family for each reason, of all metrics (``"*"``); INVALID ones for each property
+    check, and for the certificate.
     """
 
     mark: str
@@ -117,7 +117,7 @@ def families(rows: Iterable[Plain]) -> list[Family]:
         members: dict[tuple[str, str, str, str], list[Plain]] = defaultdict(list)
         for row in group:
             kind = row["reason"] if mark in WHOLE else row["metric"].partition("[")[0]
-            if mark == "invalid":  # "receipt size: measured ...": the numbers differ from cell to cell
+            if mark == "invalid":  # "receipt size: measured ...": the numbers differ from case to case
                 kind = kind.partition(":")[0]
             members[row["engine"], row["profile"], row["scene"], kind].append(row)
         for (engine, profile, scene, kind), own in members.items():

@@ -64,10 +64,10 @@ def page(store: Store) -> str:
     made = {run.commit for run in store.runs() if run.title.startswith(RELEASE_TITLE) and run.plan}
     out = [HEAD.format(commit=f"; its results were made at {' and '.join(sorted(made))}" if all(made) and made else "")]
     for engine in history.engines(store):
-        told = history.told(store, engine)
-        steps = history.steps(told)
-        out += [f"## {engine}", "", as_table(told, steps)]
-        out += [f"{PACE}.", ""] if any(each.times for each in told) else []
+        results = history.told(store, engine)
+        steps = history.steps(results)
+        out += [f"## {engine}", "", as_table(results, steps)]
+        out += [f"{PACE}.", ""] if any(each.times for each in results) else []
         said = sentences(engine, steps)
         out += [f"* {line}" for line in said] or ["Nothing changed."]
         out.append("")

@@ -35,7 +35,7 @@ def scenes() -> list[dict[str, Any]]:
 
 
 def suites() -> list[dict[str, Any]]:
-    """Cells of each scene in the suites, for a profile with an iteration count at 1/240 s, and their parameters."""
+    """Cases of each scene in the suites, for a profile with an iteration count at 1/240 s, and their parameters."""
     out: list[dict[str, Any]] = []
     for canonical in CATALOGUE.values():
         asked = {suite: canonical.variations(suite) for suite in SUITES}

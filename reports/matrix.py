@@ -110,29 +110,29 @@ def unranked(columns: Iterable[tuple[str, str]]) -> list[str]:
     """One line for each profile that is shown but not ranked: its meaning."""
     lines = []
     for engine, profile in columns:
-        told = facts(engine)
-        if told is not None and not is_ranked(engine, profile):
-            lines.append(f"{engine}/{profile}: {ROLES[told.roles[profile]]}")
+        known = facts(engine)
+        if known is not None and not is_ranked(engine, profile):
+            lines.append(f"{engine}/{profile}: {ROLES[known.roles[profile]]}")
     return lines
 
 
 def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Profiles whose planar scenes leave the plane, number of cells, and the worst; one line, or none.
+    """Profiles whose planar scenes leave the plane, number of cases, and the worst; one line, or none.
 
-    All other rows of such a cell measure the motion in the plane only, even if they pass.
+    All other rows of such a case measure the motion in the plane only, even if they pass.
     """
     cells: dict[tuple[str, str], list[tuple[bool, float, str]]] = defaultdict(list)
     for row in rows:
         if row["metric"] == OUT_OF_PLANE and row["iterations"] is None and row["value"] is not None:
             found = row["physics"] == "fail", row["value"], row["scene"]
             cells[row["engine"], row["profile"]].append(found)
-    told = []
+    counts = []
     for (engine, profile), of_it in cells.items():
         outside = sorted(each for each in of_it if each[0])
         if outside:
             _, most, scene = outside[-1]
-            told.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
-    return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(told)}"] if told else []
+            counts.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
+    return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(counts)}"] if counts else []
 
 
 def newer(rows: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -144,9 +144,9 @@ def newer(rows: Iterable[Mapping[str, Any]]) -> list[str]:
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:
     """Terminal tables of a matrix for ``width`` columns: a line per engine and profile, a column per scene.
 
-    Dimensions that say the same share a line. Scenes that do not fit beside each other make a further table. A profile
-    with settings of a user's own has a line for each of them where its name leaves no room for a scene. With ``roles``
-    what a profile is stands beside its first line, where its name does not say so.
+    Equal fields of both dimensions share a line. Scenes that do not fit beside each other make a further table. A
+    profile with a user's own settings has a line for each of them if its name leaves no room for a scene. With
+    ``roles`` the role of a profile follows its first line, unless its name says it.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
     body = list(_body(matrix, scenes, versions, roles))

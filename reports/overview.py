@@ -1,7 +1,7 @@
-"""Overview of a run of many scenes: one matrix of families that fits on a screen, and an answer per family.
+"""Overview of a run of many scenes: one matrix of groups that fits on a screen, and an answer per group.
 
 A matrix of forty scenes has two hundred lines on a terminal of eighty columns, and its answers five hundred. If the
-scenes of a run do not fit on a screen (`FIRST_LOOK`), families of scenes replace them; ``crosscheck show --all`` and
+scenes of a run do not fit on a screen (`FIRST_LOOK`), groups of scenes replace them; ``crosscheck show --all`` and
 the report show every scene.
 """
 
@@ -34,7 +34,7 @@ NEAREST = 3
 
 
 def families_of(rows: Sequence[Plain]) -> dict[str, list[str]]:
-    """Family -> its scenes in the order of the rows: the known families in their order, then others by name."""
+    """Group -> its scenes in the order of the rows: the known groups in their order, then others by name."""
     found: dict[str, list[str]] = defaultdict(list)
     for scene in dict.fromkeys(row["scene"] for row in rows):
         found[resolve(scene).family].append(scene)
@@ -43,13 +43,13 @@ def families_of(rows: Sequence[Plain]) -> dict[str, list[str]]:
 
 
 def by_family(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Matrix:
-    """Matrix of families instead of scenes; dimension 0 means all together."""
+    """Matrix of groups instead of scenes; dimension 0 means all together."""
     family = {scene: name for name, scenes in families.items() for scene in scenes}
     return matrix_of({**row, "scene": family[row["scene"]], "dimension": 0} for row in rows)
 
 
 def table_of(matrix: Matrix, families: Sequence[str], roles: bool = False) -> Table:
-    """Terminal table: a line per engine and profile, with its role if asked; a column per family, a word a line."""
+    """Terminal table: a line per engine and profile, with its role if wanted; a column per group, a word a line."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=0)
     table.add_column("engine,\nprofile", no_wrap=True)
     for name in families:
@@ -96,7 +96,7 @@ def legend(matrix: Matrix) -> str:
 
 
 def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, str]]:
-    """Family, and the profiles that pass every row of all its scenes; else the nearest ones."""
+    """Group, and the profiles that pass every row of all its scenes; else the nearest ones."""
     matrix = by_family(rows, families)
     asked: dict[tuple[str, tuple[str, str]], set[str]] = defaultdict(set)
     family = {scene: name for name, scenes in families.items() for scene in scenes}
@@ -123,7 +123,7 @@ def shortened(answer: Answer) -> Answer:
 
 
 def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> tuple[list[Answer], int]:
-    """For each engine and family the answer about the scene with most failed rows, and the number of answers.
+    """For each engine and group the answer about the scene with most failed rows, and the number of answers.
 
     Only for profiles as shipped: answers of `reports.answers` about others list only worse results.
     """

@@ -1,7 +1,7 @@
 """Raw results as Parquet, for pandas, polars and duckdb without this project.
 
 rows.parquet           judged rows of the chosen runs, as in `exports.load`; lists and tables as JSON text
-observations.parquet   a line per metric of every cell, as measured: run, slot, cell, versions, outcome, value
+observations.parquet   a line per metric of every case, as measured: run, slot, cell, versions, outcome, value
 trajectories.parquet   a line per sample and body of every kept trajectory (``run --keep-trajectories``)
 """
 
@@ -30,7 +30,7 @@ STATE = tuple(dict.fromkeys((*POSE[3], *POSE[7], *TWIST[3], *TWIST[6])))
 
 
 def write(store: Store, runs: Sequence[Run], trajectories: Path, folder: Path) -> dict[str, int]:
-    """Write the files into ``folder``; returns the number of lines of each."""
+    """Write the files into ``folder``; return the number of lines of each."""
     folder.mkdir(parents=True, exist_ok=True)
     found = [(run, store.observations(run)) for run in runs]
     rows = pd.concat([_rows(run, observations) for run, observations in found], ignore_index=True)

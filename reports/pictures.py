@@ -1,7 +1,7 @@
 """Pictures of a report for the README, taken in a real browser: ``python -m reports.pictures REPORT FOLDER``.
 
-Needs Playwright, Pillow and a Chromium, as `dev` has them; nothing else of the project imports this module. Every
-picture carries the report's last line (run and commit) as a text chunk named ``Source``.
+Needs Playwright, Pillow and a Chromium (extra `dev`); nothing else of the project imports this module. Every picture
+has the report's last line (run and commit) as a text chunk named ``Source``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from validation.catalogue import CATALOGUE
 
 #: Picture -> the part of the page that it shows.
 SHOTS = {"verdicts": "#verdicts", "restitution": "#shot-restitution", "cost": "#shot-cost"}
-#: Room around a picture, and nothing in it that cannot be clicked.
+#: Room around a picture, without anything that can be clicked.
 STYLE = ".save { display: none } #verdicts, .shot { padding: 16px }"
 WIDTH, HEIGHT = 1280, 860
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")

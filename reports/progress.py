@@ -1,4 +1,4 @@
-"""Runs a plan with a progress line on stderr; finished cells are stored, and the same command resumes."""
+"""Runs a plan with a progress line on stderr; finished cases are stored, and the same command resumes."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def run_plan(
     cluster: str = "",
     known: Sequence[Observation] = (),
 ) -> Run:
-    """Run the cells of this plan that the store lacks; the observations are in the store afterwards.
+    """Run the cases of this plan that the store lacks; the observations are in the store afterwards.
 
-    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run with cells left after
+    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run with cases left after
     time-outs is not complete: it prints that, and the same command resumes it. ``cluster`` is the address of a Dask
-    cluster to run on; its motions are not recorded, and OUT/cluster.jsonl lists which worker ran each cell. ``known``
-    are results of another run for cells of this plan, which are stored instead of being run again.
+    cluster to run on; its motions are not recorded, and OUT/cluster.jsonl lists which worker ran each case. ``known``
+    are results of another run for cases of this plan, which are stored instead of being run again.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
@@ -90,7 +90,7 @@ def run_plan(
 
 
 def _without(known: Sequence[Observation], store: Store, run: Run, todo: Sequence[Slot]) -> list[Slot]:
-    """Cells left to run after the known results are stored."""
+    """Cases left to run after the known results are stored."""
     asked, answered = set(todo), set()
     for observation in known:
         if observation.slot in asked:

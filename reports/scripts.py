@@ -1,4 +1,4 @@
-"""A cell as a script that needs only its engine, for a bug report: the case and its truth, then the run itself.
+"""A case as a script that needs only its engine, for a bug report: the case and its truth, then the run itself.
 
 The run is written by the engine's own folder (`adapters.engine.Engine.exports`).
 """

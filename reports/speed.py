@@ -76,7 +76,7 @@ def raw_of(store: Store, run: Run) -> pd.DataFrame:
 
 
 def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], float]:
-    """Cost [s/s] of the largest step from which on a profile passes every check of its bench cells.
+    """Cost [s/s] of the largest step from which on a profile passes every check of its bench cases.
 
     Keys are (scene, dimension, engine, profile). A step counts only if every smaller one passes as well: a single pass
     may be luck.
@@ -103,7 +103,7 @@ def cheapest_passing(store: Store, run: Run) -> dict[tuple[str, int, str, str], 
 
 
 def physics(observation: Observation) -> list[dict[str, Any]]:
-    """Rows of a bench's cell with PASS or FAIL only: standings belong to the run, and cost time."""
+    """Rows of a bench's case with PASS or FAIL only: standings belong to the run, and cost time."""
     slot = observation.slot
     same = {name: getattr(slot, name) for name in ("scene", "dimension", "engine", "profile", "dt", "iterations")}
     rows: list[dict[str, Any]] = []

@@ -41,7 +41,7 @@ def stage(console: Console, name: str) -> Iterator[None]:
 
 
 def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
-    """Compile the code that the engines of these cells compile at their first steps, outside timings and time limits.
+    """Compile the code that the engines of these cases compile at their first steps, outside timings and time limits.
 
     Returns engine and dimension of each compilation.
     """

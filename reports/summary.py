@@ -63,12 +63,12 @@ def show(
     short = overview.table_of(grouped, list(families))
     long = len(tables) > 1 and sum(table.row_count + HEAD for table in tables) > overview.FIRST_LOOK
     if long and _fits(short, console) and not every:
-        told = overview.table_of(grouped, list(families), roles=True)
-        roles = [] if _fits(told, console) else [roles_line(matrix.columns)]
-        _show_families(rows, families, short if roles else told, roles, console, place)
+        with_roles = overview.table_of(grouped, list(families), roles=True)
+        roles = [] if _fits(with_roles, console) else [roles_line(matrix.columns)]
+        _show_families(rows, families, short if roles else with_roles, roles, console, place)
         _where(rows, console, files, place, {"crosscheck show --all": "the same for every scene"})
         return
-    # What profiles are stands beside them where that makes no further table, else in a line below.
+    # Roles of profiles follow their names if that needs no further table, else they are in a line below.
     roles = [roles_line(matrix.columns)] if len(wider) > len(tables) else []
     for table in tables if roles else wider:
         console.print(table)
@@ -99,7 +99,7 @@ def _show_families(
     console: Console,
     place: str,
 ) -> None:
-    """The same by family of scenes; ``roles`` says what profiles are, where the table does not."""
+    """The same by group of scenes; ``roles`` are those of the profiles that the table does not show."""
     console.print(table)
     matrix = matrix_of(rows)
     explained = overview.legend(overview.by_family(rows, families))
@@ -134,7 +134,7 @@ def _fits(table: Table, console: Console) -> bool:
 
 
 def _beside(matrix: Matrix) -> list[str]:
-    """The regression status in one line; none where nothing fails."""
+    """The regression status in one line; empty if nothing fails."""
     return list(filter(None, [status_of(matrix)]))
 
 

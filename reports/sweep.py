@@ -10,7 +10,7 @@ from reports.tables import grid
 
 
 def counted(found: pd.DataFrame) -> Table:
-    """Cells of every scene, engine and profile that can run it, and the number that pass all judged checks."""
+    """Number of cases of every scene, engine and profile that can run it, and of those that pass all judged checks."""
     shown = grid("engine/profile", "scene", "cases", "pass", "fail", "no result")
     for (engine, profile, scene, dimension), cells in found.groupby(
         ["engine", "profile", "scene", "dimension"], sort=False

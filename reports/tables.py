@@ -59,10 +59,10 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
-        told = {name: _field(entry, name) for _, name in columns}
-        if "because" in told:  # equal reasons are printed once
-            told["because"], last = "as above" if told["because"] == last else told["because"], told["because"]
-        table.add_row(*map(Text, told.values()))
+        shown = {name: _field(entry, name) for _, name in columns}
+        if "because" in shown:  # equal reasons are printed once
+            shown["because"], last = "as above" if shown["because"] == last else shown["because"], shown["because"]
+        table.add_row(*map(Text, shown.values()))
     console.print(table)
     if what == "engines" and (line := roles_line((e["name"], name) for e in entries for name in e["profiles"])):
         console.print(Text(line))
@@ -199,7 +199,7 @@ def unset_text(row: Plain) -> str:
 
 
 def _said_of(fact: Plain) -> str:
-    """The cell that shows a fact with its number, the test that asserts it, or the reason for neither."""
+    """The case that shows a fact with its number, the test that asserts it, or the reason for neither."""
     chosen = f"; chosen afterwards: {fact['chosen']}" if fact["chosen"] else ""
     if not fact["scene"]:
         return str(fact["test"] or fact["unasked"]) + chosen
@@ -276,7 +276,7 @@ def health(data: Plain, console: Console) -> None:
 def sensitivity(
     entries: Sequence[Plain], receipts_alone: Mapping[str, Sequence[str]], blind: Sequence[BlindSpot], console: Console
 ) -> None:
-    """Print the size from which each check and receipt notices a planted fault, faults noticed by no check, and why."""
+    """Print the smallest planted fault that each check or property check notices; unnoticed faults with reasons."""
     table = grid("check or property check", "smallest fault that it notices")
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]

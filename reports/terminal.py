@@ -1,7 +1,7 @@
-"""The console of every command: it shows text as it is.
+"""The console of every command, which prints text unchanged.
 
 Names of scenes, reasons and settings come from files and plugins. Rich would read ``[red]`` in them as a style,
-``[/]`` as an error and ``:ok:`` as a picture; style is only ever given by us, as `rich.text.Text` or ``style=``.
+``[/]`` as an error and ``:ok:`` as a picture. Only our own code sets styles, as `rich.text.Text` or ``style=``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from reports.wording import roles_line
 
 class _Terminal(Console):
     def on_broken_pipe(self) -> None:
-        """Leave it to the command which status that is: rich would end with 1, which says that a verdict is bad."""
+        """Raise, so that the command chooses the exit status: rich would end with 1, which is a verdict."""
         self.quiet = True
         raise  # the BrokenPipeError that is being handled
 
@@ -27,6 +27,6 @@ def terminal(stderr: bool = False, width: int | None = None) -> Console:
 
 
 def print_roles(columns: Iterable[tuple[str, str]], console: Console) -> None:
-    """Print what the profiles of ``(engine, profile)`` are, once below tables that name them."""
+    """Print the roles of the profiles of ``(engine, profile)``, once below tables that name them."""
     if line := roles_line(columns):
         console.print(Text(line, style="dim"), highlight=False)

@@ -61,7 +61,7 @@ class Plugin:
         items.extend(cells.collect())
 
     def row_of(self, slot: Slot, metric: str) -> Row | None:
-        """Row of a check; the cells of its scene run with the first of them."""
+        """Row of a check; the cases of its scene run with the first of them."""
         if slot.scene not in self.ran:
             self.ran.add(slot.scene)
             own = [each for each in self.slots if each.scene == slot.scene]
@@ -84,14 +84,14 @@ def _slots(engine: str, scenes: str, profiles: str) -> list[Slot]:
 
 
 class _Cells(pytest.Collector):
-    """All checks of all cells."""
+    """All checks of all cases."""
 
     def __init__(self, plugin: Plugin, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.plugin = plugin
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Checks that have a tolerance, cell by cell."""
+        """Checks that have a tolerance, case by case."""
         facts = registry.facts(self.plugin.engine)
         lifted = facts is not None and 2 not in facts.dimensions
         for slot in self.plugin.slots:
@@ -106,7 +106,7 @@ class _Cells(pytest.Collector):
 
 
 class _Check(pytest.Item):
-    """One check of one cell."""
+    """One check of one case."""
 
     def __init__(self, plugin: Plugin, slot: Slot, metric: str, **kwargs: Any) -> None:
         super().__init__(**kwargs)

@@ -44,7 +44,7 @@ STATUS = {
 }  # fmt: skip
 
 
-#: What a profile is called for people, by its role.
+#: Name of a profile for people, by its role.
 ROLE_WORDS: dict[str, str] = {
     "shipped": "as shipped", "tuned": "tuned", "one": "compromise", "textbook": "textbook", "solution": "exact",
     "matched": "custom loop",
@@ -52,21 +52,21 @@ ROLE_WORDS: dict[str, str] = {
 
 
 def word_of(engine: str, profile: str) -> str:
-    """What a profile is called for people beside its name; empty where that is its name, or where it has no role."""
-    told = facts(engine)
-    word = ROLE_WORDS.get(told.roles.get(profile.partition("+")[0], "") if told else "", "")
+    """Name of a profile for people, beside its own; empty if both are equal or it has no role."""
+    known = facts(engine)
+    word = ROLE_WORDS.get(known.roles.get(profile.partition("+")[0], "") if known else "", "")
     return "" if word == profile else word
 
 
 def roles_line(columns: Iterable[tuple[str, str]]) -> str:
-    """What the profiles of ``(engine, profile)`` are, in one line, where their names do not say so; else empty."""
+    """Roles of the profiles of ``(engine, profile)`` in one line, if their names do not say them; else empty."""
     named = {profile.partition("+")[0]: word for engine, profile in columns if (word := word_of(engine, profile))}
     return f"Profiles: {'; '.join(f'{name}: {word}' for name, word in named.items())}." if named else ""
 
 
 def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
-    """Profiles that words name on engines: by name, or by role (``shipped``, ``as shipped``); else the word itself."""
-    roles = [told.roles for engine in engines if (told := facts(engine))]
+    """Profiles on engines by name or by role (``shipped``, ``as shipped``); an unknown word stays itself."""
+    roles = [known.roles for engine in engines if (known := facts(engine))]
     found: dict[str, None] = {}
     for word in words:
         own = [
@@ -98,7 +98,7 @@ def reproduce(slot: Mapping[str, Any]) -> str:
     """Command that runs exactly this slot."""
     words = ["crosscheck", "run", slot["scene"]]
     first = resolve(slot["scene"]).parameters[:1]
-    # A parameter selects one cell instead of the suite's variations, so one is always given.
+    # A parameter selects one case instead of the suite's variations, so one is always given.
     for name, value in (slot["params"] or {p.name: p.default for p in first}).items():
         words += ["--param", f"{name}={value:.17g}" if float(f"{value:.12g}") != value else f"{name}={value:.12g}"]
     words += ["--dim", str(slot["dimension"]), "--engine", slot["engine"], *profile_words(slot_from_dict(slot))]
@@ -115,7 +115,7 @@ def at(out: Path | None, run: str = "") -> str:
 
 
 def profile_words(slot: Slot) -> list[str]:
-    """Words that ask for the profile of a slot, with the settings that replace its own."""
+    """Options that select the profile of a slot, with the settings that replace its own."""
     sets = [word for name, value in slot.switched for word in ("--set", f"{name}={text_of(value)}")]
     return ["--profile", slot.base, *sets]
 
@@ -145,7 +145,7 @@ def measured(row: Mapping[str, Any], digits: int = 4) -> str:
 
 
 def missing_text(missing: int, planned: int) -> str:
-    """Text for a run with missing cells."""
+    """Text for a run with missing cases."""
     return (
         f"{missing} of {planned} planned cases have no result and are left out here. The command that started the "
         "run resumes it."

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tokenize
 import tomllib
 from pathlib import Path
 
@@ -66,6 +67,30 @@ GONE_FROM_REASONS = (
     "what stands",
     "whoever",
 )
+#: Phrases that are gone from docstrings and comments outside the solver.
+GONE_FROM_DOCSTRINGS = (
+    "are told",
+    "asks for",
+    "asked of",
+    "cannot be asked",
+    "cures it",
+    "has a say",
+    "is told",
+    "knows nothing",
+    "lane of its own",
+    "makes of",
+    "nobody",
+    "not told",
+    "null answers",
+    "owed",
+    "owes",
+    "stand once",
+    "stands for",
+    "stands once",
+    "told apart",
+    "what stands",
+    "whoever",
+)
 #: Strings that are no sentences: fields of JSON, rows and files, which keep their names.
 NAMES = re.compile(r"[\w.\-]*")
 
@@ -84,6 +109,15 @@ def printed(package="reports"):
             text = node.value if isinstance(node, ast.Constant) and id(node) not in docstrings else None
             if isinstance(text, str) and not NAMES.fullmatch(text):
                 yield f"{path.relative_to(ROOT)}:{node.lineno}", without_code(text)
+
+
+def documented(package):
+    """``file:line`` and text of every docstring and comment of a package, and of other long strings."""
+    for path in sorted((ROOT / package).rglob("*.py")):
+        with path.open("rb") as file:
+            for token in tokenize.tokenize(file.readline):
+                if token.type == tokenize.COMMENT or token.string.startswith(('"""', 'r"""')):
+                    yield f"{path.relative_to(ROOT)}:{token.start[0]}", without_code(token.string)
 
 
 def reasons():
@@ -107,7 +141,8 @@ def found(text, gone=GONE):
 
 
 def test_no_output_has_a_word_that_is_gone():
-    assert [f"{where}: {words} in {text!r}" for where, text in printed() if (words := found(text))] == []
+    texts = [*printed(), *printed("contact_crosscheck")]
+    assert [f"{where}: {words} in {text!r}" for where, text in texts if (words := found(text))] == []
 
 
 def test_no_page_has_a_word_that_is_gone():
@@ -123,6 +158,13 @@ def test_no_reason_has_a_phrase_that_is_gone():
     told = [*reasons(), *printed("adapters"), *printed("validation")]
     assert len(told) > 1000
     assert [f"{where}: {words} in {text!r}" for where, text in told if (words := found(text, GONE_FROM_REASONS))] == []
+
+
+@pytest.mark.parametrize("package", ["adapters", "validation", "reports", "contact_crosscheck"])
+def test_no_docstring_or_comment_has_a_phrase_that_is_gone(package):
+    texts = [*documented(package)]
+    assert len(texts) > 50
+    assert [f"{where}: {words}" for where, text in texts if (words := found(text.lower(), GONE_FROM_DOCSTRINGS))] == []
 
 
 @pytest.mark.parametrize("name", [None, *main.commands])

@@ -1,4 +1,4 @@
-"""``accept``: shows what listing a run would change, family by family, and asks for the reason of each."""
+"""``accept``: shows how a run would change the list of known failures, cause by cause, and prompts for reasons."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from validation.judging.acceptance import (
 from validation.judging.rows import Row, rows_of, with_floors
 from validation.records.store import SCATTER_TITLE, Store
 
-#: Refused rows that are printed; the rest is counted.
+#: Largest number of refused rows that are printed; the others are counted.
 SHOWN = 12
 
 
@@ -56,9 +56,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     units in the last place; if the scatter is too wide to notice an improvement, from twelve more.
 
     The command shows the causes whose lists would change. Those named by --family are accepted. On a terminal you are
-    asked about the others; without a terminal they stay as they are. Refused are checks that a law of the engine should
-    predict and does not, cases whose property checks fail, and failures of an exact profile. What did not run stays
-    as it is.
+    asked about the others; without a terminal they stay as they are. The command refuses checks that a law of the
+    engine should predict and does not, cases whose property checks fail, and failures of an exact profile. It changes
+    no entry of a case that did not run.
 
     Exits with 1 if a check is refused, a changed cause is not accepted, or another check is new or changed. Read the
     diff before you commit it: a known failure is listed to be shown, not to be hidden.
@@ -66,7 +66,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     registry.find(engine)
     console = terminal(stderr=True)
     findings = findings_of(engine)
-    about = _about(families, findings)
+    about = _selection(families, findings)
     rows, draws = _rows_with_scatter(out, run, engine, jobs, console, about)
     proposal = propose(rows, engine, findings, about, draws)
     unknown = set(families) - {change.family.id for change in proposal.changes}
@@ -85,9 +85,9 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     left = [change.family.id for change in changed if change.family.id not in chosen]
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
-        said = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
+        result = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
         counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
-        click.echo(json.dumps({**said, **counts, "not_accepted": left}, indent=1))
+        click.echo(json.dumps({**result, **counts, "not_accepted": left}, indent=1))
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
         click.echo(f"{engine}: {counted} listed in {folder / MEMBERS}")
@@ -99,8 +99,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
 
 
-def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
-    """Which rows are asked about: all on a terminal; without one, those of the families that are named, if any are."""
+def _selection(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
+    """Rows to list: all on a terminal; without one, those of the named causes, if any are named."""
     chosen = set(families)
     if findings is None or not chosen or not chosen <= set(findings.families) or _on_a_terminal():
         return lambda key: True
@@ -115,7 +115,7 @@ def _about(families: Sequence[str], findings: Findings | None) -> Callable[[Key]
 def _rows_with_scatter(
     out: Path, run: str, engine: str, jobs: int, console: Console, about: Callable[[Key], bool]
 ) -> tuple[list[Row], dict[Key, Draws]]:
-    """Rows of the engine with their scatter, measured here where the store does not have it, and their draws."""
+    """Rows of the engine with their scatter, and draws of each; scatter that the store lacks is measured here."""
     store = Store(out, create=False, write=True)
     try:
         chosen = store.run(run)
@@ -144,7 +144,7 @@ def _rows_with_scatter(
 
 
 def _is_of_this_code(observation: Observation) -> bool:
-    """What is listed must be what this code and this release of the engine do."""
+    """Whether this code and this release of the engine made the observation; others must not be listed."""
     return observation.cell == prepare(observation.slot).cell.key()
 
 
@@ -160,7 +160,7 @@ def _table(engine: str, changes: Sequence[Change]) -> Table:
 
 
 def _decide(changed: Sequence[Change], named: Sequence[str], console: Console) -> tuple[set[str], list[Family]]:
-    """Ids of the families that are accepted, and those among them that got their reason just now."""
+    """Ids of the accepted causes, and those of them that got their reason just now."""
     chosen, written = set(named), []
     for change in changed:
         if change.family.id in chosen and change.is_draft:
@@ -187,7 +187,7 @@ def _on_a_terminal() -> bool:
 
 
 def _details(change: Change) -> str:
-    """What is new, drifted and gone in a family, kind of metric by kind."""
+    """New, changed and gone checks of a cause, by kind of metric."""
     lines = [f"cause {change.family.id}: {', '.join(change.family.profiles)} on {change.family.scene}"]
     for name, entries in (("new", change.new), ("changed", change.drifted), ("gone", change.gone),
                           ("with another band", change.bands)):  # fmt: skip
@@ -201,7 +201,7 @@ def _details(change: Change) -> str:
 
 
 def _with_reasons(proposal: Proposal, written: Sequence[Family]) -> Proposal:
-    """The proposal with drafts replaced by the families that they became."""
+    """The proposal, with drafts replaced by causes that have a reason now."""
     became = {family.id: family for family in written}
     changes = []
     for change in proposal.changes:

@@ -27,7 +27,7 @@ from validation.posed import resolve
 from validation.settings.cures import Cure, cures_of
 from validation.settings.switching import Reading
 
-#: Scenes that are named beside the best one.
+#: Largest number of scenes that are named beside the best one.
 OTHERS = 3
 
 
@@ -44,18 +44,18 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     known = {facts.package.lower(): name for name in registry.names() if (facts := registry.facts(name))}
     known |= {name: name for name in registry.names()}
     named = list(dict.fromkeys(known[word] for word in text.lower().split() if word in known))
-    said = " ".join(word for word in text.split() if word.lower() not in known)
-    found = matches(said, named)
+    symptom = " ".join(word for word in text.split() if word.lower() not in known)
+    found = matches(symptom, named)
     if not found:
-        told = f"nothing is known of {said!r}; see crosscheck list scenes, and crosscheck field for known reports"
-        raise click.BadParameter(told, param_hint="WORDS")
+        reason = f"nothing is known of {symptom!r}; see crosscheck list scenes, and crosscheck field for known reports"
+        raise click.BadParameter(reason, param_hint="WORDS")
     best = found[0]
     # Beside the best: what has as many of the words, or one that it does not have.
     beside = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
     others = [match.scene for match in beside if match.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
     fixes = recorded_fixes(best.scene, about or registry.names())
-    missed = [] if best.score == math.inf else [word for word in stems(said).values() if word not in best.words]
+    missed = [] if best.score == math.inf else [word for word in stems(symptom).values() if word not in best.words]
     if as_json:
         plain = {
             "scene": best.scene, "command": best.command, "words": best.words, "missed": missed, "others": others,
@@ -144,7 +144,7 @@ def _show(found: list[Finding], commands: bool) -> None:
 
 
 def _broken(source: str, width: int) -> str:
-    """``owner/repository#number``, on two lines if it is wider than its column: a number in halves finds nothing."""
+    """``owner/repository#number``, on two lines if it is wider than its column: half a number cannot be searched."""
     return source if len(source) < width else source.replace("/", "/\n", 1)
 
 

@@ -1,4 +1,4 @@
-"""``bench`` and ``profile``: what an answer of a given error costs, and where the solver's own time goes."""
+"""``bench`` and ``profile``: cost of an answer of a given error, and time of each stage of the solver."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from validation.posed import primary_of
 from validation.records.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 
-#: Two bench runs on one machine must agree within their intervals on this share of their ratios.
+#: Least share of the time ratios of two bench runs on one machine that must agree within their intervals.
 AGREEMENT = 0.9
 
 
@@ -61,7 +61,7 @@ AGREEMENT = 0.9
 @click.option(
     "--targets",
     is_flag=True,
-    help="Instead, compare the textbook step with each engine, and with the ratios that it owes.",
+    help="Instead, compare the textbook step with each engine, and the ratios with floors and targets.",
 )
 @click.option("--brief", is_flag=True, help="Print no tables; they are in OUT/bench and in the report.")
 @AS_JSON
@@ -135,7 +135,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
 
 
 def _measurable(store: Store, run: Run, units: Sequence[Unit]) -> bool:
-    """Whether there is an error to time; says in a line what has none to be measured from."""
+    """Whether any case has an error, so that timing it makes sense; prints why others have none."""
     for each in certified_of(store.observations(run)).values():
         if each.reason:
             click.echo(f"crosscheck: bench: {each.slot.scene} {each.slot.dimension}-D: {each.reason}", err=True)
@@ -155,7 +155,7 @@ def _earlier(store: Store, name: str | None) -> Run | None:
 def time_units(
     store: Store, run: Run, scenes: Sequence[str], units: Sequence[Unit], limits: Limits, seed: int, console: Console
 ) -> None:
-    """Time all units in the lane and keep the times of ``run``, with how they were taken."""
+    """Time all units and store the times of ``run``, with the protocol."""
     console.print(f"timing {plural(len(units), 'case')}, one at a time, in random order (seed {seed})", highlight=False)
     started, load = time.monotonic(), os.getloadavg()
     store.clear_timings(run)
@@ -205,12 +205,12 @@ def _print_tables(tables: speed.Tables, console: Console) -> None:
     print_roles(tables["work_points"][["engine", "profile"]].itertuples(index=False, name=None), console)
     beside = speed.overhead_table(tables["overhead"]), speed.scaling_table(tables["scaling"], tables["scaling_fits"])
     for table in beside:
-        if table.row_count:  # a short bench may have come to none of it
+        if table.row_count:  # a short bench may have none
             console.print(table)
 
 
 def _compare(store: Store, earlier: Run, run: Run, console: Console) -> bool:
-    """Say how far two bench runs agree; True if far enough."""
+    """Print how well two bench runs agree; whether that is well enough."""
     both = agreement.agreement(agreement.ratios(store, earlier), agreement.ratios(store, run))
     if len(both) == 0:
         console.print(f"against {earlier.id}: the two benchmarks have no case of the same versions in common")

@@ -1,4 +1,4 @@
-"""``certify``: what solver and oracle promise, measured beside the gate; ``--order``: how errors fall with dt."""
+"""``certify``: error bounds of the solver and of the independent solution, measured; ``--order``: convergence."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from reports.command.group import AS_JSON, main
 from reports.terminal import terminal
 from reports.wording import number
 
-#: Modules of `reference_solver.verification` that answer for gates, in the order in which they are measured and shown.
-#: The oracle comes first: it needs few kernels; the process beside it compiles the others meanwhile. What takes minutes
-#: comes before what takes seconds, so that no process ends long before the other.
+#: Modules of `reference_solver.verification` with error bounds, in the order in which they are measured and shown. The
+#: independent solution comes first: it needs few kernels, and the other process compiles the rest meanwhile. Parts of
+#: minutes come before parts of seconds, so that both processes end at about the same time.
 PARTS = (
     "event_driven.gates",
     "impact",
@@ -50,12 +50,12 @@ PARTS = (
     "hard_cases.gates",
     "self_test",
 )
-#: The part that takes more time than all others together (560 of 702 s of CPU when it was one): its runs are measured
+#: The part that takes more time than all others together (560 of 702 s of CPU when it was one). Its runs are measured
 #: one by one, so that no process waits.
 IN_RUNS = "piles"
-#: Processes side by side, each with kernels of its own in memory [300 MB]; two cores are what times are told for.
+#: Number of processes; each has its own kernels in memory [300 MB], and the stated times are for two cores.
 WORKERS = 2
-#: Columns of a table that goes to a file; a terminal has its own width.
+#: Width of a table that goes to a file [characters]; a terminal has its own.
 WIDTH = 150
 
 
@@ -105,7 +105,7 @@ def certify(
 
 
 def show_orders(console: Console, as_json: bool) -> None:
-    """Print the fitted orders of all schemes and cases; they are observations, no gates."""
+    """Print the fitted orders of all schemes and cases; these are observations without bounds."""
     with console.status("halving steps"):
         found = list(orders())
     if as_json:
@@ -120,11 +120,11 @@ def show_orders(console: Console, as_json: bool) -> None:
 
 
 def show_self_test(console: Console, as_json: bool) -> int:
-    """Print which planted corruptions are seen, at which size; 1 if too few are at the size that is judged, else 0."""
+    """Print which planted corruptions are noticed at which size; return 1 if too few are at the judged size, else 0."""
     with console.status("planting corruptions"):
-        made = list(trials())
+        found = list(trials())
     if as_json:
-        rows = [(trial.corruption, trial.size, trial.seen) for trial in made]
+        rows = [(trial.corruption, trial.size, trial.seen) for trial in found]
         plain = [
             {"family": c.family, "corruption": c.name, "scene": c.scene, "size": size, "caught": bool(seen), "by": seen}
             for c, size, seen in rows
@@ -133,12 +133,12 @@ def show_self_test(console: Console, as_json: bool) -> int:
     table = Table(title="Planted corruptions: noticed by", title_justify="left")
     for heading in ("family", "what is corrupted", "scene", *(f"{size:g}" for size in SIZES), "where missed"):
         table.add_column(heading)
-    for corruption, group in groupby(made, lambda trial: trial.corruption):
+    for corruption, group in groupby(found, lambda trial: trial.corruption):
         seen = [trial.seen[0] if trial.seen else "MISSED" for trial in group]
         why = corruption.missed if "MISSED" in seen else ""
         table.add_row(corruption.family, corruption.name, corruption.scene, *seen, why)
     console.print(table)
-    judged = [trial for trial in made if trial.size == JUDGED]
+    judged = [trial for trial in found if trial.size == JUDGED]
     caught = sum(bool(trial.seen) for trial in judged)
     console.print(f"{caught} of {len(judged)} noticed at size {JUDGED:g}, {PROMISED:.0%} required")
     for trial in judged:
@@ -148,10 +148,10 @@ def show_self_test(console: Console, as_json: bool) -> int:
 
 
 def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: Console) -> dict[str, Any]:
-    """Return ``measure(part)`` of every part, made in processes of their own, and say on stderr how far it is."""
+    """Return ``measure(part)`` of every part, measured in several processes, with progress on stderr."""
     results: dict[str, Any] = {}
     start = time.perf_counter()
-    # A fresh interpreter each: compiled kernels and threads do not survive a fork on every platform.
+    # New interpreters: compiled kernels and threads do not survive a fork on every platform.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(WORKERS, context, end_with, (os.getpid(),)) as pool:
         jobs = {pool.submit(measure, part): part for part in parts}
@@ -163,7 +163,7 @@ def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: C
 
 
 def measured(part: str) -> list[Gate] | piles.Fall:
-    """Measure the gates of one part, or a pile; a part that cannot be measured is a gate that does not hold."""
+    """Measure the bounds of one part, or a pile; a part that cannot be measured is a bound that does not hold."""
     if part in piles.PILES:
         return piles.fall_of(part)
     gates: list[Gate] = []
@@ -175,7 +175,7 @@ def measured(part: str) -> list[Gate] | piles.Fall:
 
 
 def _finite(row: dict[str, Any]) -> dict[str, Any]:
-    """JSON has no nan and no infinity: null."""
+    """Row with null for nan and infinity, which JSON does not have."""
     return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
 
 

@@ -1,4 +1,4 @@
-"""``compare``: what changed between two runs."""
+"""``compare``: changes between two runs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What the shell offers at the Tab key: scenes, engines, ids of rows; docs/reference/status.md says how.
+"""Completions of the shell: scenes, engines, ids of rows; docs/reference/status.md explains how to enable them.
 
-A completion must never fail nor import an engine: it reads names only, and says nothing where it cannot.
+A completion must never fail and never import an engine. It only reads names, and is empty if it cannot.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def names_of_either(ctx: click.Context, param: click.Parameter, incomplete: str)
 
 
 def row_ids(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Worst rows of the families of the latest run."""
+    """Ids of the worst checks of the latest run, one for each line of ``findings``."""
     from reports.exports import load_rows
     from reports.findings import families
     from reports.wording import row_id

@@ -1,4 +1,4 @@
-"""``cure``: which stock settings mend what an engine gets wrong on a scene, and at what cost."""
+"""``cure``: stock settings that fix the errors of an engine on a scene, and their cost."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def cure(
     `explain` and the report.
     """
     if profile_of(engine, "shipped") is None:
-        load(engine)  # says that there is no such engine, if so
+        load(engine)  # raises if there is no such engine
         raise EngineError(f"cure: {engine} has no profile as shipped that could be fixed")
     version = load(engine).version()
     names = scene_names_of(scenes)
@@ -87,7 +87,7 @@ def cure(
 
 
 def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
-    """Write the table after every scene: a search of all takes long, and what is found is not lost."""
+    """Write the table after every scene: a search of all takes long and may be interrupted."""
     folder = folder_of(engine)
     if folder is None:
         raise EngineError(f"cure: {engine} has no folder of its own to keep {CURES} in")
@@ -97,8 +97,8 @@ def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
 def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, console: Console) -> None:
     head = Text(f"{engine} {scene} {dimension}-D: ", style="bold")
     if isinstance(found, Unsearched):
-        told = "as shipped nothing is to be fixed" if found.asked else "cannot run"
-        console.print(head + Text(f"{told}: {found.reason}", style=""), soft_wrap=True)
+        text = "as shipped nothing is to be fixed" if found.asked else "cannot run"
+        console.print(head + Text(f"{text}: {found.reason}", style=""), soft_wrap=True)
         return
     console.print(head + Text(f"{found.failing} of {found.judged} checks fail as shipped"), soft_wrap=True)
     if not found.helps:
@@ -116,9 +116,9 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
     console.print(table, highlight=False)
     if found.alone:
-        told = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
+        text = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
         left = f"{found.metric} {number(found.before, 4)} -> {number(found.alone_after, 4)}"
-        console.print(f"one setting alone: {told}: {left}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"one setting alone: {text}: {left}", markup=False, highlight=False, soft_wrap=True)
         alone = replace(found, changes=found.alone)
         console.print(Text(cure_paste(alone) or nothing_to_paste(alone)), soft_wrap=True)
         console.print(
@@ -139,5 +139,5 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
 
 
 def _alternatives(found: Cure) -> str:
-    told = (changes_in_words(found, each) for each in found.others)
-    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in told)
+    texts = (changes_in_words(found, each) for each in found.others)
+    return "; ".join(", ".join(f"{name} = {value}" for name, value in each) for each in texts)

@@ -1,4 +1,4 @@
-"""``frontier``: how far each engine can be driven, with the two cells that prove it."""
+"""``frontier``: breaking points of each engine, each with its two neighbouring cases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from reports.wording import profiles_called, reproduce
 from validation.catalogue import matching
 from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
 
-#: So few brackets have their commands below them without being asked.
+#: Largest number of results whose commands are printed without ``--commands``.
 FEW = 6
 
 

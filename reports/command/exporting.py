@@ -1,4 +1,4 @@
-"""``export``: results as Parquet for other tools, and a cell as a text that needs its engine alone."""
+"""``export``: results as Parquet for other tools, and a case as a script that needs only its engine."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from validation.posed import is_file, pinned, resolve
 from validation.records.store import Store
 from validation.running.plan import QUICK_DT
 
-#: Options that choose a cell to write.
+#: Options that select a case.
 _OF_A_CELL = ("output", "engine", "profile", "param", "set", "dim", "dt", "iterations")
 
 
@@ -102,7 +102,7 @@ def _cell(scene: str, options: dict[str, Any], as_json: bool) -> None:
 
 
 def _slot(scene: str, options: dict[str, Any]) -> Slot:
-    """The one cell that is asked for: in a dimension that the engine knows, as shipped, at 1/240 s."""
+    """The selected case; by default as shipped, at 1/240 s, in a dimension that the engine has."""
     engine = registry.load(options["engine"])
     name = pinned(scene) if is_file(scene) else scene
     canonical = resolve(name)

@@ -1,4 +1,4 @@
-"""Files that a call names: refused before anything runs, not after all of it."""
+"""Files and folders named by options: wrong ones are refused before anything runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from adapters.scene import SceneError
 
 
 class _File(click.ParamType):
-    """Name of a file that will be written; what ends in a slash names a folder."""
+    """Name of a file to write; a name that ends in a slash is a folder and refused."""
 
     name = "file"
 
@@ -24,7 +24,7 @@ class _File(click.ParamType):
 
 
 class _Folder(click.ParamType):
-    """Name of a folder: an empty one, such as a variable that is not set, would be the folder that one is in."""
+    """Name of a folder. An empty one, as of an unset variable, is refused: it would be the current folder."""
 
     name = "folder"
 
@@ -44,7 +44,7 @@ def writable(path: Path, field: str) -> Path:
     Raises
     ------
     SceneError
-        Naming ``field``, if it is a folder, if its folder is not there, or if it may not be written.
+        With the name ``field``, if it is a folder, if its folder is missing, or if it is not writable.
     """
     if path.is_dir():
         raise SceneError(f"{field}: {path} is a folder, not a file")
@@ -57,12 +57,12 @@ def writable(path: Path, field: str) -> Path:
 
 
 def folder(path: Path, field: str = "out") -> Path:
-    """Return ``path`` if it is a folder, or one can be made there.
+    """Return ``path`` if it is a folder, or if one can be made there.
 
     Raises
     ------
     SceneError
-        Naming ``field``, if there is a file of that name, or no folder may be made.
+        With the name ``field``, if there is a file of that name, or no folder can be made.
     """
     if path.exists() and not path.is_dir():
         raise SceneError(f"{field}: {path} is a file, not a folder")

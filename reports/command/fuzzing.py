@@ -1,4 +1,4 @@
-"""``certify --random N``: random scenes against variants of themselves, in processes that may hang or die."""
+"""``certify --random N``: compares random scenes with variants of themselves, in processes that may hang or die."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ from adapters.isolation import Child, Lost
 from reference_solver.verification.fuzz.trial import attack
 from reports.wording import number
 
-#: Processes side by side, and seconds that one scene may take: compiling kernels is part of the first.
+#: Number of processes, and time limit for a scene [s], which for the first one includes compilation.
 WORKERS, LIMIT = 2, 900.0
-#: What a process says once it has imported us, and seconds until then, on a busy machine and a cold disk.
+#: Message of a process that has imported our packages, and time limit for it [s]: enough on a busy machine with a cold
+#: disk.
 READY, START = b"ready", 120.0
-#: Seeds that a line names.
+#: Largest number of seeds in a line.
 NAMED = 6
-#: Distance from runs with other steps beyond which a refused answer counts as wrong, not only as refused [m].
+#: Distance from runs with other steps beyond which a refused result counts as wrong [m].
 WRONG = 1e-6
 
-#: Seed, dimension and, unless any scene will do, the kind that is drawn.
+#: Seed, dimension, and optionally the kind of scene that is drawn.
 Job = tuple[int, int] | tuple[int, int, str]
 
 
 @dataclass
-class _Seat:
+class _Worker:
     child: Child | None = None
     job: Job | None = None
     until: float = 0.0
 
 
 def serve(connection: Connection) -> None:
-    """Attack one scene after the other until the other end closes."""
+    """Compare one scene after the other until the other end closes."""
     connection.send_bytes(READY)
     while True:
         try:
@@ -51,7 +52,7 @@ def serve(connection: Connection) -> None:
             return
         try:
             answer = attack(seed, dimension, *kind).as_dict()
-        except Exception as error:  # a scene that breaks the solver is a find like any other
+        except Exception as error:  # a scene that breaks the solver is a result too
             answer = {"seed": seed, "dimension": dimension, "broken": said_by(error)}
         connection.send_bytes(json.dumps(answer).encode())
 
@@ -59,7 +60,7 @@ def serve(connection: Connection) -> None:
 def show_random(
     console: Console, as_json: bool, count: int, seed: int, dimensions: Sequence[int], chains: bool = False
 ) -> int:
-    """Print what became of random scenes; 1 if one is certified and differs, or has no answer, else 0."""
+    """Print the results of random scenes; return 1 for a certified one that differs or a missing one, else 0."""
     found: list[dict[str, Any]] = []
     seeds = range(seed, seed + count)
     jobs: list[Job] = [(s, d, "chains") if chains else (s, d) for d in dimensions for s in seeds]
@@ -72,74 +73,80 @@ def show_random(
         click.echo(json.dumps([{k: _finite(v) for k, v in answer.items()} for answer in found], indent=1))
     bad = 0
     for d in dimensions:
-        bad += _tell(console, d, [answer for answer in found if answer["dimension"] == d])
+        bad += _print_results(console, d, [answer for answer in found if answer["dimension"] == d])
     return 1 if bad else 0
 
 
 def attacked(jobs: Sequence[Job], limit: float = LIMIT) -> Iterator[dict[str, Any]]:
-    """Yield what became of each scene (seed, dimension), in the order in which they end."""
-    waiting, seats = deque(jobs), [_Seat() for _ in range(min(WORKERS, len(jobs)))]
+    """Yield the result of each scene (seed, dimension) as soon as it ends."""
+    waiting, workers = deque(jobs), [_Worker() for _ in range(min(WORKERS, len(jobs)))]
     try:
         while True:
-            for seat in seats:
-                if seat.job is None and waiting:
-                    seat.child = seat.child or _started()
-                    seat.job, seat.until = waiting.popleft(), time.monotonic() + limit
-                    seat.child.send(json.dumps(seat.job).encode())
-            busy = [(seat, seat.child, seat.job) for seat in seats if seat.child is not None and seat.job is not None]
+            for worker in workers:
+                if worker.job is None and waiting:
+                    worker.child = worker.child or _started()
+                    worker.job, worker.until = waiting.popleft(), time.monotonic() + limit
+                    worker.child.send(json.dumps(worker.job).encode())
+            busy = [
+                (worker, worker.child, worker.job)
+                for worker in workers
+                if worker.child is not None and worker.job is not None
+            ]
             if not busy:
                 return
             watched = [item for _, child, _ in busy for item in child.sentinels]
-            wait(watched, max(0.0, min(seat.until for seat, _, _ in busy) - time.monotonic()))
-            for seat, child, job in busy:
-                late = time.monotonic() > seat.until
+            wait(watched, max(0.0, min(worker.until for worker, _, _ in busy) - time.monotonic()))
+            for worker, child, job in busy:
+                late = time.monotonic() > worker.until
                 if child.has_answer() or child.ended() or late:
                     try:
                         answer = json.loads(child.receive(0.0))
                     except Lost as lost:
                         child.stop()
-                        seat.child = None
+                        worker.child = None
                         why = f"no answer after {limit:g} s" if late else str(lost)
                         answer = {"seed": job[0], "dimension": job[1], "broken": why}
-                    seat.job = None
+                    worker.job = None
                     yield answer
     finally:
-        for seat in seats:
-            if seat.child is not None:
-                seat.child.stop()
+        for worker in workers:
+            if worker.child is not None:
+                worker.child.stop()
 
 
 def _started() -> Child:
-    """Return a process that is ready; its scenes' clocks start then.
+    """Return a process that is ready, so that the time limits of its scenes do not include its start.
 
     Raises
     ------
     Lost
-        If it does not even start.
+        If it does not start.
     """
     child = Child(serve)
     child.receive(START)
     return child
 
 
-def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
-    """Print one dimension; how many of its scenes are defects."""
+def _print_results(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> int:
+    """Print the results of one dimension; return the number of defects."""
     broken = [answer for answer in found if "broken" in answer]
-    made = [answer for answer in found if "broken" not in answer]
-    held = [answer for answer in made if answer["certified"]]
-    refused = [answer for answer in made if not answer["certified"]]
-    differs = [answer for answer in held if answer["defects"]]
+    answered = [answer for answer in found if "broken" not in answer]
+    certified = [answer for answer in answered if answer["certified"]]
+    refused = [answer for answer in answered if not answer["certified"]]
+    differs = [answer for answer in certified if answer["defects"]]
     console.print(
-        f"{dimension}-D: {len(found)} scenes, {len(held)} certified, {len(refused)} refused, "
+        f"{dimension}-D: {len(found)} scenes, {len(certified)} certified, {len(refused)} refused, "
         f"{len(differs)} certified but different from a variant, {len(broken)} without an answer"
     )
-    if held:
-        bounds, off = (np.array([answer[name] for answer in held]) for name in ("bound", "off"))
-        share = off / bounds
-        told = f"bound X of the certified [m]: half below {np.median(bounds):.1e}, nine tenths {_tenth(bounds):.1e}"
-        console.print(f"{told}, all {bounds.max():.1e}")
-        told = f"farthest variant over X: half below {np.median(share):.2g}, nine tenths {_tenth(share):.2g}"
-        console.print(f"{told}, all {share.max():.2g}")
+    if certified:
+        bounds, distances = (np.array([answer[name] for answer in certified]) for name in ("bound", "off"))
+        share = distances / bounds
+        text = (
+            f"bound X of the certified [m]: half below {np.median(bounds):.1e}, nine tenths {_ninth_decile(bounds):.1e}"
+        )
+        console.print(f"{text}, all {bounds.max():.1e}")
+        text = f"farthest variant over X: half below {np.median(share):.2g}, nine tenths {_ninth_decile(share):.2g}"
+        console.print(f"{text}, all {share.max():.2g}")
     if refused:
         console.print(_refusals(refused))
     for answer in differs:
@@ -153,7 +160,7 @@ def _tell(console: Console, dimension: int, found: Sequence[dict[str, Any]]) -> 
 
 
 def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
-    """What refused, most frequent first; of each condition how many scenes it refused alone, and which were wrong."""
+    """Conditions that refused scenes, most frequent first: scenes, those refused by it alone, and wrong ones."""
     scenes: dict[str, list[dict[str, Any]]] = defaultdict(list)
     alone: Counter[str] = Counter()
     for answer in refused:
@@ -174,12 +181,12 @@ def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def _tenth(values: Any) -> float:
+def _ninth_decile(values: Any) -> float:
     return float(np.quantile(values, 0.9))
 
 
 def _finite(value: Any) -> Any:
-    """JSON has no nan and no infinity: null."""
+    """Value with null for nan and infinity, which JSON does not have."""
     if isinstance(value, dict):
         return {k: _finite(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""The group of all subcommands, and what they share: what goes wrong becomes one line and a status of its own."""
+"""The group of all subcommands: order in the help, common options, and errors as one line with an exit status."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from validation.findings import FindingsError
 from validation.records.store import MissingError, StoreError
 from validation.workers import LimitError
 
-#: Everything a wrong call can raise; the command turns each into one line and exit code 2.
+#: Errors of a wrong call; each is printed as one line, with exit status 2.
 WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
-#: What the machine refuses: a process, its memory.
+#: Errors of a machine that has too little memory or no further process.
 TOO_LITTLE = (LimitError, IsolationError)
 
 OUT = click.option(
@@ -47,7 +47,7 @@ SECTIONS = {
 
 
 class _Group(click.Group):
-    """Prints what goes wrong as one line; the status says whose fault it was (`reports.command.statuses`)."""
+    """Prints errors as one line; the exit status says what kind of error it was (`reports.command.statuses`)."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         _open_streams()
@@ -55,7 +55,7 @@ class _Group(click.Group):
             try:
                 return super().main(*args, **kwargs)
             finally:
-                sys.stdout.flush()  # a full disk must be noticed here, not while the interpreter ends
+                sys.stdout.flush()  # a full disk must raise here, not at the end of the interpreter
         except ReaderMissing as error:
             _leave(str(error), statuses.INCOMPLETE)
         except WRONG_CALL as error:
@@ -74,7 +74,7 @@ class _Group(click.Group):
             _leave(f"{error.filename or 'the output'}: {error.strerror or error}", statuses.RESULTS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write all commands by `SECTIONS`, each with the first line of its help and never cut."""
+        """Write all commands by `SECTIONS`, each with the whole first line of its help."""
         width = max(map(len, self.commands))
         for section, names in SECTIONS.items():
             with formatter.section(section):
@@ -89,35 +89,35 @@ class _Group(click.Group):
         except KeyboardInterrupt:
             ctx.exit(statuses.INTERRUPTED)
         except BrokenPipeError:  # click would end with 1, which is a verdict
-            _silence_stdout()  # whoever read our output has seen enough, but not all of it
+            _silence_stdout()  # the reader of our output has closed it early
             ctx.exit(statuses.RESULTS)
 
 
 def _open_streams() -> None:
-    """Point standard streams that the caller has closed (``>&-``) at nothing.
+    """Open standard streams that the caller has closed (``>&-``) on the null device.
 
-    Python has no file for such a stream, and the next file that anybody opens would get its number: what an engine
-    prints would be written into it.
+    Python has no file for a closed stream, and the next opened file would get its number: the output of an engine would
+    be written into that file.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
-            null = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: the closed one's
+            null = os.open(os.devnull, os.O_RDWR)  # the lowest free number: that of the closed stream
             if null == descriptor:
                 os.set_inheritable(null, True)
             setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
 
 
 def _leave(line: str, status: int) -> NoReturn:
-    with contextlib.suppress(OSError):  # if stderr is gone as well, the status still says it
+    with contextlib.suppress(OSError):  # if stderr is closed too, the status is enough
         click.echo(f"crosscheck: {one_line(line, 2000)}", err=True)
     sys.exit(status)
 
 
 def _silence_stdout() -> None:
-    """Point stdout at nothing: what is left in its buffer would fail again when the interpreter ends."""
+    """Point stdout at the null device: the rest of its buffer would raise again at the end of the interpreter."""
     try:
         descriptor = sys.stdout.fileno()
-    except (OSError, ValueError):  # not a file at all, as under a test runner
+    except (OSError, ValueError):  # no file, as under a test runner
         return
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, descriptor)

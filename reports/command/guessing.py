@@ -1,4 +1,4 @@
-"""``nulls``: what answers without any engine make of a scene, check by check."""
+"""``nulls``: errors of trivial answers, which need no engine, check by check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``list``, ``describe``, ``doctor``, ``check-adapter``: what there is, and whether it is sound."""
+"""``list``, ``describe``, ``doctor``, ``check-adapter``: what is available, and tests of adapters."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def check_adapter_(name: str | None, testing: bool, as_json: bool) -> None:
 
 
 def _self_test(as_json: bool) -> NoReturn:
-    """Show each planted fault as it is tried: size, what must catch it, and whether that did."""
+    """Print each planted fault when it is tried: its size, the check that must notice it, and whether it did."""
     from adapters.conformance.self_test import self_test
 
     rows = []

@@ -1,4 +1,4 @@
-"""``merge``, ``prune``: results of several machines, and results that may go."""
+"""``merge`` and ``prune``: join results of several machines, delete old ones."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
 
     FOLDERs have results of `run`. Runs that OUT has already are skipped.
     """
-    told = {}
+    merged = {}
     for source in sources:
-        Store(source, create=False).close()  # all of them must be there before the first is merged
+        Store(source, create=False).close()  # all must exist before the first is merged
     store = Store(out)
     try:
         for source in sources:
-            told[str(source)] = vars(merge_stores(store, source))
+            merged[str(source)] = vars(merge_stores(store, source))
     finally:
         store.close()
     if as_json:
-        click.echo(json.dumps(told))
+        click.echo(json.dumps(merged))
         return
-    for name, found in told.items():
+    for name, found in merged.items():
         line = f"{name}: {plural(found['runs'], 'new run')}, {found['known']} there already, "
         line += plural(found["rows"], "result")
         click.echo(line + (f"; {plural(found['differing'], 'result')} differ, ours stay" if found["differing"] else ""))

@@ -1,4 +1,4 @@
-"""``bench --piles``: what a step of a pile costs, cut at events and fixed, over the number of bodies."""
+"""``bench --piles``: cost of a step in a pile, cut at events or fixed, over the number of bodies."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ from validation.bench.statistics import Fit, Spread
 
 
 def show_piles(console: Console, as_json: bool, most: int, seed: int) -> None:
-    """Clock piles of all kinds with up to ``most`` bodies and print cost, ratio and exponents."""
+    """Time piles of all kinds with up to ``most`` bodies; print cost, ratio and exponents."""
     found: list[Lap] = []
     for kind in KINDS:
         for lap in laps(kind, most, seed):
             if not found or (found[-1].kind, found[-1].bodies) != (lap.kind, lap.bodies):
                 console.print(f"clocking {lap.bodies} {kind}", style="dim", highlight=False)
             found.append(lap)
-    told = rows(found)
+    summary = rows(found)
     if as_json:
         click.echo(
-            json.dumps({"laps": [asdict(lap) for lap in found], "rows": [asdict(row) for row in told]}, indent=1)
+            json.dumps({"laps": [asdict(lap) for lap in found], "rows": [asdict(row) for row in summary]}, indent=1)
         )
-    console.print(_costs(told))
-    console.print(_exponents(told))
+    console.print(_costs(summary))
+    console.print(_exponents(summary))
 
 
-def _costs(told: list[Row]) -> Table:
+def _costs(summary: list[Row]) -> Table:
     table = Table(title="CPU time of a step of a pile: median, 95 % interval", title_justify="left", box=SIMPLE_HEAD)
     for heading in ("pile", "bodies"):
         table.add_column(heading, no_wrap=True)
     for heading in ("located", "fixed_step", "ratio"):
-        table.add_column(heading)  # an interval goes below its median where there is no room beside it
-    for row in told:
+        table.add_column(heading)  # without room beside its median, an interval is below it
+    for row in summary:
         seconds = (_seconds(row.reference), _seconds(row.fixed_step))
         ratio = f"{row.ratio.median:.2g} [{row.ratio.low:.2g}, {row.ratio.high:.2g}]"
         table.add_row(row.kind, str(row.bodies), *seconds, ratio)
     return table
 
 
-def _exponents(told: list[Row]) -> Table:
+def _exponents(summary: list[Row]) -> Table:
     table = Table(title="Cost of a step ~ bodies^p", title_justify="left", box=SIMPLE_HEAD)
     for heading in ("pile", "bodies", "p, located", "p, fixed_step"):
         table.add_column(heading, no_wrap=True)
-    for kind, fits in exponents(told).items():
-        sizes = [row.bodies for row in told if row.kind == kind]
+    for kind, fits in exponents(summary).items():
+        sizes = [row.bodies for row in summary if row.kind == kind]
         table.add_row(kind, f"{sizes[0]} to {sizes[-1]}", *(_fit(fit) for fit in fits))
     return table
 

@@ -1,4 +1,4 @@
-"""``run --invariance``: what an answer depends on and must not: order of bodies, place, heading, company."""
+"""``run --invariance``: metamorphic tests (order of bodies, place, heading, distant bodies)."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from validation.questions.breaks import breaks_of, listed, standing_of, write
 from validation.questions.invariance import FACTOR, INVISIBLE, MOVES, RELATIONS, Change, compare
 from validation.running.plan import QUICK_DT
 
-#: How a break's standing is said.
+#: Words for the regression status of a violation.
 LABELS = {Standing.KNOWN: "known", Standing.NEW: "NEW", Standing.DRIFTED: "drifted"}
 
 
 def cells_of(slots: Iterable[Slot], named: bool) -> list[Slot]:
-    """One cell per scene, dimension, engine and profile: the representative one, or what the call named."""
+    """One case per scene, dimension, engine and profile: the representative one, or that of the call if ``named``."""
     chosen: dict[tuple[Any, ...], Slot] = {}
     for slot in slots:
         key = (slot.scene, slot.dimension, slot.engine, slot.profile)
@@ -43,7 +43,7 @@ def cells_of(slots: Iterable[Slot], named: bool) -> list[Slot]:
 
 @dataclass(frozen=True)
 class Judged:
-    """What a relation changed, and how that stands among the breaks that are listed."""
+    """Effect of a relation, and its regression status among the listed violations."""
 
     change: Change
     standing: Standing | None
@@ -51,14 +51,14 @@ class Judged:
 
     @property
     def alarming(self) -> bool:
-        """Whether it makes the command fail: a break that nobody listed, or one that is no longer what is listed."""
+        """Whether it makes the command fail: a violation that is not listed, or one that differs from its listing."""
         return not self.change.holds if self.standing is None else self.standing is not Standing.KNOWN
 
 
 def compare_and_show(slots: Sequence[Slot], as_json: bool, keep: bool = False) -> bool:
-    """Ask every cell everything; whether nothing mattered that must not, beyond the breaks that are listed.
+    """Test every case with every relation; whether no violation is new or changed.
 
-    With ``keep`` the breaks that a family speaks about are listed first.
+    With ``keep``, violations of causes that have a reason are listed first.
     """
     console, progress = terminal(), terminal(stderr=True)
     found: list[tuple[Slot, list[Change]]] = []
@@ -66,7 +66,7 @@ def compare_and_show(slots: Sequence[Slot], as_json: bool, keep: bool = False) -
         who = f"{slot.engine}/{slot.profile} {slot.scene} {slot.dimension}-D"
         progress.print(who, style="dim", markup=False, highlight=False)
         found.append((slot, compare(slot)))
-        if keep:  # after every cell: a suite takes long, and what is found is not lost
+        if keep:  # after every case, because a suite takes long and may be interrupted
             _keep(slot.engine, [(slot, change) for change in found[-1][1]])
     judged = [(slot, [_judged(slot, change) for change in changes]) for slot, changes in found]
     if as_json:
@@ -87,7 +87,7 @@ def _judged(slot: Slot, change: Change) -> Judged:
 
 
 def _plain(slot: Slot, judged: Sequence[Judged]) -> dict[str, Any]:
-    """One cell as JSON: every relation with its physics, standing and reason, as rows have them."""
+    """One case as JSON: every relation with its physics, regression status and reason, named as in rows."""
     changes = [
         {
             **asdict(each.change), "holds": each.change.holds,

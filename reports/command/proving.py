@@ -1,4 +1,4 @@
-"""``findings --prove ID``: the experiments beside a reason, run and shown."""
+"""``findings --prove ID``: runs and shows the experiments that test a stated cause."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from validation.findings.files import findings_of
 from validation.settings.proofs import Proof, experiments_on, prove
 from validation.settings.switching import Reading
 
-#: Names that are told to whoever mistypes one: a list of hundreds says nothing.
+#: Largest number of similar names for a mistyped one; a list of hundreds would not help.
 NEAREST = 3
 
 
 def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
-    """Experiments of a reason (``all``: of every reason) by engine.
+    """Experiments of a cause (``all``: of every cause) by engine.
 
     Raises
     ------
     FindingsError
-        If no chosen engine has such a reason, or nobody has written an experiment for it.
+        If no selected engine has such a cause, or it has no experiment.
     """
     found: dict[str, list[Experiment]] = {}
     families: list[str] = []
@@ -61,7 +61,7 @@ def proof_of(row: Mapping[str, Any]) -> str:
 
 
 def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
-    """Run the experiments, print what came out, and exit with 1 unless all show what they say."""
+    """Run the experiments, print their results, and exit with 1 unless all confirm their causes."""
     console = terminal()
     proofs: list[Proof] = []
     for engine, experiments in chosen(reason, engines).items():
@@ -79,19 +79,19 @@ def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:
 
 
 def lines(proof: Proof) -> list[Text]:
-    """One experiment in words: what it says, the row before and after, what changes nothing, how to run the row."""
-    slot, told = proof.before.slot, proof.experiment
+    """One experiment as text: its cause, the check before and after, changes without effect, the command to run it."""
+    slot, experiment = proof.before.slot, proof.experiment
     where = f"{proof.engine}/{slot.profile} {slot.scene} {slot.dimension}-D {params_text(dict(slot.params))}".strip()
     where += f" at {slot.iterations} iterations" if slot.iterations is not None else ""
     mark = "PROVEN" if proof.holds else "NOT PROVEN"
-    said = [Text(f"{mark}  {told.family}: {told.says}"), Text(f"  {where}: {_value(proof.before)}")]
-    said.append(Text(f"    with {_changes(told.off)}: {_value(proof.after)}"))
-    for change, each in zip(told.idle, proof.idle, strict=True):
-        said.append(Text(f"    with {_changes(change)} alone: {_value(each)}"))
+    found = [Text(f"{mark}  {experiment.family}: {experiment.says}"), Text(f"  {where}: {_value(proof.before)}")]
+    found.append(Text(f"    with {_changes(experiment.off)}: {_value(proof.after)}"))
+    for change, each in zip(experiment.idle, proof.idle, strict=True):
+        found.append(Text(f"    with {_changes(change)} alone: {_value(each)}"))
     if not proof.holds:
-        said.append(Text(f"    {proof.why_not}"))
-    said.append(Text(f"    {reproduce(slot.as_dict())}"))
-    return said
+        found.append(Text(f"    {proof.why_not}"))
+    found.append(Text(f"    {reproduce(slot.as_dict())}"))
+    return found
 
 
 def _changes(changes: Any) -> str:
@@ -103,8 +103,8 @@ def _value(found: Reading) -> str:
         return f"no {found.check.metric}: {found.reason}"
     mark = "PASS" if found.badness <= 1.0 else "FAIL"
     check = found.check
-    told = f"{quantity(found.value, check.unit, 6)} of {number(check.truth)} +- {number(check.bound)}"
-    return f"{mark} {check.metric} {told}"
+    text = f"{quantity(found.value, check.unit, 6)} of {number(check.truth)} +- {number(check.bound)}"
+    return f"{mark} {check.metric} {text}"
 
 
 def _plain(proof: Proof) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""``releases`` and ``bisect``: since when an engine answers as it does."""
+"""``releases`` and ``bisect``: since which release an engine gives its results."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Command = Callable[..., None]
 
 
 def _cells(command: Command) -> Command:
-    """Options that choose cells and say how they are run; shared by both commands."""
+    """Options of both commands that select cases and say how they run."""
     options = (
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
@@ -100,23 +100,23 @@ def releases(
         raise SceneError("releases: name an engine and its releases, such as: crosscheck releases ENGINE 3.0.0..3.2.7")
     asked, wanted, effort, console = _prepared(engine, which, options, out)
     store = Store(out)
-    told = [_drive(store, release, wanted, effort, console, times) for release in asked]
-    told = _with_floors(store, asked, wanted, told, effort, console)
+    results = [_drive(store, release, wanted, effort, console, times) for release in asked]
+    results = _with_floors(store, asked, wanted, results, effort, console)
     store.close()
-    moved = history.steps(told)
+    moved = history.steps(results)
     if as_json:
-        click.echo(rendering.as_json(told, moved))
+        click.echo(rendering.as_json(results, moved))
     elif markdown:
-        click.echo(rendering.as_markdown(told, moved), nl=False)
+        click.echo(rendering.as_markdown(results, moved), nl=False)
     else:
-        rendering.as_text(told, moved, terminal(), out)
-    sys.exit(statuses.INCOMPLETE if any(each.reason for each in told) else statuses.FINE)
+        rendering.as_text(results, moved, terminal(), out)
+    sys.exit(statuses.INCOMPLETE if any(each.reason for each in results) else statuses.FINE)
 
 
 def _prepared(
     engine: str, which: str, options: dict[str, Any], out: Path, least: int = 1
 ) -> tuple[list[Release], list[Slot], Effort, Console]:
-    """Releases, cells and how to run them; what is wrong with the call is said before anything is installed."""
+    """Releases, cases and effort; raises for a wrong call before anything is installed."""
     console = terminal(stderr=True)
     request = request_from({**options, **dict.fromkeys(SUITES, False), "standard": True, "engine": [engine], "ulp": ()})
     effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
@@ -133,7 +133,7 @@ def _prepared(
 def _drive(
     store: Store, release: Release, wanted: Sequence[Slot], effort: Effort, console: Console, times: bool = False
 ) -> history.Told:
-    """Ask one release with a line of progress, time it if asked to, and judge what it says."""
+    """Run one release with a progress line, time it if wanted, and judge it."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -157,23 +157,23 @@ def _drive(
             say(console, "interrupted: finished cases are kept; the same command resumes")
             raise
     taken = history.times(store, release.engine, release.version)
-    told = history.told_by(release.engine, release.version, found, taken)
-    say(console, f"{release.name}: {told.reason or plural(len(found), 'case')}")
-    return told
+    result = history.told_by(release.engine, release.version, found, taken)
+    say(console, f"{release.name}: {result.reason or plural(len(found), 'case')}")
+    return result
 
 
 def _with_floors(
     store: Store,
     asked: Sequence[Release],
     wanted: Sequence[Slot],
-    told: Sequence[history.Told],
+    results: Sequence[history.Told],
     effort: Effort,
     console: Console,
 ) -> list[history.Told]:
-    """What releases told, with the noise floors of all values that moved between them."""
-    starts, out = moved_starts(told), []
-    again = replace(effort, fresh=False)  # what has just been asked is stored
-    for release, before in zip(asked, told, strict=True):
+    """Results of releases, with the noise floors of all values that changed between them."""
+    starts, out = moved_starts(results), []
+    again = replace(effort, fresh=False)  # results of a moment ago are stored
+    for release, before in zip(asked, results, strict=True):
         if release.version in starts:
             before = _drive(store, release, [*wanted, *starts[release.version]], again, console)
         out.append(before)
@@ -195,8 +195,8 @@ def bisect_(
     """Find the release that changed a check.
 
     Searches the releases A to B of ENGINE for the one in which CHECK of SCENE begins or ceases to fail, or changes by
-    more than its noise. Of several cases the one with the largest change is followed. Of n releases log2(n) run; those
-    whose results are in OUT do not run again. Exits with 4 if A or B cannot run.
+    more than its noise. If there are several cases, it follows the one with the largest change. It runs log2(n) of n
+    releases, and none whose results are in OUT already. Exits with 4 if A or B cannot run.
     """
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     store = Store(out)
@@ -215,7 +215,7 @@ def bisect_(
 
 
 def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene: str, as_json: bool) -> NoReturn:
-    """Say that nothing was found, and leave."""
+    """Print that nothing was found, and exit."""
     same = f"{check} of {scene} is the same in {versions[0]} and {versions[-1]}"
     said = found.reason.replace("release 0 ", f"{versions[0]} ").replace(
         f"release {len(versions) - 1} ", f"{versions[-1]} "
@@ -225,7 +225,7 @@ def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene:
 
 
 def _commands(engine: str, before: str, after: str, slot: Slot, out: Path) -> list[str]:
-    """What reproduces the two cells: run both, compare both."""
+    """Commands that reproduce the two cases: run both, compare both."""
     name, _, _ = slot.scene.rpartition("@")
     parts = ["crosscheck", "releases", engine, f"{before},{after}", name or slot.scene, *profile_words(slot)]
     parts += ["--dim", str(slot.dimension), "--dt", format_dt(slot.dt)]

@@ -1,4 +1,4 @@
-"""``report``, ``dashboard``, ``bundle``: a page about a run, a page about all, and everything as one archive."""
+"""``report``, ``dashboard``, ``bundle``: a page about one run, a page about all runs, and a run as one archive."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
 def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None:
     """Write one HTML page about all runs and releases.
 
-    The page shows errors, times, and where they moved, for all runs in OUT. Runs are judged once; what was judged is
-    kept beside the results.
+    The page shows errors, times, and where they moved, for all runs in OUT. Each run is judged once; its
+    verdicts are stored beside the results.
     """
     path = writable(output or out / "dashboard.html", "output")
     with extra("dashboard"):
@@ -81,14 +81,14 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(render(found, f"{shown} series{made}", reports), encoding="utf-8")
     moved = sum(len(events(panel)) for panel in found)
-    told = {"path": str(path), "panels": len(found), "moved": moved}
-    click.echo(json.dumps(told) if as_json else str(path))
+    result = {"path": str(path), "panels": len(found), "moved": moved}
+    click.echo(json.dumps(result) if as_json else str(path))
     if show and not webbrowser.open(path.resolve().as_uri()):
         click.echo(f"crosscheck: open: no browser was found; the dashboard is {path}", err=True)
 
 
 def _made(commits: Sequence[str]) -> str:
-    """At which commits what is shown was run, oldest first; nothing outside a checkout."""
+    """Commits of the shown runs, oldest first; empty outside a checkout."""
     known = list(dict.fromkeys(filter(None, commits)))
     if len(known) <= 1:
         return "".join(f" of commit {name}" for name in known)
@@ -117,7 +117,7 @@ def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
 
 @contextmanager
 def extra(command: str, name: str = "report") -> Iterator[None]:
-    """Say how to get what is missing: libraries that only some commands need are extras."""
+    """Turn a missing library of an extra into an error that says how to install it."""
     try:
         yield
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""``run`` and ``run-cell``: make cells run, judge them, keep and show what came out."""
+"""``run`` and ``run-cell``: run cases, judge them, store and show the results."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         brief.keep(out, done.id, observations, rows)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     store.close()
-    # The answer goes where a pipe or a file takes it; with --json that place is taken.
+    # The answer goes to stdout, for a pipe or a file, unless --json prints there.
     answer = console if as_json else terminal()
     _show(rows, out, as_json, answer, options)
     for line in spread_lines(apart):
@@ -172,7 +172,7 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
         if not line.strip():
             continue
         try:
-            if batch and _handed(line):
+            if batch and _has_scene_texts(line):
                 continue
             cells.setdefault(_slot(line), number)
         except (SceneError, EngineError) as error:
@@ -193,8 +193,8 @@ def run_cell(batch: bool, timeout: float, jobs: int) -> None:
     sys.exit(statuses.WRONG_CALL if wrong else statuses.INCOMPLETE if left else statuses.FINE)
 
 
-def _handed(line: str) -> bool:
-    """Whether a line hands over texts of scene files, which are known from then on."""
+def _has_scene_texts(line: str) -> bool:
+    """Whether a line contains texts of scene files, which are then known."""
     if not line.lstrip().startswith('{"scenes"'):
         return False
     try:
@@ -205,7 +205,7 @@ def _handed(line: str) -> bool:
 
 
 def _slot(text: str) -> Slot:
-    """Slot in a line of JSON, as one that can be run: its scene is pinned, its parameters are the scene's own."""
+    """Runnable slot of a line of JSON, with a pinned scene and the parameters of the scene."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""``schema``: what a scene file may hold, for editors and programs."""
+"""``schema``: the JSON Schema of scene files, for editors and programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that choose cells, shared by every subcommand that runs some."""
+"""Options that select cases, common to all subcommands that run some."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from validation.running.plan import Request, knowing
 
 
 class _Seconds(click.ParamType):
-    """A limit of time: a number of seconds that a run can wait for."""
+    """Time limit: a number of seconds between 1 and `LONGEST`."""
 
     name = "seconds"
 
@@ -31,28 +31,28 @@ class _Seconds(click.ParamType):
             seconds = float(value)
         except ValueError:
             self.fail(f"{value!r} is not a number of seconds", param, ctx)
-        if not 1.0 <= seconds <= LONGEST:  # NaN is neither
+        if not 1.0 <= seconds <= LONGEST:  # false for NaN as well
             self.fail(f"{value} is not between 1 and {LONGEST:g} seconds", param, ctx)
         return seconds
 
 
-#: What the options that name a suite say of it.
+#: Help of the options that name a suite.
 WHAT_SUITES_ARE: dict[Suite, str] = {
     "quick": "A few cases per scene: the default.",
     "standard": "More cases: those whose known failures are listed check by check.",
     "full": "All cases of each scene, and other time steps.",
 }
-#: Longest time that a cell may be given [s]: a week.
+#: Longest time limit of a case [s]: a week.
 LONGEST = 7 * 86400.0
 SECONDS = _Seconds()
-#: More workers than any machine has cores are a slip of the pen; how many are started the machine decides.
+#: More worker processes than any machine has cores are a typing error; the machine decides how many start.
 MOST_JOBS = 4096
 JOBS = click.IntRange(0, MOST_JOBS)
-#: Where one worker is the rule, and none would mean nothing.
+#: Number of workers where the default is one, and zero has no meaning.
 WORKERS = click.IntRange(1, MOST_JOBS)
 
 
-#: Settings of a user's own.
+#: A user's own settings.
 SET = click.option(
     "--set",
     multiple=True,
@@ -62,7 +62,7 @@ SET = click.option(
 
 
 def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
-    """An address that can be one, refused before anything runs."""
+    """Address of a cluster, checked before anything runs."""
     if not value:
         return ""
     from validation.workers.cluster import checked
@@ -70,7 +70,7 @@ def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> s
     return checked(value)
 
 
-#: Where cells run, if not here.
+#: Cluster that runs the cases instead of this machine.
 CLUSTER = click.option(
     "--cluster",
     callback=_cluster,
@@ -80,7 +80,7 @@ CLUSTER = click.option(
 
 
 def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
-    """A line for each engine that was named and is not there, and one if none of the chosen is there at all."""
+    """One line for each named engine that is missing; or one line if none of the chosen engines is installed."""
     absent = [found for found in map(registry.find, chosen) if found.engine is None]
     lines = [f"engine: {f.name} did not run: {f.reason}" for f in absent if f.name in named]
     none = f"engine: none of {', '.join(chosen)} is installed here; crosscheck doctor says why"
@@ -99,7 +99,7 @@ def parameter(text: str) -> tuple[str, float]:
 
 
 def fixed(texts: Sequence[str]) -> dict[str, float] | None:
-    """Parameters that are fixed, None if none is; of two values for one of them neither is what was asked for."""
+    """Fixed parameters, None if there are none; two values for one parameter are refused."""
     found: dict[str, float] = {}
     for name, value in map(parameter, texts):
         if name in found:
@@ -109,7 +109,7 @@ def fixed(texts: Sequence[str]) -> dict[str, float] | None:
 
 
 def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
-    """Names of the scenes that are meant: of the catalogue by name or pattern (all by default), and files, pinned."""
+    """Names of the selected scenes: of the catalogue by name or pattern (all by default), and pinned files."""
     names: list[str] = []
     for argument in arguments or ["*"]:
         names += [pinned(argument, drop)] if is_file(argument) else [scene.name for scene in matching(argument)]
@@ -117,7 +117,7 @@ def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
 
 
 def request_from(options: dict[str, Any]) -> Request:
-    """Turn the options of `selection` into a request; raises what a wrong call raises, before anything runs."""
+    """Turn the options of `selection` into a request; raises for a wrong call before anything runs."""
     suite = _suite(options)
     registry.check_required()
     for name in options["engine"]:
@@ -141,7 +141,7 @@ def request_from(options: dict[str, Any]) -> Request:
 
 
 def _suite(options: dict[str, Any]) -> Suite:
-    """The suite that is named; of two that are neither is what was asked for."""
+    """The selected suite; two are refused."""
     named = [suite for suite in SUITES if options[suite]]
     if len(named) > 1:
         raise SceneError(f"{' and '.join(f'--{suite}' for suite in named)}: a run is of one suite")
@@ -149,14 +149,14 @@ def _suite(options: dict[str, Any]) -> Suite:
 
 
 def asked(request: Request, options: dict[str, Any]) -> str:
-    """Words that ask for these cells but their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
+    """Options that select these cases without their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
     names = ("param", "engine", "profile", "set", "dim", "dt", "iterations", "ulp")
     narrowing = [word for name in names for value in options[name] for word in (f"--{name}", str(value))]
     return shlex.join([*request.scenes, *narrowing])
 
 
 def selection(command: Callable[..., None]) -> Callable[..., None]:
-    """Options that choose cells; shared by every command that runs some."""
+    """Options that select cases, common to all commands that run some."""
     options = (
         click.argument("scenes", nargs=-1, shell_complete=scene_names),
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),

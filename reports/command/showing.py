@@ -1,4 +1,4 @@
-"""``show``, ``findings``, ``explain``: what a run in the store says, from the first look down to one row."""
+"""``show``, ``findings``, ``explain``: results of a stored run, from the overview to a single check."""
 
 from __future__ import annotations
 
@@ -57,26 +57,26 @@ from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
 from validation.running.plan import Request, slots
 
 Plain = Mapping[str, Any]
-#: How far off a row is, for those that have no tolerance in units of which to say it.
+#: Text for the ratio of error to tolerance if there is no tolerance.
 NO_RATIO = "-"
-#: Columns of an explanation that is no print: a cell of a notebook shows as many.
+#: Width of an explanation as text [characters], as a cell of a notebook shows it.
 TEXT = 100
 
 
 @dataclass(frozen=True)
 class Which:
-    """Which run of a folder is shown.
+    """The run of a folder that is shown.
 
     Parameters
     ----------
     title
-        What it ran.
+        Scenes and options of the run.
     latest
-        Whether it was chosen by being the latest.
+        Whether it was chosen as the latest.
     others
-        How many other runs the folder has.
+        Number of other runs in the folder.
     larger
-        Another run with more cases, the latest such; empty if there is none.
+        The latest other run with more cases; empty if there is none.
     """
 
     run: str
@@ -88,11 +88,11 @@ class Which:
 
     @property
     def named(self) -> str:
-        """The run as a command must name it; empty for the latest."""
+        """Id of the run for commands; empty for the latest."""
         return "" if self.latest else self.run
 
     def line(self, command: str, out: Path) -> str:
-        """What is shown, and the commands that show another run."""
+        """The shown run, and the commands that show another one."""
         text = f"Run {self.run}{', the latest' if self.latest and self.others else ''}: {self.title}"
         text += f" ({plural(self.cases, 'case')})."
         if self.latest and self.larger:
@@ -103,7 +103,7 @@ class Which:
 
 
 def which(store: Store, chosen: Run, asked: str) -> Which:
-    """Which run of a store ``asked`` has chosen."""
+    """The run of a store that ``asked`` has chosen."""
     apart = (SCATTER_TITLE, RELEASE_TITLE, "bench ")
     others = [run for run in store.runs() if run.id != chosen.id]
     larger = [run.id for run in others if len(run.plan) > len(chosen.plan) and not run.title.startswith(apart)]
@@ -113,7 +113,7 @@ def which(store: Store, chosen: Run, asked: str) -> Which:
 
 @dataclass(frozen=True)
 class Kept:
-    """What a store has of one run, read at one time."""
+    """Stored data of one run, read at one time."""
 
     run: str
     observations: list[Observation]
@@ -122,11 +122,11 @@ class Kept:
     which: Which
 
     def counted(self) -> dict[str, Any]:
-        """Id of the run, how many cells it planned, and how many of them left no observation."""
+        """Id of the run, number of planned cases, and number of those without an observation."""
         return {"run": self.run, "planned": self.planned, "missing": self.missing}
 
     def say_missing(self) -> None:
-        """Say on stderr how many planned cells the run lacks, if any."""
+        """Print the number of planned cases without an observation on stderr, if there are any."""
         if self.missing:
             click.echo(f"crosscheck: run {self.run}: {missing_text(self.missing, self.planned)}", err=True)
 
@@ -142,12 +142,12 @@ def _opened(out: Path) -> Iterator[Store]:
 
 def _kept(store: Store, run: str) -> Kept:
     chosen = store.run(run)
-    told = which(store, chosen, run)
-    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), told)
+    shown = which(store, chosen, run)
+    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), shown)
 
 
 def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
-    """Judged rows of a run, what is kept of it, and what the last bench in the same store says of costs.
+    """Judged rows of a run, its stored data, and costs by the last bench in the same store.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
 
 
 def observed(out: Path, run: str) -> Kept:
-    """What is kept of a run, not judged yet: laws take their time, and what nobody asked for needs none.
+    """Stored data of a run, not judged: laws take time, and only selected rows need it.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def observed(out: Path, run: str) -> Kept:
 
 
 def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
-    """Rows of these observations of a run, as plain data."""
+    """Judged rows of observations of a run, as plain data."""
     return [row.as_dict() for row in rows_of(run, observations)]
 
 
@@ -255,7 +255,7 @@ def findings(
             close = difflib.get_close_matches(absent[0], there, n=1)
             hint = f", did you mean {close[0]!r}?" if close else f", but of {first_of(there)}"
             raise SceneError(f"--{name}: this run has no check of {absent[0]!r}{hint}")
-    # A study never joins cells of two engines, profiles or scenes, so that what is left out changes no row.
+    # A study never joins cases of two engines, profiles or scenes, so this selection changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
         rows = [row for row in rows if is_alarming(row)]
@@ -343,9 +343,9 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
     check with the largest error there; SCENE may be a scene file, by its path or its name. With --set, PROFILE has
     these settings of your own. RUN is an id that `list runs` prints; the latest by default.
     """
-    asked, row = row, _with_own(row, set)
+    asked, row = row, _with_settings(row, set)
     kept = observed(out, named or run)
-    observations = _where(kept.observations, row)
+    observations = _needed(kept.observations, row)
     rows = judged(kept.run, observations)
     try:
         found = find_row(rows, row)
@@ -375,25 +375,25 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
             )
         )
         return
-    _print_explanation(found, _beside_the_plane(rows, found), better, (paste, said), differing, again, terminal())
+    _print_explanation(found, _out_of_plane_text(rows, found), better, (paste, said), differing, again, terminal())
 
 
 def explanation(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain, again: str) -> str:
-    """What `explain` prints of a row, as text; ``again`` says how to run it again."""
+    """Output of `explain` for a row, as text; ``again`` is the command or sentence about running it again."""
     better, paste, said, differing = _cure(rows, observations, row)
     console = terminal(width=TEXT)
     with console.capture() as captured:
-        _print_explanation(row, _beside_the_plane(rows, row), better, (paste, said), differing, again, console)
+        _print_explanation(row, _out_of_plane_text(rows, row), better, (paste, said), differing, again, console)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
-def _with_own(row: str, sets: Sequence[str]) -> str:
-    """The row's name, with the profile that has these settings.
+def _with_settings(row: str, sets: Sequence[str]) -> str:
+    """The row's name, in which the profile has these settings.
 
     Raises
     ------
     SceneError
-        If ``row`` is an id, which has settings or has none.
+        If ``row`` is an id, whose settings are fixed.
     """
     engine, slash, rest = row.partition("/")
     profile, more, where = rest.partition("/")
@@ -408,20 +408,20 @@ def _check_own(row: str, sets: Sequence[str], scenes: Collection[str]) -> None:
     Raises
     ------
     EngineError
-        Naming the first of them.
+        For the first of them, with its name.
     """
     named = named_by(row, scenes)
     if sets and named.get("scene") in scenes:
         slots(Request((named["scene"],), (named["engine"],), (named["profile"],), sets=given(sets)))
 
 
-def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
-    """What has to be judged to find the row that ``name`` means: all profiles of its engine in its scene.
+def _needed(observations: Sequence[Observation], name: str) -> list[Observation]:
+    """Observations that have to be judged to find the row ``name``: all profiles of its engine on its scene.
 
     Raises
     ------
     SceneError
-        If ids of no row or of several begin so.
+        If the id of no row, or of several, begins with ``name``.
     """
     if "/" in name:
         named = named_by(name, {observation.slot.scene for observation in observations})
@@ -438,10 +438,9 @@ def _where(observations: Sequence[Observation], name: str) -> list[Observation]:
 
 
 def scene_of(told: str, scenes: Collection[str]) -> str:
-    """The scene of a run that is meant.
+    """Scene of a run by its name.
 
-    A scene file is meant by its path as well, without the hash of what it said, or by its name alone, with or without
-    its ending.
+    A scene file may also be named by its path without the hash, or by its file name, with or without the ending.
 
     Raises
     ------
@@ -458,7 +457,7 @@ def scene_of(told: str, scenes: Collection[str]) -> str:
 
 
 def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
-    """What ENGINE/PROFILE/SCENE[/METRIC] says of each; the path of a scene file has slashes itself."""
+    """Parts of ENGINE/PROFILE/SCENE[/METRIC]; the path of a scene file may contain slashes."""
     engine, profile, *rest = name.split("/", 2)
     found = {"engine": engine, "profile": profiles_called([profile], [engine])[0]}
     if not rest:
@@ -470,32 +469,32 @@ def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
 
 
 def ids_of(observations: Sequence[Observation]) -> Iterator[tuple[str, Slot]]:
-    """Id and slot of every row that the observations will have once they are judged."""
-    owed: dict[Any, list[str]] = {}
+    """Id and slot of every row that judging the observations would give."""
+    metrics: dict[Any, list[str]] = {}
     for observation in observations:
         slot = observation.slot
-        asked = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
-        if asked not in owed:
-            owed[asked] = [check.metric for check in checks_of(observation)[1]]
+        key = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
+        if key not in metrics:
+            metrics[key] = [check.metric for check in checks_of(observation)[1]]
         plain = slot.as_dict()
-        for metric in () if slot.ulp else owed[asked]:
+        for metric in () if slot.ulp else metrics[key]:
             yield row_id({"slot": plain, "metric": metric}), slot
     for study in results(observations):
         yield row_id({"slot": study.slot.as_dict(), "metric": study.check.metric}), study.slot
 
 
 def find_row(rows: Sequence[Plain], name: str) -> Plain:
-    """Return the row that ``name`` means.
+    """Return the row ``name``.
 
     Raises
     ------
     SceneError
-        If there is none, or ids of several rows begin so.
+        If there is none, or if ids of several rows begin with it.
     """
     if "/" in name:
         named = named_by(name, {row["scene"] for row in rows})
         metric = named.pop("metric", "")
-        fits = [row for row in rows if all(row[key] == told for key, told in named.items())]
+        fits = [row for row in rows if all(row[key] == value for key, value in named.items())]
         if metric:
             fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
         if not fits:
@@ -505,10 +504,9 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:
-    """A profile of the same engine that passes this very row, lines to paste and what they are, and what it changes.
+    """A profile of the same engine that passes this row, lines to paste, their description, and its changes.
 
-    Profiles without a rank are no cures: what they do is not all in settings, so that lines to paste would do another
-    thing.
+    Unranked profiles are no fixes: they differ in more than settings, so lines to paste would not reproduce them.
     """
     if mark_of(row) == "pass":
         return "", "", "", []
@@ -526,7 +524,7 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
 
 
 def skill_text(row: Plain) -> str:
-    """``0.98 (1: exact; 0: as wrong as the trivial answer "did nothing")``; empty where there is none."""
+    """``0.98 (1: exact; 0: as wrong as the trivial answer "did nothing")``; empty without a skill."""
     value, said = skill_of(row)
     if value is None:
         return ""
@@ -537,8 +535,8 @@ def _why(change: Change) -> str:
     return f"{change.because}; {change.role}" if change.role else change.because
 
 
-def _beside_the_plane(rows: Sequence[Plain], row: Plain) -> str:
-    """How far the cell of a row has left its plane, if it has: what the row says is what is seen in the plane."""
+def _out_of_plane_text(rows: Sequence[Plain], row: Plain) -> str:
+    """Distance by which the case of a row leaves its plane, if it does: the row sees only the motion in the plane."""
     if row["metric"] == OUT_OF_PLANE:
         return ""
     for other in rows:
@@ -590,8 +588,8 @@ def _print_explanation(
         if idle:
             lines.append(("", "not needed: " + ", ".join(f"{c.name} {c.before} -> {c.after}" for c in idle)))
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
-    told = told_cure(row) if mark_of(row) != "pass" else ""
-    lines += [("smallest fix" if better else "fix", told)] if told else []
+    recorded = told_cure(row) if mark_of(row) != "pass" else ""
+    lines += [("smallest fix" if better else "fix", recorded)] if recorded else []
     lines += [("test cause", proof)] if mark_of(row) == "known" and (proof := proof_of(row)) else []
     lines.append(("run again", again))
     for name, text in lines:

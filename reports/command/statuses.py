@@ -1,24 +1,24 @@
 """Exit statuses of the command: one table, which the documentation shows and a test compares.
 
-Where several hold, the first in this order counts: the call, the results, the verdicts, completeness.
+If several apply, the first in this order counts: the call, the results, the verdicts, completeness.
 """
 
 from __future__ import annotations
 
-#: Everything that was asked for ran, and nothing of it is alarming.
+#: Everything ran, and no result is unexpected.
 FINE = 0
-#: A verdict: rows new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a check that does not hold.
+#: A verdict: checks new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a bound that does not hold.
 ALARM = 1
-#: The call is wrong: an unknown name, a value out of range, a scene file that is not valid. Nothing has run.
+#: The call is wrong: an unknown name, a value out of range, an invalid scene file. Nothing has run.
 WRONG_CALL = 2
 #: Results could not be kept, read or written: a full or read-only disk, a store of a later version, a damaged file.
 RESULTS = 3
-#: Not all of what was asked for ran: a named engine is missing, cells were left, the machine allows too little.
+#: Not everything ran: a named engine is missing, cases did not finish, the machine has too little memory.
 INCOMPLETE = 4
-#: Ctrl-C; what finished is kept, the same command resumes.
+#: Ctrl-C; finished cases are kept, and the same command resumes.
 INTERRUPTED = 130
 
-#: Status -> what it says, as docs/reference/status.md has it.
+#: Status -> meaning, as in docs/reference/status.md.
 MEANING = {
     FINE: "everything ran, no result is unexpected",
     ALARM: "an unexpected result: a new failure, a changed value, INVALID, crashed, timed out or missing; a "
@@ -31,5 +31,5 @@ MEANING = {
 
 
 def verdict(alarming: bool, complete: bool = True) -> int:
-    """Status of a command that ran: an alarm counts before what is missing."""
+    """Status of a command that ran: an unexpected result counts before a missing one."""
     return ALARM if alarming else FINE if complete else INCOMPLETE

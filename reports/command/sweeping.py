@@ -1,4 +1,4 @@
-"""``sweep``: thousands of cells over parameters, resumable, as one table."""
+"""``sweep``: thousands of cases over parameters, as one table; resumable."""
 
 from __future__ import annotations
 

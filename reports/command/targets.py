@@ -1,4 +1,4 @@
-"""``bench --targets``: how many times as fast as each engine, at 10 sweeps and at equal error, against what is owed."""
+"""``bench --targets``: ratios of time to each engine, at 10 sweeps and at equal error, with floors and targets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HEADINGS = (
     ("against", " ratio at", " ratio at", "our", "our error", "their error", "floor/", ""),
     ("", " 10 sweeps", " equal error", "sw.", "(10 sweeps)", "(10 sweeps)", "target", ""),
 )
-#: Errors are shown in thousandths of these.
+#: Units with a prefix: errors are shown in thousandths.
 SMALL = {"m": "mm", "J": "mJ"}
 KEY = """\
 Ratio: their CPU time of a step over ours in the same round, median [95 % interval]; above 1 ours
@@ -47,7 +47,7 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
     Raises
     ------
     SceneError
-        For a scene that the table does not have.
+        For a scene that is not in the table.
     """
     asked = _chosen(targets.table(), scenes)
     seed = seed if seed is not None else random.SystemRandom().randrange(10**6)
@@ -61,8 +61,8 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
     protocol = {"seed": seed, "machine": machine(), "load_before": load, "load_after": os.getloadavg()}
     protocol["versions"] = {name: registry.find(name).version for name in [registry.solver(), *asked.opponents]}
     if as_json:
-        told = [{**asdict(row), "mark": row.mark} for row in rows]
-        click.echo(json.dumps({"protocol": protocol, "rows": told}, indent=1, allow_nan=False))
+        plain = [{**asdict(row), "mark": row.mark} for row in rows]
+        click.echo(json.dumps({"protocol": protocol, "rows": plain}, indent=1, allow_nan=False))
         return
     for line in lines(rows):
         click.echo(line)
@@ -70,7 +70,7 @@ def show_targets(console: Console, as_json: bool, out: Path, scenes: Sequence[st
 
 
 def _chosen(asked: Table, scenes: Sequence[str]) -> Table:
-    """Only the rows of ``scenes``, of all where none is named."""
+    """The table with only the rows of ``scenes``; all if none is named."""
     known = list(dict.fromkeys(case.scene for case in asked.cases))
     for name in scenes:
         if name not in known:
@@ -81,11 +81,11 @@ def _chosen(asked: Table, scenes: Sequence[str]) -> Table:
 def _absent(asked: Table) -> dict[str, str]:
     """Opponents that are not installed, and why."""
     found = {name: registry.find(name) for name in asked.opponents}
-    return {name: told.reason for name, told in found.items() if told.engine is None}
+    return {name: engine.reason for name, engine in found.items() if engine.engine is None}
 
 
 def _lead(out: Path, asked: Table) -> list[Row]:
-    """The row that is read from the newest benchmark in ``out``, if there is one."""
+    """The row that is computed from the newest benchmark in ``out``, if there is one."""
     try:
         store = Store(out, create=False)
     except MissingError:
@@ -99,14 +99,14 @@ def _lead(out: Path, asked: Table) -> list[Row]:
 
 def lines(rows: Sequence[Row]) -> list[str]:
     """The table as text: a line for each scene with the names of its errors, below it a line for each opponent."""
-    told = [*map(_line, HEADINGS), "-" * (sum(WIDTHS) + len(WIDTHS) - 1)]
+    table = [*map(_line, HEADINGS), "-" * (sum(WIDTHS) + len(WIDTHS) - 1)]
     for scene, those in groupby(rows, lambda row: row.scene):
         members = list(those)
-        told.append(f"{scene}{_names(members)}")
+        table.append(f"{scene}{_names(members)}")
         for _, pair in groupby(members, lambda row: row.against):
-            told.append(_line(_cells({row.at: row for row in pair})))
+            table.append(_line(_cells({row.at: row for row in pair})))
     profiles = dict.fromkeys(row.against for row in rows if "/" in row.against)
-    return [*told, "", *KEY.splitlines(), f"Profiles: {', '.join([_ours(), *profiles])}"]
+    return [*table, "", *KEY.splitlines(), f"Profiles: {', '.join([_ours(), *profiles])}"]
 
 
 def _ours() -> str:
@@ -118,7 +118,7 @@ def _line(cells: Sequence[Any]) -> str:
 
 
 def _names(rows: Sequence[Row]) -> str:
-    """Names of a scene's errors with the units that they are shown in; of the share what it is a share of."""
+    """Names of a scene's errors with their shown units; for the share of levels the numbers behind it."""
     counts = rows[0].counts
     if "levels" in counts:
         return f": {counts['ahead']} of {counts['levels']}; {counts['only_ours']} more are reached by ours only"
@@ -133,7 +133,7 @@ def _parts(name: str) -> tuple[str, str]:
 
 
 def _cells(pair: Mapping[str, Row]) -> list[str]:
-    """Cells of one opponent from its rows by what they compare at."""
+    """Columns of one opponent, from its rows by way of comparison."""
     first = next(iter(pair.values()))
     judged = next((row for row in pair.values() if row.floor is not None), first)
     errors = pair.get(AT_SWEEPS, first)
@@ -145,7 +145,7 @@ def _cells(pair: Mapping[str, Row]) -> list[str]:
         f"x{equal.sweeps}" if equal and equal.sweeps else "",
         _errors(errors.our_error),
         _errors(errors.their_error),
-        _owed(judged),
+        _floor_and_target(judged),
         MARKS.get(judged.mark, judged.mark),
     ]
 
@@ -170,7 +170,7 @@ def _errors(errors: Mapping[str, float]) -> str:
     return ", ".join(shown)
 
 
-def _owed(row: Row) -> str:
+def _floor_and_target(row: Row) -> str:
     if row.floor is None:
         return ""
     if row.at == AT_END:

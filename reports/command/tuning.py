@@ -1,4 +1,4 @@
-"""``tune``: are an engine's tuned profiles the best that its stock settings give? A search that anyone can repeat."""
+"""``tune``: a repeatable search for stock settings that are better than an engine's tuned profile."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from validation.settings.tuning import Score, Search, groups, search
 
 
 def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Groups that are searched, as a user named them."""
+    """Groups of scenes to search; raises for an unknown one."""
     unknown = sorted(set(names) - set(groups())) if names else []
     if unknown:
         raise click.BadParameter(f"{unknown[0]!r} is not one of {', '.join(groups())}")
@@ -72,11 +72,11 @@ def tune(
     found = []
     for name in group or groups():
 
-        def said(changes: Mapping[str, Any], score: Score) -> None:
+        def print_trial(changes: Mapping[str, Any], score: Score) -> None:
             console.print(f"  {_text(changes)}: {_score(score)}", markup=False, highlight=False, style="dim")
 
         console.print(f"{engine}/{profile} on {name}", markup=False, highlight=False)
-        result = search(engine, profile, name, jobs, dimensions, said)
+        result = search(engine, profile, name, jobs, dimensions, print_trial)
         found.append(result)
         for line in _lines(result):
             console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -93,7 +93,7 @@ def _missing(engine: str, what: str, purpose: str) -> str:
 
 
 def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
-    """Measure and keep which settings decide the cures of an engine; whether the same do as were listed."""
+    """Measure and store the decisive settings of an engine's fixes; whether they equal the listed ones."""
     if not cured_of(engine):
         raise EngineError(f"tune: {_missing(engine, 'fixes', 'measure')}")
     listed = {(e.scene, e.shipped, e.better): e.text for e in measured_of(engine)}
@@ -102,7 +102,7 @@ def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
     except ValueError as error:
         raise EngineError(f"tune: {error}") from None
     folder = folder_of(engine)
-    assert folder is not None  # it has cures to measure, which stand there
+    assert folder is not None  # its folder has the fixes to measure
     write(found, folder / DECISIVE)
     console = terminal()
     if as_json:

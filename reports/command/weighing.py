@@ -1,4 +1,4 @@
-"""``residuals``: how far the impulses that engines report break the laws of contact."""
+"""``residuals``: violations of the laws of contact by the impulses that engines report."""
 
 from __future__ import annotations
 
@@ -56,17 +56,17 @@ def _show(found: list[Residuals]) -> None:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
         for heading in ("engine, profile", *LAWS):
             table.add_column(heading)
-        told = []
+        refusals = []
         for each in own:
             who = f"{each.slot.engine}/{each.slot.profile}"
             reasons = dict.fromkeys(reason for value, reason in each.values.values() if value is None)
             if reasons:
-                told.append(f"{who}: {'; '.join(reasons)}")
+                refusals.append(f"{who}: {'; '.join(reasons)}")
             else:
                 table.add_row(who, *(number(value, 2) for value, _ in each.values.values()))
         if table.row_count:
             console.print(table, highlight=False)
-        for line in told:
+        for line in refusals:
             console.print(Text(f"  {line}", style="dim"))
     console.print()
     print_roles(((each.slot.engine, each.slot.profile) for each in found), console)

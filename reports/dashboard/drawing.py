@@ -1,7 +1,7 @@
 """Small multiples as SVG text: a strip of verdicts, the error, and the time, over runs or releases.
 
-Drawn here and not by the charts of the report: a dashboard has hundreds of them, a line and a few marks each, and a
-charting library takes a twentieth of a second for one. Colours come from the page's style, text is the page's own.
+They do not use the report's charts: a dashboard has hundreds of pictures with a line and a few marks, and a charting
+library takes a twentieth of a second for each. The page's style has the colours, and text uses the page's font.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from reports.wording import number
 
 #: Size of a panel [px]; the page scales it to its column.
 WIDTH, LEFT, RIGHT = 330.0, 52.0, 8.0
-#: Points from which on single ones are no longer told apart.
+#: Number of points from which on they are not drawn one by one.
 MANY = 60
 STRIP, ERROR, TIME = (4.0, 12.0), (22.0, 92.0), (104.0, 140.0)
 
 
 def panel(of: Panel) -> Markup:
-    """The picture of one panel; what it shows is also said in words beside it."""
+    """The picture of one panel; text beside it says the same in words."""
     timed = any(point.ratio is not None for point in of.points)
     bottom = TIME[1] if timed else ERROR[1]
     parts = [_strip(of.points), _axis(of.points, bottom)]
@@ -39,7 +39,7 @@ def panel(of: Panel) -> Markup:
 
 
 def _clipped(error: float | None) -> float | None:
-    """Errors below `EXACT` are one answer."""
+    """Errors below `EXACT` are drawn as equal."""
     return None if error is None else max(abs(error), EXACT)
 
 
@@ -48,9 +48,9 @@ def _x(index: int, count: int) -> float:
 
 
 def _strip(points: Sequence[Point]) -> str:
-    """One cell per point: hollow passes, filled fails; a flip has a mark of its own above.
+    """One field per point: hollow passes, filled fails; a flip has its own mark above.
 
-    Where there are many points, neighbours of the same state are one cell.
+    If there are many points, neighbours of the same state share a field.
     """
     count = len(points)
     width = min(10.0, (WIDTH - LEFT - RIGHT) / max(1, count))
@@ -91,13 +91,13 @@ def _line(
     if not there:
         return ""
     low, high = min(v for _, v in there), max(v for _, v in there)
-    span = max(math.log10(high / low), 1.0)  # a decade at least: noise must not look like drama
+    span = max(math.log10(high / low), 1.0)  # at least a decade, so that noise looks small
     middle = 0.5 * (math.log10(high) + math.log10(low))
 
     def y(value: float) -> float:
         return room[1] - (room[1] - room[0]) * (0.5 + (math.log10(value) - middle) / span)
 
-    # What lies between two equal values is on the line between them.
+    # A point between two equal values is on the line between them.
     bends = [
         p for k, p in enumerate(there) if not 0 < k < len(there) - 1 or not there[k - 1][1] == p[1] == there[k + 1][1]
     ]

@@ -35,11 +35,11 @@ class Point(NamedTuple):
     label, title
         Label on the axis; full name.
     error
-        Largest primary error of the newest point's cells; None if not all were run.
+        Largest primary error of the newest point's cases; None if not all were run.
     fails, judged
-        Numbers of checks of those cells.
+        Numbers of checks of those cases.
     lost, mended
-        Cells in which a check began or ceased to fail since the last point with them, if moved starts do not explain
+        Cases in which a check began or ceased to fail since the last point with them, if moved starts do not explain
         it.
     """
 
@@ -98,7 +98,7 @@ class _Entry:
 
 
 class _Answer(NamedTuple):
-    """Data of an entry for a panel: cells, none if only timed; ratio of times and opponent."""
+    """Data of an entry for a panel: cases, none if only timed; ratio of times and opponent."""
 
     entry: _Entry
     cells: Mapping[str, Brief]
@@ -233,7 +233,7 @@ def _points(engine: str, present: Sequence[_Answer]) -> tuple[Point, ...]:
 
 
 def _counted(cells: Mapping[str, Brief], wanted: Sequence[str]) -> tuple[float | None, int, int]:
-    """Largest error, if all selected cells have one; failed checks; judged checks."""
+    """Largest error, if all selected cases have one; failed checks; judged checks."""
     errors = [error for slot in wanted if slot in cells and (error := cells[slot][0]) is not None]
     largest = max(errors) if errors and len(errors) == len(wanted) else None
     fails = judged = 0
@@ -243,7 +243,7 @@ def _counted(cells: Mapping[str, Brief], wanted: Sequence[str]) -> tuple[float |
 
 
 def _flips(before: Mapping[str, Brief], cells: Mapping[str, Brief]) -> tuple[int, int]:
-    """Cells in which a check begins to fail, and ceases to."""
+    """Cases in which a check begins to fail, and ceases to."""
     lost = mended = 0
     for slot, now in cells.items():
         was = before.get(slot)

@@ -1,8 +1,8 @@
 """Steps in a series: where its level changes and stays, found by the change-point detection of `ruptures`.
 
-x            log10 of an error, or of a ratio of times: a step is a factor, wherever it stands
+x            log10 of an error, or of a ratio of times: a step is a factor, at any level
 scatter      robust, from differences of neighbours: a step adds one large difference, and the median ignores it
-penalty      PENALTY scatter^2 (1 + SHORT/n) for each step: what noise alone gains by splitting stays below it
+penalty      PENALTY scatter^2 (1 + SHORT/n) for each step: larger than what noise alone gains by a split
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import ruptures
 
 #: With few points the scatter itself is uncertain: at n = 8 the penalty is three times as large.
 SHORT = 16.0
-#: Least scatter [decades]: what is closer than this is one level, however exactly it repeats. A tenth of a per cent.
+#: Least scatter [decades], a tenth of a per cent: closer values are one level, even if they repeat exactly.
 LEAST = math.log10(1.001)
-#: Points from which on the median of their differences is not the step itself.
+#: Number of points from which on the median of their differences is not the step itself.
 ENOUGH = 4
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What makes a step.
+    """Criteria for a step.
 
     Parameters
     ----------
     factor
-        Least change that is worth a look.
+        Least relevant change.
     lasts
         Points that a level must last.
     penalty
@@ -45,8 +45,8 @@ class Rule:
 
 #: An error is computed and repeats.
 ERROR = Rule(1.01, 1, 25.0)
-#: A time is measured. One that stands out alone is a busy machine; and its tails are heavy: Student's distribution with
-#: 4 degrees of freedom has twice the variance that its median difference tells. Factor: `comparison.PRACTICAL`.
+#: A time is measured. A single outlier is a busy machine. Its tails are heavy: Student's distribution with 4 degrees of
+#: freedom has twice the variance that its median difference suggests. Factor: `comparison.PRACTICAL`.
 TIME = Rule(1.1, 3, 50.0)
 
 

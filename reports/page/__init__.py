@@ -1,10 +1,10 @@
-"""The report: one self-contained page, complete without JavaScript, without a single request.
+"""The report: one self-contained page, complete without JavaScript and without any request.
 
     Source (rows, replays, bench)  ->  sections as plain data  ->  templates  ->  one HTML text
 
-Sections are computed in the modules beside this one; templates only arrange them. Everything that comes from a name,
-a reason or a parameter is escaped by the templates; the only text that is not are our own style and script and the
-charts, whose own text vl-convert escapes.
+The other modules of this folder compute the sections; templates only arrange them. The templates escape everything that
+comes from a name, a reason or a parameter. They do not escape our own style and script, and charts, whose text
+vl-convert has escaped.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ __all__ = ["Bench", "Source", "load_source", "render"]
 
 #: Order matters: the first defines what the others use.
 SCRIPTS = ("page.js", "replay.js", "explorer.js")
-#: Lines of what is wrong that are read one after the other; of more the worst stand first, and the others open.
+#: Largest number of lines about errors that are shown in full; of more, only the worst are shown and the others are
+#: folded.
 SEEN = 30
 
 
@@ -50,7 +51,7 @@ def render(source: Source) -> str:
     script = Markup("\n".join(_text(name) for name in SCRIPTS).strip())
     wrong = answers(source.rows)
     sheet = fairness.fairness(source)
-    others = [answer for answer in wrong if answer.engine != sheet.solver]  # ours are told in a section of their own
+    others = [answer for answer in wrong if answer.engine != sheet.solver]  # our own solver has its own section
     first = first_answers(source, others)
     choices = choosing.choices(source)
     shown = replay.replays(source)
@@ -92,11 +93,11 @@ def render(source: Source) -> str:
             beside=[*unranked(source.columns), *leaving(source.rows), *newer(source.rows)],
         )
     )
-    return minify_html.minify(page)  # style and scripts stay as they are: the policy holds their hashes
+    return minify_html.minify(page)  # style and scripts must stay the same: the policy has their hashes
 
 
 def first_answers(source: Source, wrong: Sequence[Answer]) -> list[Answer]:
-    """What is seen without opening anything: everything of few scenes, of many the worst of each engine and family."""
+    """Answers that are not folded: all if they are few, else those about the worst scene of each engine and group."""
     if len(wrong) <= SEEN:
         return list(wrong)
     worst, _ = worst_answers(source.rows, families_of(source.rows))
@@ -117,7 +118,7 @@ def policy(style: str, script: str) -> str:
 
 
 def _text(name: str) -> str:
-    # Normalised, because a browser hashes what it parsed, and it parses line ends as \n.
+    # Normalised line ends, because a browser hashes the parsed text, and parsing makes them \n.
     return files(__name__).joinpath("templates", name).read_text(encoding="utf-8").replace("\r\n", "\n")
 
 
@@ -135,7 +136,7 @@ def _environment() -> jinja2.Environment:
 
 
 def as_data(value: Any) -> Markup:
-    """JSON for a data block: no character in it can end the block."""
+    """JSON for a data block, in which no character can end the block."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
@@ -160,7 +161,7 @@ def facts(source: Source) -> dict[str, Any]:
 
 
 def cite(source: Source) -> dict[str, str]:
-    """How to cite this page, and the commands that make it again."""
+    """How to cite this page, and the commands that reproduce it."""
     run, installed = source.run, package_version()
     commit = f", commit {run.commit}" if run.commit else ""
     text = (
@@ -180,22 +181,22 @@ def cite(source: Source) -> dict[str, str]:
 
 
 def again(command: str, title: str) -> str:
-    """The command that asks for the cells of a run again, from its title; all of our scenes need not be named."""
+    """The command that runs the cases of a run again, from its title; scenes are left out if they are all of ours."""
     suite, _, words = title.partition(": ")
     scenes, options, narrowing = words.partition(" --")
     if scenes.split() == list(CATALOGUE):
         scenes = ""
-    told = (
+    parts = (
         f"crosscheck {command}",
         scenes,
         f"{options}{narrowing}".strip(),
         f"--{suite if suite in SUITES else 'quick'}",
     )
-    return " ".join([*filter(None, told), "--out again"])
+    return " ".join([*filter(None, parts), "--out again"])
 
 
 def package_version() -> str:
-    """Version of this distribution; of a checkout that was never installed it is not known."""
+    """Version of this distribution; unknown in a checkout that was never installed."""
     try:
         return version("contact-crosscheck")
     except PackageNotFoundError:

@@ -1,8 +1,8 @@
 """Static charts: Altair makes the specification, vl-convert the SVG; both work without a browser or a network.
 
-Text and lines are ``currentColor``, so that one picture serves the light and the dark page. Charts carry no legend:
-the page shows one for all of them, made from `reports.palette`. Every point's label says what it is, for screen
-readers and for the page's hover text.
+Text and lines are ``currentColor``, so that one picture serves the light and the dark page. Charts have no legend: the
+page shows one for all of them, made from `reports.palette`. The label of every point describes it, for screen readers
+and for the page's hover text.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from reports.palette import HOLLOW, colours_of, dash_of, role_of, shape_of
 WIDTH, HEIGHT = 330, 250
 #: Width of the outline of a point [px].
 POINT = 1.5
-#: Errors below this share of their unit are exact for whoever chooses an engine: 1e-9 and 1e-16 are one answer.
+#: Smaller errors count as exact: 1e-9 and 1e-16 are the same for the choice of an engine.
 EXACT = 1e-6
-#: Where they are drawn: in a gutter below the axis, labelled "exact".
+#: Place of exact errors: a gutter below the axis, labelled "exact".
 GUTTER = 3e-7
 #: Shift between marks that coincide, as a share of the axis.
 DODGE = 0.016
@@ -44,28 +44,28 @@ _CONFIG: dict[str, Any] = {
     "text": {"color": "currentColor", "fontSize": 11.5},
     "rule": {"color": "currentColor"},
 }  # fmt: skip
-#: What no reader is given, for a chart is a picture with one name, and what SVG takes for granted.
-_UNREAD = re.compile(
+#: Parts that screen readers skip, because a chart is a picture with one name, and attributes that are defaults of SVG.
+_SKIPPED = re.compile(
     r' (?:class|role|aria-hidden|aria-roledescription|pointer-events|stroke-miterlimit|font-family)="[^"]*"'
     r'| (?:opacity|fill-opacity|stroke-width)="1"| transform="translate\(0,0\)"| aria-label="[XY]-axis[^"]*"'
     r'|<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>'
 )
-#: Where a part is and how long it is: tenths of a pixel are seen.
-_PLACE = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
-_LONG = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
+#: Attributes with places and lengths; tenths of a pixel are visible, smaller digits are not.
+_PLACES = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
+_DIGITS = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
 
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     """SVG text of ``chart``, for inlining, with ``title`` as its accessible name."""
-    spec = chart.to_dict(validate=False)  # a tenth of a second each; a wrong one would not draw
+    spec = chart.to_dict(validate=False)  # validation takes a tenth of a second each; a wrong spec would not draw
     spec["config"] = _CONFIG
-    text = _UNREAD.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
-    text = _PLACE.sub(lambda place: _LONG.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
+    text = _SKIPPED.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
+    text = _PLACES.sub(lambda place: _DIGITS.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
     return Markup(text.replace("<svg", f'<svg role="img" aria-label="{Markup.escape(title)}"', 1))
 
 
 def log_axis(low: float, high: float) -> list[float]:
-    """Decades from ``low`` to ``high``, thinned to at most eight; with 2 and 5 between them where they are few."""
+    """Decades from ``low`` to ``high``, at most eight; for less than two decades also 2 and 5 times each."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     stride = max(1, math.ceil((last - first) / 8))
     steps = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
@@ -89,7 +89,7 @@ def gutter(errors: Any) -> Any:
 
 
 def error_axis(values: Sequence[float], title: str, pad: float = 2.0) -> tuple[alt.Scale, alt.Axis, float]:
-    """Scale and axis of errors that went through `gutter`, and the lowest error that the axis tells."""
+    """Scale and axis of errors from `gutter`, and the smallest error above the gutter."""
     shown = [v for v in values if v >= EXACT] or [1e-3]
     exact = any(v < EXACT for v in values)
     scale, ticks = log_scale(shown, pad)
@@ -102,7 +102,7 @@ def error_axis(values: Sequence[float], title: str, pad: float = 2.0) -> tuple[a
 
 
 def gutter_band(values: Sequence[float], scale: alt.Scale, axis: alt.Axis) -> list[alt.Chart]:
-    """Pale band behind the gutter, where there is one."""
+    """Pale band behind the gutter, if there is one."""
     if not any(v < EXACT for v in values):
         return []
     band = pd.DataFrame([{"from": scale["domain"][0], "to": GUTTER * 1.8}])
@@ -163,14 +163,14 @@ def styled(table: pd.DataFrame) -> dict[str, Any]:
 
 
 def named(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with ``engine/profile`` in a column: what a line is called, and what the page's filter looks for."""
+    """The table with ``engine/profile`` in a column: the name of a line, for which the page's filter searches."""
     return table.assign(who=table["engine"].astype(str) + "/" + table["profile"].astype(str))
 
 
 def dashes(table: pd.DataFrame) -> alt.StrokeDash:
     """Dash pattern by ``profile``."""
     profiles = sorted(set(table["profile"]))
-    # Vega wants a pattern for a full line as well.
+    # Vega needs a pattern for a full line too.
     patterns = [list(dash_of(name)) or [1, 0] for name in profiles]
     return alt.StrokeDash("profile:N", scale=alt.Scale(domain=profiles, range=patterns), legend=None)
 
@@ -184,7 +184,7 @@ def lines(
     order: str | None = None,
     below: Sequence[alt.Chart] = (),
 ) -> alt.LayerChart | alt.FacetChart:
-    """Points with thin lines per engine and profile; the column ``label`` says what a point is."""
+    """Points with thin lines per engine and profile; the column ``label`` describes each point."""
     table, style = named(table), styled(table)
     base = alt.Chart(table)
     detail = [alt.Detail("engine:N"), alt.Detail("profile:N")]

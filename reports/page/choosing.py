@@ -1,4 +1,4 @@
-"""Which engine for what: who passes every check of a scene, from which step on, at what cost; and what cures whom."""
+"""Choice of an engine: profiles that pass every check of a scene, from which step on, at what cost; and fixes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Cost:
 class Candidate:
     """One engine and profile on one scene: the steps that ran, which of them pass every check, and the cost.
 
-    ``tied``: the interval of its cost overlaps that of the cheapest, so that neither is the cheaper one.
+    ``tied`` is whether the interval of its cost overlaps that of the cheapest, so that their order is open.
     """
 
     engine: str
@@ -48,18 +48,18 @@ class Candidate:
 
     @property
     def cost(self) -> float:
-        """CPU time per simulated second [s/s] at the largest step that passes; infinite where it was not timed."""
+        """CPU time per simulated second [s/s] at the largest step that passes; infinite if it was not timed."""
         return math.inf if self.price is None or math.isnan(self.price.value) else self.price.value
 
     @property
     def cost_text(self) -> str:
-        """The cost as people read it; empty where it was not timed."""
+        """The cost as text; empty if it was not timed."""
         return duration(self.cost) if math.isfinite(self.cost) else ""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Candidates of a scene, those that pass first and the cheapest of them on top, with the answer in a sentence."""
+    """Candidates of a scene, passing ones first and the cheapest of them on top, with the answer in a sentence."""
 
     scene: str
     dimension: int
@@ -69,7 +69,7 @@ class Choice:
 
     @property
     def timed(self) -> bool:
-        """Whether any of those that pass was timed: only then is there a first choice."""
+        """Whether any passing candidate was timed; without a time there is no first choice."""
         return any(candidate.cost_text for candidate in self.good)
 
     @property
@@ -93,7 +93,7 @@ def choices(source: Source) -> list[Choice]:
 def _costs(source: Source) -> dict[tuple[Any, ...], Cost]:
     """Cost by scene, dimension, engine, profile, step, at the profile's own iterations.
 
-    Empty where nothing was timed, or on a machine so busy that times rank nobody.
+    Empty if nothing was timed, or if the machine was so busy that times give no order.
     """
     if source.bench is None or busy(source.bench.tables["timings"]):
         return {}
@@ -124,7 +124,7 @@ def _choice(
 
 
 def _with_ties(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates, the cheapest first, with those told that cannot be told apart from it."""
+    """Mark the candidates whose cost cannot be distinguished from that of the first, the cheapest."""
     best, *others = candidates
     if best.price is None:
         return list(candidates)
@@ -140,7 +140,7 @@ def _candidate(
 ) -> Candidate:
     passing = {dt: all(mark_of(r) in ("pass", "none") for r in rows) for dt, rows in steps.items()}
     order = sorted(passing, reverse=True)
-    # A step counts only if every smaller one passes as well: what passes once by luck is no recommendation.
+    # A step counts only if every smaller one passes too: a single pass may be luck.
     safe = [dt for k, dt in enumerate(order) if all(passing[finer] for finer in order[k:])]
     price = costs.get((*line, *column, safe[0])) if safe else None
     bad = [row for rows in steps.values() for row in rows if mark_of(row) not in ("pass", "none")]
@@ -178,10 +178,10 @@ def _answer(candidates: Sequence[Candidate], timed: bool) -> str:
 
 @dataclass(frozen=True)
 class Cure:
-    """An engine as shipped on one scene, and the profile that does better, with what it changes.
+    """An engine as shipped on one scene, and the profile that does better, with its changes.
 
-    ``pasted`` says what the lines in ``paste`` are, or why there are none.
-    ``like`` is the scene beside which the same changes stand already, where there is one.
+    ``pasted`` describes the lines in ``paste``, or says why there are none. ``like`` is a scene with the same changes,
+    which are shown there; empty if there is none.
     """
 
     scene: str
@@ -202,7 +202,7 @@ class Cure:
 
 
 def cures(source: Source) -> list[Cure]:
-    """Engines that fail as shipped and whose tuned profile is nearer to the truth in the same worst check."""
+    """Engines that fail as shipped, with tuned profiles that are nearer to the truth in the same worst check."""
     found = []
     asked = {engine: (profile_of(engine, "shipped"), profile_of(engine, "tuned")) for engine in source.engines}
     for scene, dimension in source.lines:
@@ -223,9 +223,9 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     known = [(a, b) for a, b in pairs if b is not None]
     if not known:
         return None
-    # What the better profile passes says more than what it still fails.
+    # Checks that the better profile passes are preferred to those that it still fails.
     known = [pair for pair in known if pair[1]["physics"] == "pass"] or known
-    # The default cell of the scene is the one that people know, and its first check the plainest; else the worst.
+    # The default case of the scene is the best known, and its first check the plainest; without one, the worst.
     plain = [pair for pair in known if not pair[0]["slot"]["params"]]
     plain.sort(key=lambda pair: abs(math.log(pair[0]["dt"] / QUICK_DT)))
     worst, same = plain[0] if plain else max(known, key=lambda pair: ratio_of(pair[0]) or 0.0)
@@ -236,7 +236,7 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     return Cure(
         scene, dimension, engine, shipped, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
-        sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # what matters stands first
+        sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # decisive settings first
         *fix(worst, source.observations, better),
         how_measured(engine, scene, dimension, shipped, better),
     )  # fmt: skip

@@ -1,6 +1,6 @@
-"""What the data say, in sentences: where engines agree, where they depart by a law, where something is wrong.
+"""Conclusions in sentences: where engines agree, where they differ by a law, where something is wrong.
 
-Every sentence is computed from the rows; nothing in it is known in advance.
+Every sentence is computed from the rows; none is fixed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def joined(words: Iterable[str], last: str = "and") -> str:
 
 
 def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
-    """Engine -> its profiles that pass every judged row of ``scene``, in every dimension the engine has."""
+    """Engine -> its profiles that pass every judged row of ``scene``, in every dimension that the engine has."""
     found: dict[str, list[str]] = {}
     for engine, profile in (column for column in source.columns if is_ranked(*column)):
         rows = [r for r in source.of(scene=scene, engine=engine, profile=profile) if r["outcome"] != "unsupported"]
@@ -48,24 +48,26 @@ def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:
     return found
 
 
-#: Scenes on which not every engine has a clean profile that are told one by one; of more it is told by engine.
+#: Largest number of scenes without a clean profile of some engine that are named one by one; of more, a sentence per
+#: engine.
 FEW = 4
-#: Scenes that a sentence of the first screen names; of more it says how many, and the families below it name them.
+#: Largest number of scenes named in a sentence of the first screen; of more, it says how many, and the groups below
+#: name them.
 NAMED = 6
 
 
 def scenes_text(scenes: Sequence[str], of: int) -> str:
-    """Scenes by their names while a sentence can hold them, else how many of how many."""
+    """Names of scenes if they are few, else how many of how many."""
     return joined(scenes) if len(scenes) <= NAMED else f"{len(scenes)} of {of} scenes"
 
 
 def answering(source: Source) -> list[str]:
-    """Engines that gave at least one answer."""
+    """Engines with at least one judged answer."""
     return [engine for engine in source.engines if any(row["physics"] for row in source.of(engine=engine))]
 
 
 def answers(source: Source, scene: str, engine: str) -> bool:
-    """Whether an engine gave an answer that is judged on a scene."""
+    """Whether an engine has a judged answer on a scene."""
     return any(row["physics"] for row in source.of(scene=scene, engine=engine))
 
 
@@ -114,7 +116,7 @@ def _spread(source: Source, scene: str, clean: Mapping[str, Sequence[str]]) -> s
 
 
 def departures(source: Source) -> str:
-    """Where engines depart by a known law."""
+    """Where engines differ by a known law."""
     groups: dict[tuple[str, str], list[Plain]] = defaultdict(list)
     for row in source.rows:
         if row["standing"] == "explained":
@@ -137,7 +139,7 @@ def _law_text(reason: str) -> str:
 
 
 def wrongs(source: Source) -> str:
-    """Where something is wrong: alarms first, else the largest failures that are known."""
+    """Where something is wrong: unexpected results first, else the largest failures that are known."""
     counts = Counter(mark_of(row) for row in source.rows)
     alarms = [f"{counts[mark]} {SAID[mark][1]}" for mark in ALARMS if counts[mark]]
     said = ""
@@ -156,7 +158,7 @@ def wrongs(source: Source) -> str:
 
 
 def where_text(row: Plain) -> str:
-    """Parameters and iterations that a row asked for: ``n=10, 4 iterations``."""
+    """Parameters and iterations that a row sets: ``n=10, 4 iterations``."""
     count = row["iterations"]
     own = "" if count is None else f"{count} iteration{'s' if count > 1 else ''}"
     return ", ".join(text for text in (params_text(row["slot"]["params"]), own) if text)
@@ -174,7 +176,7 @@ def _row_text(row: Plain) -> str:
 
 
 def sentences(source: Source) -> list[tuple[str, str]]:
-    """Three headed sentences for the first screen."""
+    """Three sentences with headings for the first screen."""
     return [
         ("Where they agree", agreement(source)),
         ("Where the contact model explains a failure", departures(source)),
@@ -184,7 +186,7 @@ def sentences(source: Source) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class FindingFamily:
-    """Rows that fail alike, shown by their worst one."""
+    """Rows that fail alike, represented by the worst one."""
 
     engine: str
     profile: str
@@ -199,7 +201,7 @@ class FindingFamily:
 
 @dataclass(frozen=True)
 class Member:
-    """A line of findings: what reads the same in the plane and in space stands once, with a link to each."""
+    """A line of findings: equal texts in 2-D and 3-D share it, with a link to each."""
 
     scene: str
     family: str
@@ -210,7 +212,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Reasoned:
-    """Findings of one engine and profile that have one reason, with what cures each scene of theirs."""
+    """Findings of one engine and profile with the same reason, with the fix of each of their scenes."""
 
     anchor: str
     engine: str
@@ -221,21 +223,21 @@ class Reasoned:
 
 
 def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list[Reasoned]:
-    """Findings that have the same reason, together, in the order in which the first of each stands."""
-    # The settings that would do stand once, with what is wrong.
+    """Findings grouped by reason, in the order of the first one of each."""
+    # Only the first part of a fix: its settings are listed once, with the errors.
     cured = {(a.engine, a.profile, a.scene): a.cure.partition("; ")[0] for a in answers_of(source.rows)}
     groups: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
     for finding in found:
         groups[finding.engine, finding.profile, without_prediction(finding.reason)].append(finding)
-    said = []
+    grouped = []
     for (engine, profile, reason), members in groups.items():
         by_cure: dict[str, list[str]] = defaultdict(list)
         for scene in dict.fromkeys(member.scene for member in members):
             by_cure[cured.get((engine, profile, scene), "")].append(scene)
-        told = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
+        fixes = tuple((joined(scenes), cure) for cure, scenes in by_cure.items() if cure)
         anchor = why_anchor(mark, engine, profile, reason)
-        said.append(Reasoned(anchor, engine, profile, reason, told, _lines(members)))
-    return said
+        grouped.append(Reasoned(anchor, engine, profile, reason, fixes, _lines(members)))
+    return grouped
 
 
 def _lines(found: Iterable[FindingFamily]) -> tuple[Member, ...]:
@@ -249,7 +251,7 @@ def _lines(found: Iterable[FindingFamily]) -> tuple[Member, ...]:
 
 
 def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
-    """Failing rows by standing, most serious first, and within it by family, worst first."""
+    """Failing rows by regression status, most serious first, and within it by kind of metric, worst first."""
     groups: dict[str, dict[tuple[Any, ...], list[Plain]]] = defaultdict(lambda: defaultdict(list))
     for row in source.rows:
         mark = mark_of(row)

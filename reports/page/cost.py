@@ -1,4 +1,4 @@
-"""Speed: cost at equal error, error at equal cost, scaling, the binding's own cost, and how all of it was timed."""
+"""Speed: cost at equal error, error at equal cost, scaling, cost of the binding, and how everything was timed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ROOM = 0.8
 
 @dataclass(frozen=True)
 class LevelCell:
-    """What an engine needs for one error (or reaches for one cost); ``ties`` are not told apart from it."""
+    """Cost of an engine at one error (or its error at one cost); ``ties`` are indistinguishable from it."""
 
     text: str
     detail: str
@@ -50,7 +50,7 @@ class LevelCell:
 
 @dataclass(frozen=True)
 class LevelTable:
-    """One scene and dimension: engines x levels; ``refused`` names who has no line because it cannot be asked."""
+    """One scene and dimension: engines x levels; ``refused`` names engines that cannot run it and have no line."""
 
     anchor: str
     scene: str
@@ -107,9 +107,9 @@ def speed(source: Source) -> Speed | None:
 
 
 def _timed(source: Source, tables: Mapping[str, pd.DataFrame]) -> list[tuple[str, str]]:
-    """Columns of the page that were timed, in its order: profiles without a rank are run, but not timed."""
-    told = [tables[name] for name in ("work_points", "scaling") if len(tables[name])]
-    timed = {who for table in told for who in zip(table["engine"], table["profile"], strict=True)}
+    """Timed columns of the page, in its order: profiles without a rank run, but are not timed."""
+    timed_tables = [tables[name] for name in ("work_points", "scaling") if len(tables[name])]
+    timed = {who for table in timed_tables for who in zip(table["engine"], table["profile"], strict=True)}
     return [column for column in source.columns if column in timed]
 
 
@@ -119,7 +119,7 @@ def level_text(level: float) -> str:
 
 
 def _cheapest(table: pd.DataFrame) -> tuple[list[tuple[str, str, list[LevelCell]]], list[str]]:
-    """Per scene and dimension the cheapest engine of each error level."""
+    """Per scene and dimension the cheapest engine at each error level."""
     if len(table) == 0:
         return [], []
     levels = sorted(set(table["level"]), reverse=True)
@@ -134,7 +134,7 @@ def _cheapest(table: pd.DataFrame) -> tuple[list[tuple[str, str, list[LevelCell]
 
 
 def _cheapest_cell(tied: Sequence[Plain]) -> LevelCell:
-    """The cheapest, and who is not told apart from it."""
+    """The cheapest profile, and those that are indistinguishable from it."""
     if not tied:
         return LevelCell("none reaches it", "", False, "")
     row, *others = tied
@@ -185,7 +185,7 @@ def _level_cell(row: Plain, column: str, ranked: bool) -> LevelCell:
 def _multiples(bench: Bench) -> list[Figure]:
     """Small work-precision panels on one axis of cost: the best settings of every profile, scene by scene.
 
-    A scene that was timed in the plane and in space is shown in the plane; its own section has both.
+    A scene that was timed in 2-D and 3-D is shown in 2-D; its own section has both.
     """
     points = bench.tables["work_points"]
     if len(points) == 0:
@@ -216,7 +216,7 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
     table = named(table)
     on_front = table[table["best"]].sort_values("cost")
     best = alt.Chart(on_front)
-    told = on_front.drop_duplicates("shown")  # what is dearer and no better has none
+    labelled = on_front.drop_duplicates("shown")  # points that cost more for the same error have no step beside them
     thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7)
     points = alt.Chart(table).mark_point(strokeWidth=POINT, size=40)
     detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}
@@ -233,20 +233,20 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
         thin.encode(x=x, y=y, color=style["color"], strokeDash=dashes(table), **detail),
         intervals(table, x, y, style["color"]),
         points.encode(x=x, y=y, description="label:N", **style),
-        *(_steps(own, bool(side)).encode(x=x, y=y) for side, own in told.groupby("right")),
+        *(_steps(own, bool(side)).encode(x=x, y=y) for side, own in labelled.groupby("right")),
     ).properties(width=215, height=180)
     title = f"{scene} {dimension}-D"
     return Figure(f"fig-multiple-{title}", title, "", svg(chart, f"Work and precision, {title}"))
 
 
 def _steps(table: pd.DataFrame, right: bool) -> alt.Chart:
-    """Time steps beside points: above them, where the axis is not, and to the side of them that is within the plot."""
+    """Time steps beside points: above them, away from the axis, and on the side on which they fit into the plot."""
     side: dict[str, Any] = {"align": "left", "dx": 5} if right else {"align": "right", "dx": -5}
     return alt.Chart(table).mark_text(dy=-8, fontSize=11, aria=False, **side).encode(text="step:N")
 
 
 def _scaling_figures(table: pd.DataFrame) -> list[Figure]:
-    """Cost of a step against bodies or iterations."""
+    """Cost of a step over bodies or iterations."""
     out: list[Figure] = []
     if len(table) == 0:
         return out
@@ -299,21 +299,21 @@ def _overhead(table: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> Sequen
 
 
 def _protocol(bench: Bench) -> list[tuple[str, str]]:
-    """The protocol as it was kept, one line each; nested tables flattened. Declared errors stand in their scenes."""
+    """The stored protocol, one line each, with nested tables flattened; headline errors are in the scenes' sections."""
     kept = {k: v for k, v in bench.protocol.items() if k != "primary" and v not in (None, "", [], {})}
-    return [(name.replace("_", " "), _said(value)) for name, value in kept.items()]
+    return [(name.replace("_", " "), _as_text(value)) for name, value in kept.items()]
 
 
-def _said(value: Any) -> str:
+def _as_text(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "; ".join(f"{k}: {_said(v)}" for k, v in value.items())
+        return "; ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
     if isinstance(value, list):
-        return "; ".join(_said(item) for item in value)
+        return "; ".join(_as_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _voided(timings: pd.DataFrame) -> list[str]:
-    """Timings that were taken and must not be used, with the reason."""
+    """Timings that must not be used, with the reason."""
     if len(timings) == 0:
         return []
     void = timings[timings["void"] != ""].to_dict("records")

@@ -1,6 +1,6 @@
-"""Bounce explorer: the law h_n = e^(2n) h0 beside what each engine measured; restitution that was set against measured.
+"""Bounce explorer: the law h_n = e^(2n) h0 beside measured heights; restitution set against restitution measured.
 
-Which metrics of which scenes show a restitution, the scenes say (`validation.canonical.Restitution`).
+Scenes declare which of their metrics show a restitution (`validation.canonical.Restitution`).
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from reports.palette import HOLLOW, colours_of, role_of, shape_of
 from reports.wording import number
 from validation.canonical import Restitution
 
-#: Materials that people know, with the coefficient that is usually quoted for them.
+#: Familiar materials, with the coefficient that is usually quoted for them.
 PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
 FAINT = (0.9, 0.5)
-#: Width of a panel of restitution [px], and how far from the diagonal is not seen to leave it [restitution].
+#: Width of a panel of restitution [px], and the distance from the diagonal below which a point counts as on it
+#: [restitution].
 MAP, BAND = 300, 0.02
 #: Height of a line of text in it [restitution].
 LINE = 0.065
@@ -35,7 +36,7 @@ LINE = 0.065
 class Explorer:
     """Data of the slider, its picture without JavaScript, and the pictures of restitution with their scene.
 
-    ``shown`` are the engines and profiles that have points in the picture.
+    ``shown`` are the engines and profiles with points in the picture.
     """
 
     data: dict[str, Any]
@@ -87,7 +88,7 @@ def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, 
 
 
 def _rebounds(source: Source, scene: str, shown: Restitution) -> list[Plain]:
-    """Ratios of speeds with what they were asked to be and the speed: ``asked``, ``got``, ``speed``."""
+    """Ratios of speeds with the set restitution and the speed: ``asked``, ``got``, ``speed``."""
     rows = source.of(scene=scene, metric=shown.metric)
     return [
         {**row, "asked": row["params"][shown.asked], "got": row["value"], "speed": row["params"][shown.scale]}
@@ -96,7 +97,7 @@ def _rebounds(source: Source, scene: str, shown: Restitution) -> list[Plain]:
 
 
 def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]], e: float) -> Figure:
-    """The explorer as a still: law, faint curves, and points of engines at one restitution."""
+    """The explorer as a still picture: law, faint curves, and points of engines at one restitution."""
     n = range(0, 9)
     law = pd.DataFrame([{"n": k, "h": c ** (2 * k), "e": c} for c in (e, *FAINT) for k in n])
     rows = [
@@ -124,9 +125,9 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
 
 
 def _maps(rebounds: Sequence[Plain], scene: str) -> list[Figure]:
-    """Measured against set restitution, one panel per approach speed (planar, else spatial), the telling one first.
+    """Measured over set restitution, one panel per approach speed, in 2-D if it ran; the most informative one first.
 
-    It is the one in which most engines leave the diagonal; of equals the one with most points, then the fastest.
+    That is the one in which most engines leave the diagonal; of equals the one with most points, then the fastest.
     """
     if not rebounds:
         return []
@@ -140,13 +141,13 @@ def _maps(rebounds: Sequence[Plain], scene: str) -> list[Figure]:
 
 
 def _leaving(rows: Sequence[Plain]) -> list[tuple[str, str]]:
-    """Engines and profiles that are seen to leave the diagonal anywhere."""
+    """Engines and profiles that visibly leave the diagonal anywhere."""
     off = [(row["engine"], row["profile"]) for row in rows if abs(row["got"] - row["asked"]) > BAND]
     return list(dict.fromkeys(off))
 
 
 def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
-    """One panel: a grey diagonal for all that rebound as set, and a line with its name for each that does not."""
+    """One panel: a grey diagonal for all that rebound as set, and a named line for each that does not."""
     off = _leaving(rows)
     table = named(pd.DataFrame(
         {
@@ -163,13 +164,13 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
     y = alt.Y("got:Q", axis=alt.Axis(title="restitution measured", values=[0, 0.2, 0.4, 0.6, 0.8, 1]),
               scale=alt.Scale(domain=[low, top], nice=False))  # fmt: skip
     diagonal = alt.Chart(pd.DataFrame({"asked": [0.0, 1.0], "got": [0.0, 1.0]}))
-    wide = 2.0 * BAND * MAP / (1.06 * math.sqrt(2.0))  # across the line, what is `BAND` above and below it
+    wide = 2.0 * BAND * MAP / (1.06 * math.sqrt(2.0))  # width across the line of `BAND` above and below it
     on, left = table[~table["off"]], table[table["off"]]
     layers = [
         diagonal.mark_line(color="currentColor", opacity=0.25, strokeWidth=wide, aria=False).encode(x=x, y=y),
         alt.Chart(on).mark_point(filled=True, size=14, color="currentColor", opacity=0.6)
         .encode(x=x, y=y, description="label:N"),
-        _words(_stayed(on, off), x, y, "currentColor"),
+        _labels(_diagonal_label(on, off), x, y, "currentColor"),
     ]  # fmt: skip
     style = styled(table)
     if off:
@@ -180,22 +181,22 @@ def _map(rows: Sequence[Plain], speed: float, scene: str) -> Figure:
         layers.append(
             alt.Chart(left).mark_point(strokeWidth=POINT, size=60).encode(x=x, y=y, description="label:N", **style)
         )
-    layers += [_words(told, x, y, colour) for told, colour in _names(left)]
+    layers += [_labels(places, x, y, colour) for places, colour in _end_labels(left)]
     chart = alt.layer(*layers).properties(width=MAP, height=0.9 * MAP)
     title = f"Impact at {speed:g} m/s"
     caption = f"{title}, scene {scene}. Grey band: what is measured is what was set, to within {BAND:g}."
     return Figure(f"fig-map-{speed:g}", title, caption, svg(chart, f"Restitution that was set and measured. {title}"))
 
 
-def _words(told: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
-    """Words that end at places in a panel."""
-    table = pd.DataFrame(told, columns=["asked", "got", "text"])
+def _labels(places: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colour: str) -> alt.Chart:
+    """Text that ends at given places of a panel."""
+    table = pd.DataFrame(places, columns=["asked", "got", "text"])
     mark = alt.Chart(table).mark_text(align="right", fontSize=13, fontWeight=600, color=colour, opacity=0.9, aria=False)
     return mark.encode(x=x, y=y, text="text:N")
 
 
-def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
-    """Names of lines above their right ends, each a line of text above the one below, with their colours."""
+def _end_labels(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
+    """Names of lines above their right ends, one line of text above the other, with their colours."""
     ends = left.sort_values("asked").drop_duplicates("who", keep="last").sort_values("got")
     found: list[tuple[list[tuple[float, float, str]], str]] = []
     height = -math.inf
@@ -207,17 +208,17 @@ def _names(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str
     return found
 
 
-def _stayed(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
-    """Who the diagonal is, in two lines of text to the left of it."""
-    stayed = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
+def _diagonal_label(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:
+    """The engines on the diagonal, in two lines of text to the left of it."""
+    kept = list(dict.fromkeys(zip(on["engine"], on["profile"], strict=True)))
     if not off:
-        said = ["every engine", "and profile"]
-    elif not stayed:
-        said = ["as it should be"]
+        texts = ["every engine", "and profile"]
+    elif not kept:
+        texts = ["as it should be"]
     else:
-        tuned = [column for column in (*stayed, *off) if role_of(column[1]) in SECOND]
-        shipped = [called(engine) for engine, profile in stayed if word_of(profile) == "as shipped"]
+        tuned = [column for column in (*kept, *off) if role_of(column[1]) in SECOND]
+        shipped = [called(engine) for engine, profile in kept if word_of(profile) == "as shipped"]
         others = f"{shipped[0] if len(shipped) == 1 else f'{len(shipped)} engines'} as shipped" if shipped else ""
-        mended = bool(tuned) and not set(tuned) & set(off)
-        said = [text for text in ("every tuned profile" if mended else "", others) if text] or ["everybody else"]
-    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(said)]
+        tuning_fixes = bool(tuned) and not set(tuned) & set(off)
+        texts = [text for text in ("every tuned profile" if tuning_fixes else "", others) if text] or ["everybody else"]
+    return [(0.7, 0.86 - LINE * k, text) for k, text in enumerate(texts)]

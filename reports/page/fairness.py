@@ -1,4 +1,4 @@
-"""Fairness sheet: everything a maintainer needs to check, or to contest, how an engine was treated."""
+"""Fairness sheet: everything that a maintainer needs to check, or to contest, the treatment of an engine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from validation.findings.files import findings_of
 
 @dataclass(frozen=True)
 class SettingLine:
-    """One setting of a profile; ``where`` names the scenes if the value depends on what a scene needs."""
+    """One setting of a profile; ``where`` names the scenes if the value depends on the needs of a scene."""
 
     name: str
     value: str
@@ -35,7 +35,7 @@ class SettingLine:
 
 @dataclass(frozen=True)
 class ReceiptLine:
-    """One quantity of a profile, at the cell whose measurement is farthest from what is declared."""
+    """One property check of a profile, in the case whose measurement is farthest from the declared value."""
 
     quantity: str
     asked: str
@@ -48,7 +48,7 @@ class ReceiptLine:
 
 @dataclass(frozen=True)
 class ProfileSheet:
-    """A profile's settings, receipts, and what had to be changed in the start state."""
+    """A profile's settings, property checks, and necessary changes of the start state."""
 
     name: str
     settings: list[SettingLine]
@@ -69,7 +69,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Listed:
-    """One reason of the list of known findings, with how many rows of this run carry it."""
+    """One cause of the list of known failures, with the number of its rows in this run."""
 
     id: str
     text: str
@@ -113,7 +113,7 @@ def fairness(source: Source) -> Fairness:
 
 
 def _planted() -> dict[str, str]:
-    """Each fault that the kit's self-test plants, its sizes, and what must catch it."""
+    """Each planted fault of the conformance kit's self-test, its sizes, and the check that must notice it."""
     return {
         f"{name} ({', '.join(f'{size:g}' for size in fault.sizes)} {fault.unit})" if fault.sizes else name: fault.check
         for name, fault in FAULTS.items()
@@ -121,15 +121,15 @@ def _planted() -> dict[str, str]:
 
 
 def _once(every: Iterable[Cure]) -> list[Cure]:
-    """One cure per engine and scene: what cures the plane cures space. Each table of settings stands once.
+    """One fix per engine and scene, since a fix in 2-D also fixes 3-D; each table of settings is shown once.
 
-    So do its lines to paste, where a scene has the same ones as that beside which the table stands.
+    Lines to paste are left out where they equal those of the scene with the table.
     """
     first: dict[tuple[str, str], Cure] = {}
-    told: dict[tuple[str, tuple[Change, ...]], Cure] = {}
+    first_with: dict[tuple[str, tuple[Change, ...]], Cure] = {}
     for cure in every:
         if (cure.engine, cure.scene) not in first:
-            same = told.setdefault((cure.engine, tuple(cure.changes)), cure)
+            same = first_with.setdefault((cure.engine, tuple(cure.changes)), cure)
             if same is not cure:
                 cure = replace(cure, like=same.scene, paste="" if cure.paste == same.paste else cure.paste)
             first[cure.engine, cure.scene] = cure
@@ -153,7 +153,7 @@ def _profile(name: str, observations: Sequence[Observation]) -> ProfileSheet:
 
 
 def _settings(observations: Sequence[Observation]) -> list[SettingLine]:
-    """One line per setting and value; iteration counts asked for by a sweep are no part of a profile."""
+    """One line per setting and value; iteration counts of a sweep are no part of a profile."""
     found: dict[str, dict[tuple[str, str, str], dict[str, None]]] = defaultdict(lambda: defaultdict(dict))
     for o in observations:
         if o.slot.iterations is None:
@@ -174,7 +174,7 @@ def _settings(observations: Sequence[Observation]) -> list[SettingLine]:
 
 
 def _where(scenes: Iterable[str]) -> str:
-    """``impact, stack 3-D``: the dimension only where a scene is not meant in both."""
+    """``impact, stack 3-D``: the dimension only for scenes with just one of them."""
     dimensions: dict[str, list[str]] = defaultdict(list)
     for text in scenes:
         name, _, dimension = text.rpartition(" ")
@@ -183,7 +183,7 @@ def _where(scenes: Iterable[str]) -> str:
 
 
 def _receipts(observations: Sequence[Observation]) -> list[ReceiptLine]:
-    """Per quantity the receipt that comes closest to leaving its band, or is farthest outside."""
+    """Per quantity the property check that is closest to the edge of its band, or farthest outside."""
     groups: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
     for o in observations:
         for slip in o.receipts:
@@ -208,7 +208,7 @@ def _receipts(observations: Sequence[Observation]) -> list[ReceiptLine]:
 
 
 def _laws(source: Source, engine: str) -> list[Law]:
-    """Laws by mechanism: profiles, scenes and metrics they speak about, and rows of this run they explain."""
+    """Laws by mechanism: their profiles, scenes and metrics, and the number of rows of this run that they explain."""
     groups: dict[tuple[str, str], dict[str, dict[str, None]]] = defaultdict(lambda: {"profiles": {}, "where": {}})
     for law in laws_of(engine):
         group = groups[law.because, law.source]
@@ -222,7 +222,7 @@ def _laws(source: Source, engine: str) -> list[Law]:
 
 
 def _listed(source: Source, engine: str) -> list[Listed]:
-    """Families and reasons of unsupported cells of this engine, with how many rows of this run carry them."""
+    """Causes of known failures and of unsupported cases of this engine, with their numbers of rows in this run."""
     findings = findings_of(engine)
     if findings is None:
         return []
@@ -245,7 +245,7 @@ def _is_about(row: Mapping[str, Any], entry: Unsupported) -> bool:
 
 
 def _unsupported(observations: Iterable[Observation]) -> list[tuple[str, str, int]]:
-    """What the engine cannot be asked, with its reason."""
+    """Cases that the engine cannot run, with the reason."""
     counts: dict[tuple[str, str], int] = defaultdict(int)
     for o in observations:
         if o.outcome.value in ("unsupported", "not_installed"):

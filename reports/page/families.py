@@ -1,4 +1,4 @@
-"""Scenes by family: a line of marks and a sentence each, so that forty scenes are read like eight."""
+"""Groups of scenes: a line of marks and a sentence each, so that forty scenes read like eight."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from reports.wording import mark_of, plural
 from validation.canonical import FAMILIES
 from validation.posed import resolve
 
-#: Scenes that a sentence names one by one.
+#: Largest number of scenes that a sentence names one by one.
 FEW = 3
 
 
 @dataclass(frozen=True)
 class Family:
-    """One family: its scenes, what the data say of it, its marks (one per engine and profile), its scenes' lines."""
+    """One group: its scenes, a sentence about the data, a mark per engine and profile, and the lines of its scenes."""
 
     name: str
     anchor: str
@@ -31,7 +31,7 @@ class Family:
 
 
 def families(source: Source) -> list[Family]:
-    """Families of the run's scenes: the known ones in their order, then others by name."""
+    """Groups of the run's scenes: the known ones in their order, then others by name."""
     found = matrix_of(source.rows)
     scenes: dict[str, list[str]] = {}
     for scene in source.scenes:
@@ -53,7 +53,7 @@ def _family(source: Source, found: Matrix, name: str, scenes: Sequence[str]) -> 
 
 
 def sentence(source: Source, scenes: Sequence[str]) -> str:
-    """What the data say of some scenes: who passes all of them, where each other engine has no clean profile."""
+    """Sentence about some scenes: engines that pass all of them, and where each other engine has no clean profile."""
     clean = {scene: clean_profiles(source, scene) for scene in scenes}
     asked = {
         engine: [s for s in scenes if any(mark_of(r) not in UNJUDGED for r in source.of(scene=s, engine=engine))]

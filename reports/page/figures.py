@@ -1,4 +1,4 @@
-"""The figures of the page, each from a table to an SVG with a title, or None where there is nothing to draw."""
+"""The figures of the page: each makes an SVG with a title from a table, or None if there is nothing to draw."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from validation.cells import format_dt
 from validation.posed import primary_of
 from validation.questions.convergence import Convergence
 
-#: Said of charts in which marks were moved.
+#: Caption of charts with moved marks.
 DODGED = "Marks that coincide stand side by side; below 1e-6 an error counts as exact."
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One picture: anchor, title, caption and the SVG itself."""
+    """One picture: anchor, title, caption and SVG."""
 
     id: str
     title: str
@@ -65,7 +65,7 @@ def _guides(x: Sequence[float], anchor: tuple[float, float], scale_x: alt.X, sca
 
 
 def error_against_step(entries: Iterable[Convergence], scene: str, dimension: int) -> Figure | None:
-    """Declared error over dt, one line per engine and profile."""
+    """Headline error over dt, one line per engine and profile."""
     rows = [
         {
             "engine": c.engine, "profile": c.profile, "dt": dt, "error": error,
@@ -85,7 +85,7 @@ def error_against_step(entries: Iterable[Convergence], scene: str, dimension: in
     table["error"] = gutter(table["error"])
     error_scale, axis, low = error_axis(list(table["error"]), with_unit(primary.name, primary.unit))
     y = alt.Y("error:Q", scale=error_scale, axis=axis)
-    # The guides start at the most exact engine of the coarsest step: what converges runs alongside them.
+    # The guides start at the most exact engine of the coarsest step, so that converging engines run along them.
     coarsest = table[(table["dt"] == ticks[-1]) & (table["error"] >= EXACT)]["error"]
     start = float(coarsest.min()) if len(coarsest) else float(table["error"].max())
     guides = [_guides(ticks, (ticks[-1], start), x, y, low)] if start >= EXACT else []
@@ -116,7 +116,7 @@ def error_against_iterations(table: pd.DataFrame, scene: str, dimension: int, dt
 
 
 def work_precision(points: pd.DataFrame, scene: str, dimension: int) -> Figure | None:
-    """Error over cost, log-log; a series' line joins its own front, the grey steps are the front over all."""
+    """Error over cost, log-log; the line of a series joins its own front, the grey steps are the front over all."""
     table = points[(points["scene"] == scene) & (points["dimension"] == dimension)].copy()
     table = table[table["cost"].notna() & table["error"].notna()]
     if len(table) == 0:
@@ -171,7 +171,7 @@ def _point_text(row: Mapping[Hashable, Any]) -> str:
 
 
 def motion(table: pd.DataFrame, truth: pd.DataFrame | None, what: str, title: str) -> Figure:
-    """One coordinate over time for every engine; the truth is a broad grey line. Without truth the axis is a power."""
+    """One coordinate over time for every engine; the truth is a broad grey line. Without it the axis is logarithmic."""
     x = alt.X("t:Q", axis=alt.Axis(title="time [s]", tickCount=8), scale=alt.Scale(nice=False))
     if truth is None:
         scale, ticks = log_scale(list(table["value"]), 2.0)

@@ -1,4 +1,4 @@
-"""What is wrong with each engine, and the setting that fixes it: before, after, cost, and lines to paste."""
+"""Errors of each engine, and the setting that fixes each: before, after, cost, and lines to paste."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from validation.settings.cures import Cure
 
 @dataclass(frozen=True)
 class Fix:
-    """Settings that mend a scene, the check that tells it before and after, and the cost in times of that before."""
+    """Settings that fix a scene, a check before and after, and the cost relative to that before."""
 
     where: str
     settings: list[tuple[str, str]]
@@ -28,7 +28,7 @@ class Fix:
 
 @dataclass(frozen=True)
 class Wrong:
-    """What one engine and profile gets wrong in one scene, its fixes, and what its other profiles do."""
+    """Error of one engine and profile in one scene, its fixes, and the results of its other profiles."""
 
     answer: Answer
     fixes: list[Fix]
@@ -36,7 +36,7 @@ class Wrong:
 
 
 def wrongs(source: Source, answers: Iterable[Answer]) -> list[Wrong]:
-    """One line per answer: with the fixes of the committed table, or the words of the answer where it has none."""
+    """One line per answer: with the fixes of the committed table; without any, with the words of the answer."""
     return [_wrong(source, answer) for answer in answers]
 
 

@@ -1,6 +1,6 @@
 """The first screen: the finding of the run in a headline, and the engines as shipped beside their tuned profiles.
 
-Nothing in it is known in advance: engines, shares and numbers are those of the run's rows.
+Everything is computed from the rows of the run: engines, shares and numbers.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from reports.wording import ROLE_WORDS, mark_of
 from validation.canonical import Restitution
 from validation.posed import resolve
 
-#: Roles of the two profiles by which an engine is judged first.
+#: Roles of the two profiles that are shown first for each engine.
 FIRST, SECOND = ("shipped", "textbook"), ("tuned", "solution")
-#: An engine does not do what it is set to where more than half of the checks fail.
+#: Share of failed checks above which an engine does not do what it is set to.
 MOST = 0.5
 
 
 @dataclass(frozen=True)
 class Half:
-    """A column of the first matrix: a profile, what it is called, and its place among all columns."""
+    """A column of the first matrix: a profile, its name for people, and its place among all columns."""
 
     profile: str
     word: str
@@ -37,8 +37,8 @@ class Half:
 
 @cache
 def called(engine: str) -> str:
-    """Name of an engine for people: the first word of its title, or all before a bracket if another begins so."""
-    titles = {name: told.title for name in names() if (told := facts(name))}
+    """Name of an engine for people: the first word of its title; if others begin so too, all before a bracket."""
+    titles = {name: known.title for name in names() if (known := facts(name))}
     if engine not in titles:
         return engine
     short = titles[engine].split()[0]
@@ -47,12 +47,12 @@ def called(engine: str) -> str:
 
 
 def word_of(profile: str) -> str:
-    """What a profile is called for people; one without a role has its own name."""
+    """Name of a profile for people by its role; without a role its own name."""
     return ROLE_WORDS.get(role_of(profile) or "", profile)
 
 
 def halves(source: Source) -> list[tuple[str, list[Half]]]:
-    """Per engine at most two columns: as it is shipped and tuned; of an engine without roles its first two."""
+    """Per engine at most two columns: as shipped and tuned; for an engine without roles its first two."""
     found = []
     for engine in source.engines:
         own = [Half(p, word_of(p), k) for k, (name, p) in enumerate(source.columns) if name == engine]
@@ -71,24 +71,26 @@ def shares(rows: Iterable[Plain]) -> dict[tuple[str, str], float]:
 
 def shown(source: Source, series: bool) -> tuple[str, Restitution] | None:
     """First scene of the run that shows restitution as a series of heights, or as a ratio of speeds."""
-    told = ((scene, resolve(scene).restitution) for scene in source.scenes)
-    return next(((scene, found) for scene, found in told if found and bool(found.heights) is series), None)
+    declared = ((scene, resolve(scene).restitution) for scene in source.scenes)
+    return next(((scene, found) for scene, found in declared if found and bool(found.heights) is series), None)
 
 
 def rebounds(source: Source) -> list[Plain]:
-    """Rows that measure a restitution in the scenes of which the page shows it."""
-    told = filter(None, (shown(source, series) for series in (True, False)))
-    return [r for scene, found in told for r in source.of(scene=scene) if family_of(r["metric"]) == found.metric]
+    """Rows that measure a restitution in the scenes for which the page shows it."""
+    restitutions = filter(None, (shown(source, series) for series in (True, False)))
+    return [
+        r for scene, found in restitutions for r in source.of(scene=scene) if family_of(r["metric"]) == found.metric
+    ]
 
 
 def headline(source: Source) -> str:
-    """The finding: who does not rebound as set, where, and whether tuning mends it; else who fails the most checks."""
+    """The finding: engines that do not rebound as set, where, whether tuning helps; else the one with most failures."""
     if not answering(source):
         return "No check has a result."
     rebound = shares(rebounds(source))
     wrong = [e for e in source.engines if rebound.get((e, "as shipped"), 0.0) > MOST]
     if not wrong:
-        return _most(source)
+        return _most_failures(source)
     scenes = list(dict.fromkeys(row["scene"] for row in rebounds(source)))
     return f"{_rebounds(wrong, rebound)} ({'scene' if len(scenes) == 1 else 'scenes'} {joined(scenes)})"
 
@@ -96,21 +98,21 @@ def headline(source: Source) -> str:
 def _rebounds(wrong: Sequence[str], rebound: dict[tuple[str, str], float]) -> str:
     tuned = [e for e in wrong if (e, "tuned") in rebound]
     mended = [e for e in tuned if rebound[e, "tuned"] == 0.0]
-    said = f"{joined(map(called, wrong))} {_do(wrong)} not rebound as set"
+    said = f"{joined(map(called, wrong))} {_verb(wrong)} not rebound as set"
     if len(tuned) == len(wrong) and not mended:
         return f"{said}, neither as shipped nor tuned"
     if not mended:
         return f"As shipped, {said}"
     who = {1: "it", 2: "both"}.get(len(wrong), "all") if mended == wrong else joined(map(called, mended))
-    return f"As shipped, {said}; tuned, {who} {_do(mended)}"
+    return f"As shipped, {said}; tuned, {who} {_verb(mended)}"
 
 
-def _do(engines: Sequence[str]) -> str:
+def _verb(engines: Sequence[str]) -> str:
     return "does" if len(engines) == 1 else "do"
 
 
-def _most(source: Source) -> str:
-    """Of engines that rebound as set, or were not asked: who fails the most checks as shipped, and how many tuned."""
+def _most_failures(source: Source) -> str:
+    """If all engines rebound as set, or none ran such a scene: most failures as shipped, and those when tuned."""
     found = shares(source.rows)
     shipped = {engine: part for (engine, word), part in found.items() if word == "as shipped"}
     if not shipped:

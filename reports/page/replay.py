@@ -1,12 +1,12 @@
 """Replays: recordings of all engines on one scene, packed for the page's player, with the truth as a ghost.
 
-    heads (JSON, deflated, of all scenes at once)     bodies, series, what a level is
+    heads (JSON, deflated, of all scenes at once)     bodies, series, size of a level
     levels of one scene, deflated    16-bit integers: times in steps, then one quantity after the other, each as
                                      changes along time; low bytes first
     who (JSON, once for all scenes)  name, colour and dash of each engine and profile
 
-The player draws what is here and computes nothing; the moments at which an engine leaves the tube of
-`validation.running.tracks` were computed from the full trajectory when the cell ran.
+The player only draws and computes nothing. The moments at which an engine leaves the tube of
+`validation.running.tracks` were computed from the full trajectory when the case ran.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from validation.running.tracks import Recording
 
 #: Levels of a length over the largest extent of the scene: half a pixel of a screen 4000 pixels wide.
 LENGTHS = 8000
-#: Levels of a contact's point and impulse: an arrow is read to a hundredth at best.
+#: Levels of a contact's point and impulse: arrows cannot be read more finely than a hundredth.
 ARROWS = 250
 #: Levels of an angle per radian, and of a quaternion's component.
 ANGLES = 4000
-#: What an engine threw further than this many times the exact motion's extent is not followed by the camera.
+#: The camera does not follow bodies that an engine threw further than this many extents of the exact motion.
 FOLLOWED = 3.0
 
 
 def people(source: Source) -> list[dict[str, Any]]:
-    """Name, colour and dash of each engine and profile, as the player's series count them."""
+    """Name, colour and dash of each engine and profile, in the numbering of the player's series."""
     colours = colours_of(source.engines)
     return [
         {"name": f"{engine}/{profile}", "colour": colours[engine], "dash": list(dash_of(profile))}
@@ -71,7 +71,7 @@ class Replay:
 
     @property
     def departures_text(self) -> str:
-        """Who leaves the tolerance, and when, the first on top: ``one/default at 0.100 s; the other 3 never``."""
+        """Engines that leave the tolerance, and when, in order: ``one/default at 0.100 s; the other 3 never``."""
         gone = sorted((d for d in self.departures if d[2] is not None), key=lambda d: d[2] or 0.0)
         said = [f"{e}/{p} at {t:.3f} s{' (diverged)' if end == 'diverged' else ''}" for e, p, t, end in gone]
         said += [f"{e}/{p} diverged" for e, p, t, end in self.departures if t is None and end == "diverged"]
@@ -84,7 +84,7 @@ class Replay:
 
 
 def heads(shown: Sequence[Replay]) -> str:
-    """What the player knows of each scene, by its id: they are much alike, and deflate to a tenth together."""
+    """Heads of all scenes for the player, by id; together they deflate to a tenth, because they are much alike."""
     text = json.dumps({replay.id: replay.head for replay in shown}, separators=(",", ":"), allow_nan=False)
     return _deflated(text.encode())
 
@@ -94,13 +94,13 @@ def _deflated(content: bytes) -> str:
 
 
 def replays(source: Source) -> list[Replay]:
-    """All scenes that were recorded: first the one that shows a rebound, then in the order of the run."""
+    """All recorded scenes: first the one that shows a rebound, then in the order of the run."""
     groups: dict[tuple[str, int], list[tuple[Slot, Recording]]] = defaultdict(list)
     for slot, recording in source.replays:
         groups[slot.scene, slot.dimension].append((slot, recording))
     bounced, *_ = shown(source, series=True) or ("",)
     order = sorted((line for line in source.lines if line in groups), key=lambda line: line[0] != bounced)
-    drawn = {scene: dimension for scene, dimension in reversed(order)}  # a motion is drawn once, in the plane if it can
+    drawn = {scene: dimension for scene, dimension in reversed(order)}  # a motion is drawn once, in 2-D if possible
     return [_replay(source, *line, groups[line], drawn[line[0]] == line[1]) for line in order]
 
 
@@ -153,7 +153,7 @@ def _packed(
         series.append(one)
     if exact is not None:
         blocks.append(_differenced(np.round(exact / unit)))
-    # Low bytes, then high ones: of small steps the high bytes are nearly all alike, which deflates to nothing.
+    # Low bytes, then high ones: the high bytes of small steps are nearly all equal, which deflates very well.
     levels = np.concatenate([block.ravel() for block in blocks]).astype("<i2")
     raw = levels.view(np.uint8).reshape(-1, 2).T.tobytes()
     head = {
@@ -178,7 +178,7 @@ def _view(
     tracked: int | None,
     free: Sequence[int],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of what the camera shows: bodies at start, the exact motion, and engines as far as they are followed."""
+    """Corners of the camera's view: bodies at the start, the exact motion, and engines as far as they are followed."""
     d = scene.dimension
     start = np.array([scene.bodies[i].pose[:d] for i in free])
     around = max(reach(scene.bodies[i].shape) for i in free)
@@ -206,7 +206,7 @@ def _body(scene: Scene, i: int) -> dict[str, Any]:
 
 
 def _corners(shape: Capsule | Cylinder | Polygon | Hull, dimension: int) -> list[tuple[float, ...]]:
-    """Points whose hull is the shape, or looks like it: of what is round about its axis, some of its outline."""
+    """Points whose hull is, or looks like, the shape; for round shapes some points of the outline."""
     if isinstance(shape, Polygon | Hull):
         return [*shape.vertices]
     turns = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
@@ -229,13 +229,13 @@ def _pose_levels(pose: NDArray[np.float64], dimension: int, unit: float) -> NDAr
 
 
 def _differenced(levels: NDArray[np.float64]) -> NDArray[np.int16]:
-    """One quantity after the other, each first as it starts, then its changes; sums wrap around like the browser's."""
+    """One quantity after the other, each with its start and then its changes; sums wrap around as in the browser."""
     clipped = np.clip(np.nan_to_num(levels), -32000, 32000).astype(np.int64)
     return _by_quantity(np.diff(clipped, axis=0, prepend=0))
 
 
 def _by_quantity(levels: NDArray[Any]) -> NDArray[np.int16]:
-    """All of the first quantity, then all of the next: what follows each other is alike, and deflates to less."""
+    """All of the first quantity, then all of the next: neighbouring values are alike, and deflate to less."""
     return np.ascontiguousarray(levels.reshape(len(levels), math.prod(levels.shape[1:])).T).astype(np.int16)
 
 
@@ -250,7 +250,7 @@ def _arrow_levels(recording: Recording, unit: float, strongest: float) -> list[N
 
 
 def _coarse(unit: float) -> float:
-    """What a level of a contact's place is [m]."""
+    """Size of a level of a contact's place [m]."""
     return unit * LENGTHS / ARROWS
 
 
@@ -261,7 +261,7 @@ def _figure(
     exact: NDArray[np.float64] | None,
     tracked: int | None,
 ) -> Figure | None:
-    """What the player shows, without JavaScript: the coordinate that travels most, or the distance from rest."""
+    """Picture for readers without JavaScript: the coordinate with the largest travel, or the distance from rest."""
     if exact is None or tracked is None:
         return None
     d, axes = scene.dimension, ("x", "y") if scene.dimension == 2 else ("x", "y", "z")

@@ -76,7 +76,7 @@ def _section(
 
 
 def _iteration_table(observations: Sequence[Observation]) -> pd.DataFrame:
-    """Declared error at dt = 1/240 for every iteration count that was asked for."""
+    """Headline error at dt = 1/240 for every iteration count that was set."""
     rows = []
     for (scene, dimension, engine, profile), errors in declared_errors(observations).items():
         for (dt, iterations), error in errors.items():
@@ -95,7 +95,7 @@ def _iterations(errors: pd.DataFrame, scene: str, dimension: int) -> Figure | No
 
 
 def split_figure(figure: str) -> tuple[list[str], str]:
-    """Paragraphs and drawing of a scene's figure: what is indented is drawn, the rest is said."""
+    """Paragraphs and drawing of a scene's figure: indented blocks are the drawing, the others text."""
     blocks = [block for block in re.split(r"\n\s*\n", figure.strip("\n")) if block.strip()]
     drawn = [block for block in blocks if block.startswith(" ")]
     said = [" ".join(block.split()) for block in blocks if not block.startswith(" ")]

@@ -1,4 +1,4 @@
-"""What the page is made from: one run of a store, its replays, and the last bench in the same store."""
+"""Data of the page: one run of a store, its replays, and the last bench in the same store."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Plain = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Bench:
-    """A bench run: its protocol, the tables of `reports.speed.tables_of`, and the PASS or FAIL of its cells."""
+    """A bench run: its protocol, the tables of `reports.speed.tables_of`, and PASS or FAIL of its cases."""
 
     run: Run
     protocol: Mapping[str, Any]
@@ -33,24 +33,24 @@ class Bench:
 
 @dataclass(frozen=True)
 class Source:
-    """Everything that is shown; nothing below this line touches a store or an engine.
+    """Everything that is shown; the rest of the page reads no store and imports no engine.
 
     Parameters
     ----------
     rows
         Judged rows as plain data.
     observations
-        Without the cells whose start was moved by some units in the last place (they measure the noise floor).
+        Without the cases whose start was moved by some units in the last place (they measure the noise floor).
     replays
-        Recordings with the slots they show.
+        Recordings with their slots.
     bench
         The last bench of the same store; None if there is none.
     missing
-        Cells that were planned and left no observation.
+        Number of planned cases without an observation.
     scenes_kept
         Texts of the scene files of the run and of the bench, by pinned name.
     nulls
-        Rows of the nulls (`validation.questions.nulls`).
+        Rows of the trivial answers (`validation.questions.nulls`).
     """
 
     run: Run
@@ -77,7 +77,7 @@ class Source:
 
     @property
     def named(self) -> list[tuple[str, str]]:
-        """Engines and profiles that the page names: those of the rows, then those that only the bench has."""
+        """Engines and profiles on the page: those of the rows, then those that only the bench has."""
         timed = [(o.slot.engine, o.slot.profile) for o in self.bench.observations] if self.bench else []
         return list(dict.fromkeys([*self.columns, *timed]))
 

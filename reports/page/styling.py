@@ -24,14 +24,14 @@ def engine_style(engines: list[str]) -> str:
 
 
 def heat_style() -> str:
-    """CSS of the shares that fail, in twentieths (`reports.page.verdicts.Mark.twentieths`): ``w0`` to ``w20``."""
+    """CSS for shares of failed checks, in twentieths (`reports.page.verdicts.Mark.twentieths`): ``w0`` to ``w20``."""
     return "".join(f".w{k}{{background:light-dark({heat('light', k)},{heat('dark', k)})}}" for k in range(21))
 
 
 def symbols(columns: Sequence[tuple[str, str]]) -> str:
-    """CSS that puts point and line of an engine and profile, as charts have them, before its name.
+    """CSS that draws point and line of an engine and profile, as in charts, before its name.
 
-    The class is ``s`` and the place among ``columns``: names of them stand a thousand times on a page.
+    The class is ``s`` and the place among ``columns``, because it occurs a thousand times on a page.
     """
     colours = colours_of(list(dict.fromkeys(engine for engine, _ in columns)))
     rules = []

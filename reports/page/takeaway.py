@@ -1,4 +1,4 @@
-"""Tables to take away: inside the page, compressed, as links that work without JavaScript."""
+"""Tables for download: inside the page, compressed, as links that work without JavaScript."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from markupsafe import Markup
 from reports.exports import flattened
 from reports.page.source import Source
 
-#: Identities of cells, how long each took here and skills, which ``crosscheck bundle`` has; an error is value minus
-#: truth.
+#: Columns that only ``crosscheck bundle`` has: identities of cases, durations, skills, and the error, which is value
+#: minus truth.
 ELSEWHERE = frozenset({"cells", "state_hash", "wall_time_s", "error", "skill", "null"})
 
 
@@ -49,7 +49,7 @@ def takeaway(source: Source) -> list[File]:
 
 
 def columns(source: Source) -> dict[str, list[Any]]:
-    """Values of every row by column: what is alike stands together, which halves the page's largest part."""
+    """Values of every row by column: equal values are neighbours, which halves the largest part of the page."""
     flat = [flattened(row) for row in source.rows]
     return {name: [row[name] for row in flat] for name in (flat[0] if flat else ()) if name not in ELSEWHERE}
 
@@ -69,5 +69,5 @@ def _bench(source: Source) -> bytes:
             flat = table.drop(columns=["slot"], errors="ignore")
             entry = zipfile.ZipInfo(f"{name}.csv")  # 1980: no time stamp either
             entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, flat.to_csv(index=False, float_format="%.6g"))  # times are good to three digits
+            archive.writestr(entry, flat.to_csv(index=False, float_format="%.6g"))  # times have three valid digits
     return stream.getvalue()

@@ -19,7 +19,7 @@ from validation.cells import format_dt
 from validation.questions.nulls import skill_of
 
 Plain = Mapping[str, Any]
-#: Mark -> how a cell of the page says it: a sign and a word, so that no meaning hangs on colour.
+#: Mark -> sign and word in a field of the page, so that no meaning depends on colour.
 SAID = {
     "pass": ("✓", "pass"),
     "explained": ("✗", "explained"),
@@ -37,9 +37,9 @@ SAID = {
     "none": ("–", "no value"),
 }
 ALARMS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
-#: Mark -> class of the ground a value stands on: a letter, because tables of every value say it thousands of times.
+#: Mark -> class of a value's background: one letter, because tables of every value contain it thousands of times.
 GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.fromkeys(ALARMS, "a")
-#: What the words mean, for the legend.
+#: Meaning of the words, for the legend.
 MEANINGS = {
     "pass": "within the stated tolerance of the truth",
     "explained": "fails as the engine's contact model predicts",
@@ -59,9 +59,10 @@ MEANINGS = {
 
 
 def slug(*parts: Any) -> str:
-    """Anchor from names that may hold anything; distinct for names that differ in any character.
+    """Anchor from any names; distinct for names that differ in any character.
 
-    What is more than small letters, digits, dashes and underscores loses something here, so it carries a hash of it.
+    Names with other characters than small letters, digits, dashes and underscores lose them here, so their hash is
+    added.
     """
     raw = "-".join(map(str, parts))
     plain = re.sub(r"[^a-z0-9_]+", "-", raw.lower()).strip("-")
@@ -74,27 +75,27 @@ def family_of(metric: str) -> str:
 
 
 def ratio_of(row: Plain) -> float | None:
-    """|error| in units of the tolerance; None where there is no error or no tolerance to compare with."""
+    """|error| in units of the tolerance; None without an error or a tolerance."""
     if row["error"] is None or not row["tolerance"]:
         return None
     return abs(float(row["error"])) / float(row["tolerance"])
 
 
 def severity(row: Plain) -> tuple[int, float]:
-    """Order of rows by how bad they are."""
+    """Sort key of rows, larger for more serious ones."""
     mark = mark_of(row)
     rank = len(MARKS) - MARKS.index(mark) if mark in MARKS else 0
     return rank, ratio_of(row) or 0.0
 
 
 def times(ratio: float | None) -> str:
-    """How far off: ``0.3``, ``1.2e+4``."""
+    """Ratio as text: ``0.3``, ``1.2e+4``."""
     return "" if ratio is None else number(ratio, 2)
 
 
 @dataclass(frozen=True)
 class Mark:
-    """What a cell shows: mark, words after it, where it leads, the longer text, and the share that fails."""
+    """A field: mark, words after it, link, longer text, and share of failed checks."""
 
     mark: str
     text: str
@@ -104,12 +105,12 @@ class Mark:
 
     @property
     def twentieths(self) -> int:
-        """The share, rounded up: a shade that the page has a class for, as it runs no styles of single elements."""
+        """The share, rounded up: the page has a class for each shade, because its policy forbids inline styles."""
         return math.ceil(20.0 * self.share)
 
     @property
     def percent(self) -> str:
-        """The share as a field of the matrix shows it; a dash where nothing was judged."""
+        """The share in per cent for a field of the matrix; a dash if nothing was judged."""
         return share(self.share, 1.0) if self.text else SAID[self.mark][0]
 
     @property
@@ -120,7 +121,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class MatrixLine:
-    """A line of the matrix: its scene, its dimension and whether it is swept, where it leads, a mark per column."""
+    """A line of the matrix: its scene, its dimension and whether it is swept, its anchor, a mark per column."""
 
     scene: str
     kind: str
@@ -146,7 +147,7 @@ def _matrix_mark(field: Field | None, line: tuple[str, int], column: tuple[str, 
 
 
 def family_mark(field: Field | None, anchor: str) -> Mark:
-    """A field of the matrix: its worst mark, how many rows do not pass, and where it leads."""
+    """A field of the matrix: its worst mark, the number of rows that do not pass, and its link."""
     if field is None or field.mark in ("unsupported", "not_installed"):
         return Mark(field.mark if field else "unsupported", "")
     text = "" if not field.judged else f"{field.missed}/{field.judged}" if field.missed else str(field.judged)
@@ -178,7 +179,7 @@ class Worst:
 class GridLine:
     """One parameter set of a check: truth and tolerance once, then the error of each engine and profile.
 
-    ``options`` are its own words of the command; None if they are its label's.
+    ``options`` are its own words of the command; None if they equal its label.
     """
 
     label: str
@@ -190,7 +191,7 @@ class GridLine:
 
 @dataclass(frozen=True)
 class CheckBlock:
-    """Everything about one family of checks in one scene and dimension."""
+    """Everything about one kind of check in one scene and dimension."""
 
     anchor: str
     family: str
@@ -207,7 +208,7 @@ class CheckBlock:
 class SceneVerdicts:
     """Checks of a scene in one dimension: its worst mark, an overview (engines x checks) and a block per check.
 
-    ``nulls``: lines of the overview for answers without an engine, their worst errors in units of the tolerance.
+    ``nulls`` are lines of the overview for trivial answers, with their worst errors in units of the tolerance.
     """
 
     scene: str
@@ -241,12 +242,16 @@ def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
             marks = [mark or Mark("unsupported", "") for mark in own]
             overview.append((column, slug(scene, dimension, *column), marks))
     anchor = slug(scene, dimension)
-    guesses = _guesses(source, scene, dimension, [block.family for block in blocks])
-    return SceneVerdicts(scene, dimension, anchor, _summed(rows), asked, ", ".join(refused), overview, blocks, guesses)
+    guesses = _trivial_answers(source, scene, dimension, [block.family for block in blocks])
+    return SceneVerdicts(
+        scene, dimension, anchor, _scene_mark(rows), asked, ", ".join(refused), overview, blocks, guesses
+    )
 
 
-def _guesses(source: Source, scene: str, dimension: int, families: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Per null and family of checks the largest error in units of the tolerance; a dash where it has no such number."""
+def _trivial_answers(
+    source: Source, scene: str, dimension: int, families: Sequence[str]
+) -> list[tuple[str, list[str]]]:
+    """Per trivial answer and kind of check the largest error in units of the tolerance; a dash if it has none."""
     worst: dict[str, dict[str, float]] = defaultdict(dict)
     for row in source.nulls:
         if (row["scene"], row["dimension"]) == (scene, dimension):
@@ -260,8 +265,8 @@ def _guesses(source: Source, scene: str, dimension: int, families: Sequence[str]
     ]
 
 
-def _summed(rows: Sequence[Plain]) -> Mark:
-    """Worst mark at the profiles' own iteration counts, and how many engines' profiles pass everything."""
+def _scene_mark(rows: Sequence[Plain]) -> Mark:
+    """Worst mark at the profiles' own iteration counts, and the number of profiles that pass everything."""
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for row in rows:
         if row["iterations"] is None and mark_of(row) not in UNJUDGED:
@@ -324,7 +329,7 @@ LISTED = (*ALARMS, "fail", "known", "explained")
 
 
 def why_anchor(mark: str, engine: str, profile: str, reason: str) -> str:
-    """Where the findings say why: the same for all rows of an engine and profile that have the same reason."""
+    """Anchor of a reason among the findings: the same for all rows of an engine and profile with the same reason."""
     said = "|".join((mark, engine, profile, without_prediction(reason)))
     return f"why-{hashlib.sha256(said.encode()).hexdigest()[:8]}"
 
@@ -335,19 +340,19 @@ def without_prediction(reason: str) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """``1`` reads as what it is."""
+    """The unit in words if it is ``1``."""
     return "dimensionless" if unit == "1" else unit
 
 
 def varied(row: Plain) -> dict[str, float]:
-    """Parameters that were asked for, not left at their defaults."""
+    """Parameters that were set, without those at their defaults."""
     return dict(row["slot"]["params"])
 
 
 def grid(columns: Sequence[tuple[str, str]], rows: Iterable[Plain]) -> tuple[tuple[str, str], list[GridLine]]:
     """One line per parameter set, step, iteration count and index; one error per engine and profile.
 
-    Before the lines, what all of their commands begin and end with; a line's ``options`` stand between the two.
+    Before the lines comes the common begin and end of all their commands; a line's ``options`` are between the two.
     """
     rows = list(rows)
     names = list(dict.fromkeys(name for row in rows for name in row["slot"]["params"]))
@@ -381,7 +386,7 @@ def _shared(lists: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _cell(row: Plain | None) -> tuple[str, str]:
-    """Mark and error; the word where there is no error."""
+    """Mark and error; the word if there is no error."""
     if row is None:
         return "", ""
     mark = mark_of(row)

@@ -220,8 +220,16 @@ sys.meta_path.insert(0, Hidden())
     ("arguments", "status", "said"),
     [
         (["doctor"], statuses.FINE, "its compiler cannot be loaded"),
-        (["bench", "impact", "--engine", "chipmunk", "--dim", "2"], statuses.INCOMPLETE, "chipmunk was named"),
-        (["run", "impact", "--param", "v=6", "--engine", "chipmunk"], statuses.INCOMPLETE, "chipmunk was named"),
+        (
+            ["bench", "impact", "--engine", "chipmunk", "--dim", "2"],
+            statuses.INCOMPLETE,
+            "chipmunk did not run: No module",
+        ),
+        (
+            ["run", "impact", "--param", "v=6", "--engine", "chipmunk"],
+            statuses.INCOMPLETE,
+            "chipmunk did not run: No module",
+        ),
         (["profile", "impact"], statuses.INCOMPLETE, "numba"),
     ],
 )

@@ -199,7 +199,7 @@ BROKEN_LAWS = [
     ("def (", "SyntaxError"),
     ("DEVIATIONS = 7", "not iterable"),
     ("DEVIATIONS = ('a law',)", "not a Deviation of toy"),
-    (LAWS.replace('engine="toy"', 'engine="bullet"'), "not a Deviation of toy"),
+    (LAWS.replace('"engine": "toy"', '"engine": "bullet"'), "not a Deviation of toy"),
 ]
 
 

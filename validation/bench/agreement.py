@@ -1,6 +1,6 @@
 """Ratios of times within a run, and whether two runs agree on them.
 
-A ratio taken within one round of the lane survives a machine that is busy or slows down: both sides felt it.
+A busy or slowing machine hardly changes a ratio that is taken within one round: it slows both sides alike.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from validation.records.store import Run, Store
 
 
 def ratios(store: Store, run: Run) -> pd.DataFrame:
-    """Ratio of each unit's time to its opponent's in the same round: what survives a busy machine.
+    """Ratio of each unit's time to its opponent's in the same round; a busy machine hardly changes it.
 
     One row per unit, unsampled: `POINT`, ``purpose``, ``params``, ``engine_version``, ``opponent``,
     ``opponent_version``, ``ratio`` (median over rounds), ``ratio_low``, ``ratio_high`` (bootstrap interval),
@@ -46,7 +46,7 @@ def ratios(store: Store, run: Run) -> pd.DataFrame:
 
 
 def ratio(own: Mapping[int, Timing], other: Mapping[int, Timing]) -> Spread | None:
-    """Median over rounds of the time of a step over ``other``'s in the same round; None for fewer than two rounds."""
+    """Median over rounds of the ratio of step times, ``own`` to ``other``; None for fewer than two common rounds."""
     rounds = sorted(set(own) & set(other))
     if len(rounds) < 2:
         return None
@@ -55,7 +55,7 @@ def ratio(own: Mapping[int, Timing], other: Mapping[int, Timing]) -> Spread | No
 
 
 def opponent_slot(timing: Timing) -> Slot:
-    """Slot of the unit that a timing's ratio is taken against: same scene and step, the opponent's own iterations."""
+    """Slot of the opponent of a timing's unit: same scene and step, the opponent's own iteration count."""
     engine, _, profile = timing.opponent.partition("/")
     same = timing.slot.iterations if timing.purpose == "iterations" else None
     return replace(timing.slot, engine=engine, profile=profile, iterations=same)
@@ -66,10 +66,10 @@ def _rate(timing: Timing) -> float:
 
 
 def agreement(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
-    """Ratios of two bench runs side by side: ``agrees`` where their intervals overlap.
+    """Ratios of two bench runs side by side; ``agrees`` where their intervals overlap.
 
-    Rows: units that both have, with the same versions of both engines; columns ``ratio``, ``ratio_low``,
-    ``ratio_high`` with the endings ``_1`` and ``_2``.
+    One row per unit that both runs have with the same versions of both engines. The columns ``ratio``, ``ratio_low``,
+    ``ratio_high`` have the endings ``_1`` and ``_2``.
     """
     keys = ["purpose", *POINT, "params_text", "engine_version", "opponent", "opponent_version"]
 

@@ -1,12 +1,12 @@
-"""What is wrong with a run, for scenes that are compared at equal error: one or more numbers, each better if smaller.
+"""Errors of a run for comparisons at equal error: one or more numbers per scene, each better if smaller.
 
-    primary   the one declared error of a scene of the catalogue, over its variations
-    column    the top at any sample: how far it is aside of its place [m], how far above or below it [m]
+    primary   the headline error of a scene of the catalogue, the largest over its variations
+    column    top body, largest over all samples: distance aside [m], and above or below its place [m]
     drift     the first of these
-    wall      the second of these, of the box that was made last
-    heap      at the end: the deepest overlap of any two bodies [m], and the kinetic energy [J]
+    wall      the second of these, of the body that was added last
+    heap      at the end: largest overlap of two bodies [m], and kinetic energy [J]
 
-All are read from poses and twists by the same lines for every engine. Where the truth is rest, any of them is error.
+The same code computes them from poses and twists of every engine. The truth is rest, so that any such number is error.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ from validation.bounds import ROUND_OFF
 from validation.cells import Slot
 from validation.posed import primary_of, resolve
 
-#: Time between two samples of a run [s]: a column of ten sways in about a second.
+#: Time between two samples of a run [s]. A column of ten sways with a period of about a second.
 SAMPLE = 0.125
 
 
 @dataclass(frozen=True)
 class Found:
-    """Errors of one run by name, each with its unit and its round-off, and what the run was.
+    """Errors of one run by name (with unit), their round-off, and the size of the run.
 
     Parameters
     ----------
     contacts
-        Contact points that the engine tells at the end; None where it was not asked.
+        Contact points that the engine reports at the end; None if they were not counted.
     seconds
-        CPU time of all that was run for it [s].
+        CPU time of all runs behind these errors [s].
     reason
-        Why there are no errors; empty where there are.
+        Why there are no errors; empty if there are.
     """
 
     errors: Mapping[str, float]
@@ -56,18 +56,18 @@ class Found:
     reason: str = ""
 
     def is_within(self, other: Found) -> bool:
-        """Whether no error is larger than ``other``'s by more than 1 % or round-off; NaN is larger."""
+        """Whether no error exceeds ``other``'s by more than 1 % and round-off; NaN exceeds everything."""
         return not self.reason and all(
             self.errors[name] <= 1.01 * theirs + other.round_off[name] for name, theirs in other.errors.items()
         )
 
 
 def errors_of(kind: str, slot: Slot, seconds: float, count: bool = True) -> Found:
-    """Run a slot and measure its errors, and ``count`` its contacts; an engine that fails gives a reason."""
+    """Run a slot and measure its errors, and its contacts if ``count``; for an engine that fails only a reason."""
     started = time.process_time()
     try:
         found = _primary(slot) if kind == "primary" else _sampled(kind, slot, seconds, count)
-    except BaseException as failure:  # whatever an engine raises costs this run only
+    except BaseException as failure:  # any error of an engine ends this run only
         found = Found({}, {}, None, 0, 0.0, said_by(failure))
     if not all(map(math.isfinite, found.errors.values())):
         found = Found({}, {}, found.contacts, found.steps, 0.0, "an error is not finite")
@@ -75,7 +75,7 @@ def errors_of(kind: str, slot: Slot, seconds: float, count: bool = True) -> Foun
 
 
 def _primary(slot: Slot) -> Found:
-    """As the bench of the catalogue: the largest over the variations, which an engine cannot choose."""
+    """Headline error as in the bench of the catalogue: the largest over variations that an engine cannot choose."""
     canonical, primary = resolve(slot.scene), primary_of(slot.scene)
     worst, steps, contacts = [], 0, 0
     for params in primary.variations(slot.dt):
@@ -114,24 +114,24 @@ def _sampled(kind: str, slot: Slot, seconds: float, count: bool) -> Found:
 
 
 def column(scene: Scene, poses: np.ndarray, twist: np.ndarray) -> dict[str, float]:
-    """How far the last body of ``poses`` (s, n, 3 | 7) was from its place: aside, and up or down [m]."""
+    """Largest distances of the last body of ``poses`` (s, n, 3 | 7) from its place: aside, and above or below [m]."""
     moved = poses[:, -1, : scene.dimension] - poses[0, -1, : scene.dimension]
     aside = np.linalg.norm(moved[:, :-1], axis=1)
     return {"drift [m]": metrics.largest(aside), "sag [m]": metrics.largest(np.abs(moved[:, -1]))}
 
 
 def drift(scene: Scene, poses: np.ndarray, twist: np.ndarray) -> dict[str, float]:
-    """How far a column's top was aside."""
+    """Largest distance aside of a column's top [m]."""
     return {"drift [m]": column(scene, poses, twist)["drift [m]"]}
 
 
 def wall(scene: Scene, poses: np.ndarray, twist: np.ndarray) -> dict[str, float]:
-    """How far the top of a wall was above or below its place."""
+    """Largest distance of a wall's top above or below its place [m]."""
     return {"sag [m]": column(scene, poses, twist)["sag [m]"]}
 
 
 def heap(scene: Scene, poses: np.ndarray, twist: np.ndarray) -> dict[str, float]:
-    """Deepest overlap of the last of ``poses``, and kinetic energy of ``twist`` (n, 3 | 6) there."""
+    """Largest overlap [m] at the last of ``poses`` (s, n, 3 | 7), and kinetic energy [J] of ``twist`` (n, 3 | 6)."""
     end = Trajectory(np.zeros(1), poses[-1:], twist[None], None, 1.0, "completed")
     bodies = (
         replace(body, pose=tuple(pose.tolist())) if body.motion == "free" else body

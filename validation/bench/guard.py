@@ -1,9 +1,9 @@
-"""Whether the textbook step became slower: its time over that of naive sweeps which never change.
+"""Whether the textbook step has become slower: its time over that of naive sweeps whose code never changes.
 
-    python -m validation.bench.guard      under a minute; exits with 1 if a step costs over 1.6 times what it did
+    python -m validation.bench.guard      under a minute; exits with 1 if a ratio is over 1.6 times the stored one
 
-A time of its own says little: machines differ, and others use them. Both sides are clocked in turn in one process, and
-the median of the ratios is compared with the one in guard.toml, where it stands how to renew it.
+A time alone says little, because machines and their load differ. Both sides are timed alternately in one process, and
+the median of the ratios is compared with that of guard.toml, which says how to renew it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from validation.bench.units import PILE_DT, prepared
 from validation.cells import Slot
 
 TABLE = Path(__file__).with_name("guard.toml")
-#: Pairs of laps, one of each side: a median of so many passes over those that something else disturbed.
+#: Pairs of laps, one of each side: with so many, a few disturbed ones do not change the median.
 ROUNDS = 15
-#: Time until a heap has fallen and lies [s].
+#: Time after which a heap has fallen and lies still [s].
 REST = 0.75
-#: Friction coefficient of the naive sweeps: that of the stack.
+#: Friction coefficient of the naive sweeps, equal to that of the stack.
 MU = 0.5
 
 Array = NDArray[np.float64]
@@ -43,9 +43,9 @@ def naive(sweeps: int, bodies: NDArray[np.uint64], arms: Array, impulse: Array, 
     Parameters
     ----------
     bodies
-        Of each point (p, 2), unsigned.
+        Two of each point (p, 2), unsigned.
     arms
-        Rows of the constraints (p, r, 2, f), of bodies with unit mass and moments; the first row of a point is normal.
+        Rows of the constraints (p, r, 2, f), of bodies with unit mass and moments. The first row of a point is normal.
     impulse, velocity
         (p, r) and (n, f), changed in place.
     """
@@ -69,7 +69,7 @@ def naive(sweeps: int, bodies: NDArray[np.uint64], arms: Array, impulse: Array, 
 
 
 def sweeping(points: int, dimension: int, sweeps: int) -> Callable[[int], None]:
-    """Return what sweeps ``points`` drawn contacts of a chain of bodies; its argument is how many steps of it."""
+    """Return a function that sweeps ``points`` random contacts of a chain of bodies for a given number of steps."""
     rng, freedoms = np.random.default_rng(points), 3 * (dimension - 1)
     count = max(2, points // 2)
     first = np.arange(points) % (count - 1)
@@ -84,24 +84,24 @@ def sweeping(points: int, dimension: int, sweeps: int) -> Callable[[int], None]:
     return steps
 
 
-def ratio(told: Mapping[str, Any], sweeps: int) -> Spread:
+def ratio(step: Mapping[str, Any], sweeps: int) -> Spread:
     """CPU time of our step over that of the naive sweeps: median and interval over `ROUNDS`."""
     solver = registry.solver()
-    params = tuple(sorted((name, float(value)) for name, value in told["params"].items()))
+    params = tuple(sorted((name, float(value)) for name, value in step["params"].items()))
     profile = registry.profile_of(solver, "textbook") or ""
     engine, scene, settings, _ = prepared(
-        Slot(told["scene"], params, told["dimension"], solver, profile, PILE_DT, sweeps)
+        Slot(step["scene"], params, step["dimension"], solver, profile, PILE_DT, sweeps)
     )
     simulation = engine.build(scene, PILE_DT, settings)
     simulation.advance(step_count(REST, PILE_DT))
-    plain = sweeping(told["points"], told["dimension"], sweeps)
+    plain = sweeping(step["points"], step["dimension"], sweeps)
     plain(1)  # compiles
     found = []
     for _ in range(ROUNDS):
         laps = []
         for side in (simulation.advance, plain):
             start = time.process_time()
-            side(told["steps"])
+            side(step["steps"])
             laps.append(time.process_time() - start)
         found.append(laps[0] / laps[1])
     simulation.close()
@@ -109,15 +109,15 @@ def ratio(told: Mapping[str, Any], sweeps: int) -> Spread:
 
 
 def main(path: Path = TABLE) -> int:
-    """Print a line for each step that is watched; 1 if one is too slow."""
+    """Print one line per step in the table; return 1 if any is too slow, else 0."""
     data, slow = tomllib.loads(path.read_text(encoding="utf-8")), False
-    for told in data["steps"]:
-        found = ratio(told, data["sweeps"])
-        is_slow = found.median > data["margin"] * told["ratio"]
+    for step in data["steps"]:
+        found = ratio(step, data["sweeps"])
+        is_slow = found.median > data["margin"] * step["ratio"]
         slow |= is_slow
         print(
-            f"{told['title']:<30} {found.median:5.2f} [{found.low:.2f} {found.high:.2f}] times the naive sweeps, "
-            f"kept {told['ratio']:g}: {'TOO SLOW' if is_slow else 'ok'}"
+            f"{step['title']:<30} {found.median:5.2f} [{found.low:.2f} {found.high:.2f}] times the naive sweeps, "
+            f"kept {step['ratio']:g}: {'TOO SLOW' if is_slow else 'ok'}"
         )
     return int(slow)
 

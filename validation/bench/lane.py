@@ -1,11 +1,11 @@
-"""The timing lane: one process that times one thing at a time, driven in rounds from outside.
+"""The timing process: it times one unit at a time, and its parent drives it in rounds.
 
-    parent --(call)--> lane process: stopwatch --(lap)--> parent
+    parent --(call)--> timing process: stopwatch --(lap)--> parent
        each round: groups in random order; in a group, every open unit once, in random order
        a unit closes when the interval of its median is narrow enough, or its rounds or its time are used up
 
-A process that dies or hangs voids the unit it was timing; a fresh one goes on with the rest. The process is renewed
-every few rounds in any case: where memory happens to lie differs between processes, and the interval must know.
+If the process dies or hangs, the timed unit is void and a new process continues with the others. It is also replaced
+every few rounds: the layout of memory differs between processes, and the interval has to include that.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from validation.bench.timing import Timing
 from validation.bench.units import Unit
 
 T = TypeVar("T")
-#: Libraries must not start threads of their own: a thread that helps one engine is time that is not counted alike.
+#: Number of threads of libraries. CPU time of helper threads would count for some engines only.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -42,17 +42,17 @@ class Limits:
     Parameters
     ----------
     width
-        Of the median's bootstrap interval, relative: narrow enough.
+        Sufficient width of the median's bootstrap interval, relative to the median.
     fewest, most
-        Rounds: an interval of fewer than five values means nothing; after forty it hardly narrows.
+        Rounds. An interval of fewer than five values means nothing; after forty it hardly narrows.
     unit_seconds
-        CPU time spent on one unit, building included, after which three rounds have to do.
+        CPU time for one unit, building included. After it, three rounds suffice.
     size_seconds
-        A pile whose round takes more CPU time ends its series: larger ones are left out, with the reason.
+        A pile whose round takes more CPU time ends its series: larger ones are left out, with that reason.
     lane_seconds
-        Wall time for the whole lane; what is open then keeps the rounds it has.
+        Wall time for all units. After it, open units keep the rounds they have.
     patience
-        Seconds without an answer after which the lane's process counts as hanging.
+        Seconds without an answer after which the timing process counts as hanging.
     renew
         Rounds after which the process is replaced.
     """
@@ -89,7 +89,7 @@ class _Entry:
 
 
 class Lane:
-    """The lane's process, replaced whenever it dies.
+    """Handle of the timing process, which is replaced when it dies.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Lane:
         self._connection: Connection | None = None
 
     def start(self) -> None:
-        """Replace the process by a fresh one."""
+        """Start a process, in place of the previous one."""
         self.stop()
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
@@ -115,12 +115,12 @@ class Lane:
         self.count += 1
 
     def time(self, unit: Unit) -> Lap:
-        """Lap of ``unit``; void if the process died or hung over it."""
+        """Time ``unit`` once; the lap is void if the process died or hung."""
         answer, reason = self.ask(partial(lap, unit))
         return answer or Lap("", 0.0, 0.0, self.patience, "", None, void=reason)
 
     def ask(self, call: Callable[[], T]) -> tuple[T | None, str]:
-        """What ``call`` returns in the lane's process; None, and why, if that died or hung over it."""
+        """Result of ``call`` in the timing process and ""; None and the reason if the process died or hung."""
         assert self._connection is not None
         reason = f"no answer after {self.patience:g} s"
         try:
@@ -144,8 +144,8 @@ class Lane:
 
 def _child(connection: Connection, parent: int, scenes: dict[str, str]) -> None:
     end_with(parent)
-    posed.remember(scenes)  # a model was read by an engine in a process of its own, and this one may start none
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    posed.remember(scenes)  # this process may start no other, so it gets the models that engines have read
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     load_engines_here()
     serve(connection)
 
@@ -165,9 +165,9 @@ def _one_thread() -> Iterator[None]:
 
 
 def run_lane(units: Sequence[Unit], limits: Limits, seed: int) -> Iterator[Timing]:
-    """Time all units in rounds and yield every raw timing as it is taken.
+    """Time all units in rounds and yield every raw timing when it is taken.
 
-    The first unit of a group is the opponent of its group: it stays open as long as any other.
+    The first unit of a group is the opponent of the group: it is timed as long as any other is open.
     """
     shuffle = random.Random(seed).shuffle
     groups: dict[tuple[Any, ...], list[_Entry]] = {}
@@ -185,7 +185,7 @@ def run_lane(units: Sequence[Unit], limits: Limits, seed: int) -> Iterator[Timin
             if not todo:
                 return
             for members in todo:
-                # Every unit gets three rounds, whatever they take: without them there is no interval at all.
+                # Every unit gets three rounds, even after the time limit: with fewer there is no interval.
                 if round_ >= 3 and time.monotonic() > ends:
                     return
                 yield from _round(members, lane, limits, round_, shuffle)
@@ -230,7 +230,7 @@ def _timing(unit: Unit, opponent: Unit, round_: int, order: int, process: int, f
 
 
 def _end_series(members: list[_Entry], groups: dict[Any, list[_Entry]], limits: Limits) -> Iterator[Timing]:
-    """Leave out what is larger than a pile that already takes too long."""
+    """Close the units that are larger than a pile which already takes too long, with that reason."""
     slow = {e.unit.series: e for e in members if e.unit.purpose == "bodies" and e.spent > limits.size_seconds}
     for others in groups.values():
         for entry in others:

@@ -1,7 +1,7 @@
-"""What piles cost: steps cut at events against steps of fixed length, from the same states, over the number of bodies.
+"""Cost of steps that are cut at events over that of fixed steps, in piles, over the number of bodies.
 
-A pile falls by the profile that promises a solution; at some instants its state is handed to both, in an order drawn at
-random, and `STEPS` steps of each are clocked. A state is pose and twist, so that both go on from the very same.
+A pile falls with the exact profile. At some instants both profiles start from its state, in random order, and `STEPS`
+steps of each are timed. A state is pose and twist, so both start from the same.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
 from validation.bench.statistics import Fit, Spread, power_law, spread
 
-#: Dimension and share of round bodies of each kind of pile.
+#: Kind of pile -> dimension, and share of round bodies.
 KINDS = {"discs": (2, 1.0), "boxes": (2, 0.0), "spheres": (3, 1.0), "spatial boxes": (3, 0.0)}
-#: Bodies, as often doubled as asked for; seeds of the piles; instants at which both are clocked [s]: while bodies fall
-#: onto each other, while they settle, and when they lie.
+#: Smallest number of bodies, which is then doubled; seeds of the piles; instants of the timings [s]: bodies fall onto
+#: each other, settle, lie still.
 LEAST, SEEDS, INSTANTS = 20, (1, 2), (0.4, 0.8, 1.2)
 #: Steps in one lap.
 STEPS = 12
-#: CPU seconds after which a kind gets no more bodies: what it would cost is told by what it has cost.
+#: CPU time after which a kind gets no larger piles [s]; the cost so far shows what they would cost.
 PATIENCE = 120.0
 
 
 @dataclass(frozen=True)
 class Lap:
-    """CPU time of a step of both profiles from one state [s]."""
+    """CPU time per step of both profiles from one state [s]."""
 
     kind: str
     bodies: int
@@ -41,13 +41,13 @@ class Lap:
 
     @property
     def ratio(self) -> float:
-        """How many times as much a step costs that is cut at events."""
+        """Cost of a step that is cut at events over that of a fixed step."""
         return self.reference / self.fixed_step
 
 
 @dataclass(frozen=True)
 class Row:
-    """One kind and size: cost of a step [s] and ratio, each with its interval."""
+    """Costs of a step [s] and their ratio for one kind and size, each with its interval."""
 
     kind: str
     bodies: int
@@ -57,7 +57,7 @@ class Row:
 
 
 def laps(kind: str, most: int, seed: int = 0, patience: float = PATIENCE) -> Iterator[Lap]:
-    """Yield laps of one kind with 20 bodies, 40 and so on up to ``most``, or until ``patience`` [s] has been used."""
+    """Yield laps of one kind with 20 bodies, 40 and so on up to ``most``, or until ``patience`` [s] is used up."""
     dimension, share = KINDS[kind]
     pile = planar_pile if dimension == 2 else spatial_pile
     random = np.random.default_rng(seed)
@@ -95,18 +95,18 @@ def _lap(kind: str, bodies: int, model: Model, falling: Simulation, random: np.r
 
 
 def rows(found: Sequence[Lap]) -> list[Row]:
-    """Return what laps tell of each kind and size."""
+    """Summarize laps by kind and size."""
     keys = list(dict.fromkeys((lap.kind, lap.bodies) for lap in found))
-    told = []
+    summary = []
     for key in keys:
         those = [lap for lap in found if (lap.kind, lap.bodies) == key]
         columns = ([lap.reference for lap in those], [lap.fixed_step for lap in those], [lap.ratio for lap in those])
-        told.append(Row(*key, *(spread(column) for column in columns)))
-    return told
+        summary.append(Row(*key, *(spread(column) for column in columns)))
+    return summary
 
 
 def exponents(found: Sequence[Row]) -> dict[str, tuple[Fit | None, Fit | None]]:
-    """Return the exponents of cost over bodies of each kind: of steps cut at events, and of fixed ones."""
+    """Exponents of cost over bodies for each kind: of steps cut at events, and of fixed steps."""
     fits = {}
     for kind in dict.fromkeys(row.kind for row in found):
         those = [row for row in found if row.kind == kind]

@@ -1,9 +1,9 @@
-"""Tables of the timings of a bench run: what each unit cost, overhead of bindings, cost against size.
+"""Tables of the timings of a bench run: cost of each unit, overhead of bindings, cost over size.
 
-``cost`` is CPU time per simulated second [s/s] everywhere (1 is real time), so that steps and scenes compare.
-Tables are pandas DataFrames, one row per thing named in each docstring; a number that does not exist is NaN and its
-reason stands in the same row. Work points and comparisons at equal error stand in `validation.bench.work`, ratios of
-two runs in `validation.bench.agreement`.
+``cost`` is CPU time per simulated second [s/s] everywhere (1 is real time), so that it compares between steps and
+scenes. Tables are pandas DataFrames; each docstring says what a row is. A missing number is NaN, with a reason in the
+same row. Work points and comparisons at equal error are in `validation.bench.work`, ratios of two runs in
+`validation.bench.agreement`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from validation.bench.timing import Timing
 from validation.cells import Slot
 from validation.records.store import RELEASE_TITLE, Run, Store
 
-#: What a series is: an engine with a profile on a scene.
+#: Columns that identify a series: an engine with a profile on a scene.
 SERIES = ["scene", "dimension", "engine", "profile"]
 POINT = [*SERIES, "dt", "iterations"]
 
 
 def bench_runs(store: Store) -> list[Run]:
-    """Runs that timed something, oldest first."""
-    return [run for run in store.timed_runs() if not run.title.startswith(RELEASE_TITLE)]  # theirs: how they were asked
+    """Runs with timings, oldest first, without those of other releases."""
+    return [run for run in store.timed_runs() if not run.title.startswith(RELEASE_TITLE)]
 
 
 def timings_summary(store: Store, run: Run) -> pd.DataFrame:
@@ -39,7 +39,7 @@ def timings_summary(store: Store, run: Run) -> pd.DataFrame:
     relative), ``drift`` (second half of the rounds against the first, relative), ``drifts`` (beyond 5 % and outside
     the interval), ``load`` (median of wall time over CPU time: above 1 the machine was busy); ``cost``,
     ``cost_minimum``, ``cost_low``, ``cost_high`` [s/s], ``per_step`` [s]; ``error``, ``state_hash``, ``states``
-    (different end states seen: 1 for a deterministic engine), ``void``.
+    (number of different end states: 1 for a deterministic engine), ``void``.
     """
     groups: dict[tuple[Any, ...], list[Timing]] = defaultdict(list)
     for timing in store.timings(run):
@@ -51,7 +51,7 @@ def timings_summary(store: Store, run: Run) -> pd.DataFrame:
 def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
     first = timings[0]
     void = next((timing.void for timing in timings if timing.void), "")
-    # What is void has no time: it could only mislead.
+    # A void unit has no time, because any number would mislead.
     seconds = [math.nan] if void else [timing.seconds for timing in timings]
     found, moved = spread(seconds), drift(seconds)
     simulated = first.steps * first.slot.dt
@@ -81,7 +81,7 @@ def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
 
 
 def table_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """Rows as a table; a missing iteration count stays None (pandas would make it NaN, which equals nothing)."""
+    """Rows as a table; a missing iteration count stays None, because NaN of pandas equals nothing."""
     table = pd.DataFrame(rows)
     if "iterations" in table:
         table["iterations"] = pd.Series([row["iterations"] for row in rows], dtype=object)
@@ -89,7 +89,7 @@ def table_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def identity(slot: Slot) -> dict[str, Any]:
-    """Columns that say which slot a row is about."""
+    """Columns that identify the slot of a row."""
     return {
         "scene": slot.scene,
         "dimension": slot.dimension,
@@ -103,10 +103,10 @@ def identity(slot: Slot) -> dict[str, Any]:
 
 
 def overhead(store: Store, run: Run) -> pd.DataFrame:
-    """What a binding costs before there is any physics: an empty scene, and one free body, per step.
+    """Cost of a step without contact: an empty scene, and one free body. It is mostly the binding's own.
 
-    One row per dimension, engine, profile, scene (``empty``, ``flight``) and way of sampling; columns as
-    `timings_summary`, of which ``per_step``, ``per_step_low``, ``per_step_high`` [s] matter here.
+    One row per dimension, engine, profile, scene (``empty``, ``flight``) and way of sampling. Columns as in
+    `timings_summary`, with ``per_step``, ``per_step_low``, ``per_step_high`` [s].
     """
     table = timings_summary(store, run)
     table = table[table["purpose"] == "overhead"].copy()
@@ -117,10 +117,10 @@ def overhead(store: Store, run: Run) -> pd.DataFrame:
 
 
 def scaling(store: Store, run: Run) -> pd.DataFrame:
-    """Cost of a step against the number of bodies (purpose ``bodies``) and of iterations (``iterations``).
+    """Cost of a step over the number of bodies (purpose ``bodies``) and of iterations (``iterations``).
 
     Rows and columns of `timings_summary`, with ``x`` (bodies or iterations), ``per_step``, ``per_step_low``,
-    ``per_step_high`` [s]; ``error`` is the largest displacement of a body, in sides, at the end of the timed call.
+    ``per_step_high`` [s]. ``error`` is the largest displacement of a body at the end of the timed call, in sides.
     """
     table = timings_summary(store, run)
     table = table[table["purpose"].isin(["bodies", "iterations"])].copy()
@@ -131,7 +131,7 @@ def scaling(store: Store, run: Run) -> pd.DataFrame:
     return table.reset_index(drop=True)
 
 
-#: Sizes below this many bodies, or iterations, show the binding's overhead rather than the algorithm.
+#: Fits leave out smaller numbers of bodies and iterations, whose cost is mostly the binding's own.
 SMALLEST_FITTED = {"bodies": 10.0, "iterations": 3.0}
 
 
@@ -139,7 +139,7 @@ def scaling_fits(table: pd.DataFrame) -> pd.DataFrame:
     """Exponents p of per_step = a x^p by least squares in logarithms, over x >= `SMALLEST_FITTED`.
 
     One row per purpose, scene, dimension, engine and profile: ``exponent``, ``standard_error``, ``factor`` [s],
-    ``points``, ``smallest``, ``largest`` (of x), ``reason`` where there are too few points.
+    ``points``, ``smallest``, ``largest`` (of x), ``reason`` if there are too few points.
     """
     rows = []
     for names, group in grouped(table, ["purpose", *SERIES]):

@@ -1,12 +1,12 @@
-"""Scenes of the bench that no suite has, because their truth is no verdict's business.
+"""Scenes of the bench that no suite has, because they have no truth to check.
 
-    empty    only the floor: what a step costs before there is any physics
-    flight   one free body that meets nothing
-    wall     rows of boxes as in a pyramid, as many as asked for, ``gap`` apart: 0 lets the sides of neighbours touch
-    heap     n discs or spheres between walls, dropped by a little from the places of a grid
+    empty    only the floor, for the cost of a step without contact
+    flight   one free body without contact
+    wall     rows of boxes as in a pyramid, of any number, ``gap`` apart; with 0 the sides of neighbours touch
+    heap     n discs or spheres between walls, which fall a little from the places of a grid
 
-Each is an ordinary `Scene`; `validation.bench.units.scene_of` finds them here by name before it asks the catalogue.
-Whoever adds one writes a function ``(dimension, params) -> Scene`` and a line of `OWN`.
+Each is an ordinary `Scene`. `validation.bench.units.scene_of` looks for a name here before it looks in the catalogue.
+To add one, write a function ``(dimension, params) -> Scene`` and a line of `OWN`.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from validation.canonical import GRAVITY, Params
 from validation.scenes.parts import along, at, ball, cube, floor, upward
 
 SIDE = 1.0
-#: Radii of a heap's balls [m], drawn evenly: unlike ones do not lie down in a crystal.
+#: Range of the uniform random radii of a heap's balls [m]; equal ones would settle as a crystal.
 RADII = (0.48, 0.5)
-#: Distance of the largest neighbours on the grid that a heap falls from [m]: with the radii it makes ten layers fall
-#: for a quarter of a second.
+#: Gap between neighbours of the largest radius on the grid of a heap [m]. With these radii, ten layers fall for a
+#: quarter of a second.
 CLEARANCE = 0.005
 
 
 def empty(dimension: int, params: Params) -> Scene:
-    """Nothing but a floor."""
+    """Only a floor."""
     return _scene("empty", dimension, (floor(dimension),), params)
 
 
 def flight(dimension: int, params: Params) -> Scene:
-    """One ball and nothing that it could meet."""
+    """One ball without contact."""
     return _scene("flight", dimension, (ball("ball", dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), params)
 
 
 def wall(dimension: int, params: Params) -> Scene:
-    """``rows`` boxes in the lowest row, one fewer in each above; neighbours of a row are ``gap`` [m] apart."""
+    """``rows`` boxes in the lowest row, one fewer in each row above; neighbours in a row are ``gap`` [m] apart."""
     rows, pitch = int(params["rows"]), SIDE + params["gap"]
     boxes = list[Body]()
     for row in range(rows):
@@ -51,11 +51,11 @@ def wall(dimension: int, params: Params) -> Scene:
 
 
 def heap(dimension: int, params: Params) -> Scene:
-    """``n`` balls of 1 kg in ``layers`` between walls, drawn from ``seed``; each layer over the hollows of the last."""
+    """``n`` balls of 1 kg in ``layers`` between walls, random by ``seed``; each layer lies over the hollows below."""
     count, rng = int(params["n"]), np.random.default_rng(int(params["seed"]))
-    across = math.ceil((count / params["layers"]) ** (1.0 / (dimension - 1)) - 1e-9)  # forgives the rounding of roots
+    across = math.ceil((count / params["layers"]) ** (1.0 / (dimension - 1)) - 1e-9)  # the root may be rounded up
     pitch = 2.0 * RADII[1] + CLEARANCE
-    rise = pitch * math.sqrt(1.0 - 0.25 * (dimension - 1))  # of a layer: half a place aside along each level axis
+    rise = pitch * math.sqrt(1.0 - 0.25 * (dimension - 1))  # layers shift by half a pitch per level axis
     half_width = 0.5 * (across + 0.5) * pitch
     bodies = [floor(dimension)]
     for axis in range(dimension - 1):

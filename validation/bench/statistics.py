@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Resamples of a bootstrap: the ends of a 95 % interval then rest on ten resamples each.
+#: Resamples of a bootstrap; beyond each end of a 95 % interval are then ten of them.
 RESAMPLES = 400
 CONFIDENCE = 0.95
 #: Change of the median from the first to the second half of the rounds that counts as drift.
@@ -56,9 +56,9 @@ def drift(samples: ArrayLike) -> float:
 
 
 def lower_envelope(cost: ArrayLike, error: ArrayLike) -> NDArray[np.bool_]:
-    """Which points nothing beats: no other point is as cheap and as exact, and better in one of the two.
+    """Which points are on the lower envelope: no other point is as good in both cost and error, and better in one.
 
-    Points only, never a line between them: what was not run is not known. NaN is never on it.
+    Only points that ran; nothing is interpolated between them. A NaN is never on it.
     """
     c, e = np.asarray(cost, float), np.asarray(error, float)
     on = np.zeros(len(c), bool)

@@ -1,8 +1,8 @@
-"""One timing: build, bring into the state that matters, and clock one call.
+"""One timing: build a simulation, bring it into the state of interest, and time one call.
 
-    build -> [ a twin runs first, unclocked | warm-up steps ] -> clock( advance(n) ) -> read the state -> close
+    build -> [ a twin runs first, untimed | warm-up steps ] -> clock( advance(n) ) -> read the state -> close
 
-Runs in the lane's own process (`validation.bench.lane`), which has one thread.
+Runs in the timing process (`validation.bench.lane`), which has one thread.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_o
 
 @dataclass(frozen=True)
 class Lap:
-    """Answer of the stopwatch: CPU and wall time of the call, CPU time with everything around it, the end state."""
+    """Result of one timing: CPU and wall time of the call, CPU time with preparation [s], and the end state."""
 
     engine_version: str
     seconds: float
@@ -45,7 +45,7 @@ def lap(unit: Unit) -> Lap:
     version = find(unit.slot.engine).version
     try:
         seconds, wall, state, error, kernel = _clocked(unit)
-    except BaseException as failure:  # whatever an engine raises costs this unit only
+    except BaseException as failure:  # any error of an engine ends this lap only
         return Lap(version, 0.0, 0.0, time.process_time() - started, "", None, void=said_by(failure))
     return Lap(version, seconds, wall, time.process_time() - started, state, error, kernel, _void(unit, error))
 
@@ -59,7 +59,7 @@ def _void(unit: Unit, error: float | None) -> str:
 
 
 class Lowered:
-    """Reads a lifted simulation as a planar one, state by state: what a user who looks after each step pays."""
+    """View of an embedded planar simulation that converts each state to the plane, as a user would for every step."""
 
     def __init__(self, inner: Simulation) -> None:
         self.inner = inner
@@ -76,7 +76,7 @@ class Lowered:
 def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
     engine, scene, settings, lifted = prepared(unit.slot)
     dt = unit.slot.dt
-    if not unit.warm_up:  # the timed call is the whole scene, so that only a twin can warm caches and predictors
+    if not unit.warm_up:  # the timed call is the whole scene: only a twin can warm caches and predictors
         twin = engine.build(scene, dt, settings)
         twin.advance(unit.steps)
         twin.close()
@@ -100,8 +100,8 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
 
 
 def _clock(simulation: Simulation, view: Any, steps: int, sampled: bool) -> tuple[float, float]:
-    """CPU and wall time of ``steps`` steps in one call, or one by one with every state read [s]."""
-    gc.disable()  # a collection would charge this call with garbage that others made
+    """CPU and wall time [s] of ``steps`` steps: in one call, or if ``sampled`` one by one, with each state read."""
+    gc.disable()  # a collection would add the time for garbage of earlier calls
     try:
         wall, cpu = time.perf_counter(), time.process_time()
         if sampled:
@@ -116,7 +116,7 @@ def _clock(simulation: Simulation, view: Any, steps: int, sampled: bool) -> tupl
 
 
 def _clock_cost() -> float:
-    """CPU time that reading the clock itself adds to a timing [s]: median of a thousand empty ones."""
+    """CPU time that reading the clock adds to a timing [s]: median of a thousand readings."""
     laps = []
     for _ in range(1000):
         start = time.process_time()
@@ -128,7 +128,7 @@ CLOCK_COST = _clock_cost()
 
 
 def serve(connection: Connection) -> None:
-    """Call what is sent and send back what it returns until the other end closes; what engines print is thrown away."""
+    """Run the calls that arrive and return their results until the other end closes; output of engines is discarded."""
     import os
 
     null = os.open(os.devnull, os.O_WRONLY)

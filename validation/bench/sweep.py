@@ -1,10 +1,9 @@
-"""What is run for its error, and what is timed: every engine and profile over steps and iteration counts.
+"""What runs for its error, and what is timed: every engine and profile over steps and iteration counts.
 
-Each scene declares its steps and iteration counts (`validation.canonical.Steps`), for the quick and the full suite;
-here stands what is scaled.
+Each scene declares its steps and iteration counts (`validation.canonical.Steps`) for the quick and the full suite. The
+sizes of piles are in this module.
 
-A single contact is solved by one sweep, so iterations are swept there only to let each engine be as cheap as it
-honestly can.
+One sweep solves a single contact. Iterations are swept there only so that each engine runs at its lowest real cost.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ from validation.posed import is_file, primary_of, resolve
 from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Store
 from validation.running.plan import Request, slots
 
-#: Outcomes that the same cell has again.
+#: Outcomes that repeat if the same case runs again.
 REPEATS = (Outcome.OK, Outcome.DIVERGED, Outcome.UNSUPPORTED, Outcome.INVALID)
-#: Step at which cost with every step sampled is timed as well.
+#: Step at which the cost with every step sampled is timed too [s].
 SAMPLED_DT = 1.0 / 240.0
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """Sizes of the piles: scenes of n bodies, pyramids of r rows; iteration counts and the pyramid they run on."""
+    """Sizes of piles: n bodies, r rows of pyramids; iteration counts, and the rows of their pyramid."""
 
     counts: tuple[int, ...]
     rows: tuple[int, ...]
@@ -52,7 +51,7 @@ SCALING: dict[Suite, Scaling] = {
 
 @dataclass(frozen=True)
 class Sweep:
-    """What a user asked for; empty means the suite's own."""
+    """The request of a user; empty fields are those of the suite."""
 
     request: Request
     dts: Sequence[float] = ()
@@ -64,25 +63,25 @@ class Sweep:
         return tuple(self.dts) or resolve(scene).steps.dts(self.request.suite)
 
     def counts(self, scene: str) -> Sequence[int]:
-        """Iteration counts of a scene beside each profile's own; none where the count is a setting of a user's own."""
+        """Iteration counts of a scene beside each profile's own; none if the count is one of the user's settings."""
         if any(name == "iterations" for name, _ in self.request.sets):
             return ()
         return tuple(self.iterations) or resolve(scene).steps.counts(self.request.suite)
 
 
 def benched(suite: Suite) -> list[str]:
-    """Scenes that a bench of a suite runs where none is named: those that declare an error, and steps for the suite."""
+    """Scenes in a bench of a suite without named scenes: those with a headline error, and with steps for the suite."""
     ours = [(name, scene.steps) for name, scene in CATALOGUE.items() if scene.primary]
     return [name for name, steps in ours if steps.quick or suite == "full"]
 
 
 def accuracy_slots(sweep: Sweep) -> list[Slot]:
-    """Return all cells whose errors are needed; of scenes from files also the runs that they are measured from.
+    """All cases whose errors are needed; for scenes from files also their certified runs.
 
     Raises
     ------
     SceneError, EngineError
-        For a scene without a declared error, unknown engines, profiles or parameters.
+        For a scene without a headline error, or for unknown engines, profiles or parameters.
     """
     found: dict[Slot, None] = {}
     apart: dict[Slot, None] = {}
@@ -102,15 +101,15 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
 
 
 def _is_benched(request: Request, engine: str, profile: str) -> bool:
-    """Whether a profile is run for its error and timed: one without a rank only where it is named."""
+    """Whether a profile is run and timed; an unranked one only if the request names it."""
     return profile in request.profiles or (not request.profiles and is_ranked(engine, profile))
 
 
 def answered(store: Store, slots: Sequence[Slot]) -> tuple[str, list[Observation]]:
-    """What the newest run of verdicts answered to the very same cells on this machine, and its id.
+    """Id and observations of the newest run without timings on this machine, for the very same cases.
 
-    The same cell: scene, code, engine, adapter, settings and interpreter are equal, as its identity says; engines that
-    crashed or hung are asked again. A time is never taken over.
+    Cases are the same if scene, code, engine, adapter, settings and interpreter are equal (`Cell.key`). Crashes and
+    time-outs are not reused, and times never are.
     """
     runs = store.runs()
     apart, timed = (SCATTER_TITLE, RELEASE_TITLE), {run.id for run in store.timed_runs()}
@@ -123,7 +122,7 @@ def answered(store: Store, slots: Sequence[Slot]) -> tuple[str, list[Observation
 
 
 def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]:
-    """Everything to time after the errors are known; work points without a valid error are not among it."""
+    """All units to time, after the errors are known; work points without a valid error are left out."""
     suite, request = sweep.request.suite, sweep.request
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
     certified = certified_of(observations)

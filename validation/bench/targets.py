@@ -1,15 +1,15 @@
-"""How far the textbook step is ahead of each engine: ratios of time at 10 sweeps and at equal error, with their floors.
+"""Lead of the textbook step over each engine: ratios of time at 10 sweeps and at equal error, with floors and targets.
 
-    targets.toml     which scenes, which opponents, what is owed (floor) and aimed for (target)
+    targets.toml     scenes, opponents, least ratio (floor) and desired ratio (target)
        |
     errors.py        errors of each opponent and of ours, in a process that may die
        |  search: our fewest sweeps whose errors are no larger than theirs
        v
-    lane.py          ours at 10 sweeps, ours at those sweeps and all opponents, interleaved in rounds
+    lane.py          ours at 10 sweeps, ours at those sweeps, and all opponents, interleaved in rounds
        |
-    rows             one per scene, opponent and way of comparing
+    rows             one per scene, opponent and way of comparison
 
-A ratio is their CPU time a step over ours in the same round: above 1 ours is faster.
+A ratio is their CPU time per step over ours in the same round: above 1 ours is faster.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from validation.bench.work import time_at_equal_error
 from validation.cells import Slot, parse_dt
 
 TABLE = Path(__file__).with_name("targets.toml")
-#: Nine rounds for what is cheap; three where a round of one engine takes seconds.
+#: Nine rounds for cheap units; three where a round of one engine takes seconds.
 LIMITS = Limits(width=0.03, fewest=7, most=9, unit_seconds=10.0, lane_seconds=300.0, patience=300.0, renew=3)
-#: Most sweeps that are tried, and CPU time for the tries of a scene [s]: all that the largest scenes need is then known
-#: in half of the ten minutes.
+#: Largest number of sweeps in a search, and CPU time of the searches on one scene [s]. In that time the largest scenes
+#: find all they need, in half of the command's ten minutes.
 MOST_SWEEPS, SEARCH_SECONDS = 640, 40.0
 AT_SWEEPS, AT_ERROR, AT_END = "10 sweeps", "equal error", "end of the run"
 NOT_THERE = "not at this error"
@@ -50,9 +50,9 @@ TIMED_ONLY = "not run for its errors, which would take minutes"
 
 @dataclass(frozen=True)
 class Opponent:
-    """An engine's profile by its role, the sweeps it gets (None: its own), where floor and target hold.
+    """Profile of an engine by its role, its sweeps (None: the profile's own), and the comparison with floor and target.
 
-    ``contacts``: whether its contacts are counted.
+    ``contacts`` is whether its contacts are counted.
     """
 
     engine: str
@@ -69,7 +69,7 @@ class Opponent:
 
 @dataclass(frozen=True)
 class Case:
-    """One scene of the table; see targets.toml for its fields."""
+    """One scene of the table; targets.toml explains its fields."""
 
     title: str
     scene: str
@@ -85,19 +85,19 @@ class Case:
     timed_only: Sequence[str] = ()
 
     def slot(self, engine: str, profile: str, sweeps: int | None) -> Slot:
-        """What is run of it."""
+        """Slot of this scene on an engine."""
         params = tuple(sorted((name, float(value)) for name, value in self.params.items()))
         return Slot(self.scene, params, self.dimension, engine, profile, self.dt, sweeps)
 
     def ours(self, sweeps: int) -> Slot:
-        """Our textbook step at ``sweeps``."""
+        """Slot of our textbook step at ``sweeps``."""
         solver = registry.solver()
         return self.slot(solver, registry.profile_of(solver, "textbook") or "", sweeps)
 
 
 @dataclass(frozen=True)
 class Table:
-    """All that targets.toml says; ``twice`` are floor and target of the share of `lead`."""
+    """Content of targets.toml; ``twice`` has floor and target of `lead`."""
 
     cases: tuple[Case, ...]
     opponents: Mapping[str, Opponent]
@@ -113,19 +113,19 @@ class Row:
     at
         ``10 sweeps`` or ``equal error``; ``end of the run`` where nothing is timed.
     measured, low, high
-        Their CPU time a step over ours, median over rounds and 95 % interval; where nothing is timed our error.
-        None where there is none.
+        Their CPU time per step over ours, median over rounds and 95 % interval; our error where nothing is timed.
+        None if there is no value.
     floor, target
-        Least value that is owed, and aimed for; where nothing is timed the largest error allowed. None: shown only.
+        Least and desired value; the largest allowed error where nothing is timed. None: shown only.
     our_error, their_error
         By name, with unit.
     sweeps
-        Ours; None where no number of them is known to reach their error.
+        Ours; None if no number is known to reach their error.
     counts
-        Bodies, timed steps, rounds; of both sides contacts at the end of the run for errors, a hash of the state that
-        the timed steps ended in, and the median CPU time of a step [s].
+        Bodies, timed steps, rounds. For both sides contacts at the end of the run for errors, a hash of the state after
+        the timed steps, and the median CPU time per step [s].
     reason
-        Why a ratio or their error is missing; empty where neither is.
+        Why a ratio or their error is missing; empty if neither is.
     """
 
     scene: str
@@ -144,7 +144,7 @@ class Row:
 
     @property
     def mark(self) -> str:
-        """``target`` or ``floor`` where it is met, ``below floor``; empty where nothing is asked."""
+        """``target`` or ``floor`` for what is met, ``below floor``, or empty without a floor."""
         if self.floor is None:
             return ""
         if self.at == AT_END:
@@ -159,25 +159,27 @@ def table(path: Path = TABLE) -> Table:
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     sweeps = data["sweeps"]
     opponents = {
-        name: Opponent(name, **{**told, "sweeps": sweeps if told["sweeps"] else None})
-        for name, told in data["opponents"].items()
+        name: Opponent(name, **{**entry, "sweeps": sweeps if entry["sweeps"] else None})
+        for name, entry in data["opponents"].items()
     }
-    cases = (Case(**{"sweeps": sweeps, **told, "dt": parse_dt(told.get("dt", data["dt"]))}) for told in data["scenes"])
+    cases = (
+        Case(**{"sweeps": sweeps, **entry, "dt": parse_dt(entry.get("dt", data["dt"]))}) for entry in data["scenes"]
+    )
     return Table(tuple(cases), opponents, tuple(data["equal_error"]["twice"]))
 
 
 def fewest_sweeps(reaches: Callable[[int], bool | None], least: int, most: int) -> int | None:
-    """Fewest sweeps that reach an error: by doubling, then by halving what lies between.
+    """Fewest sweeps that reach an error: by doubling, then by bisection.
 
     Parameters
     ----------
     reaches
-        Whether a number of sweeps reaches it; None if that is not to be tried, for lack of time. Errors may rise and
-        fall with the sweeps: what is returned reaches it, and something below it does not.
+        Whether a number of sweeps reaches it; None if there is no time to try. Errors may rise and fall with the
+        sweeps: the returned number reaches it, and a smaller tried one does not.
 
     Returns
     -------
-    None if nothing that was tried reaches it. Where time ends among the halves, the fewest that are known to.
+    None if no tried number reaches it. If time ends during bisection, the fewest that is known to reach it.
     """
     low, high = least - 1, least
     while not (found := reaches(high)):
@@ -194,20 +196,20 @@ def fewest_sweeps(reaches: Callable[[int], bool | None], least: int, most: int) 
 
 
 class Ours:
-    """Our errors on one scene over the sweeps, each found once, as long as there is time."""
+    """Our errors on one scene by number of sweeps, each computed once, while time is left."""
 
     def __init__(self, ask: Callable[[int], Found], seconds: float = SEARCH_SECONDS) -> None:
         self.ask, self.left, self.known = ask, seconds, dict[int, Found]()
 
     def at(self, sweeps: int) -> Found:
-        """Errors at ``sweeps``, whatever they cost."""
+        """Errors at ``sweeps``, also if no time is left."""
         if sweeps not in self.known:
             self.known[sweeps] = self.ask(sweeps)
             self.left -= self.known[sweeps].seconds
         return self.known[sweeps]
 
     def against(self, theirs: Found, least: int) -> tuple[int | None, str]:
-        """Fewest sweeps whose errors are within ``theirs``; None, and why, if there are none."""
+        """Fewest sweeps whose errors are within ``theirs``, and ""; else None and the reason."""
         if theirs.reason:
             return None, theirs.reason
         found = fewest_sweeps(lambda sweeps: self._reaches(sweeps, theirs), least, MOST_SWEEPS)
@@ -227,7 +229,7 @@ class Ours:
 def measure(
     asked: Table, seed: int, tell: Callable[[str], None] = lambda text: None, limits: Limits = LIMITS
 ) -> Iterator[Row]:
-    """Measure errors, then time, and yield the rows in the order of the table."""
+    """Measure errors, then times, and yield the rows in the order of the table."""
     lane = Lane(limits.patience)
     lane.start()
     try:
@@ -245,7 +247,7 @@ def measure(
 
 
 class _Errors:
-    """Errors of one scene: theirs, ours at all sweeps that were tried, and our sweeps at equal error."""
+    """Errors of one scene: theirs, ours at all tried sweeps, and our sweeps at equal error."""
 
     def __init__(self, case: Case, asked: Table, lane: Lane, tell: Callable[[str], None]) -> None:
         def ask(slot: Slot, contacts: bool = True) -> Found:
@@ -271,7 +273,7 @@ class _Errors:
         }
 
     def units(self) -> list[Unit]:
-        """What is timed, ours at 10 sweeps first: it is timed as long as any other."""
+        """Units to time, ours at 10 sweeps first: it is timed as long as any other."""
         case = self.case
         if case.clock is None:
             return []
@@ -313,16 +315,18 @@ class _Errors:
         case = self.case
         ours = self.ours.at(count or max(self.ours.known))
         own, other = timings.get(case.ours(count), {}) if count else {}, timings.get(slot, {})
-        # A step of theirs over one of ours: above 1 ours is faster.
+        # Their step over ours: above 1 ours is faster.
         found = ratio(other, own)
-        told = (found.median, found.low, found.high) if found else (None, None, None)
+        interval = (found.median, found.low, found.high) if found else (None, None, None)
         counts: dict[str, Any] = {"rounds": found.n if found else 0}
         for side, rounds in (("our", own), ("their", other)):
             for timing in list(rounds.values())[-1:]:
                 counts |= {"bodies": timing.bodies, "steps": timing.steps, f"{side}_state": timing.state_hash}
                 counts[f"{side}_step_s"] = spread([each.seconds / each.steps for each in rounds.values()]).median
         floor, target = (asked[0], asked[1]) if asked else (None, None)
-        return self._row(slot, at, count, ours, told, (floor, target), counts, why or ("" if found else "not timed"))
+        return self._row(
+            slot, at, count, ours, interval, (floor, target), counts, why or ("" if found else "not timed")
+        )
 
     def _row(
         self,
@@ -330,7 +334,7 @@ class _Errors:
         at: str,
         count: int | None,
         ours: Found,
-        told: tuple[float | None, float | None, float | None],
+        interval: tuple[float | None, float | None, float | None],
         asked: tuple[float | None, float | None],
         counts: Mapping[str, Any],
         reason: str,
@@ -341,7 +345,7 @@ class _Errors:
             self.case.title,
             f"{slot.engine}/{slot.profile}",
             at,
-            *told,
+            *interval,
             *asked,
             ours.errors,
             theirs.errors,
@@ -352,9 +356,9 @@ class _Errors:
 
 
 def lead(points: pd.DataFrame, twice: tuple[float, float]) -> Row:
-    """On which share of (scene, error level) ours is at least twice as fast as the best engine, in a stored bench.
+    """Share of (scene, error level) in a stored bench at which ours is at least twice as fast as the best engine.
 
-    Counted are the levels that another engine reaches; those that only we reach stand apart.
+    It counts the levels that another engine reaches. The number that only ours reaches is separate.
     """
     levels = time_at_equal_error(points)
     levels = levels[levels["rank"].notna()]
@@ -366,6 +370,6 @@ def lead(points: pd.DataFrame, twice: tuple[float, float]) -> Row:
     ahead = int((2.0 * reached["ours"] <= reached["theirs"]).sum())
     share = ahead / len(reached) if len(reached) else math.nan
     counts = {"ahead": ahead, "levels": len(reached), "only_ours": int(both["theirs"].isna().sum())}
-    told = share if math.isfinite(share) else None
+    value = share if math.isfinite(share) else None
     title = "levels of error in the stored bench where ours is twice as fast"
-    return Row(title, "others", AT_ERROR, told, None, None, *twice, {}, {}, None, counts)
+    return Row(title, "others", AT_ERROR, value, None, None, *twice, {}, {}, None, counts)

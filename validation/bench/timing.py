@@ -1,4 +1,4 @@
-"""One raw timing, as the store keeps it."""
+"""One raw timing, as stored."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from validation.cells import Slot, slot_from_dict
 
-#: Why something was timed: a point of a work-precision plot; the binding's own cost (empty scene, one free body);
-#: cost against the number of bodies; cost against the number of iterations.
+#: Purpose of a timing: a point of a work-precision plot; cost of the binding (empty scene, one free body); cost over
+#: the number of bodies; cost over the number of iterations.
 Purpose = Literal["work", "overhead", "bodies", "iterations"]
 
 
@@ -20,20 +20,20 @@ class Timing:
     Parameters
     ----------
     slot
-        What was timed: scene, parameters, engine, profile, step, iterations. ``empty`` and ``flight`` are
-        scenes of the bench, see `validation.bench.units`.
+        Scene, parameters, engine, profile, step, iterations. ``empty`` and ``flight`` are scenes of the bench, see
+        `validation.bench.units`.
     cell
-        Cell of the catalogue whose error this is; empty for the bench's own scenes.
+        Case of the catalogue with this error; empty for scenes of the bench.
     bodies
         Free bodies in the scene.
     opponent
-        ``engine/profile`` that shares the round and that ratios are taken against.
+        ``engine/profile`` in the same round against which ratios are taken.
     round, order, process
-        Round of the lane, position within it, and which process of the lane it was; all from 0.
+        Round, position within it, and number of the timing process; all from 0.
     sampled
-        Whether poses and twists were read after each step, and lowered where the scene was lifted.
+        Whether poses and twists were read after each step, and converted to the plane if the scene was embedded in 3-D.
     worlds, threads, kernel
-        Worlds per call, threads, and the variant of a kernel where an engine names one.
+        Worlds per call, threads, and the variant of a kernel if an engine names one.
     steps
         Steps in the timed call.
     seconds, wall_seconds
@@ -41,7 +41,7 @@ class Timing:
     state_hash
         Over the bits of the poses and twists at the end of the timed call.
     error
-        Primary error of what was timed (see `validation.canonical.Primary`); None where there is no such thing.
+        Headline error of the timed case (see `validation.canonical.Primary`); None if it has none.
     void
         Why this timing must not be used; empty if it may.
     """

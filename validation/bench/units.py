@@ -1,4 +1,4 @@
-"""What is timed: scenes of the catalogue, at any size where they have one, and the bench's own scenes (`scenes`).
+"""What is timed: scenes of the catalogue, at any size if they have one, and the bench's own (`bench.scenes`).
 
 Piles are scenes of the catalogue: columns of n bodies, and the wall of r rows of boxes.
 """
@@ -23,9 +23,9 @@ from validation.bench.timing import Purpose
 from validation.cells import Slot, settings_of
 from validation.posed import primary_of, resolve
 
-#: A pile is timed after this much time in contact, for as long again [s]: 24 steps of 1/240 s.
+#: A pile is timed after this time in contact, for as long again [s]: 24 steps of 1/240 s.
 SETTLING = 0.1
-#: A body that has moved by half a side no longer stands where it stood: the pile has collapsed, or was pushed apart.
+#: A body that has moved by half a side no longer stands in its place: the pile collapsed, or was pushed apart.
 COLLAPSED = 0.5
 PILE_DT = 1.0 / 240.0
 
@@ -39,8 +39,8 @@ class Unit:
     warm_up, steps
         Steps before the timed call and within it.
     error
-        Primary error that was measured before; None for the bench's own scenes, whose error is measured on the
-        timed simulation itself.
+        Headline error, measured before; None for scenes of the bench, whose error is measured on the timed simulation
+        itself.
     """
 
     purpose: Purpose
@@ -54,20 +54,20 @@ class Unit:
 
     @property
     def group(self) -> tuple[Any, ...]:
-        """Units of one group are timed next to each other: same scene, size, step, and kind of question."""
+        """Key of units that are timed next to each other: same scene, size, step and purpose."""
         slot = self.slot
         iterations = slot.iterations if self.purpose == "iterations" else None
         return self.purpose, slot.scene, slot.dimension, slot.params, slot.dt, iterations, self.sampled
 
     @property
     def series(self) -> tuple[Any, ...]:
-        """Units that differ in size only."""
+        """Key of units that differ in size only."""
         slot = self.slot
         return self.purpose, slot.scene, slot.dimension, slot.engine, slot.profile, slot.iterations
 
 
 def work_unit(slot: Slot, cell: str, error: float | None, sampled: bool = False) -> Unit:
-    """Unit that times a work point in the state its scene declares (`validation.canonical.Primary`)."""
+    """Unit of a work point, timed in the state that its scene declares (`validation.canonical.Primary`)."""
     primary, scene = primary_of(slot.scene), scene_of(slot)
     warm_up = step_count(primary.warm_up, slot.dt) if primary.warm_up else 0
     steps = step_count(primary.window or scene.duration, slot.dt)
@@ -75,7 +75,7 @@ def work_unit(slot: Slot, cell: str, error: float | None, sampled: bool = False)
 
 
 def overhead_units(engines: Sequence[tuple[str, str]], dimensions: Sequence[int]) -> Iterator[Unit]:
-    """Empty scene and one free body for every ``(engine, profile)``, plain and sampled; a second of steps each."""
+    """Empty scene and one free body for every ``(engine, profile)``, plain and sampled; one second of steps each."""
     for dimension in dimensions:
         for name in ("empty", "flight"):
             for engine, profile in engines:
@@ -93,7 +93,7 @@ def size_units(
     counts: Sequence[int],
     rows: Sequence[int],
 ) -> Iterator[Unit]:
-    """Scenes of n bodies (name, parameter that is n) and pyramids of r rows, at the profile's own iterations."""
+    """Scenes of n bodies (name, and its parameter n) and pyramids of r rows, at the profile's own iteration count."""
     sizes = [(scene, parameter, n) for scene, parameter in scenes for n in counts]
     sizes += [("pyramid", "rows", r) for r in rows]
     for dimension in dimensions:
@@ -107,7 +107,7 @@ def size_units(
 def iteration_units(
     engines: Sequence[tuple[str, str]], dimensions: Sequence[int], counts: Sequence[int], rows: int
 ) -> Iterator[Unit]:
-    """One pyramid at several iteration counts, where a profile has one."""
+    """One pyramid at several iteration counts, for profiles with such a setting."""
     for dimension in dimensions:
         for count in counts:
             for engine, profile in engines:
@@ -122,7 +122,7 @@ def _pile_unit(purpose: Purpose, slot: Slot) -> Unit:
 
 
 def runs(slot: Slot) -> bool:
-    """Whether the engine is there, has the dimension, and an iteration count if one is asked for."""
+    """Whether the engine is installed, has the dimension, and has an iteration count if the slot sets one."""
     engine = find(slot.engine).engine
     if engine is None or not engine.facts.dimensions & ({2, 3} if slot.dimension == 2 else {3}):
         return False
@@ -143,7 +143,7 @@ def _free(scene: Scene) -> int:
 
 
 def prepared(slot: Slot) -> tuple[Engine, Scene, dict[str, Any], bool]:
-    """Engine, scene as the engine gets it, setting values, and whether that scene was lifted."""
+    """Engine, scene in its dimension, values of its settings, and whether the scene was embedded in 3-D."""
     engine, scene = load(slot.engine), scene_of(slot)
     settings = settings_of(engine, slot, scene)
     posed = posed_for(engine, scene)
@@ -151,11 +151,11 @@ def prepared(slot: Slot) -> tuple[Engine, Scene, dict[str, Any], bool]:
 
 
 def own_error(scene: Scene, time: float, start: Array, pose: Array) -> float | None:
-    """Error of one of the bench's own scenes at ``time`` [s]; None where nothing can err.
+    """Error of a scene of the bench at ``time`` [s]; None without free bodies.
 
     Piles: largest displacement of a body since the start, in sides. Flight: distance from the exact fall [m].
-    ``start`` holds the poses before the first step as the engine has them: what an adapter had to change in them is
-    declared elsewhere, and adds up over a tall pile.
+    ``start`` has the poses before the first step as the engine reports them: changes of poses by an adapter are
+    declared elsewhere, and add up over a tall pile.
     """
     free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]
     if not free:

@@ -1,6 +1,6 @@
-"""Work points: the error of every run of an engine and what it cost; cost at equal error, error at equal cost.
+"""Work points: error and cost of every run of an engine; cost at equal error, and error at equal cost.
 
-Observations give the error, timings the cost; both are read from the store, nothing here is measured.
+Errors come from observations, costs from timings, both from the store. Nothing is measured here.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ Row = Mapping[Hashable, Any]
 
 
 def work_points(store: Store, run: Run, observations: Iterable[Observation] | None = None) -> pd.DataFrame:
-    """One row per scene, dimension, engine, profile, step and iteration count: what was bought, and for how much.
+    """Error and cost: one row per scene, dimension, engine, profile, step and iteration count.
 
-    Columns: `POINT` (``iterations`` None: the profile's own), ``params``, ``slot`` (the timed cell, as the command
-    reproduces it), ``engine_version``; ``error`` (primary, supremum over ``cells`` cells), ``error_name``, ``unit``,
-    ``worst`` (parameters of the worst cell), ``outcome``, ``reason`` (why there is no error or no cost);
+    Columns: `POINT` (``iterations`` None: the profile's own), ``params``, ``slot`` (the timed case, as the command
+    reproduces it), ``engine_version``; ``error`` (the largest over ``cells`` cases), ``error_name``, ``unit``,
+    ``worst`` (parameters of the worst case), ``outcome``, ``reason`` (why error or cost is missing);
     ``cost``, ``cost_low``, ``cost_high``, ``cost_minimum`` [s/s], ``rounds``, ``width``, ``drifts``;
-    ``cost_corrected`` (without what an empty scene costs per step on the same engine and profile),
-    ``cost_sampled`` (with every step read; only where that was timed); ``state_hash`` of the timed call;
-    ``on_front`` (of its own series' lower envelope), ``best`` (of the envelope over all engines).
-    ``observations`` are those of the run, where they were read already.
+    ``cost_corrected`` (minus the cost per step of an empty scene on the same engine and profile),
+    ``cost_sampled`` (with every step read, if timed); ``state_hash`` of the timed call;
+    ``on_front`` (on the lower envelope of its series), ``best`` (on that over all engines).
+    ``observations`` are those of the run, if already read.
     """
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
     everything = list(store.observations(run) if observations is None else observations)
@@ -63,20 +63,20 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
 
 
 def certified_of(observations: Sequence[Observation]) -> CertifiedRuns:
-    """The certified runs of those scenes that are files."""
+    """The certified runs of scenes from files."""
     return certified_runs(o for o in observations if is_file(o.slot.scene))
 
 
 def measured(observations: Iterable[Observation], certified: CertifiedRuns) -> Iterator[Observation]:
-    """Observations but those that others are measured from."""
+    """Observations without the certified runs themselves."""
     apart = {run.slot for run in certified.values()}
     return (observation for observation in observations if observation.slot not in apart)
 
 
 def accuracy(members: Sequence[Observation], certified: CertifiedRuns | None = None) -> dict[str, Any]:
-    """Identity, primary error and outcome of one work point from the observations of its cells.
+    """Identity, headline error and outcome of one work point from the observations of its cases.
 
-    ``certified`` are the runs that scenes from files are measured from.
+    ``certified`` are the runs from which errors of scenes from files are measured.
     """
     first = min(members, key=lambda observation: _position(observation.slot))
     primary = primary_of(first.slot.scene)
@@ -100,7 +100,7 @@ def accuracy(members: Sequence[Observation], certified: CertifiedRuns | None = N
 
 
 def _position(slot: Slot) -> int:
-    """Place of a slot among the variations of its scene; the first is the one that is timed."""
+    """Place of a slot among the variations of its scene; the first one is timed."""
     canonical, given = resolve(slot.scene), dict(slot.params)
     complete = canonical.complete(given)
     for k, params in enumerate(primary_of(slot.scene).variations(slot.dt)):
@@ -134,7 +134,7 @@ def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:
 
 
 def with_fronts(points: pd.DataFrame) -> pd.DataFrame:
-    """Mark the lower envelopes: of each series, and over all engines of a scene, of profiles that have a rank."""
+    """Mark the points on lower envelopes: of each series, and over all ranked profiles of a scene."""
     points = points.copy()
     for column, names in (("on_front", SERIES), ("best", SERIES[:2])):
         points[column] = False
@@ -146,12 +146,12 @@ def with_fronts(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LEVELS) -> pd.DataFrame:
-    """Per series and error level: the cheapest point that was run with at most that error; never between points.
+    """Cheapest point of each series with at most the error of each level; nothing is interpolated.
 
     Columns: `SERIES`, ``level``; ``cost``, ``cost_low``, ``cost_high``, ``cost_corrected``, ``error``, ``dt``,
     ``iterations``, ``slot``; ``rank`` (1 is the cheapest of its scene, dimension and level), ``tied`` (its interval
-    overlaps that of the cheapest, so that the two are not told apart), ``times_cheapest``; ``reason`` where no point
-    reaches the level.
+    overlaps that of the cheapest, so that their order is open), ``times_cheapest``; ``reason`` if no point reaches the
+    level.
     """
     rows = []
     for names, group in grouped(points, SERIES):
@@ -163,9 +163,9 @@ def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LE
 
 
 def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEVELS) -> pd.DataFrame:
-    """Per series and cost level [s/s]: the most exact point that costs at most that much.
+    """Point of each series with the smallest error among those that cost at most each level [s/s].
 
-    Columns as `time_at_equal_error`, with ``times_best`` (error over the best error of its scene and level).
+    Columns as in `time_at_equal_error`, with ``times_best`` (error over the best error of its scene and level).
     """
     rows = []
     for names, group in grouped(points, SERIES):
@@ -182,7 +182,7 @@ def _chosen(candidates: pd.DataFrame, column: str, why_not: str) -> dict[str, An
     columns = ("cost", "cost_low", "cost_high", "cost_corrected", "error", "dt", "iterations", "slot")
     if len(candidates) == 0:
         return {**dict.fromkeys(columns[:6], math.nan), "iterations": None, "slot": None, "reason": why_not}
-    # Of points that are equal in what is asked for, the one that is better in the other thing.
+    # Of points that are equal in this column, the one that is better in the other.
     best = candidates.sort_values([column, "cost" if column == "error" else "error"]).iloc[0]
     return {**{name: best[name] for name in columns}, "reason": ""}
 
@@ -198,7 +198,7 @@ def _no_point(group: pd.DataFrame) -> str:
 
 
 def _has_rank(table: pd.DataFrame) -> pd.Series:
-    """Which rows are of profiles that have a rank."""
+    """Which rows have a ranked profile."""
     known = [is_ranked(engine, profile) for engine, profile in zip(table["engine"], table["profile"], strict=True)]
     return pd.Series(known, index=table.index, dtype=bool)
 
@@ -218,10 +218,10 @@ def _ranked(table: pd.DataFrame, column: str, factor: str) -> pd.DataFrame:
 
 
 def _tied(table: pd.DataFrame, column: str) -> pd.Series:
-    """Which rows are not told apart from the best of their scene, dimension and level.
+    """Which rows are indistinguishable from the best of their scene, dimension and level.
 
-    Costs carry the bootstrap interval of their median: two that overlap are a tie. Errors are deterministic: only
-    equal ones are.
+    Costs have the bootstrap interval of their median: two that overlap are tied. Errors are deterministic: only equal
+    ones are tied.
     """
     tied = table["rank"] == 1
     if column != "cost":

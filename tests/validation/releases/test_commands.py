@@ -64,7 +64,7 @@ def test_nothing_changed_is_said_and_is_no_alarm(call):
 @pytest.mark.long
 def test_an_end_that_does_not_answer_is_incomplete(call):
     done = call("bisect", "toy", "1.0.0,1.1.0", "impact", "--check", "rebound_ratio", *CELL, status=4)
-    assert "1.1.0 cannot be asked: cannot be imported" in done.stdout
+    assert "1.1.0 cannot run: cannot be imported" in done.stdout
 
 
 @pytest.mark.long
