@@ -73,7 +73,7 @@ recipe: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -m sphinx -q -W --keep-going docs docs/_build/html
 
-# Engines that are set apart, beside those of `all`; whatever is run afterwards asks them too.
+# Optional engines, beside those of `all`; later commands run them too.
 extras: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$(EXTRAS)]" -c constraints.txt
 
@@ -95,13 +95,13 @@ publish: $(STAMP)
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
 
-# Engines that are set apart, in a matrix of their own: their quick suite has 3896 cells, 12 min on two busy cores.
+# Optional engines, in a matrix of their own: their quick suite has 3896 cells, 12 min on two busy cores.
 apart: extras
 	@test -z "$$(git status --porcelain)" || { echo "commit first: the matrix names the commit"; exit 2; }
 	$(BIN)/crosscheck run --quick $(foreach name,$(subst $(comma), ,$(EXTRAS)),--engine $(name)) --out $(OUT) \
 		--markdown $(OUT)/engines.md
-	@{ echo "# Engines that are set apart"; echo; \
-	echo "Rows of the quick suite at $$(git rev-parse --short HEAD), by \`make apart\`; what the marks mean stands below the table."; echo; \
+	@{ echo "# Optional engines"; echo; \
+	echo "Checks of the quick suite at $$(git rev-parse --short HEAD), by \`make apart\`; the marks are explained below the table."; echo; \
 	cat $(OUT)/engines.md; } > reports/published/engines.md
 
 # History over releases of the engines, with times: environments are built once, what is stored is not run again; about

@@ -16,9 +16,10 @@ import jinja2
 import pandas as pd
 
 from adapters import registry
-from reports.cures import cure_paste, cure_text, recorded_fixes
+from reports.cures import cure_paste, cure_text, recorded_fixes, setting_text
 from reports.listing import describe
-from reports.wording import markdown, number
+from reports.tables import unset_text
+from reports.wording import first_of, markdown, number, word_of
 from validation.catalogue import CATALOGUE
 
 PUBLISHED = Path(__file__).parents[1] / "reports" / "published" / "report.html"
@@ -35,7 +36,9 @@ def write(folder: Path) -> None:
     environment.filters |= {
         "md": lambda text: markdown(str(text)).replace("\n", " ").replace("*", "\\*"),
         "number": number,
+        "unset": unset_text,
     }
+    environment.globals["word_of"] = word_of
     passes = passed()
     for name, values in made(passes):
         template = name.split("/")[0] if "index" not in name else name.replace("/", "-")
@@ -110,7 +113,8 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "scenes/index", {"groups": groups}
     engines = [name for name in registry.names() if registry.find(name).engine is not None]
     for name in engines:
-        yield f"engines/{name}", describe(name) | {"settings": settings(describe(name)["profiles"])}
+        told = describe(name)
+        yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
     yield (
         "engines/index",
         {
@@ -160,15 +164,23 @@ def fixes(scene: str) -> list[dict[str, Any]]:
 
 
 def settings(profiles: dict[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """Settings of each profile with the scenes in which they hold; none where it is all of them."""
+    """Settings of each profile with the scenes in which they hold; nothing where it is all of them."""
     found = {}
     for profile, scenes in profiles.items():
         where: dict[tuple[str, str, str], list[str]] = {}
         for scene, own in scenes.items():
             for each in own:
-                where.setdefault((each["name"], str(each["value"]), each["because"]), []).append(scene)
+                where.setdefault((each["name"], setting_text(each["value"]), each["because"]), []).append(scene)
         found[profile] = [
-            {"name": name, "value": value, "because": because, "scenes": [] if len(own) == len(scenes) else own}
+            {"name": name, "value": value, "because": because, "scenes": _only_in(own, list(scenes))}
             for (name, value, because), own in where.items()
         ]
     return found
+
+
+def _only_in(own: list[str], scenes: list[str]) -> str:
+    """The scenes of a setting in a few words: the first of them, or all but the first of the others."""
+    others = [scene for scene in scenes if scene not in own]
+    if len(others) < len(own):
+        return f"all but {first_of(others)}" if others else ""
+    return first_of(own)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.wording import markdown, number, plural, reproduce
+from reports.wording import first_of, markdown, number, plural, reproduce, roles_line
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
-from validation.judging.comparison import Change, Kind, families
+from validation.judging.comparison import Change, Kind, by_seriousness, families
 from validation.judging.rows import rows_of
 from validation.records.store import RELEASE_TITLE, MissingError, Store
 from validation.releases.history import told as told_by_releases
@@ -138,11 +138,13 @@ def headline(changes: Sequence[Change]) -> str:
         if kind is Kind.FLIP:
             parts += [f"{n} {WORDS[regressed]}" for n, regressed in ((worse, True), (other, False)) if n]
         elif worse + other:
-            judged = "" if kind in (Kind.ADDED, Kind.REMOVED) else f" ({worse} worse)"
+            judged = "" if kind in ONE_SIDED else f" ({worse} worse)"
             parts.append(f"{worse + other} {kind.value}{judged}")
     return "; ".join(parts) or "nothing changed"
 
 
+#: Kinds of checks that only one side has.
+ONE_SIDED = (Kind.ADDED, Kind.REMOVED)
 #: Word for a check that fails on one side only, by whether it got worse.
 WORDS = {True: "newly failing", False: "fixed"}
 
@@ -159,18 +161,15 @@ def _where(change: Change) -> str:
 def _size(change: Change) -> str:
     if change.kind is Kind.SPEED:
         return f"x{number(change.size, 3)}"
-    return f"{'+' if change.size > 0 else ''}{number(change.size, 3)} tol" if change.size else ""
+    return f"error {'+' if change.size > 0 else ''}{number(change.size, 3)} tolerances" if change.size else ""
 
 
 def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
     """Both sides, the headline, and the largest change of each family, one line each."""
-    lines = [*header(a, b), headline(changes)]
-    for family in families(changes):
+    apart = b.rows and sum(change.kind is Kind.ADDED for change in changes) == len(b.rows)
+    lines = [*header(a, b), headline(changes) + ("; no check is in both" if apart else "")]
+    for family in families(change for change in changes if change.kind not in ONE_SIDED):
         change, more = family.first, len(family.changes) - 1
-        if change.kind in (Kind.ADDED, Kind.REMOVED):
-            who = f"{change.engine}/{change.profile} {change.scene}"
-            lines.append(f"{change.kind.value}: {who} {change.metric.partition('[')[0]}: {plural(more + 1, 'check')}")
-            continue
         flips = change.kind is Kind.FLIP
         trend = "" if flips else " (worse)" if change.regressed else " (not worse)"
         rest = f", and {more} more like it" if more else ""
@@ -180,7 +179,21 @@ def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
         ]  # fmt: skip
         lines.append(" ".join(filter(None, said)) + rest)
         lines.append(f"    {reproduce(change.slot)}")
+    lines += _of_one_side(changes)
+    lines += filter(None, [roles_line((change.engine, change.profile) for change in changes)])
     return "\n".join(lines) + "\n"
+
+
+def _of_one_side(changes: Sequence[Change]) -> list[str]:
+    """Checks that only one side has: a line for each profile, with its first scenes."""
+    found: dict[tuple[Kind, str], Counter[str]] = {}
+    for change in sorted(changes, key=by_seriousness):
+        if change.kind in ONE_SIDED:
+            found.setdefault((change.kind, f"{change.engine}/{change.profile}"), Counter())[change.scene] += 1
+    return [
+        f"{kind.value}: {who}: {plural(scenes.total(), 'check')} of {first_of(list(scenes))}"
+        for (kind, who), scenes in found.items()
+    ]
 
 
 def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> str:
@@ -211,6 +224,7 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
     if len(found) > most:
         left = plural(len(found) - most, "more family")
         out.append(f"\n... and {left}; `crosscheck compare --json` lists every change")
+    out += [f"\n{line}" for line in [roles_line((change.engine, change.profile) for change in changes)] if line]
     return "\n".join(out) + "\n"
 
 

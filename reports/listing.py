@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import os
 import sys
@@ -49,7 +50,7 @@ def suites() -> list[dict[str, Any]]:
 
 def _cell(variation: Variation) -> str:
     """``n=10 at own/1/30 iterations``."""
-    params = " ".join(f"{name}={value:g}" for name, value in variation.params.items()) or "as it is"
+    params = " ".join(f"{name}={value:g}" for name, value in variation.params.items()) or "defaults"
     counts = "/".join("own" if count is None else str(count) for count in variation.iterations)
     return params if variation.iterations == (None,) else f"{params} at {counts} iterations"
 
@@ -99,8 +100,9 @@ def describe(name: str) -> dict[str, Any]:
     try:
         return _describe_scene(name)
     except SceneError:
-        known = [*CATALOGUE, *registry.names()]
-        raise SceneError(f"name: nothing is called {name!r}; known: {', '.join(known)}") from None
+        close = difflib.get_close_matches(name, [*CATALOGUE, *registry.names()], n=1)
+        hint = f"did you mean {close[0]!r}?" if close else "crosscheck list scenes, or list engines"
+        raise SceneError(f"name: nothing is called {name!r}; {hint}") from None
 
 
 def _describe_scene(name: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
 from reports.wording import LABELS, MARKS, STATUS, mark_of, word_of
-from validation.metrics import OUT_OF_PLANE
+from validation.metrics import NEWER, OUT_OF_PLANE
 
 #: Colours; they support the words and never replace them.
 STYLES = {"pass": "green", "explained": "cyan", "known": "yellow", "fail": "red", "unsupported": "dim"}
@@ -133,6 +133,12 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
             _, most, scene = outside[-1]
             counts.append(f"{engine}/{profile} {len(outside)} of {len(of_it)} (farthest in {scene}: {most:.2g} m)")
     return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(counts)}"] if counts else []
+
+
+def newer(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """How many checks did not exist when the run was made; one line, or none."""
+    count = sum(row["reason"] == NEWER for row in rows)
+    return [f"{count} of the checks are newer than this run: without a value, not judged."] if count else []
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:

@@ -113,7 +113,7 @@ def choices(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> Ite
 
 def _named(column: tuple[str, str], asked: int, scenes: int) -> str:
     """``engine/profile``, with the number of scenes that it can run if not all."""
-    return "/".join(column) + (f" ({asked} of {plural(scenes, 'scene')})" if asked < scenes else "")
+    return "/".join(column) + (f" ({asked} of {plural(scenes, 'scene')} run)" if asked < scenes else "")
 
 
 def shortened(answer: Answer) -> Answer:

@@ -80,8 +80,8 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
 
 
 def mark(change: Change) -> str:
-    """``flip``, ``moved`` or another kind of change, in one word."""
-    return {Kind.FLIP: "flip", Kind.OUTCOME: "ended", Kind.ERROR: "moved"}.get(change.kind, "other")
+    """Kind of a change, in one word."""
+    return {Kind.FLIP: "verdict", Kind.OUTCOME: "outcome", Kind.ERROR: "value"}.get(change.kind, "other")
 
 
 def as_table(releases: Sequence[Told], steps: Sequence[Step]) -> str:

@@ -21,7 +21,18 @@ from rich.text import Text
 from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
-from reports.matrix import Matrix, leaving, legend, matrix_of, status_of, sweeps_of, tables_of, unranked, versions_of
+from reports.matrix import (
+    Matrix,
+    leaving,
+    legend,
+    matrix_of,
+    newer,
+    status_of,
+    sweeps_of,
+    tables_of,
+    unranked,
+    versions_of,
+)
 from reports.wording import at, plural, roles_line
 
 Plain = Mapping[str, Any]
@@ -69,6 +80,7 @@ def show(
         *sweeps_of(matrix),
         *unranked(matrix.columns),
         *leaving(rows),
+        *newer(rows),
     ):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
@@ -91,7 +103,14 @@ def _show_families(
     console.print(table)
     matrix = matrix_of(rows)
     explained = overview.legend(overview.by_family(rows, families))
-    for line in (explained, *filter(None, roles), *_beside(matrix), *unranked(matrix.columns), *leaving(rows)):
+    for line in (
+        explained,
+        *filter(None, roles),
+        *_beside(matrix),
+        *unranked(matrix.columns),
+        *leaving(rows),
+        *newer(rows),
+    ):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())
     console.print(_folded(ran, console, ""), style="dim")
@@ -143,7 +162,7 @@ def _alarms(rows: Sequence[Plain], console: Console, place: str) -> None:
     for family in found[:MOST_ALARMS]:
         console.print(_folded(family.line, console))
     if len(found) > MOST_ALARMS:
-        more = f"... {len(found) - MOST_ALARMS} more: crosscheck findings --new{place}"
+        more = f"... {len(found) - MOST_ALARMS} more lines: crosscheck findings --new{place}"
         console.print(_folded(more, console))
 
 

@@ -10,11 +10,13 @@ from reports.tables import grid
 
 
 def counted(found: pd.DataFrame) -> Table:
-    """Number of cases of every scene, engine and profile, and of those that pass all judged checks."""
+    """Number of cases of every scene, engine and profile that can run it, and of those that pass all judged checks."""
     shown = grid("engine/profile", "scene", "cases", "pass", "fail", "no result")
     for (engine, profile, scene, dimension), cells in found.groupby(
         ["engine", "profile", "scene", "dimension"], sort=False
     ):
+        if (cells["outcome"] == "unsupported").all():
+            continue
         answered = cells[cells["outcome"].isin(["ok", "diverged"])]
         passing = int(answered["passes"].sum())
         words = (f"{engine}/{profile}", f"{scene} {dimension}-D", str(len(cells)), str(passing),

@@ -14,13 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from reports.cures import setting_text
-from reports.wording import number, quantity
+from reports.wording import FEW, first_of, number, quantity, roles_line, word_of
 from validation.cells import format_dt
 from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
-#: Largest number of scenes in a run's line; a quick suite has forty.
-FEW = 4
 #: Note below facts measured without an adapter.
 AFTERWARDS = (
     "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
@@ -66,8 +64,12 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
             shown["because"], last = "as above" if shown["because"] == last else shown["because"], shown["because"]
         table.add_row(*map(Text, shown.values()))
     console.print(table)
+    if what == "engines" and (line := roles_line((e["name"], name) for e in entries for name in e["profiles"])):
+        console.print(Text(line))
+    if what == "suites":
+        console.print(Text("Numbers of cases: each in 2-D and in 3-D where the scene has both."))
     if what == "checks" and not reasons:
-        console.print(Text("Reasons of tolerances: --reasons, or crosscheck describe SCENE."))
+        console.print(Text("First case of each scene, step 1/240 s. Reasons: --reasons, or describe SCENE"))
     for entry in entries:
         if entry.get("reason"):
             console.print(Text(f"{entry['name']}: {entry['reason']}"))
@@ -83,7 +85,7 @@ def _field(entry: Plain, name: str) -> str:
         return ", ".join(map(str, value))
     if name == "date":
         return str(value)[: len("2026-01-01T12:00")].replace("T", " ")
-    if name == "title":
+    if name == "title" and "finished" in entry:  # a run's, which names scenes
         return title_of(str(value))
     return setting_text(value) if value is not None else "-"
 
@@ -91,9 +93,10 @@ def _field(entry: Plain, name: str) -> str:
 def title_of(title: str) -> str:
     """A run's title, with the first few of many scenes."""
     asked, options, narrowing = title.partition(" --")
-    if len(scenes := asked.partition(": ")[2].split()) > FEW:
-        asked = f"{asked.partition(': ')[0]}: {' '.join(scenes[:FEW])} and {len(scenes) - FEW} more"
-    return f"{asked}{options}{narrowing}"
+    suite, colon, scenes = asked.partition(": ")
+    if len(scenes.split()) > FEW:
+        scenes = first_of(scenes.split())
+    return f"{suite}{colon}{scenes}{options}{narrowing}"
 
 
 def described(data: Plain, console: Console) -> None:
@@ -143,7 +146,8 @@ def _engine(data: Plain, console: Console) -> None:
     _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
     _unset(data, console)
     for profile, scenes in data["profiles"].items():
-        _heading(f"Profile {profile}", console)
+        word = word_of(data["name"], profile)
+        _heading(f"Profile {profile}" + (f" ({word})" if word else ""), console)
         _settings(scenes, console)
     if data["settable"]:
         _heading("What can be set (--set NAME=VALUE)", console)
@@ -179,13 +183,13 @@ def _unset(data: Plain, console: Console) -> None:
     table = grid("", "documented", "measured", "where it is documented")
     table.columns[0].no_wrap = False
     for row in rows:
-        table.add_row(*(Text(text) for text in (row["what"], row["documented"], _measured(row), row["source"])))
+        table.add_row(*(Text(text) for text in (row["what"], row["documented"], unset_text(row), row["source"])))
     console.print(table)
     for reason in dict.fromkeys(row["reason"] for row in rows if row["reason"]):
         console.print(Text(f"-: not measured: {reason}"))
 
 
-def _measured(row: Plain) -> str:
+def unset_text(row: Plain) -> str:
     """The measured behaviour without any settings, with a note if it differs from the documented one."""
     value = row["measured"]
     if value is None:

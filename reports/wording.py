@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from validation.posed import resolve
 
 #: Characters at which a spreadsheet starts a formula.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
+#: Largest number of names, as of scenes, in one line.
+FEW = 4
 #: Priority of marks of a group of rows: the first that occurs is its mark.
 MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
 LABELS = {
@@ -130,9 +132,15 @@ def quantity(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def measured(row: Mapping[str, Any], digits: int = 4) -> str:
-    """Measured value with its unit; a time beyond the end of the run is "never"."""
+    """Measured value with its unit; a time beyond the end of the run is "never".
+
+    A value that fails and prints as its truth is the truth and its error: ``1.751 + 3.1e-9 rad/s``.
+    """
     if row["reason"].startswith(NEVER):
         return NEVER
+    truth = number(row.get("truth"), digits)
+    if row.get("physics") == "fail" and row.get("error") and number(row["value"], digits) == truth:
+        return f"{truth} {'-' if row['error'] < 0 else '+'} {quantity(abs(row['error']), row['unit'], 2)}"
     return quantity(row["value"], row["unit"], digits)
 
 
@@ -179,6 +187,11 @@ def markdown(text: str) -> str:
 def params_text(params: Mapping[str, float]) -> str:
     """``e=0.8 height=1.03``."""
     return " ".join(f"{name}={value:g}" for name, value in params.items())
+
+
+def first_of(names: Sequence[str]) -> str:
+    """The names, or the first few of many: ``a, b, c, d and 7 more``."""
+    return ", ".join(names) if len(names) <= FEW else f"{', '.join(names[:FEW])} and {len(names) - FEW} more"
 
 
 def plural(count: int, noun: str) -> str:

@@ -145,6 +145,15 @@ def test_no_output_has_a_word_that_is_gone():
     assert [f"{where}: {words} in {text!r}" for where, text in texts if (words := found(text))] == []
 
 
+def test_no_page_has_a_word_that_is_gone():
+    """Templates of the report and the dashboard, without what they compute, code and tags."""
+    paths = [*(ROOT / "reports").rglob("*.html.j2"), *(ROOT / "docs").rglob("*.md.j2")]
+    texts = {path.name: re.sub(r"\{[{%#].*?[}%#]\}|<[^>]*>", "", path.read_text(encoding="utf-8")) for path in paths}
+    assert len(texts) > 15
+    told = ((name, found(without_code(text), [*GONE, *GONE_FROM_REASONS])) for name, text in texts.items())
+    assert {name: words for name, words in told if words} == {}
+
+
 def test_no_reason_has_a_phrase_that_is_gone():
     told = [*reasons(), *printed("adapters"), *printed("validation")]
     assert len(told) > 1000

@@ -108,7 +108,7 @@ FAMILIES = (
     "rebound", "materials", "grip and force", "stacks and statics", "friction", "turning", "many impacts", "hard",
 )  # fmt: skip
 
-#: A few cells a scene; those and others whose FAILs are listed row by row; those that map a scene out.
+#: A few cells a scene; those and others whose known failures are listed check by check; those that map a scene out.
 Suite = Literal["quick", "standard", "full"]
 SUITES: tuple[Suite, ...] = ("quick", "standard", "full")
 #: Parameters of a cell, as what differs from the scene's defaults.
@@ -349,9 +349,9 @@ class CanonicalScene:
     family
         Its group: one of `FAMILIES`, or another name.
     quick, standard, full
-        Cells of the suites. Quick: a few, which cover every kind of result. Standard: those whose FAILs are listed one
-        by one. Full: a map of the parameters, possibly without the defaults. A suite without cells uses those of the
-        suite before.
+        Cells of the suites. Quick: a few, which cover every kind of result. Standard: those whose known failures are
+        listed check by check. Full: a map of the parameters, possibly without the defaults. A suite without cells uses
+        those of the suite before.
     representative
         The cell that represents the scene: its noise floor is measured, and its motion is kept for the replay.
     planted

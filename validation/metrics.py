@@ -23,6 +23,8 @@ UNAVAILABLE = "the engine does not tell the impulses of these contacts"
 SEVERAL = "a corner of the plane is an edge in space, with contacts at both its ends"
 #: Reasons of a missing value that are no failure of the motion.
 UNTOLD = (UNAVAILABLE, SEVERAL)
+#: Reason of a missing value of a stored run that was made before its scene had this check.
+NEWER = "the check is newer than this run"
 #: Reason of a missing force where no step was recorded with contacts.
 NOT_RECORDED = "contacts were not recorded"
 #: Statistics of a quantity that is known step by step; spread is the standard deviation.

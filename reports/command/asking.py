@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -20,7 +21,7 @@ from reports.command.selection import WORKERS
 from reports.cures import cure_paste, cure_text, nothing_to_paste, recorded_fixes
 from reports.terminal import terminal
 from reports.wording import number, reproduce
-from validation.field import Finding, ask, matching
+from validation.field import CURED, Finding, ask, matching
 from validation.field.symptoms import matches, stems
 from validation.posed import resolve
 from validation.settings.cures import Cure, cures_of
@@ -48,7 +49,10 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     if not found:
         reason = f"nothing is known of {symptom!r}; see crosscheck list scenes, and crosscheck field for known reports"
         raise click.BadParameter(reason, param_hint="WORDS")
-    best, others = found[0], [other.scene for other in found[1:] if other.scene][:OTHERS]
+    best = found[0]
+    # Beside the best: what has as many of the words, or one that it does not have.
+    beside = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
+    others = [match.scene for match in beside if match.scene][:OTHERS]
     about = [best.report.engine] if best.report and "#" in text else named
     fixes = recorded_fixes(best.scene, about or registry.names())
     missed = [] if best.score == math.inf else [word for word in stems(symptom).values() if word not in best.words]
@@ -64,16 +68,16 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     console.print(Text(best.command or f"{best.scene}: {resolve(best.scene).title}", style="bold"), soft_wrap=True)
     if missed:
         console.print(Text(f"no match for: {', '.join(missed)}", style="dim"))
-    if best.report:
+    if best.report and (not about or {best.report.engine, best.report.about} & set(about)):
         console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
     if best.scene:
-        _show_fixes(best.scene, about, fixes, console)
+        _show_fixes(best.scene, about, fixes, text, console)
     if others:
         near = (f"{name} ({resolve(name).title.lower()})" for name in others)
         console.print(Text(f"or: {'; '.join(near)}", style="dim"))
 
 
-def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console: Console) -> None:
+def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], text: str, console: Console) -> None:
     for fix in fixes:
         console.print()
         console.print(Text(f"{fix.engine} as shipped: {fix.failing} of {fix.judged} checks fail", style="bold"))
@@ -86,11 +90,16 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], console
             console.print(
                 Text(f"{engine}: {'no failure is on record' if cures_of(engine) else 'has no table of fixes'}")
             )
+    if not fixes and not named:
+        console.print(Text("no failure of an engine as shipped is on record"))
     console.print()
     console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
     helped = [fix.engine for fix in fixes if fix.helps and fix.engine not in named]
     if helped:
-        console.print(Text(f"for lines to paste, add the engine: {', '.join(helped)}"))
+        engines = " or ".join(dict.fromkeys(helped))
+        console.print(
+            Text(f"lines to paste: name {engines}, as in: crosscheck ask {shlex.join(text.split())} {helped[0]}")
+        )
 
 
 @main.command("field", epilog="Example: crosscheck field stack")
@@ -141,12 +150,16 @@ def _broken(source: str, width: int) -> str:
 
 def _said(each: Finding) -> str:
     note = each.note
-    text = each.now + ("" if each.as_said else f" (the report says: {note.said})")
+    text = _word(each.now) + ("" if each.as_said else f" (the report says: {_word(note.said)})")
     if each.before is not None:
         text += f"\n{note.engine}/{note.profile} {note.scene} {note.dimension}-D: {note.metric} {_number(each.before)}"
     if each.after is not None:
         text += f"; with {note.cure_text}: {_number(each.after)}"
     return text
+
+
+def _word(said: str) -> str:
+    return "fixed" if said == CURED else said
 
 
 def _number(found: Reading) -> str:

@@ -9,7 +9,7 @@ import click
 
 from reports import changes as rendering
 from reports.command.group import AS_JSON, OUT, main
-from validation.judging.comparison import FAIL_ON, Kind, by_seriousness, compare_rows, compare_speeds, failing
+from validation.judging.comparison import FAIL_ON, by_seriousness, compare_rows, compare_speeds, failing
 
 
 @main.command(epilog="Example: crosscheck compare latest crosscheck-out/rows.jsonl")
@@ -45,7 +45,7 @@ def compare(
     if only_regressed:
         changes = [change for change in changes if change.regressed]
     if only_changed:
-        changes = [change for change in changes if change.kind not in (Kind.ADDED, Kind.REMOVED)]
+        changes = [change for change in changes if change.kind not in rendering.ONE_SIDED]
     render = rendering.as_json if as_json else rendering.as_markdown if markdown else rendering.as_text
     click.echo(render(changes, a, b), nl=False)
     sys.exit(1 if failing(changes, fail_on) else 0)

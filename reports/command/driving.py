@@ -68,8 +68,11 @@ def frontier(
         registry.find(name)
     found = brackets(names, engines, profiles_called(profile, engines), dim, quick)
     console, progress = terminal(), terminal(stderr=True)
+    said = None
     for still, _ in search(found, QUICK_RATIO if quick else FULL_RATIO, jobs):
-        progress.print(f"{still} of {len(found)} searches left", style="dim", highlight=False)
+        if still != said:
+            progress.print(f"{still} of {len(found)} searches left", style="dim", highlight=False)
+        said = still
     if as_json:
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
     else:
@@ -86,13 +89,16 @@ def _who(bracket: Bracket) -> str:
 
 def _show(found: list[Bracket], commands: bool, console: Console) -> None:
     kinds = dict.fromkeys((each.base.scene, each.frontier.name) for each in found)
+    meant = ""
     for scene, name in kinds:
         own = [each for each in found if (each.base.scene, each.frontier.name) == (scene, name)]
         first = own[0].frontier
         console.print()
         params = " ".join(f"{k}={v:g}" for k, v in first.params.items())
         console.print(Text(f"{name} ({scene}{' ' + params if params else ''})", style="bold"))
-        console.print(Text(f"works if it {first.survives}", style="dim"))
+        if first.survives != meant:
+            console.print(Text(f"works if it {first.survives}", style="dim"))
+        meant = first.survives
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 2))
         for heading in ("engine, profile", "works", "fails", "how"):
             table.add_column(heading)

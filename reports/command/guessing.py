@@ -53,7 +53,9 @@ def nulls(scenes: tuple[str, ...], param: tuple[str, ...], dim: tuple[int, ...],
         return
     console = terminal()
     for head in dict.fromkeys((row["scene"], row["dimension"], params_text(row["params"])) for row in rows):
-        console.print(Text(f"{head[0]} {head[1]}-D{' ' + head[2] if head[2] else ''}: errors", style="bold"))
+        console.print(
+            Text(f"{head[0]} {head[1]}-D{' ' + head[2] if head[2] else ''}: errors of trivial answers", style="bold")
+        )
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         for heading in ("check", "truth", "tolerance", *NULLS):
             table.add_column(heading, overflow="fold", no_wrap=heading == "check")

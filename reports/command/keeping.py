@@ -17,13 +17,13 @@ from validation.records.store import Store
 
 
 @main.command(epilog="Example: crosscheck merge other-out")
-@click.argument("sources", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
+@click.argument("sources", metavar="FOLDER...", nargs=-1, required=True, type=FOLDER)
 @AS_JSON
 @OUT
 def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
     """Add the runs of other folders to this one.
 
-    STOREs are results folders. Runs that OUT has already are skipped.
+    FOLDERs have results of `run`. Runs that OUT has already are skipped.
     """
     merged = {}
     for source in sources:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,7 +16,8 @@ from adapters import registry
 from adapters.experiment import Experiment
 from reports.terminal import terminal
 from reports.wording import number, params_text, quantity, reproduce
-from validation.findings import FindingsError
+from validation.cells import slot_from_dict
+from validation.findings import FindingsError, row_key
 from validation.findings.files import findings_of
 from validation.settings.proofs import Proof, experiments_on, prove
 from validation.settings.switching import Reading
@@ -45,9 +46,18 @@ def chosen(reason: str, engines: Sequence[str]) -> dict[str, list[Experiment]]:
         raise FindingsError(f"prove: the cause {reason!r} has no experiment (in families.toml of its engine)")
     if not found:
         close = ", ".join(map(repr, difflib.get_close_matches(reason, dict.fromkeys(families), n=NEAREST, cutoff=0.5)))
-        hint = f"did you mean {close}?" if close else "`crosscheck findings` lists causes"
+        hint = f"did you mean {close}?" if close else "crosscheck explain names that of a known failure"
         raise FindingsError(f"prove: none of {len(families)} causes is called {reason!r}; {hint}")
     return found
+
+
+def proof_of(row: Mapping[str, Any]) -> str:
+    """The command that tests the cause of a row that is on record; empty where the cause has no experiment."""
+    known = findings_of(row["engine"])
+    member = known.members.get(row_key(slot_from_dict(row["slot"]), row["metric"])) if known else None
+    if member is None or member.family.id not in {each.family for each in experiments_on(row["engine"])}:
+        return ""
+    return f"crosscheck findings --prove {member.family.id}"
 
 
 def prove_and_show(reason: str, engines: Sequence[str], as_json: bool) -> None:

@@ -17,7 +17,7 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.showing import which
 from reports.stages import say, stage
 from reports.terminal import terminal
-from reports.wording import missing_text, plural
+from reports.wording import missing_text
 from validation.records.store import MissingError, Store
 
 
@@ -77,8 +77,9 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
         store.close()
         if not found:
             raise MissingError(f"out: {out} has no finished run of a scene to show")
+        shown = sum(len(panel.points) > 1 for panel in found)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(render(found, f"{plural(len(found), 'panel')}{made}", reports), encoding="utf-8")
+        path.write_text(render(found, f"{shown} series{made}", reports), encoding="utf-8")
     moved = sum(len(events(panel)) for panel in found)
     result = {"path": str(path), "panels": len(found), "moved": moved}
     click.echo(json.dumps(result) if as_json else str(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,17 +22,18 @@ from reports import speed
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.proving import prove_and_show
+from reports.command.proving import proof_of, prove_and_show
 from reports.command.selection import SET
 from reports.cures import ROLES, Change, changes, fix, how_measured, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.tables import title_of
-from reports.terminal import terminal
+from reports.terminal import print_roles, terminal
 from reports.wording import (
     LABELS,
     at,
+    first_of,
     mark_of,
     measured,
     missing_text,
@@ -42,6 +44,7 @@ from reports.wording import (
     quantity,
     reproduce,
     row_id,
+    word_of,
 )
 from validation.bench import reading
 from validation.cells import Observation, Slot, checks_of
@@ -249,7 +252,9 @@ def findings(
     for name, asked in wanted.items():
         there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
         if absent := [one for one in asked if one not in there]:
-            raise SceneError(f"--{name}: this run has no check of {absent[0]!r}, but of {', '.join(there)}")
+            close = difflib.get_close_matches(absent[0], there, n=1)
+            hint = f", did you mean {close[0]!r}?" if close else f", but of {first_of(there)}"
+            raise SceneError(f"--{name}: this run has no check of {absent[0]!r}{hint}")
     # A study never joins cases of two engines, profiles or scenes, so this selection changes no row.
     rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
     if new:
@@ -295,6 +300,7 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str, pla
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
+    print_roles(((family.engine, family.profile) for family in found), console)
     said = f"crosscheck explain ID{place} says everything about a check; --all lists every check."
     console.print(Text(said), style="dim")
 
@@ -320,10 +326,11 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
         who = f"{row['engine']}/{row['profile']} {row['scene']}"
         table.add_row(row_id(row), LABELS[mark_of(row)], who, _worst(row))
     console.print(table, highlight=False)
+    print_roles(((row["engine"], row["profile"]) for row in rows), console)
 
 
 @main.command(epilog="Example: crosscheck explain ENGINE/default/bounce")
-@click.argument("row", shell_complete=row_ids)
+@click.argument("row", metavar="CHECK", shell_complete=row_ids)
 @click.argument("run", default="latest")
 @click.option("--run", "named", hidden=True)
 @SET
@@ -332,9 +339,9 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
 def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json: bool, out: Path) -> None:
     """Explain one check: values, truth, tolerance, cause and fix.
 
-    ROW is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the check
-    with the largest error there; SCENE may be a scene file, by its path or its name. With --set, PROFILE has these
-    settings of your own. RUN is an id that `list runs` prints; the latest by default.
+    CHECK is an id that `findings` prints (or its first digits), or ENGINE/PROFILE/SCENE[/METRIC], which means the
+    check with the largest error there; SCENE may be a scene file, by its path or its name. With --set, PROFILE has
+    these settings of your own. RUN is an id that `list runs` prints; the latest by default.
     """
     asked, row = row, _with_settings(row, set)
     kept = observed(out, named or run)
@@ -391,7 +398,7 @@ def _with_settings(row: str, sets: Sequence[str]) -> str:
     engine, slash, rest = row.partition("/")
     profile, more, where = rest.partition("/")
     if sets and not (slash and more):
-        raise SceneError(f"set: names a profile; say ENGINE/PROFILE/SCENE in the place of {row!r}")
+        raise SceneError(f"set: changes a profile; name the check as ENGINE/PROFILE/SCENE, not {row!r}")
     return f"{engine}{slash}{profile}{suffix_of(given(sets))}{more}{where}"
 
 
@@ -423,7 +430,9 @@ def _needed(observations: Sequence[Observation], name: str) -> list[Observation]
         slots = [slot for found, slot in ids_of(observations) if found.startswith(name.lower())]
         if len(slots) != 1:
             many = f"the ids of {len(slots)} checks begin" if slots else "no id of this run begins"
-            raise SceneError(f"row: {many} with {name!r}; crosscheck findings lists ids")
+            raise SceneError(
+                f"check: {many} with {name!r}; crosscheck findings lists ids; or name it ENGINE/PROFILE/SCENE"
+            )
         keys = [("engine", slots[0].engine), ("scene", slots[0].scene)]
     return [one for one in observations if all(getattr(one.slot, key) == value for key, value in keys)]
 
@@ -489,7 +498,7 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         if metric:
             fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
         if not fits:
-            raise SceneError(f"row: this run has no check {name!r}; crosscheck findings lists what fails")
+            raise SceneError(f"check: this run has no check {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)
     return next(row for row in rows if row_id(row).startswith(name.lower()))
 
@@ -559,9 +568,10 @@ def _print_explanation(
     table.columns[0].no_wrap = True
     off = f" = {_ratio(row)} tolerances" if severity(row) else ""
     skill, invalid = skill_text(row), row["outcome"] == "invalid"
+    role = f" ({word})" if (word := word_of(row["engine"], row["profile"])) else ""
     lines = [
         ("check", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
-        ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}"),
+        ("engine", f"{row['engine']} {row['engine_version']}, profile {row['profile']}{role}"),
         ("case", f"{asked}; step {number(row['dt'], 4)} s, iterations: {iterations}"),
         ("measured", _measured_text(row)),
         ("truth", f"{quantity(row['truth'], row['unit'], 8)}   ({row['source']})"),
@@ -580,6 +590,7 @@ def _print_explanation(
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
     recorded = told_cure(row) if mark_of(row) != "pass" else ""
     lines += [("smallest fix" if better else "fix", recorded)] if recorded else []
+    lines += [("test cause", proof)] if mark_of(row) == "known" and (proof := proof_of(row)) else []
     lines.append(("run again", again))
     for name, text in lines:
         table.add_row(Text(name, style="bold"), Text(text))

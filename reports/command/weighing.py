@@ -70,4 +70,7 @@ def _show(found: list[Residuals]) -> None:
             console.print(Text(f"  {line}", style="dim"))
     console.print()
     print_roles(((each.slot.engine, each.slot.profile) for each in found), console)
-    console.print(Text("; ".join(f"{name}: {law}" for name, law in LAWS.items()), style="dim"))
+    laws = "; ".join(f"{name}: {law}" for name, law in LAWS.items())
+    console.print(
+        Text(f"Largest violation of each law, as a share of the largest impulse or work: {laws}", style="dim")
+    )

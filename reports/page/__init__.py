@@ -22,14 +22,14 @@ import minify_html
 from markupsafe import Markup
 
 from reports.answers import Answer, answers
-from reports.matrix import leaving, unranked
+from reports.matrix import leaving, newer, unranked
 from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, fixing, opening, replay, takeaway, verdicts
 from reports.page.families import families
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, heat_style, symbols
-from reports.wording import missing_text, number
+from reports.wording import missing_text, number, word_of
 from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
 from validation.cells import format_dt
@@ -90,7 +90,7 @@ def render(source: Source) -> str:
             grounds=verdicts.GROUNDS,
             meanings=verdicts.MEANINGS,
             marks_used=_marks_used(source),
-            beside=[*unranked(source.columns), *leaving(source.rows)],
+            beside=[*unranked(source.columns), *leaving(source.rows), *newer(source.rows)],
         )
     )
     return minify_html.minify(page)  # style and scripts must stay the same: the policy has their hashes
@@ -131,7 +131,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "dt": format_dt, "data": as_data}
-    environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text}
+    environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text, "word_of": word_of}
     return environment
 
 
@@ -176,7 +176,7 @@ def cite(source: Source) -> dict[str, str]:
     lines.append(again("run", run.title))
     if source.bench is not None:
         lines.append(again("bench", source.bench.run.title.removeprefix("bench ")))
-    lines += ["crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run"]
+    lines += ["crosscheck report --out again", "crosscheck compare FOLDER again   # FOLDER: that of this run"]
     return {"text": text, "commands": "\n".join(lines if clean else lines[1:])}
 
 

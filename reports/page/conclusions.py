@@ -153,7 +153,7 @@ def wrongs(source: Source) -> str:
         return said + ("Nothing else fails." if alarms else "Every failure is what the contact model predicts.")
     worst = max(listed, key=lambda row: ratio_of(row) or 0.0)
     unlisted = f" ({counts['fail']} of engines of which nothing is on record)" if counts["fail"] else ""
-    head = "" if alarms else "Nothing is new, drifted, invalid or crashed. "
+    head = "" if alarms else "Nothing is new, changed, invalid or crashed. "
     return f"{said}{head}{len(listed)} checks fail for other causes{unlisted}; the largest is {_row_text(worst)}."
 
 

@@ -63,16 +63,11 @@ def sentence(source: Source, scenes: Sequence[str]) -> str:
     for engine, own in asked.items():
         without = [scene for scene in own if not clean[scene].get(engine)]
         if own and not without:
-            whole.append(engine if len(own) == len(scenes) else f"{engine} ({len(own)} of them)")
+            whole.append(engine if len(own) == len(scenes) else f"{engine} ({len(own)} of {len(scenes)} run)")
         elif without:
             where = joined(without) if len(without) <= FEW else f"{len(without)} of {len(own)}"
-            lacking.append(f"{engine} has none for {where}")
+            lacking.append(f"{engine} fails {where}")
     if not whole and not lacking:
         return "No engine gave an answer that is judged."
-    said = f"{plural(len(scenes), 'scene')}. "
-    if whole:
-        has = "has" if len(whole) == 1 else "each have"
-        said += f"{joined(whole)} {has} a profile that passes everything{'; ' if lacking else '.'}"
-    if lacking:
-        said += f"{'' if whole else 'No engine passes everything: '}{joined(lacking)}."
-    return said
+    passing = [f"{joined(whole)} {'passes' if len(whole) == 1 else 'pass'} every check"] if whole else []
+    return f"{plural(len(scenes), 'scene')}. With its best profile for each: {'; '.join([*passing, *lacking])}."

@@ -26,7 +26,7 @@ SAID = {
     "known": ("✗", "known"),
     "fail": ("✗", "FAIL"),
     "new": ("✗", "NEW"),
-    "drifted": ("✗", "DRIFTED"),
+    "drifted": ("✗", "CHANGED"),
     "diverged": ("✗", "DIVERGED"),
     "invalid": ("!", "INVALID"),
     "crashed": ("!", "CRASHED"),
@@ -46,15 +46,15 @@ MEANINGS = {
     "known": "fails; cause and value are on record",
     "fail": "fails; nothing is on record for this engine, or only for the standard suite",
     "new": "fails or has no value; not on record",
-    "drifted": "fails by another amount than is on record or predicted",
+    "drifted": "another value than is on record or predicted",
     "diverged": "the state exploded or stopped being finite",
-    "invalid": "the profile does not realise what it declares (see its property checks)",
+    "invalid": "the measurement is broken, so that nothing is judged",
     "crashed": "the engine raised an error or killed its process",
     "timed_out": "no answer in time",
     "missing": "planned, but the run has nothing of it",
     "unsupported": "not supported by this engine",
     "not_installed": "the engine is not installed here",
-    "none": "the engine does not report what this needs",
+    "none": "not measured, or without a tolerance",
 }
 
 

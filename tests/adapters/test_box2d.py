@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("Box2D", reason="Box2D is set apart: pip install -e '.[box2d]'")
+pytest.importorskip("Box2D", reason="Box2D is optional: pip install -e '.[box2d]'")
 
 from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import BLOWS, DEVIATIONS

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("pyb2d3", reason="Box2D 3.1 is set apart: pip install -e '.[box2d3]'")
+pytest.importorskip("pyb2d3", reason="Box2D 3.1 is optional: pip install -e '.[box2d3]'")
 
 from adapters.box2d3 import Box2D3Engine
 from adapters.box2d3.ball_on_plane import ball_law

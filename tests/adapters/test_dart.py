@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-pytest.importorskip("dartpy", reason="DART is set apart: pip install -e '.[dart]'")
+pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
 
 from adapters.conformance import items
 from adapters.dart import DartEngine

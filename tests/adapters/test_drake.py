@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-pytest.importorskip("pydrake", reason="Drake is set apart: pip install -e '.[drake]'")
+pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
 
 from adapters.conformance import items
 from adapters.drake import DrakeEngine

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-pytest.importorskip("dartpy", reason="DART is set apart: pip install -e '.[dart]'")
+pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
 
 from adapters.dart import DartEngine
 from adapters.dart.laws import DEVIATIONS

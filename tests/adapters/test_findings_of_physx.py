@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("sapien", reason="PhysX is set apart: pip install -e '.[physx]'")
+pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
 
 from adapters.needs import needs
 from adapters.physx import PhysxEngine

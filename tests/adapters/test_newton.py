@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("newton", reason="Newton is set apart: pip install -e '.[newton]'")
+pytest.importorskip("newton", reason="Newton is optional: pip install -e '.[newton]'")
 
 from adapters.conformance import items
 from adapters.drives import Harmonic

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("sapien", reason="PhysX is set apart: pip install -e '.[physx]'")
+pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
 
 from adapters.conformance import items
 from adapters.drives import Harmonic

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("rapier3d", reason="Rapier is set apart: pip install -e '.[rapier]'")
+pytest.importorskip("rapier3d", reason="Rapier is optional: pip install -e '.[rapier]'")
 
 from adapters.conformance import items
 from adapters.engine import EngineError

@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-pytest.importorskip("rapier3d", reason="Rapier is set apart: pip install -e '.[rapier]'")
+pytest.importorskip("rapier3d", reason="Rapier is optional: pip install -e '.[rapier]'")
 
 from adapters.lift import lift
 from adapters.needs import needs

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("pydrake", reason="Drake is set apart: pip install -e '.[drake]'")
+pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
 
 from adapters.drake import DrakeEngine
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-pytest.importorskip("pydrake", reason="Drake is set apart: pip install -e '.[drake]'")
+pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
 
 from adapters import registry
 from adapters.drake.engine import DrakeEngine

@@ -67,7 +67,7 @@ def test_an_engine_that_is_named_gets_its_numbers_and_the_lines_to_paste():
     assert all(line in said for line in cure_paste(fix).splitlines()), "as `cure` prints them, unbroken"
     assert said.count("\n") <= 24, "one screen"
     without = asked("grip", "slips")
-    assert cure_paste(fix).splitlines()[0] not in without and "add the engine: bullet, mujoco" in without
+    assert cure_paste(fix).splitlines()[0] not in without and "crosscheck ask grip slips bullet" in without
 
 
 def test_names_of_packages_are_names_of_engines():
@@ -76,6 +76,34 @@ def test_names_of_packages_are_names_of_engines():
 
 def test_a_question_about_releases_leads_to_the_command_that_answers_it():
     assert asked("results", "changed", "with", "a", "release").startswith("crosscheck bisect ")
+
+
+@pytest.mark.parametrize("words", ["it is slow", "the simulation is too slow", "my sim is slow in mujoco"])
+def test_a_question_about_time_leads_to_the_bench(words):
+    """A slow ball is a symptom of a scene; of a question that has nothing else the command comes first."""
+    assert asked(*words.split()).startswith("crosscheck bench ")
+
+
+@pytest.mark.parametrize("words", ["the ball won't bounce", "the ball doesn\N{RIGHT SINGLE QUOTATION MARK}t bounce"])
+def test_an_apostrophe_divides_no_word(words):
+    said = asked(*words.split())
+    assert said.startswith("bounce: ") and "no match for" not in said
+
+
+def test_beside_the_best_scene_stand_those_with_as_many_of_the_words_or_another_one():
+    best, *others = matches("tower of blocks falls over")
+    named = json.loads(asked("tower", "of", "blocks", "falls", "over", "--json"))["others"]
+    told = {other.scene: set(other.words) for other in others}
+    assert named and all(len(told[s]) >= len(best.words) or told[s] - set(best.words) for s in named)
+
+
+def test_a_report_about_another_engine_than_the_one_that_is_named_is_left_out():
+    assert "known report bulletphysics" in asked("ball", "rolls", "straight", "on", "curves")
+    assert "known report" not in asked("ball", "rolls", "straight", "on", "curves", "pymunk")
+
+
+def test_a_scene_without_a_failure_on_record_says_so():
+    assert "no failure of an engine as shipped is on record" in asked("energy", "grows", "at", "each", "collision")
 
 
 def test_what_is_not_known_is_said():

@@ -61,16 +61,26 @@ def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
     lines = as_text([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B).splitlines()
     assert lines[:5] == [*header(A, B), headline([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED])]
     assert sorted(lines[5:]) == sorted([
-        "newly failing: bullet/tuned stack 2-D n=5 drift: pass 1e-6 m -> FAIL 3e-3 m +2.5 tol [3.2.6 -> 3.2.7], "
-        "and 1 more like it",
+        "newly failing: bullet/tuned stack 2-D n=5 drift: pass 1e-6 m -> FAIL 3e-3 m error +2.5 tolerances "
+        "[3.2.6 -> 3.2.7], and 1 more like it",
         f"{Kind.ERROR.value} (not worse): bullet/tuned stack 2-D n=5 interface_impulse[3]: pass 1e-6 m -> "
-        "FAIL 3e-3 m -0.25 tol",
+        "FAIL 3e-3 m error -0.25 tolerances",
         f"{Kind.SPEED.value} (not worse): bullet/tuned stack 2-D n=5 time: pass 1e-6 m -> FAIL 3e-3 m x0.5",
         *3 * [f"    {again}"],
-        f"{Kind.REMOVED.value}: bullet/tuned stack interface_impulse: 2 checks",
-        f"{Kind.ADDED.value}: bullet/tuned incline creep: 1 check",
+        f"{Kind.REMOVED.value}: bullet/tuned: 2 checks of stack",
+        f"{Kind.ADDED.value}: bullet/tuned: 1 check of incline",
     ])  # fmt: skip
     assert as_text([], A, A).endswith("nothing changed\n")
+
+
+def test_checks_of_one_side_are_a_line_for_each_profile_with_its_first_scenes_and_roles_stand_below():
+    scenes = ["arch", "bounce", "cradle", "domino", "edge_drop", "flat_box"]
+    gone = [replace(GONE, engine="mujoco", profile="default", scene=scene, metric=m) for scene in scenes for m in "ab"]
+    assert as_text(gone, A, B).splitlines()[5:] == [
+        f"{Kind.REMOVED.value}: mujoco/default: 12 checks of arch, bounce, cradle, domino and 2 more",
+        "Profiles: default: as shipped.",
+    ]
+    assert as_markdown(gone, A, B).endswith("\n\nProfiles: default: as shipped.\n")
 
 
 def test_a_change_without_a_size_says_none():
@@ -87,8 +97,10 @@ def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
         *[f"* {line}" for line in header(A, B)], "",
         "| change | | checks | where | metric | before | after | size |",
         "|---|---|---|---|---|---|---|---|",
-        f"| {flip} | worse | 2 | bullet/tuned stack 2-D n=5 | `drift` | pass 1e-6 m | FAIL 3e-3 m | +2.5 tol |",
-        f"| {value} |  | 1 | bullet/tuned stack 2-D n=5 | `a\\|b'c` | &lt;1&gt; | 2 &amp; 3 | -0.25 tol |", "",
+        f"| {flip} | worse | 2 | bullet/tuned stack 2-D n=5 | `drift` | pass 1e-6 m | FAIL 3e-3 m | "
+        "error +2.5 tolerances |",
+        f"| {value} |  | 1 | bullet/tuned stack 2-D n=5 | `a\\|b'c` | &lt;1&gt; | 2 &amp; 3 | "
+        "error -0.25 tolerances |", "",
     ])  # fmt: skip
     assert "| change |" not in as_markdown([], A, B)
 
@@ -182,8 +194,9 @@ def test_a_release_that_is_not_there_is_refused_with_those_that_are(released, tm
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (replace(FLIP, kind=Kind.SPEED, size=0.123456), "x0.123"), (replace(FLIP, size=0.123456), "+0.123 tol"),
-        (replace(FLIP, size=-0.5), "-0.5 tol"), (replace(FLIP, size=0.0), ""),
+        (replace(FLIP, kind=Kind.SPEED, size=0.123456), "x0.123"),
+        (replace(FLIP, size=0.123456), "error +0.123 tolerances"),
+        (replace(FLIP, size=-0.5), "error -0.5 tolerances"), (replace(FLIP, size=0.0), ""),
     ],
 )  # fmt: skip
 def test_sizes_have_a_sign_where_they_are_differences_and_three_digits(change, said):

@@ -49,6 +49,7 @@ def call(*arguments, **kwargs):
         (["run", "bounce", "--iterations", "0"], "iterations"),
         (["run", "nowhere.toml"], "cannot read nowhere.toml"),
         (["describe", "nothing"], "nothing is called 'nothing'"),
+        (["describe", "bounc"], "nothing is called 'bounc'; did you mean 'bounce'?"),
         (["list", "engines-and-more"], "engines-and-more"),
         (["check-adapter", "chipmonk"], "did you mean 'chipmunk'"),
     ],

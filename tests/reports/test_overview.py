@@ -121,7 +121,7 @@ def test_what_cannot_be_asked_is_told_apart_from_what_passes():
     assert next(line for line in lines if line.startswith("  only")).split()[1:] == ["-"] * 3 + ["pass"] + ["-"] * 4
     said = dict(overview.choices(rows, overview.families_of(rows)))
     many = len(overview.families_of(rows)["stacks and statics"])
-    assert f"flat/only (1 of {many} scenes)" in said["stacks and statics"] and "flat" not in said["rebound"]
+    assert f"flat/only (1 of {many} scenes run)" in said["stacks and statics"] and "flat" not in said["rebound"]
     assert "A dash: the engine cannot run these scenes." in " ".join(" ".join(lines).split())
 
 

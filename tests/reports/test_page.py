@@ -358,8 +358,8 @@ def test_a_familys_marks_count_the_rows_of_its_scenes(page_source):
 
 def test_the_sentence_of_a_family_changes_when_the_physics_of_the_data_flips():
     base, flipped = (sentence(golden(name), ["bounce"]) for name in ("base", "flip"))
-    assert "a profile that passes everything" in base and "has none for" not in base
-    assert "has none for bounce" in flipped
+    assert "every check" in base and " fails " not in base
+    assert "fails bounce" in flipped
 
 
 # ---- choice, cures, explorer ----
@@ -493,7 +493,7 @@ def test_a_page_is_made_of_whatever_there_is(page_source, missing):
         source = Source(page_source.run, page_source.rows, page_source.observations, **kept)
     page = render(source)
     said = {
-        "bench": "no bench in this store yet",
+        "bench": "This folder has no bench yet",
         "replays": "kept no recordings",
         "everything": "No check has a result",
     }

@@ -6,9 +6,10 @@ import pytest
 from click.testing import CliRunner
 
 from reports.command import main, proving, statuses
-from reports.command.proving import chosen
+from reports.command.proving import chosen, proof_of
 from validation.canonical import Check
-from validation.cells import Slot
+from validation.cells import Slot, parse_dt
+from validation.findings.files import findings_of
 from validation.settings.proofs import Proof, experiments_on
 from validation.settings.switching import Reading
 
@@ -19,7 +20,10 @@ def run(*arguments):
 
 @pytest.mark.parametrize(
     ("asked", "hint"),
-    [("stack-touching", "you mean 'stack-touching-start'"), ("phlogiston", "`crosscheck findings` lists causes")],
+    [
+        ("stack-touching", "you mean 'stack-touching-start'"),
+        ("phlogiston", "crosscheck explain names that of a known failure"),
+    ],
 )
 def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, hint):
     """Hundreds of names are no hint."""
@@ -28,6 +32,20 @@ def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, 
     (said,) = (line for line in result.output.splitlines() if asked in line)
     assert f"causes is called {asked!r}" in said and hint in said
     assert len(said) < 240
+
+
+def test_a_failure_on_record_has_the_command_that_tests_its_cause_if_there_is_an_experiment():
+    """Else nothing printed would say by which name `--prove` knows a cause."""
+    known, tested = findings_of("bullet"), {each.family for each in experiments_on("bullet")}
+    found = {}
+    for (profile, scene, dimension, params, dt, iterations, metric), finding in known.members.items():
+        values = tuple((name, float(value)) for name, _, value in (each.partition("=") for each in params.split()))
+        count = int(iterations) if iterations else None
+        slot = Slot(scene, values, int(dimension), "bullet", profile, parse_dt(dt), count)
+        found[finding.family.id] = proof_of({"engine": "bullet", "slot": slot.as_dict(), "metric": metric})
+    assert {name for name, command in found.items() if command} == tested & set(found) != set()
+    assert all(command == f"crosscheck findings --prove {name}" for name, command in found.items() if command)
+    assert proof_of({"engine": "bullet", "slot": slot.as_dict(), "metric": "none"}) == ""
 
 
 def test_all_means_every_experiment_of_the_chosen_engines():
@@ -75,6 +93,11 @@ def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
     assert result.exit_code == statuses.ALARM
     said = [line.split()[0] for line in result.stdout.splitlines() if "PROVEN" in line]
     assert said == ["PROVEN", "NOT"] and "1 of 2 experiments confirm their cause" in result.stdout
+
+
+def test_a_name_with_a_slip_is_answered_with_the_nearest_and_not_with_all(page_folder):
+    said = run("--out", str(page_folder), "--scene", "bounc").stderr
+    assert said.endswith("this run has no check of 'bounc', did you mean 'bounce'?\n")
 
 
 def test_a_ratio_is_told_without_its_unit_of_one():

@@ -94,7 +94,7 @@ def test_a_known_finding_is_an_expected_failure_with_its_reason(repository):
 
 def test_a_finding_of_this_release_that_passes_fails(repository):
     output = repository(listed=SLOW, releases="<=1.0", options=ASK, status=1)
-    assert counts(output)["failed"] == 3 and "passes, but is listed with 0.5" in output
+    assert counts(output)["failed"] == 3 and "passes, but on record with 0.5" in output
 
 
 def test_a_finding_of_other_releases_that_passes_is_mended(repository):

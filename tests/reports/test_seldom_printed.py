@@ -367,7 +367,7 @@ def test_a_page_says_how_it_is_cited_and_made_again(monkeypatch, title, again):
     )
     lines = [
         'pip install -e ".[all]" -c constraints.txt', f"crosscheck run {again} --out again",
-        "crosscheck report --out again", "crosscheck compare LEFT again   # LEFT: the folder of this run",
+        "crosscheck report --out again", "crosscheck compare FOLDER again   # FOLDER: that of this run",
     ]  # fmt: skip
     assert told("")["commands"].splitlines() == lines
     assert told("abc")["commands"].splitlines() == ["git checkout abc", *lines]

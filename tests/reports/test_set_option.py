@@ -107,7 +107,7 @@ def test_what_explain_cannot_find_is_one_line(ran):
     done = call("explain", "chipmunk/default/bounce", "--set", "damping=0.25", "--out", ran[0], status=2)
     assert "no check 'chipmunk/default+damping=0.25/bounce'" in done.output
     done = call("explain", "0123abcd", "--set", "damping=0.25", "--out", ran[0], status=2)
-    assert "set: names a profile; say ENGINE/PROFILE/SCENE in the place of '0123abcd'" in done.output
+    assert "set: changes a profile; name the check as ENGINE/PROFILE/SCENE, not '0123abcd'" in done.output
 
 
 @pytest.mark.parametrize(

@@ -516,7 +516,7 @@ def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
 def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
     out, _ = two_engines
     result = call("explain", name, "--out", out)
-    assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1 and "row:" in result.stderr
+    assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1 and "check: " in result.stderr
 
 
 @pytest.mark.parametrize(

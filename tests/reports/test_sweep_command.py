@@ -24,6 +24,12 @@ def call(*words, status=0):
     return done
 
 
+def test_a_dimension_that_an_engine_does_not_have_is_no_line_of_the_summary(tmp_path):
+    told = call("sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--out", tmp_path).output
+    assert "impact 2-D" in told and "impact 3-D" not in told
+    assert set(pd.read_csv(tmp_path / "sweep.csv").dimension) == {2, 3}
+
+
 def test_grids_and_lists_are_crossed_and_points_are_drawn_together():
     study = Study(dict([grid("e=0:1:3"), listed("v=1,2")]), [{"mass": 1.0}, {"mass": 2.0}])
     cells = list(study)

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 import reports
 from reports import exports, listing
 from reports.command import main
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.posed import pinned
 from validation.records.store import Store
@@ -211,6 +212,18 @@ def test_what_is_listed_and_described_fits_every_width_and_is_cut_off_at_none(wo
     assert sizes == sorted(sizes, reverse=True)  # room that is there is used
 
 
+def test_titles_of_scenes_are_listed_whole():
+    """One with a colon was cut as the title of a run that names many scenes."""
+    told = " ".join(CliRunner(env={"COLUMNS": "400"}).invoke(main, ["list", "scenes"]).stdout.split())
+    assert all(" ".join(scene.title.split()) in told for scene in CATALOGUE.values())
+
+
+def test_profiles_are_listed_and_described_with_their_roles():
+    assert "Profiles: classical: textbook; reference: exact; default: as shipped" in call("list", "engines").stdout
+    told = call("describe", "chipmunk").stdout.splitlines()
+    assert "Profile default (as shipped)" in told and "Profile tuned" in told
+
+
 def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     """The title of a quick suite names forty-six scenes: a screen for every run."""
     store = Store(tmp_path)
@@ -220,7 +233,7 @@ def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
     store.close()
     result = call("list", "runs", "--out", tmp_path)
     many, few = (line for line in result.stdout.splitlines() if "quick:" in line)
-    assert "quick: scene0 scene1 scene2 scene3 and 42 more --dim 2" in many and "scene4" not in many
+    assert "quick: scene0, scene1, scene2, scene3 and 42 more --dim 2" in many and "scene4" not in many
     assert "quick: scene0 scene1 scene2 scene3 " in few and "more" not in few
     plain = json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)
     assert plain[0]["title"].split()[1:-2] == names and plain[0]["date"][:16].replace("T", " ") in many

@@ -10,6 +10,7 @@ from adapters import registry
 from reports.wording import (
     ROLE_WORDS,
     cell,
+    first_of,
     mark_of,
     markdown,
     measured,
@@ -46,6 +47,22 @@ def test_digits_are_four_unless_somebody_asks():
 
 def test_a_time_that_the_end_cut_off_is_no_time():
     assert measured({"value": 5.0, "unit": "s", "reason": "never settled: still moving"}) == "never settled"
+
+
+@pytest.mark.parametrize(
+    ("value", "truth", "unit", "physics", "said"),
+    [(1.751000003, 1.751, "rad/s", "fail", "1.751 + 3.0e-9 rad/s"), (0.999999, 1.0, "1", "fail", "1 - 1.0e-6"),
+     (-1.751000003, -1.751, "rad/s", "fail", "-1.751 - 3.0e-9 rad/s"), (1.752, 1.751, "rad/s", "fail", "1.752 rad/s"),
+     (1.751000003, 1.751, "rad/s", "pass", "1.751 rad/s"), (1.751, 1.751, "rad/s", "fail", "1.751 rad/s")],
+)  # fmt: skip
+def test_a_failing_value_that_prints_as_its_truth_is_told_by_its_error(value, truth, unit, physics, said):
+    row = {"value": value, "truth": truth, "error": value - truth, "unit": unit, "physics": physics, "reason": ""}
+    assert measured(row) == said
+
+
+def test_of_many_names_the_first_are_said_and_how_many_more():
+    assert (first_of([]), first_of(list("abcd"))) == ("", "a, b, c, d")
+    assert first_of(list("abcdef")) == "a, b, c, d and 2 more"
 
 
 def test_a_plain_number_keeps_the_digits_it_was_asked_for():

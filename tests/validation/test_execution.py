@@ -62,7 +62,12 @@ def test_a_measure_that_is_not_finite_is_a_missing_value_with_its_reason(monkeyp
     monkeypatch.setattr(execution, "prepare", lambda slot: replace(prepared, canonical=canonical))
     observation = observed(monkeypatch, HOLDS)
     assert observation.outcome is Outcome.OK
-    assert observation.metrics == {
+    stated = {check.metric for check in prepared.canonical.checks(prepared.scene, SLOT.dt)}
+    assert set(observation.metrics) == stated
+    assert {name: observation.metrics[name] for name in stated - set(found)} == {
+        name: (None, execution.UNMEASURED) for name in stated - set(found)
+    }
+    assert {name: observation.metrics[name] for name in found} == {
         "momentum_defect": (None, "the value is inf, not a finite number"),
         "impulse": (None, "late; the value is nan, not a finite number"),
         "rebound_ratio": (0.8, ""),

@@ -115,9 +115,9 @@ def test_a_fail_that_is_not_listed_is_new_though_a_family_would_cover_it(finding
 
 def test_a_check_without_a_value_is_new_unless_listed_as_having_none(findings):
     findings(members=HEAD)
-    assert judged(SLOT) == (None, "new", True)
+    assert judged(SLOT, creep=None) == (None, "new", True)
     findings(members=HEAD + "creeps,default,2,ratio=0.99,1/240,,creep,,\n")
-    assert judged(SLOT) == (None, "known", False)
+    assert judged(SLOT, creep=None) == (None, "known", False)
     assert judged(SLOT, creep=0.0) == ("pass", "drifted", True)
 
 

@@ -9,13 +9,16 @@ from adapters.engine import EngineError
 from adapters.law import Deviation
 from reports.exports import as_junit, as_markdown
 from reports.findings import alarms
+from reports.wording import mark_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import FindingsError
 from validation.judging import predicting, rows
+from validation.judging.comparison import Kind, compare_rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
-from validation.metrics import UNTOLD
+from validation.metrics import NEWER, UNTOLD
 from validation.posed import pinned
+from validation.running.execution import UNMEASURED
 
 #: A box below the edge of the friction cone: one check, its creep.
 SLOT = Slot("incline", (("ratio", 0.99),), 3, "nameless", "soft", 1 / 240, 7)
@@ -74,9 +77,22 @@ def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatc
 def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     monkeypatch.setattr(rows, "findings_of", lambda engine: None)
-    said = "has no value, which is not listed; it never touched"
+    said = "has no value; not on record; it never touched"
     assert judged(metrics={"creep": (None, "it never touched")}).reason == said
-    assert judged(metrics={}).reason.endswith("; it was not measured")
+    missed = judged(metrics={"creep": (None, UNMEASURED)})
+    assert missed.alarming and missed.reason.endswith("; it was not measured")
+
+
+def test_a_check_that_a_stored_run_does_not_have_is_newer_than_the_run_and_not_judged(monkeypatch):
+    monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
+    monkeypatch.setattr(rows, "findings_of", lambda engine: None)
+    newer = judged(metrics={"another": (0.5, "")})
+    assert (newer.value, newer.physics, newer.standing, newer.reason) == (None, None, None, NEWER)
+    assert not newer.alarming and not newer.failing and mark_of(newer.as_dict()) == "none"
+    seen = judged(metrics={"creep": (0.5, "")})
+    (change,) = compare_rows([newer.as_dict()], [seen.as_dict()])  # neither better nor worse
+    assert (change.kind, change.regressed) == (Kind.ADDED, False)
+    assert compare_rows([newer.as_dict()], [newer.as_dict()]) == []
 
 
 @pytest.mark.parametrize("outcome", ["not_installed", "crashed", "timed_out", "invalid"])
@@ -330,7 +346,7 @@ def test_a_study_without_a_value_says_why(monkeypatch):
     result = next(iter(rows.results([replace(SEEN, slot=replace(OWN, params=(("ratio", r),))) for r in (0.9, 1.1)])))
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     row = rows._study_row("run1", replace(result, value=None, reason="it never ran"))
-    assert row.reason == "has no value, which is not listed; it never ran"
+    assert row.reason == "has no value; not on record; it never ran"
 
 
 # ---- as a table ----------------------------------------------------------------------------------------------------

@@ -147,28 +147,28 @@ def test_the_band_of_a_finding_holds_at_its_edge(value, standing):
     [
         (1.505, LAWFUL, NEW, "it does so by design (predicted 1.5 +- 0.01)"),
         (1.6, LAWFUL, NEW, "outside the band of its contact law, 1.5 +- 0.01: it does so by design"),
-        (1.2, [], NEW, "neither listed nor explained by a contact law"),
+        (1.2, [], NEW, "not on record, and no contact law predicts it"),
         (
             1.2,
             [],
             Known(None, True, "another release"),
-            "neither listed nor explained by a contact law; another release",
+            "not on record, and no contact law predicts it; another release",
         ),
         (1.2, [], UNLISTED, "the engine has no list"),
         (1.21, [], FAILS, "a reason"),
-        (1.23, [], FAILS, "is listed with 1.2 +- 0.02: a reason"),
-        (1.05, [], FAILS, "passes, but is listed with 1.2 +- 0.02: a reason"),
-        (1.09, [], MARGINAL, "passes within the band of the listed failure: a reason"),
+        (1.23, [], FAILS, "on record with 1.2 +- 0.02: a reason"),
+        (1.05, [], FAILS, "passes, but on record with 1.2 +- 0.02: a reason"),
+        (1.09, [], MARGINAL, "passes within the band of the known failure: a reason"),
         (1.12, [], MARGINAL, "a reason"),
-        (1.2, [], NO_VALUE, "is listed as having no value: a reason"),
-        (1.2, [], EXPLODES, "is listed as diverging: a reason"),
-        (1.05, [], NO_VALUE, "passes, but is listed as having no value: a reason"),
+        (1.2, [], NO_VALUE, "on record as having no value: a reason"),
+        (1.2, [], EXPLODES, "on record as diverging: a reason"),
+        (1.05, [], NO_VALUE, "passes, but on record as having no value: a reason"),
         (1.05, [], NEW, ""),
-        (None, [], NEW, "has no value, which is not listed"),
+        (None, [], NEW, "has no value; not on record"),
         (None, [], UNLISTED, "the engine has no list"),
         (None, [], NO_VALUE, "a reason"),
-        (None, [], FAILS, "has no value now; is listed with 1.2 +- 0.02: a reason"),
-        (None, [], EXPLODES, "has no value now; is listed as diverging: a reason"),
+        (None, [], FAILS, "has no value now; on record with 1.2 +- 0.02: a reason"),
+        (None, [], EXPLODES, "has no value now; on record as diverging: a reason"),
     ],
 )
 def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
@@ -177,7 +177,7 @@ def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
 
 def test_a_missing_value_says_why_after_what_is_wrong_with_that():
     verdict = judge(None, CHECK, (), NEW, "there is no apex")
-    assert verdict.reason == "has no value, which is not listed; there is no apex"
+    assert verdict.reason == "has no value; not on record; there is no apex"
 
 
 @pytest.mark.parametrize(
@@ -186,8 +186,8 @@ def test_a_missing_value_says_why_after_what_is_wrong_with_that():
         (NEW, "it blew up"),
         (UNLISTED, "it blew up; the engine has no list"),
         (EXPLODES, "it blew up; a reason"),
-        (FAILS, "it blew up; is listed with 1.2 +- 0.02: a reason"),
-        (NO_VALUE, "it blew up; is listed as having no value: a reason"),
+        (FAILS, "it blew up; on record with 1.2 +- 0.02: a reason"),
+        (NO_VALUE, "it blew up; on record as having no value: a reason"),
     ],
 )
 def test_the_reason_of_a_divergence_in_full(known, said):

@@ -12,15 +12,17 @@ from validation.field import Note, notes
 
 #: Words without meaning for contact.
 IDLE = frozenset(re.findall(r"\w+", """
-    a an and are as at be by can do does don every for from have how i in is it its just keep my not of off on one or
-    should so some than that the them they thing this to too up we what when which why with
+    a after an and are as at be before by can cant do does doesnt dont every for from get gets go goes have how i in is
+    isnt it its just keep my not object of off on one or should so some than that the them they thing this to too up we
+    what when which while why with wont
 """))  # fmt: skip
 ENDINGS = re.compile(r"(?:ions?|ing|ed|es|er|s|e|y)$")
 #: Symptoms that no scene shows, with the command that helps.
 COMMANDS = {
     "results changed with a release, version, upgrade or update of the engine":
         "crosscheck bisect ENGINE OLD..NEW SCENE names the release that changed them",
-    "it is slow, too expensive, costs too much time, speed": "crosscheck bench SCENE shows error against time",
+    "the simulation or sim is slow, too expensive, costs too much time, speed":
+        "crosscheck bench SCENE shows error against time",
 }  # fmt: skip
 
 
@@ -60,7 +62,7 @@ def stem(word: str) -> str:
 
 def stems(text: str) -> dict[str, str]:
     """Meaningful words of a text, by their stem."""
-    words = re.findall(r"[a-z0-9#]+", text.lower())
+    words = re.findall(r"[a-z0-9#]+", re.sub("['\N{RIGHT SINGLE QUOTATION MARK}]", "", text.lower()))
     return {stem(word): word for word in words if word not in IDLE}
 
 
@@ -100,4 +102,4 @@ def matches(words: str, engines: Sequence[str] = ()) -> list[Match]:
             said = tuple(asked[word] for word in asked if word in common)
             scene = name if name in CATALOGUE else ""
             found.append(Match(scene, score, said, report, COMMANDS.get(name, "")))
-    return sorted(found, key=lambda match: -match.score)
+    return sorted(found, key=lambda match: (-match.score, bool(match.scene)))

@@ -3,7 +3,7 @@
 Deterministic values are equal to the last bit or they changed; a change counts only if it is larger than the noise
 floor of its cell, measured by moving the start by one and two units in the last place, and larger than a hundredth of
 its tolerance: smaller changes are ignored. Verdict flips come first, then errors, then speed. Rows on one side only are
-reported, and are neither better nor worse.
+reported, and are neither better nor worse; so are checks that are newer than the run of one side.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from enum import Enum
 from typing import Any
 
 from validation.cells import slot_from_dict
+from validation.metrics import NEWER
 
 Plain = Mapping[str, Any]
 #: Share of a tolerance by which an error must change to count.
@@ -72,8 +73,7 @@ def _identity(row: Plain) -> tuple[str, str]:
 
 def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
     """All changes of rows from ``before`` to ``after``, most serious first."""
-    a = {_identity(row): row for row in before}
-    b = {_identity(row): row for row in after}
+    a, b = ({_identity(row): row for row in rows if row.get("reason") != NEWER} for rows in (before, after))
     changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
     changes += [_make(Kind.REMOVED, False, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
     changes += [_make(Kind.ADDED, False, b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()]

@@ -29,7 +29,7 @@ from validation.judging.verdicts import (
     judge_divergence,
     judge_physics,
 )
-from validation.metrics import UNTOLD
+from validation.metrics import NEWER, UNTOLD
 from validation.posed import is_file, is_model, resolve
 
 #: Standings and outcomes that make the command exit 1.
@@ -166,7 +166,7 @@ def _difference(value: float | None, other: float | None) -> float | None:
 
 
 def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: Ready) -> Row:
-    value, why = observation.metrics.get(check.metric, (None, "it was not measured"))
+    value, why = observation.metrics.get(check.metric, (None, NEWER))
     if _is_lawful(observation, check):
         observation = replace(observation, outcome=Outcome.OK, reason="")
     doubt = _doubt(observation, check)
@@ -186,6 +186,8 @@ def _verdict(
 ) -> Verdict:
     """Verdict of an observation; cells without a result have no physics, and unsupported ones must be listed."""
     slot, outcome = observation.slot, observation.outcome
+    if outcome is Outcome.OK and check.metric not in observation.metrics:
+        return Verdict(None, None, NEWER)
     if outcome is Outcome.OK:
         known, said = _known(observation, slot, check), []
         try:

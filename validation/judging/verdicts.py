@@ -103,14 +103,14 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
         return _against_finding(physics, value, known.finding)
     if physics is Physics.PASS:
         return Verdict(physics, None)
-    return _unlisted(physics, known, "neither listed nor explained by a contact law")
+    return _unlisted(physics, known, "not on record, and no contact law predicts it")
 
 
 def _without_value(known: Known, why: str) -> Verdict:
     """A judged check must have a value, unless it is listed with the reason why there is none."""
     finding = known.finding
     if finding is None:
-        return _unlisted(None, known, "; ".join(filter(None, ("has no value, which is not listed", why))))
+        return _unlisted(None, known, "; ".join(filter(None, ("has no value; not on record", why))))
     if finding.value is None and not finding.diverged:
         return Verdict(None, Standing.KNOWN, finding.family.reason)
     return Verdict(None, Standing.DRIFTED, f"has no value now; {_listed_as(finding)}")
@@ -120,14 +120,14 @@ def _against_finding(physics: Physics | None, value: float, finding: Finding) ->
     if not finding.holds(value):
         passes = "passes, but " if physics is Physics.PASS else ""
         return Verdict(physics, Standing.DRIFTED, f"{passes}{_listed_as(finding)}")
-    marginal = "passes within the band of the listed failure: " if physics is Physics.PASS else ""
+    marginal = "passes within the band of the known failure: " if physics is Physics.PASS else ""
     return Verdict(physics, Standing.KNOWN, f"{marginal}{finding.family.reason}")
 
 
 def _listed_as(finding: Finding) -> str:
     if finding.value is None:
-        return f"is listed as {'diverging' if finding.diverged else 'having no value'}: {finding.family.reason}"
-    return f"is listed with {finding.band_text}: {finding.family.reason}"
+        return f"on record as {'diverging' if finding.diverged else 'having no value'}: {finding.family.reason}"
+    return f"on record with {finding.band_text}: {finding.family.reason}"
 
 
 def _unlisted(physics: Physics | None, known: Known, why: str) -> Verdict:

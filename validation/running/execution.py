@@ -28,6 +28,9 @@ from validation.posed import resolve
 from validation.running.certification import fully_certified
 from validation.running.tracks import Recording, record
 
+#: Reason of a check that its scene states and does not measure.
+UNMEASURED = "it was not measured"
+
 
 def execute(slot: Slot, keep: Path | None = None) -> Observation:
     """Run ``slot`` and measure it.
@@ -113,7 +116,11 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
     if trajectory.finish == "diverged":  # an engine with a certificate reports why it ended the run
         said = [trajectory.reason, *map(str, trajectory.certificate.get("reasons", ()))]
         return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
-    metrics = dict(prepared.canonical.measure(prepared.scene, trajectory))
+    # A check without an entry is newer than the run (`metrics.NEWER`), so each has one.
+    metrics: dict[str, Measured] = {
+        check.metric: (None, UNMEASURED) for check in prepared.canonical.checks(prepared.scene, blank.slot.dt)
+    }
+    metrics |= prepared.canonical.measure(prepared.scene, trajectory)
     if trajectory.out_of_plane is not None:
         metrics[OUT_OF_PLANE] = trajectory.out_of_plane, ""
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})

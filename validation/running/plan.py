@@ -3,7 +3,7 @@
 quick
     dt 1/240; a few cells of each scene, which cover every check, law and family of findings.
 standard
-    dt 1/240; the cells whose FAILs are listed one by one.
+    dt 1/240; the cells whose known failures are listed check by check.
 full
     each scene's full cells at dt 1/240; the standard cells from 1/60 to 1/960 by halves as well, and at each engine's
     customary step; representative cells moved by 1 and 2 units in the last place (the floor that comparisons use).

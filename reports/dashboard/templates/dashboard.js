@@ -27,7 +27,7 @@ function apply() {
   for (const section of document.querySelectorAll("section[class^='e-']")) {
     section.classList.toggle("off", !section.querySelector(".panel:not(.off)"));
   }
-  shown.textContent = `${count} panels`;
+  shown.textContent = `${count} series`;
   return choice;
 }
 

@@ -48,7 +48,7 @@ def test_filters_narrow_what_is_shown_and_an_address_keeps_them(browser, dashboa
         assert page.locator(".panel:visible").count() == 2
         assert page.locator("#moved tbody tr:visible").count() == 2
         page.select_option("select[name=verdict]", "moved")
-        assert page.locator("#shown").inner_text() == "2 panels"
+        assert page.locator("#shown").inner_text() == "2 series"
         address = page.url
     assert "engine=bullet" in address and "verdict=moved" in address
     with opened(browser, dashboard_file, "#" + address.partition("#")[2]) as page:

@@ -400,7 +400,7 @@ def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_pat
     told = json.loads(done.stdout)
     assert told == {"path": str(path), "panels": 4, "moved": 4}
     text = path.read_text()
-    assert "<svg" in text and "4 panels of " in text
+    assert "<svg" in text and "4 series of " in text
 
 
 def test_a_store_without_a_finished_run_is_one_line(tmp_path):
