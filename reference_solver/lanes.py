@@ -1,10 +1,10 @@
-"""A number of kernels that is several: one for each of `LANES` worlds that are stepped side by side.
+"""A number of kernels that is several: one for each of `LANES` worlds, or manifolds, that are computed side by side.
 
-`Lanes` is a vector of the processor. Kernels calculate with it as with a float, so that one source serves a single
-world and several: each lane holds, to the bit, what the same operations give for the world alone. What a float decides
-by a branch, lanes decide by `where`; `any_of` and `all_of` allow for what no lane, or each, needs.
+It is a vector of the processor. Kernels calculate with it as with a float, so that one source serves both. Each lane
+holds, to the bit, what the same operations give for its float. What a float decides by a branch, lanes decide by
+`where`. `any_of` and `all_of` leave out what no lane, or not each, needs.
 
-numba's means of extension are public: types, data models, lowering (its manual, "Low-level extension API").
+numba is told by its low-level means of extension: types, data models, lowering.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from numba.extending import (
 )
 from numpy.typing import NDArray
 
-#: Worlds side by side: eight doubles fill a register of AVX-512, two of AVX2.
+#: Numbers side by side: eight doubles fill a register of AVX-512, two of AVX2.
 LANES = 8
 
 

@@ -41,8 +41,8 @@ class Together:
         padded = [*models, *[models[-1]] * (LANES - len(models))]
         worlds = [(allocate_bodies(each, self.needs), allocate_pairs(each, 0)) for each in padded]
         # A body of similar size has at most six neighbours, each pair counted once; columns have fewer.
-        room = 4 * len(models[0].bodies) + 16
-        self.group = allocate_group(worlds, options(settings, self.needs, False), room)
+        contacts = 4 * len(models[0].bodies) + 16
+        self.group = allocate_group(worlds, options(settings, self.needs, False), contacts)
         self.apart: list[World] = []
 
     def states(self) -> tuple[Array, Array]:
