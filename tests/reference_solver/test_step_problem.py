@@ -107,7 +107,9 @@ def test_more_contacts_than_there_is_room_for_are_all_exported(dimension):
     world = simulation._world
     if dimension == 2:
         counts = np.zeros_like(world._rows.counts)
-        world._rows = type(world._rows)(*(array[:2].copy() if array.ndim else array for array in world._rows))
+        world._rows = type(world._rows)(
+            *(array[:2].copy() if getattr(array, "ndim", 0) else array for array in world._rows)
+        )
         world._rows = world._rows._replace(counts=counts, local=full_scratch(pile(2)))
     else:
         world._manifolds, world._memory = world._manifolds[:1].copy(), world._memory[:1].copy()
