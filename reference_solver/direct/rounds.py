@@ -24,7 +24,9 @@ FIRST_STIFFNESS = 100.0
 #: once: at a residual e they part with their share of the load within 1 / (e stiffness) rounds.
 LEAST_STIFFNESS, LARGEST_STIFFNESS = 1.0, 1e14
 #: The first stiffness is this over the residual where that is more: with a small one hardly a contact will change.
-SETTLED = 1.0
+#: At most the second: beyond it round-off of velocities, times the stiffness, makes contacts at rest open and slide, and
+#: Newton's method follows it (four to six steps instead of one or two in a pyramid of 91).
+SETTLED, LARGEST_FIRST = 1.0, 1e9
 #: Rounds go on below the tolerance while each leaves less than this of the residual: they cost one factorisation
 #: each, and a mass ratio multiplies what a residual means for the impulses.
 POLISH = 0.3
@@ -59,7 +61,7 @@ def solve_problem(problem: Problem, tolerance: float, budget: int, fresh: bool) 
     if fresh:
         withdraw(problem)
         residual = scaled_map(problem)
-    stiffness = min(max(FIRST_STIFFNESS, SETTLED / max(residual, 1.0 / LARGEST_STIFFNESS)), LARGEST_STIFFNESS)
+    stiffness = max(FIRST_STIFFNESS, SETTLED / max(residual, SETTLED / LARGEST_FIRST))
     growth, standing = GROWTH, False
     while problem.size[FACTORISATIONS] < budget:
         spent = problem.size[FACTORISATIONS]
