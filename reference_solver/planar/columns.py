@@ -65,12 +65,12 @@ FRICTION = 10
 PN, PT = 11, 12
 #: u_n before forces (E6) [m/s].
 APPROACH = 13
-#: Reference speed of the residual (E14) [m/s].
-SPEED = 14
-#: Accumulated pseudo-impulse, and the pseudo-velocity it must reach (E16).
-PUSH, PUSH_TARGET = 15, 16
+#: The pseudo-velocity to reach, and the accumulated pseudo-impulse (E16).
+PUSH_TARGET, PUSH = 14, 15
 #: A sweep reads the columns up to here and no others; a multiple of the lanes.
-WIDE_REALS = 24
+WIDE_REALS = 16
+#: Reference speed of the residual (E14) [m/s].
+SPEED = 16
 #: Separation [m], < 0 overlap.
 GAP = 17
 #: Contact point minus centre of A and of B [m]: two columns each.
