@@ -24,7 +24,7 @@ FIRST_STIFFNESS = 100.0
 #: once: at a residual e they part with their share of the load within 1 / (e stiffness) rounds.
 LEAST_STIFFNESS, LARGEST_STIFFNESS = 1.0, 1e14
 #: The first stiffness is this over the residual where that is more: with a small one hardly a contact will change.
-#: At most the second: beyond it round-off of velocities, times the stiffness, makes contacts at rest open and slide, and
+#: It is at most the second. Round-off of velocities times more than that makes contacts at rest open and slide, and
 #: Newton's method follows it (four to six steps instead of one or two in a pyramid of 91).
 SETTLED, LARGEST_FIRST = 1.0, 1e9
 #: Rounds go on below the tolerance while each leaves less than this of the residual: they cost one factorisation
