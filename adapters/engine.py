@@ -338,9 +338,15 @@ class Engine(ABC):
     def build_many(
         self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
     ) -> Simulation | None:
-        """Make a world of each scene, all stepped by one call on ``threads`` threads; None if the engine cannot.
+        """Make one world for each scene. One call steps all of them on ``threads`` threads.
 
-        Scenes have the same bodies and differ in their numbers. What is read is the state of the first.
+        Scenes have the same bodies; their numbers differ. The readers return the state of the first world. None if the
+        engine has no such call.
+
+        Raises
+        ------
+        EngineError
+            For a scene or a setting that `build` refuses.
         """
         return None
 

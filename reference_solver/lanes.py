@@ -4,7 +4,7 @@ It is a vector of the processor. Kernels calculate with it as with a float, so t
 holds, to the bit, what the same operations give for its float. What a float decides by a branch, lanes decide by
 `where`. `any_of` and `all_of` leave out what no lane, or not each, needs.
 
-numba is told by its low-level means of extension: types, data models, lowering.
+numba's low-level extension interface (types, data models, lowering) makes it known to kernels.
 """
 
 from __future__ import annotations

@@ -96,6 +96,11 @@ class Settings:
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
         _require("accuracy", self.accuracy, 1e-12 <= self.accuracy <= 1e-4, "in [1e-12, 1e-4]")
 
+    @property
+    def is_textbook(self) -> bool:
+        """Whether a step makes a fixed number of sweeps, row by row."""
+        return self.scheme == "fixed" and self.solver == "scalar" and self.residual is None
+
     @classmethod
     def classical(cls, dt: float, iterations: int = 10, pull: float = 9.81) -> Settings:
         """Return what the textbook does: sequential impulses, a fixed number of sweeps, split impulse.

@@ -104,7 +104,7 @@ class Simulation:
 
         Each has the same states, to the bit, as a simulation of it alone. In the plane, with a fixed number of
         row-by-row sweeps (`Settings.classical`), eight worlds whose bodies are alike take about twice the time of one.
-        Nothing is certified of a fixed number of sweeps.
+        Many worlds have no `certificate`; a simulation has.
 
         Parameters
         ----------

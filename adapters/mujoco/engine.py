@@ -145,6 +145,10 @@ class MujocoEngine(Engine):
         EngineError
             For a scene or a setting that MuJoCo does not support.
         """
+        self._check(scene, dt, settings)
+        return MujocoSimulation(scene, dt, settings)
+
+    def _check(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
         refusal = self.refuses(scene, "")
@@ -153,13 +157,15 @@ class MujocoEngine(Engine):
         check_settings(settings)
         if moved(scene) and settings["integrator"] == "RK4":
             raise EngineError("integrator: RK4 detects contacts within a step, where moving faces have no velocity")
-        return MujocoSimulation(scene, dt, settings)
 
     def build_many(
         self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
     ) -> Simulation | None:
-        """See `Engine.build_many`: ``mujoco.rollout``; None where this adapter acts between steps."""
-        if any(body.motion == "prescribed" or any(body.force) for body in scenes[0].bodies) or "rounds" in settings:
+        """See `Engine.build_many`: ``mujoco.rollout``; None with loads, or where this adapter acts between steps."""
+        for scene in scenes:
+            self._check(scene, dt, settings)
+        loaded = any(any((*body.force, *body.torque)) or body.course is not None for s in scenes for body in s.bodies)
+        if loaded or any(map(moved, scenes)) or "rounds" in settings:
             return None
         return MujocoWorlds(scenes, dt, settings, threads)
 

@@ -67,9 +67,12 @@ class MujocoSimulation(Simulation):
         else:
             self._mujoco.mj_step(self._model, self._data, nstep=steps)
         check_state(self._mujoco, self._data)
+        self._check_memory(self._data)
+
+    def _check_memory(self, data: Any) -> None:
         kinds = self._mujoco.mjtWarning
         for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
-            if self._data.warning[kind].number:
+            if data.warning[kind].number:
                 raise EngineError("memory: MuJoCo's arena is too small, so contacts were dropped")
 
     def _drive(self) -> None:
@@ -190,7 +193,7 @@ class MujocoSimulation(Simulation):
 
 @final
 class MujocoWorlds(MujocoSimulation):
-    """Many models by ``mujoco.rollout``; what is read is the state of the first."""
+    """Many models by ``mujoco.rollout``, which begins each call without warm start; the state of the first is read."""
 
     def __init__(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> None:
         from mujoco import rollout
@@ -206,12 +209,24 @@ class MujocoWorlds(MujocoSimulation):
         self._states = np.tile(state, (len(scenes), 1))
 
     def advance(self, steps: int) -> None:
-        """Make ``steps`` steps of all worlds."""
+        """Make ``steps`` steps of all worlds; see `MujocoSimulation.advance`."""
         if not steps:
             return
         states, _ = self._rollout.rollout(self._models, self._workers, self._states, nstep=steps)
         self._states = states[:, -1].copy()
         self._mujoco.mj_setState(self._model, self._data, self._states[0], self._kind)
+        for data in self._workers:
+            self._check_memory(data)
+
+    def contacts(self) -> Contacts:
+        """Contacts of many worlds are not kept.
+
+        Raises
+        ------
+        EngineError
+            Always.
+        """
+        raise EngineError("contacts: many worlds keep none")
 
     def close(self) -> None:
         """End the threads."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Recorded, Simulation
+from adapters.engine import Array, Contacts, EngineError, Recorded, Simulation
 from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 
@@ -138,7 +138,7 @@ class ReferenceWorlds(ReferenceSimulation):
     def __init__(self, scenes: Sequence[Scene], settings: Any, threads: int) -> None:
         from reference_solver import Simulation as Solver
 
-        super().__init__(scenes[0], solver_model(scenes[0]), settings)
+        super().__init__(scenes[0], solver_model(scenes[0]), settings)  # for `readback`; it is not stepped
         told = [{"scene": scene} for scene in scenes]
         self.worlds = Solver.many(solver_model, told, settings, threads)
 
@@ -155,11 +155,21 @@ class ReferenceWorlds(ReferenceSimulation):
         return np.asarray(self.worlds.twist[0], float)
 
     def contacts(self) -> Contacts:
-        """Not recorded of many worlds."""
-        return Contacts.from_rows([], self.scene.dimension)
+        """Contacts of many worlds are not kept.
+
+        Raises
+        ------
+        EngineError
+            Always.
+        """
+        raise EngineError("contacts: many worlds keep none")
 
     def record(self, samples: int, stride: int, contacts: bool) -> None:
-        """Not in one call."""
+        """Samples are taken by calls of `advance`."""
+
+    def certificate(self) -> dict[str, Any]:
+        """Many worlds have none."""
+        return {}
 
 
 def _contacts(found: Any) -> Contacts:

@@ -97,7 +97,7 @@ def allocate_group(worlds: list[tuple[Bodies, Pairs]], options: Options, contact
     Parameters
     ----------
     worlds
-        Bodies and pairs of each world, as `state.allocate_bodies` and `state.allocate_pairs` make them.
+        Bodies and pairs of each world, from `state.allocate_bodies` and `state.allocate_pairs`.
     """
     bodies, pairs = [each for each, _ in worlds], [each for _, each in worlds]
     n = len(bodies[0].kind)

@@ -20,13 +20,11 @@ from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.broadphase import bound_closely
 from reference_solver.planar.columns import (
     APPROACH,
-    ARM_A,
     COS,
     EXTENT,
     FEATURE,
     FRICTION,
     PN,
-    POINT,
     PT,
     PUSH,
     SIN,
@@ -34,11 +32,11 @@ from reference_solver.planar.columns import (
     A,
     B,
 )
-from reference_solver.planar.kinematics import apply_normal, apply_tangent, load_speed, normal_velocity
+from reference_solver.planar.kinematics import apply_normal, apply_tangent, load_speed
 from reference_solver.planar.manifolds import contact_key
 from reference_solver.planar.narrowphase import collide
 from reference_solver.planar.position import begin_pushes
-from reference_solver.planar.rows import prepare_masses, set_target
+from reference_solver.planar.rows import prepare_row
 from reference_solver.planar.sequential_impulses import push_pair, push_point, sweep_pair, sweep_point
 from reference_solver.planar.state import (
     CONTACTS,
@@ -150,10 +148,12 @@ def find_pairs(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> bool:
     boxes, n = group.boxes, len(group.kind)
     for i in range(n):
         for k in range(2):
-            boxes.low[i, k], boxes.high[i, k] = group.low[i, k, 0], group.high[i, k, 0]
-            for lane in range(1, LANES):
-                boxes.low[i, k] = min(boxes.low[i, k], group.low[i, k, lane])
-                boxes.high[i, k] = max(boxes.high[i, k], group.high[i, k, lane])
+            boxes.low[i, k], boxes.high[i, k] = math.inf, -math.inf
+            for lane in range(LANES):
+                low, high = group.low[i, k, lane], group.high[i, k, lane]
+                if not low <= high:  # no numbers: such a body may touch all others, as in a world alone
+                    low, high = -math.inf, math.inf
+                boxes.low[i, k], boxes.high[i, k] = min(boxes.low[i, k], low), max(boxes.high[i, k], high)
     count = pair_bodies(bodies, boxes, group.options.broadphase)
     if count > len(boxes.candidate) or count >= len(group.manifold):
         return False
@@ -185,7 +185,8 @@ def detect(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> None:
             continue
         bounces = pairs.restitution[a, b] > (0.0 if options.restitution else math.inf)
         extent = min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
-        reach, near = where(bounces, TOUCHING, options.margin) * extent, overlap(pairs.boxes, a, b)
+        reach = where(bounces, TOUCHING, options.margin) * extent
+        near = ~are_apart(pairs.boxes.low, pairs.boxes.high, a, b)
         found[m] = collide_at_once(bodies, a, b, reach, near, rows, feature, c)
     if apart:
         for lane in range(LANES):
@@ -193,10 +194,10 @@ def detect(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> None:
 
 
 @inner_kernel
-def overlap(boxes: Boxes, a: int, b: int) -> Any:
-    """In which worlds the bounds of two bodies overlap."""
-    along = ~((boxes.low[a, 0] > boxes.high[b, 0]) | (boxes.low[b, 0] > boxes.high[a, 0]))
-    return along & ~((boxes.low[a, 1] > boxes.high[b, 1]) | (boxes.low[b, 1] > boxes.high[a, 1]))
+def are_apart(low: Array, high: Array, a: int, b: int) -> Any:
+    """Whether the bounds of two bodies are apart, in one world or in each; see `broadphase.may_touch`."""
+    along_x = (low[a, 0] > high[b, 0]) | (low[b, 0] > high[a, 0])
+    return along_x | (low[a, 1] > high[b, 1]) | (low[b, 1] > high[a, 1])
 
 
 @inner_kernel
@@ -211,10 +212,7 @@ def detect_in(group: Group, lane: int) -> None:
         a, b = group.integer[first, A], group.integer[first, B]
         if are_found_at_once(bodies, a, b):
             continue
-        near = (
-            low[a, 0] <= high[b, 0] and low[b, 0] <= high[a, 0] and low[a, 1] <= high[b, 1] and low[b, 1] <= high[a, 1]
-        )
-        if near:
+        if not are_apart(low, high, a, b):
             bounces = options.restitution and group.restitution[a, b, lane] > 0.0
             found = collide(bodies, a, b, TOUCHING if bounces else options.margin, 0.0, probe, 0)
         group.found[m, lane] = found
@@ -247,15 +245,8 @@ def prepare(group: Group, bodies: Bodies, pairs: Pairs, rows: Rows) -> None:
     """See `rows.prepare`; of points that are not there all is zero but masses and friction."""
     options, impact = group.options, lanes(group.impact)
     for c in range(rows.counts[CONTACTS]):
-        prepare_masses(bodies, rows, c)
-        a, b = rows.integer[c, A], rows.integer[c, B]
-        for k in range(2):
-            rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
-        rows.real[c, FRICTION] = pairs.friction[a, b]
-        approach = normal_velocity(bodies.twist, rows, c)
-        rows.real[c, APPROACH] = approach
-        set_target(bodies, pairs, rows, c, options)
-        push = load_speed(bodies, rows, c, options.dt)
+        prepare_row(bodies, pairs, rows, c, options)
+        approach, push = rows.real[c, APPROACH], load_speed(bodies, rows, c, options.dt)
         impact[c] = where(abs(approach) > push, 1.0, 0.0)
         rows.real[c, PN] = where(approach > push, 0.0, rows.real[c, PN])
         rows.real[c, PT] = where(approach > push, 0.0, rows.real[c, PT])

@@ -174,8 +174,7 @@ def _size(model: Model) -> str:
 
 def _in_lanes(model: Model, settings: Settings) -> bool:
     """Whether a model can be stepped with others in one."""
-    textbook = settings.scheme == "fixed" and settings.solver == "scalar" and settings.residual is None
-    return model.dimension == 2 and textbook and not config.DISABLE_JIT
+    return model.dimension == 2 and settings.is_textbook and not config.DISABLE_JIT
 
 
 def _kind(model: Model) -> Any:

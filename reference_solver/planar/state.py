@@ -110,11 +110,11 @@ class Narrow(NamedTuple):
 
 @structure
 class Wide(NamedTuple):
-    """Room for manifolds in blocks of `LANES`, see `wide`. Slots: one for each lane of each block."""
+    """Room for manifolds in blocks of `LANES` (`planar.wide`). A block has one slot for each lane."""
 
     last: Indices  # (n,): level of a body's last manifold, plus 1
-    level: Indices  # (m,): of each manifold
-    begin: Indices  # (2 m + 1,): first slot of each level, its manifolds of one point before those of two
+    level: Indices  # (m,): twice the level of each manifold, plus its points less one
+    begin: Indices  # (2 m + 3,): first slot of each level, its manifolds of one point before those of two
     order: Indices  # (blocks, LANES): manifold of each slot, -1 where there is none
     body: Indices  # (blocks, 2, LANES): rows of `velocity` of A and B
     row: Indices  # (blocks, 2, LANES): rows of `Rows.real`

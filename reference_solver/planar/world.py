@@ -45,8 +45,8 @@ class World(SteppedWorld):
         super().__init__(model, settings, needs, certified, room)
         self._bodies = allocate_bodies(model, needs)
         self._pairs = allocate_pairs(model, room)
-        textbook = settings.scheme == "fixed" and settings.solver == "scalar" and settings.residual is None
-        self._rows = allocate_rows(room, n if textbook and n > ALL_PAIRS_LIMIT and not config.DISABLE_JIT else 0)
+        wide = settings.is_textbook and n > ALL_PAIRS_LIMIT and not config.DISABLE_JIT
+        self._rows = allocate_rows(room, n if wide else 0)
         self._sub = allocate_sub_step(n, room, allocate_meeting(self._bodies))
         self._world = allocate_world(self._bodies, room)
         self._laws = self._pairs.restitution, self._pairs.friction

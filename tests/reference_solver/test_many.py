@@ -1,5 +1,6 @@
 """Worlds that are stepped side by side have the bits that each has alone, whatever is beside them."""
 
+import dataclasses
 import itertools
 import math
 import struct
@@ -180,6 +181,25 @@ def test_states_between_calls_are_those_of_one_call():
 def test_a_world_whose_numbers_overflow_changes_no_other():
     told = [{"height": 0.6, "restitution": 0.5, "spin": spin} for spin in (0.0, 1e308, 2.0)]
     require_same_bits(ball, told, Settings.classical(DT), 80, 8)
+
+
+@pytest.mark.parametrize("kind", ["box", "capsule"])
+def test_a_world_without_numbers_changes_no_other(kind):
+    """A body at infinity, whose bounds are no numbers: its world ends as it does alone, the others as they do."""
+
+    def column_of(speed):
+        model = jumble(["floor", kind, "box", kind], ["fixed", "prescribed", "free", "free"], 7, False)
+        bodies = [*model.bodies]
+        bodies[1] = dataclasses.replace(bodies[1], twist=(speed, 0.0, 0.0))
+        return dataclasses.replace(model, bodies=tuple(bodies))
+
+    # m/s; the first is at infinity after 254 steps.
+    told = [{"speed": speed} for speed in (1.7e308, 0.0, 1.0, 0.5, 1.7e308, 2.0, -1.0, 0.1)]
+    found = Simulation.many(column_of, told, Settings.classical(DT), 1).record(400, 10)
+    for w, (_, pose, twist) in enumerate(alone(column_of, told, Settings.classical(DT), 400, 10)):
+        assert np.array_equal(found.pose[w], pose, equal_nan=True), w
+        assert np.array_equal(found.twist[w], twist, equal_nan=True), w
+    assert np.isfinite(found.pose[1]).all() and not np.isfinite(found.pose[0]).all()
 
 
 @pytest.mark.parametrize(
