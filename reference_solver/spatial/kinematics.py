@@ -11,6 +11,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.spatial.state import Bodies, Manifolds
 from reference_solver.spatial.vector import (
+    ZERO,
     Vector,
     add,
     add_scaled,
@@ -80,7 +81,10 @@ def point_velocity(bodies: Bodies, i: int, arm: Vector) -> Vector:
 @inner_kernel
 def acceleration_at(bodies: Bodies, i: int, arm: Vector) -> float:
     """Magnitude of what loads alone do to a point of body i [m/s^2]."""
-    spin = times(bodies.inverse_inertia, i, row(bodies.torque, i, 0))
+    torque = row(bodies.torque, i, 0)
+    if torque == ZERO:
+        return length(row(bodies.acceleration, i, 0))
+    spin = times(bodies.inverse_inertia, i, torque)
     return length(add(row(bodies.acceleration, i, 0), cross(spin, arm)))
 
 
