@@ -81,16 +81,18 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         raise FindingsError(f"accept: {engine} is a plain module and has no folder to list findings in")
     add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
+    path = folder / MEMBERS
+    before = path.read_bytes() if path.exists() else b""
     write_members(folder, members)
     left = [change.family.id for change in changed if change.family.id not in chosen]
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
-        result = {"engine": engine, "rows": len(members), "families": listed, "file": str(folder / MEMBERS)}
+        result = {"engine": engine, "rows": len(members), "families": listed, "file": str(path)}
         counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
         click.echo(json.dumps({**result, **counts, "not_accepted": left}, indent=1))
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
-        click.echo(f"{engine}: {counted} listed in {folder / MEMBERS}")
+        click.echo(f"{engine}: {counted} listed in {path}{', as before' if path.read_bytes() == before else ''}")
     _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)

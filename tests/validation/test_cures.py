@@ -88,6 +88,17 @@ def test_a_search_that_found_nothing_says_how_many_settings_it_tried_in_each_dim
     assert said == "no setting helps (45 tried in 2-D, 30 tried in 3-D)"
 
 
+def test_settings_that_leave_most_checks_failing_are_counted_and_not_recommended(monkeypatch):
+    most = replace(CURE, failing=20, left=19)
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): most})
+    assert told_cures("mujoco", "4.0.1", "pinch", "default", [2]) == [
+        "2-D: the best settings found fix 1 of 20 checks (45 tried)"
+    ]
+    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): replace(most, left=10)})
+    (said,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2])
+    assert said.startswith("best settings found, 2-D: cone=elliptic") and "10 of 20 checks still fail" in said
+
+
 def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): CURE})
     assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 1
