@@ -167,7 +167,7 @@ def test_the_shade_of_a_field_is_the_share_that_fails_and_never_paper_where_one_
     assert found.percent == said[missed, judged]
 
 
-def test_time_steps_stand_above_their_points_and_within_the_panel():
+def test_time_steps_stand_above_both_ends_of_the_front_and_within_the_panel():
     """Below a point lies the axis of cost, to the left of the first one that of the error."""
     points = [(1e-4, 1e-1, 1 / 60), (3e-4, 1e-3, 1 / 240), (1e-3, 1e-18, 1 / 960)]
     table = pd.DataFrame([
@@ -182,6 +182,6 @@ def test_time_steps_stand_above_their_points_and_within_the_panel():
     labels = {text: (float(x), float(y)) for x, y, text in numbers}
     numbers = re.findall(rf'data-is="[^"]*dt (1/\d+): error[^"]*" transform="{place}', figure.picture)
     marks = {text: (float(x), float(y)) for text, x, y in numbers}
-    assert set(labels) == set(marks) == {"1/60", "1/240", "1/960"}
+    assert set(labels) == {"1/60", "1/960"} and set(marks) == {*labels, "1/240"}
     assert all(labels[text][1] < marks[text][1] for text in labels)
-    assert {text: labels[text][0] > marks[text][0] for text in labels} == {"1/60": True, "1/240": True, "1/960": False}
+    assert {text: labels[text][0] > marks[text][0] for text in labels} == {"1/60": True, "1/960": False}
