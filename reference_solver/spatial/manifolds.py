@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.box_box import EDGE_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
@@ -18,7 +20,7 @@ from reference_solver.spatial.state import (
     Manifolds,
     Memory,
 )
-from reference_solver.spatial.vector import dot, row, tangents
+from reference_solver.spatial.vector import dot, row, sub, tangents
 from reference_solver.stepping.broadphase import bodies_of
 from reference_solver.stepping.noise import TOUCHING
 from reference_solver.stepping.options import BLOCK, Options
@@ -141,7 +143,7 @@ def set_world_points(bodies: Bodies, manifolds: Manifolds, m: int) -> None:
 
 @inner_kernel
 def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: Memory, options: Options) -> None:
-    """Give each point the impulse of the same feature one step before: a merge of two sorted lists of detection."""
+    """Give each point an impulse of its pair one step before: a merge of two sorted lists of detection."""
     old = 0
     for m in range(len(manifolds)):
         for p in range(manifolds.points[m]):
@@ -156,13 +158,34 @@ def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: M
 
 @inner_kernel
 def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> None:
-    """Match the points of manifold m with those of remembered manifold `old`; impulses turn into the new frame."""
+    """Match the points of manifold m with those of remembered manifold `old`: by their features, then by their places.
+
+    Corners of two faces that lie on each other come and go as points of another feature at nearly the same place.
+    """
+    matched, taken = 0, 0
     for p in range(manifolds.points[m]):
         for o in range(memory.points[old]):
             if memory.feature[old, o] == manifolds.feature[m, p]:
-                for k in range(3):
-                    manifolds.impulse[m, p, k] = dot(row(manifolds.frame[m], k, 0), row(memory.impulse[old], o, 0))
-                manifolds.impulse[m, p, 2] = max(manifolds.impulse[m, p, 2], 0.0)
+                recall_impulse(manifolds, m, p, memory, old, o)
+                matched, taken = matched | 1 << p, taken | 1 << o
+    for p in range(manifolds.points[m]):
+        nearest, least = -1, math.inf
+        for o in range(memory.points[old]):
+            if not (matched >> p & 1 or taken >> o & 1):
+                way = sub(row(manifolds.arm_b[m], p, 0), row(memory.arm[old], o, 0))
+                if dot(way, way) < least:
+                    nearest, least = o, dot(way, way)
+        if nearest >= 0:
+            recall_impulse(manifolds, m, p, memory, old, nearest)
+            taken |= 1 << nearest
+
+
+@inner_kernel
+def recall_impulse(manifolds: Manifolds, m: int, p: int, memory: Memory, old: int, o: int) -> None:
+    """Give point p the impulse of remembered point o, turned into the new frame."""
+    for k in range(3):
+        manifolds.impulse[m, p, k] = dot(row(manifolds.frame[m], k, 0), row(memory.impulse[old], o, 0))
+    manifolds.impulse[m, p, 2] = max(manifolds.impulse[m, p, 2], 0.0)
 
 
 @inner_kernel
@@ -176,6 +199,7 @@ def remember(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory:
             kept = 0.0 if manifolds.impact[m, p] else 1.0
             for d in range(3):
                 memory.impulse[m, p, d] = kept * world_component(manifolds, m, p, d)
+                memory.arm[m, p, d] = manifolds.arm_b[m, p, d]
     detection.found[REMEMBERED] = len(manifolds)
 
 

@@ -144,6 +144,7 @@ MEMORY = np.dtype(
         ("points", "i8"),
         ("feature", "i8", POINTS),
         ("impulse", "f8", (POINTS, 3)),  # world axes, so that a turning contact frame does not turn the impulse
+        ("arm", "f8", (POINTS, 3)),  # contact point minus centre of B [m], in fixed steps
     ],
     align=True,
 )

@@ -7,6 +7,11 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, HalfSpace, Settings
+from reference_solver.compilation import from_python
+from reference_solver.spatial import manifolds as contacts
+from reference_solver.spatial.state import allocate_manifolds, allocate_memory
+
+recall_points = from_python(contacts.recall_points)
 
 G = 9.81
 
@@ -81,6 +86,42 @@ def test_a_ball_in_a_corner_of_three_planes_loads_each_by_geometry(build, refere
     simulation.advance(10)
     pressed = np.linalg.norm(simulation.contacts().impulse, axis=1)
     assert pressed == pytest.approx(np.full(3, G * build.dt / math.sqrt(3)), rel=1e-12)
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
+def test_a_column_of_ten_stands_a_minute_with_ten_sweeps(build, dt):
+    """Within 0.1 side lengths: much less than half a side, at which a box is past the edge below it."""
+    simulation = build.column(10, Settings.classical(dt), certified=False)
+    for _ in range(60):
+        simulation.advance(round(1.0 / dt))
+        assert np.abs(simulation.pose[1:, :2]).max() < 0.1
+
+
+def recalled(remembered, found):
+    """Normal impulses that the points of a manifold get from those of the step before.
+
+    ``remembered``: feature, place along x [m] and normal impulse [N s] of each point; ``found``: feature and place.
+    """
+    manifolds, memory = allocate_manifolds(1), allocate_memory(1)
+    manifolds.frame[0] = np.eye(3)
+    manifolds.points[0], memory.points[0] = len(found), len(remembered)
+    for o, (feature, x, impulse) in enumerate(remembered):
+        memory.feature[0, o], memory.arm[0, o, 0], memory.impulse[0, o] = feature, x, (0.1, 0.2, impulse)
+    for p, (feature, x) in enumerate(found):
+        manifolds.feature[0, p], manifolds.arm_b[0, p, 0] = feature, x
+        manifolds.impulse[0, p] = 0.0
+    recall_points(manifolds, 0, memory, 0)
+    return manifolds.impulse[0, : len(found), 2].tolist()
+
+
+def test_points_start_from_the_impulses_of_their_feature_then_of_the_nearest_place():
+    before = [(5, -0.5, 1.0), (6, 0.5, 2.0), (7, 0.0, 4.0)]
+    assert recalled(before, [(5, -0.5), (6, 0.5), (7, 0.0)]) == [1.0, 2.0, 4.0]
+    assert recalled(before, [(6, -0.5), (5, 0.5)]) == [2.0, 1.0]  # the feature counts first
+    assert recalled(before, [(8, 0.49), (7, 0.0), (9, -0.6)]) == [2.0, 4.0, 1.0]
+    assert recalled(before[:1], [(8, 0.4), (9, -0.5)]) == [1.0, 0.0]  # each impulse is given once
+    assert recalled(before[:1], [(8, 0.4), (5, -0.5)]) == [0.0, 1.0]
+    assert recalled([], [(8, 0.4)]) == [0.0]
 
 
 def plane(normal):
