@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from reference_solver.compilation import inner_kernel
 from reference_solver.spatial.box_box import EDGE_ADVANTAGE
 from reference_solver.spatial.broadphase import find_candidates
@@ -30,6 +28,9 @@ from reference_solver.stepping.options import BLOCK, Options
 #: of the other speeds, with a friction that hardly determines itself (condition 1 / height^2). Where a contact point
 #: lies between two overlapping surfaces is uncertain by more, g dt^2 at least.
 FLAT = 1e-4
+#: Points of two steps are the same if they are nearer than this share of the smaller half width. Bodies at rest move
+#: much less in a step. The next corner of a face is two half widths away: an impulse given to it would tilt the body.
+SAME_PLACE = 0.1
 
 
 @inner_kernel
@@ -153,11 +154,11 @@ def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: M
         while old < detection.found[REMEMBERED] and memory.pair[old] < pair:
             old += 1
         if options.warm_starting and old < detection.found[REMEMBERED] and memory.pair[old] == pair:
-            recall_points(manifolds, m, memory, old)
+            recall_points(bodies, manifolds, m, memory, old)
 
 
 @inner_kernel
-def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> None:
+def recall_points(bodies: Bodies, manifolds: Manifolds, m: int, memory: Memory, old: int) -> None:
     """Match the points of manifold m with those of remembered manifold `old`: by their features, then by their places.
 
     Corners of two faces that lie on each other come and go as points of another feature at nearly the same place.
@@ -168,8 +169,9 @@ def recall_points(manifolds: Manifolds, m: int, memory: Memory, old: int) -> Non
             if memory.feature[old, o] == manifolds.feature[m, p]:
                 recall_impulse(manifolds, m, p, memory, old, o)
                 matched, taken = matched | 1 << p, taken | 1 << o
+    reach = SAME_PLACE * min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
     for p in range(manifolds.points[m]):
-        nearest, least = -1, math.inf
+        nearest, least = -1, reach * reach
         for o in range(memory.points[old]):
             if not (matched >> p & 1 or taken >> o & 1):
                 way = sub(row(manifolds.arm_b[m], p, 0), row(memory.arm[old], o, 0))

@@ -9,7 +9,7 @@ import pytest
 from reference_solver import Body, HalfSpace, Settings
 from reference_solver.compilation import from_python
 from reference_solver.spatial import manifolds as contacts
-from reference_solver.spatial.state import allocate_manifolds, allocate_memory
+from reference_solver.spatial.state import BODY, allocate_manifolds, allocate_memory
 
 recall_points = from_python(contacts.recall_points)
 
@@ -98,7 +98,7 @@ def test_a_column_of_ten_stands_a_minute_with_ten_sweeps(build, dt):
 
 
 def recalled(remembered, found):
-    """Normal impulses that the points of a manifold get from those of the step before.
+    """Normal impulses that the points between two bodies of half width 0.5 m get from those of the step before.
 
     ``remembered``: feature, place along x [m] and normal impulse [N s] of each point; ``found``: feature and place.
     """
@@ -110,7 +110,10 @@ def recalled(remembered, found):
     for p, (feature, x) in enumerate(found):
         manifolds.feature[0, p], manifolds.arm_b[0, p, 0] = feature, x
         manifolds.impulse[0, p] = 0.0
-    recall_points(manifolds, 0, memory, 0)
+    manifolds.body_b[0] = 1
+    bodies = np.zeros(2, BODY).view(np.recarray)
+    bodies.extent = 0.5
+    recall_points(bodies, manifolds, 0, memory, 0)
     return manifolds.impulse[0, : len(found), 2].tolist()
 
 
@@ -118,9 +121,10 @@ def test_points_start_from_the_impulses_of_their_feature_then_of_the_nearest_pla
     before = [(5, -0.5, 1.0), (6, 0.5, 2.0), (7, 0.0, 4.0)]
     assert recalled(before, [(5, -0.5), (6, 0.5), (7, 0.0)]) == [1.0, 2.0, 4.0]
     assert recalled(before, [(6, -0.5), (5, 0.5)]) == [2.0, 1.0]  # the feature counts first
-    assert recalled(before, [(8, 0.49), (7, 0.0), (9, -0.6)]) == [2.0, 4.0, 1.0]
-    assert recalled(before[:1], [(8, 0.4), (9, -0.5)]) == [1.0, 0.0]  # each impulse is given once
-    assert recalled(before[:1], [(8, 0.4), (5, -0.5)]) == [0.0, 1.0]
+    assert recalled(before, [(8, 0.49), (7, 0.0), (9, -0.54)]) == [2.0, 4.0, 1.0]
+    assert recalled(before, [(8, 0.44), (9, -0.56)]) == [0.0, 0.0]  # a tenth of the half width is too far
+    assert recalled([(5, 0.0, 1.0), (6, 0.03, 2.0)], [(8, 0.02), (9, 0.04)]) == [2.0, 1.0]  # each impulse is given once
+    assert recalled(before[:1], [(8, -0.49), (5, -0.5)]) == [0.0, 1.0]
     assert recalled([], [(8, 0.4)]) == [0.0]
 
 
