@@ -57,7 +57,7 @@ def test_a_summary_that_another_program_wrote_is_made_anew(file):
 
 def test_a_file_that_another_process_writes_is_left_alone_and_a_folder_that_is_not_there_is_none(file, monkeypatch):
     connect = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda path, timeout: connect(path, timeout=0.01 * timeout))
+    monkeypatch.setattr(sqlite3, "connect", lambda path, timeout=5.0, **more: connect(path, 0.01 * timeout, **more))
     kept, other = Kept(file.parent), connect(file)
     other.execute("BEGIN EXCLUSIVE")
     kept.put("run", summary())
