@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.mujoco import ball_on_face, motions, predictions, profiles
+from adapters.mujoco import ball_on_face, blows, motions, predictions, profiles
 from adapters.mujoco.predictions import BLURRED, EITHER, ENOUGH, PERTURBATIONS, SPREAD_FACTOR
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
@@ -261,3 +261,18 @@ def test_a_planar_motion_along_a_heading_stays_upright_and_turns_about_the_level
     assert turned == pytest.approx(math.cos(0.5) * ahead + math.sin(0.5) * np.array([0.0, 0.0, 1.0]))
     assert np.cross(found.twist[1, 1, 3:], ahead) == pytest.approx([0.0, 0.0, 0.125])
     assert found.pose[0, 1, 3:] == pytest.approx([1.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_gap_of_two_balls_is_what_lies_between_them(dimension):
+    rest = (0.0,) * (dimension - 1), () if dimension == 2 else (0.0, 0.0)
+    turn = (0.0,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
+    made = Disc if dimension == 2 else Sphere
+    first, second = (
+        Body(name, made(radius), mass, 0.1 if dimension == 2 else (0.1,) * 3, (x, *rest[0], *turn),
+             (speed, *rest[0], 0.0, *rest[1]))
+        for name, radius, mass, x, speed in (("first", 0.5, 2.0, -1.0, 3.0), ("second", 0.25, 4.0, 0.75, 1.0))
+    )  # fmt: skip
+    scene = Scene("own", 1, dimension, (first, second), (Pair(restitution=0.5),), (0.0,) * dimension, 1.0)
+    found = blows.blow_of(scene)
+    assert found is not None and (found.gap, found.closing) == (1.0, 2.0)

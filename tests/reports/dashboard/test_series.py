@@ -6,6 +6,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
@@ -14,13 +15,14 @@ from hypothesis import strategies as st
 from reports.brief import FILE, Kept, Summary, summarise
 from reports.command import main
 from reports.dashboard import events, grid, render
-from reports.dashboard.series import _divided, _Entry, panels
+from reports.dashboard.series import _divided, _Entry, _times, panels
 from reports.dashboard.steps import ERROR, TIME, steps
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
 from validation.posed import resolve
 from validation.records.store import RELEASE_TITLE, Store
+from validation.running.plan import QUICK_DT
 
 SERIES = (("chipmunk", "default"), ("chipmunk", "tuned"), ("bullet", "default"), ("bullet", "tuned"))
 
@@ -424,3 +426,15 @@ def test_the_collector_is_afterwards_as_it_was_also_when_something_breaks(was):
         assert gc.isenabled() is was
     finally:
         (gc.enable if before else gc.disable)()
+
+
+def test_a_time_is_of_a_unit_of_work_at_the_quick_step_where_there_is_one():
+    def row(purpose, dt, ratio):
+        return {"purpose": purpose, "dt": dt, "ratio": ratio, "opponent": "chipmunk/default", "engine": "reference",
+                "profile": "classical", "scene": "stack", "dimension": 2}  # fmt: skip
+
+    key = ("reference", "classical", "stack", 2)
+    rows = [row("size", QUICK_DT, 9.0), row("work", 1 / 60, 2.0), row("work", QUICK_DT, 3.0), row("work", 1 / 960, 4.0)]
+    assert _times(pd.DataFrame(rows)) == {key: (3.0, "chipmunk/default")}
+    assert _times(pd.DataFrame(rows[:2])) == {key: (2.0, "chipmunk/default")}
+    assert _times(pd.DataFrame(rows[:1])) == {}
