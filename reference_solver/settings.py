@@ -40,7 +40,7 @@ class Settings:
     slop
         Gap or overlap that is left alone: within it a contact counts as touching [m].
     warm_starting
-        Start from the impulses of the step before, matched by feature.
+        Start from the impulses of the step before, matched by feature, in space also by place (E9).
     direct
         Hand a step over to the direct solver (E44) where block sweeps with a residual stop turn out to be slow.
     margin
