@@ -82,7 +82,6 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
     path = folder / MEMBERS
-    before = path.read_bytes() if path.exists() else b""
     write_members(folder, members)
     left = [change.family.id for change in changed if change.family.id not in chosen]
     listed = sorted({m.family.id for m in members.values()})
@@ -92,7 +91,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         click.echo(json.dumps({**result, **counts, "not_accepted": left}, indent=1))
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
-        click.echo(f"{engine}: {counted} listed in {path}{', as before' if path.read_bytes() == before else ''}")
+        as_before = findings is not None and members == findings.members
+        click.echo(f"{engine}: {counted} listed in {path}{', as before' if as_before else ''}")
     _show_refused(proposal.refused)
     if left:
         click.echo(f"not accepted: {', '.join(left)}", err=True)

@@ -104,7 +104,8 @@ def _line(
     dots = " ".join(f"{_x(i, len(points)):.1f},{y(v):.1f}" for i, v in bends)
     out = [f'<polyline class="{name}" points="{dots}"/>']
     if len(points) <= MANY:
-        out += [f'<circle cx="{_x(i, len(points)):.1f}" cy="{y(v):.1f}" r="1.8"/>' for i, v in there]
+        marks = "".join(f"M{_x(i, len(points)):.1f} {y(v):.1f}h0" for i, v in there)  # round ends make a dot of each
+        out.append(f'<path class="dots" d="{marks}"/>')
     labels = {high: room[0] + 4, low: room[1]} if high > 1.001 * low else {high: y(high) + 3}
     for value, place in labels.items():
         said = "exact" if value <= EXACT and "time" not in name else number(value, 2)

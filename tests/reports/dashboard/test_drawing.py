@@ -1,6 +1,7 @@
 """The picture of a panel, read back as SVG: what stands where must be what the points say."""
 
 import math
+import re
 from collections import Counter
 from itertools import groupby, pairwise
 from xml.etree import ElementTree
@@ -47,13 +48,19 @@ def line_of(tree, name):
     return np.array([[float(x) for x in pair.split(",")] for pair in line.get("points").split()])
 
 
+def dots_of(tree):
+    """Places of all dots [px]."""
+    drawn_dots = "".join(node.get("d") for node in of_class(tree, "dots"))
+    return [(float(x), float(y)) for x, y in re.findall(r"M([\d.]+) ([\d.]+)h0", drawn_dots)]
+
+
 def size(tree):
     return [float(x) for x in tree.get("viewBox").split()][2:]
 
 
 def test_points_stand_evenly_between_the_labels_and_inside_the_picture():
     tree = drawn([point(i, error=10.0 ** -(i % 3)) for i in range(7)])
-    places = [number(dot, "cx") for dot in tree.iter("circle")]
+    places = [x for x, _ in dots_of(tree)]
     assert len(places) == 7 and np.diff(places) == pytest.approx(np.full(6, places[1] - places[0]), abs=2 * DRAWN)
     axis = {node.text: node for node in tree.iter("text")}
     left, right = axis["r0 & s"], axis["r6 & s"]
@@ -61,14 +68,14 @@ def test_points_stand_evenly_between_the_labels_and_inside_the_picture():
     assert left.get("text-anchor") is None and right.get("text-anchor") == "end"  # both run into the picture
     width, height = size(tree)
     assert 0.0 < places[0] < places[-1] < width
-    below = max(number(dot, "cy") for dot in tree.iter("circle"))
+    below = max(y for _, y in dots_of(tree))
     assert below < number(left, "y") == number(right, "y") < height
 
 
 def test_a_single_point_stands_in_the_middle_of_where_two_would_and_has_one_label():
     alone, two = drawn([point(0, error=1.0)]), drawn([point(0, error=1.0), point(1, error=1.0)])
-    (place,) = [number(dot, "cx") for dot in alone.iter("circle")]
-    assert place == pytest.approx(np.mean([number(dot, "cx") for dot in two.iter("circle")]), abs=DRAWN)
+    (place,) = [x for x, _ in dots_of(alone)]
+    assert place == pytest.approx(np.mean([x for x, _ in dots_of(two)]), abs=DRAWN)
     said = [node.text for node in alone.iter("text")]
     assert said.count("r0 & s") == 1
     assert place == pytest.approx(middle(of_class(alone, "good")[0]), abs=2 * DRAWN)
@@ -101,7 +108,7 @@ def test_the_extremes_are_said_beside_their_heights_and_one_number_where_they_ar
     tree = drawn([point(i, error=e) for i, e in enumerate([0.25, 2.5, 0.5])])
     said = labels(tree)
     assert list(said) == ["2.5", "0.25"]
-    first = min(number(dot, "cx") for dot in tree.iter("circle"))
+    first = min(x for x, _ in dots_of(tree))
     high, low = said["2.5"], said["0.25"]
     # A text's baseline: of the largest below its height so that it is not cut, of the least at it.
     assert ERROR[0] < high[0] < ERROR[0] + 8.0 and low[0] == ERROR[1]
@@ -114,7 +121,7 @@ def test_an_error_that_is_round_off_is_called_exact_and_a_time_never_is():
     tree = drawn([point(0, error=1e-17, ratio=1e-17), point(1, error=0.0, ratio=2e-17)])
     said = [node.text for node in tree.iter("text")]
     assert said.count("exact") == 1 and "1.0e-17" in said and "2.0e-17" in said
-    assert len({number(dot, "cy") for dot in list(tree.iter("circle"))[:2]}) == 1  # both are the same answer
+    assert len({y for _, y in dots_of(tree)[:2]}) == 1  # both are the same answer
 
 
 def test_signs_of_an_error_do_not_matter():
@@ -125,7 +132,7 @@ def test_signs_of_an_error_do_not_matter():
 
 def test_what_has_no_error_or_no_time_leaves_a_gap_and_no_line_where_none_has():
     tree = drawn([point(0, error=1.0), point(1), point(2, error=4.0)])
-    assert len(list(tree.iter("circle"))) == 2 and len(line_of(tree, "line")) == 2
+    assert len(dots_of(tree)) == 2 and len(line_of(tree, "line")) == 2
     assert of_class(tree, "line time") == []
     untimed, timed = size(tree)[1], size(drawn([point(0, error=1.0, ratio=2.0)]))[1]
     assert untimed < TIME[0] + 16 and timed > TIME[1]  # no room is kept for times that are not there
@@ -136,9 +143,9 @@ def test_corners_that_change_nothing_are_left_out_and_those_that_do_are_there():
     errors = [1.0] * 5 + [2.0] * 5 + [1.0]
     tree = drawn([point(i, error=e) for i, e in enumerate(errors)])
     corners = line_of(tree, "line")
-    places = [number(dot, "cx") for dot in tree.iter("circle")]
+    places = [x for x, _ in dots_of(tree)]
     assert corners[:, 0] == pytest.approx([places[i] for i in (0, 4, 5, 9, 10)], abs=DRAWN)
-    dots = [(number(dot, "cx"), number(dot, "cy")) for dot in tree.iter("circle")]
+    dots = dots_of(tree)
     assert len(dots) == 11
     for x, y in dots:  # whoever reads the line sees every point on it
         assert np.interp(x, *corners.T) == pytest.approx(y, abs=4 * DRAWN)
@@ -151,7 +158,7 @@ def test_a_step_stands_half_way_between_two_points_across_its_own_room(timed, fa
     points = [point(i, error=1.0, ratio=1.0) for i in range(8)]
     tree = drawn(points, **{"time_steps" if timed else "error_steps": steps})
     (mark,) = of_class(tree, says)
-    places = sorted({number(dot, "cx") for dot in tree.iter("circle")})
+    places = sorted({x for x, _ in dots_of(tree)})
     assert number(mark, "x1") == number(mark, "x2") == pytest.approx((places[2] + places[3]) / 2, abs=3 * DRAWN)
     room, other = (TIME, ERROR) if timed else (ERROR, TIME)
     assert number(mark, "y1") < room[0] < room[1] < number(mark, "y2")
@@ -162,7 +169,7 @@ def test_a_step_stands_half_way_between_two_points_across_its_own_room(timed, fa
 def test_every_judged_run_has_a_cell_of_its_own_filled_where_it_fails(count):
     points = [point(i, error=1.0, fails=i % 4 // 2, judged=2 * (i % 5 != 4)) for i in range(count)]
     tree = drawn(points)
-    places = [number(dot, "cx") for dot in tree.iter("circle")]
+    places = [x for x, _ in dots_of(tree)]
     for name, wanted in (
         ("good", [i for i, p in enumerate(points) if p.judged and not p.fails]),
         ("bad", [i for i, p in enumerate(points) if p.judged and p.fails]),
@@ -178,7 +185,7 @@ def test_every_judged_run_has_a_cell_of_its_own_filled_where_it_fails(count):
 def test_of_many_runs_neighbours_of_a_state_are_one_cell_from_the_first_to_the_last(states):
     kinds = {"good": (0, 1), "bad": (1, 1), "": (0, 0)}
     tree = drawn([point(i, 1.0, *kinds[state]) for i, state in enumerate(states)])
-    assert list(tree.iter("circle")) == []
+    assert dots_of(tree) == []
     groups = [(state, [i for i, _ in own]) for state, own in groupby(enumerate(states), key=lambda pair: pair[1])]
     found = [r for r in tree.iter("rect")]
     wanted = [(state, own[0], own[-1]) for state, own in groups if state]
@@ -195,7 +202,7 @@ def test_of_many_runs_neighbours_of_a_state_are_one_cell_from_the_first_to_the_l
 def test_a_flip_has_a_mark_over_its_run_that_points_down_where_it_is_lost_and_up_where_it_is_mended():
     points = [point(i, error=1.0, lost=i == 1, mended=i in (1, 3)) for i in range(5)]
     tree = drawn(points)
-    places = [number(dot, "cx") for dot in tree.iter("circle")]
+    places = [x for x, _ in dots_of(tree)]
     (lost,), (mended,) = of_class(tree, "lost"), of_class(tree, "mended")  # both at once: what is lost matters
     for mark, at, tip in ((lost, 1, 6.0), (mended, 3, 0.0)):
         start, rest = mark.get("d")[1:].split("h")
