@@ -206,6 +206,20 @@ class Simulation(ABC):
         """Release the engine's resources."""
 
 
+class Worlds(Simulation):
+    """Many worlds that one call steps, from `Engine.build_many`; the state of the first is read."""
+
+    def contacts(self) -> Contacts:
+        """Contacts of many worlds are not kept.
+
+        Raises
+        ------
+        EngineError
+            Always.
+        """
+        raise EngineError("contacts: many worlds keep none")
+
+
 ProfileRule = Callable[[Needs, float], list[Setting]]
 #: ``write(scene, dt, settings, steps)``: the run of a scene as a text that needs the engine only.
 #: The settings have passed `Engine.check_settings`.

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError, Simulation, Worlds
 from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
@@ -192,7 +192,7 @@ class MujocoSimulation(Simulation):
 
 
 @final
-class MujocoWorlds(MujocoSimulation):
+class MujocoWorlds(Worlds, MujocoSimulation):
     """Many models by ``mujoco.rollout``, which begins each call without warm start; the state of the first is read."""
 
     def __init__(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> None:
@@ -217,16 +217,6 @@ class MujocoWorlds(MujocoSimulation):
         self._mujoco.mj_setState(self._model, self._data, self._states[0], self._kind)
         for data in self._workers:
             self._check_memory(data)
-
-    def contacts(self) -> Contacts:
-        """Contacts of many worlds are not kept.
-
-        Raises
-        ------
-        EngineError
-            Always.
-        """
-        raise EngineError("contacts: many worlds keep none")
 
     def close(self) -> None:
         """End the threads."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, EngineError, Recorded, Simulation
+from adapters.engine import Array, Contacts, Recorded, Simulation, Worlds
 from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 
@@ -132,7 +132,7 @@ class ReferenceSimulation(Simulation):
         return found if self.settings.residual is None else {**found, "certified": found["holds"]}
 
 
-class ReferenceWorlds(ReferenceSimulation):
+class ReferenceWorlds(Worlds, ReferenceSimulation):
     """Many worlds by `reference_solver.Simulation.many`; what is read is the state of the first."""
 
     def __init__(self, scenes: Sequence[Scene], settings: Any, threads: int) -> None:
@@ -153,16 +153,6 @@ class ReferenceWorlds(ReferenceSimulation):
     def twist(self) -> Array:
         """Twists of the first world."""
         return np.asarray(self.worlds.twist[0], float)
-
-    def contacts(self) -> Contacts:
-        """Contacts of many worlds are not kept.
-
-        Raises
-        ------
-        EngineError
-            Always.
-        """
-        raise EngineError("contacts: many worlds keep none")
 
     def record(self, samples: int, stride: int, contacts: bool) -> None:
         """Samples are taken by calls of `advance`."""

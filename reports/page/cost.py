@@ -216,8 +216,10 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
     table = named(table)
     on_front = table[table["best"]].sort_values("cost")
     best = alt.Chart(on_front)
-    # The step stands beside both ends: between them points lie too close. A point at the same error costs more.
-    labelled = on_front.drop_duplicates("shown").iloc[[0, -1]].drop_duplicates()
+    # Only the first and the last point show their time step: the others lie too close together. Of points with the
+    # same error the cheapest counts.
+    labelled = on_front.drop_duplicates("shown")
+    labelled = labelled.iloc[[0, -1][: len(labelled)]]
     thin = alt.Chart(table).mark_line(strokeWidth=1.1, opacity=0.7)
     points = alt.Chart(table).mark_point(strokeWidth=POINT, size=40)
     detail = {"detail": ["engine:N", "profile:N"], "description": "who:N"}

@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 
@@ -72,7 +72,7 @@ def run(tree: Path, tests: Sequence[str]) -> tuple[int, str]:
         options += ("--hypothesis-profile=ci", f"@{names.name}")
         process = psutil.Popen(
             [sys.executable, "-m", "pytest", *options],
-            cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, stdout=printed, stderr=subprocess.DEVNULL, text=True,
+            cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, stdout=printed, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         status = ended(process)
         printed.seek(0)
@@ -94,7 +94,8 @@ def ended(process: psutil.Popen) -> int:
             used = process.cpu_times()
             if used.user + used.system > SPENT or time.monotonic() - start > PATIENCE:
                 for each in (*process.children(recursive=True), process):
-                    each.kill()
+                    with suppress(psutil.NoSuchProcess):
+                        each.kill()
                 process.wait()
                 return -1
 

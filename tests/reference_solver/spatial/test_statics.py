@@ -98,9 +98,14 @@ def test_a_column_of_ten_stands_a_minute_with_ten_sweeps(build, dt):
 
 
 def recalled(remembered, found):
-    """Normal impulses that the points between two bodies of half width 0.5 m get from those of the step before.
+    """Normal impulse [N s] with which each point of this step starts; both bodies have a half width of 0.5 m.
 
-    ``remembered``: feature, place along x [m] and normal impulse [N s] of each point; ``found``: feature and place.
+    Parameters
+    ----------
+    remembered
+        Feature, x [m] and normal impulse [N s] of each point of the step before.
+    found
+        Feature and x [m] of each point of this step.
     """
     manifolds, memory = allocate_manifolds(1), allocate_memory(1)
     manifolds.frame[0] = np.eye(3)
