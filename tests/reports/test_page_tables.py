@@ -60,7 +60,8 @@ def test_a_table_of_levels_has_who_answers_and_names_who_cannot_be_asked():
         told("box2d", cost=float("nan"), reason="unsupported: no such shape"),
     ]  # fmt: skip
     (table,) = cost._level_tables(pd.DataFrame(rows), "cost", 0.0)
-    assert (table.scene, table.dimension, table.refused) == ("impact", 2, "box2d/tuned")
+    assert (table.anchor, table.scene, table.dimension) == ("level-cost-impact-2", "impact", 2)
+    assert table.refused == "box2d/tuned"
     assert [(engine, profile) for engine, profile, _ in table.rows] == [("chipmunk", "tuned"), ("bullet", "tuned")]
     (first, _), (second, missing) = (cells for _, _, cells in table.rows)
     assert first.best and (first.text, first.detail) == ("2 ms", "dt 1/240")
