@@ -146,7 +146,7 @@ def _helped_by_drop(engine: str, suffix: str, text: str) -> str:
         left_out = len(registry.load(engine).reads[suffix.lower()](text, True).dropped)
     except Exception:  # it is refused for another reason too, which the next call reports
         return ""
-    return f"; --drop leaves it out ({left_out} in all)" if left_out > 1 else "; --drop leaves it out"
+    return "; run --drop leaves it out" + (f" ({left_out} in all)" if left_out > 1 else "")
 
 
 # ---- shared by readers -----------------------------------------------------------------------------------------------

@@ -361,9 +361,9 @@ def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
 
 def test_a_refusal_names_drop_where_it_helps_and_nowhere_else():
     text = f'<mujoco><worldbody>{PLANE}<body><freejoint/><geom size=".1" density="1"/></body></worldbody>{{}}</mujoco>'
-    with pytest.raises(SceneError, match=r"; --drop leaves it out$"):
+    with pytest.raises(SceneError, match=r"; run --drop leaves it out$"):
         read("mujoco", ".xml", text.format("<tendon/>"), False)
-    with pytest.raises(SceneError, match=r"; --drop leaves it out \(2 in all\)$"):
+    with pytest.raises(SceneError, match=r"; run --drop leaves it out \(2 in all\)$"):
         read("mujoco", ".xml", text.format('<tendon/><equality><weld body1="a"/></equality>'), False)
     for drop in (False, True):  # nothing is left that moves
         with pytest.raises(SceneError) as caught:
