@@ -86,11 +86,10 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], text: s
             console.print(Text(recorded_paste(fix) or nothing_to_paste(fix)), soft_wrap=True)
     for engine in named:
         if engine not in {fix.engine for fix in fixes}:
-            console.print(
-                Text(f"{engine}: {'no failure is on record' if cures_of(engine) else 'has no table of fixes'}")
-            )
+            search = f"no fix is on record; to search: crosscheck cure {engine} {scene}"
+            console.print(Text(f"{engine}: {search if cures_of(engine) else 'has no table of fixes'}"))
     if not fixes and not named:
-        console.print(Text("no failure of an engine as shipped is on record"))
+        console.print(Text("no fix of an engine as shipped is on record"))
     console.print()
     console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
     helped = [fix.engine for fix in fixes if fix.recommended and fix.engine not in named]
