@@ -8,6 +8,7 @@ gives a one-line error.
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -57,6 +58,11 @@ class Model:
         Further settings for the model's own engine: contact softness, solver options.
     dt
         The model's own step [s].
+
+    Raises
+    ------
+    SceneError
+        If the step is not a positive, finite number.
     """
 
     scene: Scene
@@ -64,6 +70,10 @@ class Model:
     dropped: tuple[str, ...]
     settings: tuple[Setting, ...]
     dt: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.dt) and self.dt > 0.0):
+            raise SceneError(f"model: its time step of {self.dt:g} s must be positive and finite")
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data (JSON-ready) that `model_from_dict` reads back."""
@@ -146,7 +156,7 @@ def _helped_by_drop(engine: str, suffix: str, text: str) -> str:
         left_out = len(registry.load(engine).reads[suffix.lower()](text, True).dropped)
     except Exception:  # it is refused for another reason too, which the next call reports
         return ""
-    return f"; --drop leaves it out ({left_out} in all)" if left_out > 1 else "; --drop leaves it out"
+    return "; run --drop leaves it out" + (f" ({left_out} in all)" if left_out > 1 else "")
 
 
 # ---- shared by readers -----------------------------------------------------------------------------------------------

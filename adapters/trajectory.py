@@ -123,6 +123,12 @@ class Trajectory:
     out_of_plane: float | None = None
     wall_time: float = 0.0
 
+    def __repr__(self) -> str:
+        """What it holds, in place of thousands of numbers."""
+        contacts = "contacts not recorded" if self.contacts is None else f"{len(self.contacts.rows.a)} contacts"
+        until = f"{len(self.t)} samples until {self.t[-1]:.6g} s" if len(self.t) else "no samples"
+        return f"<{self.finish}: {self.pose.shape[1]} bodies in {self.dimension}-D, {until}, {contacts}>"
+
     @property
     def dimension(self) -> int:
         """2 or 3."""

@@ -16,7 +16,7 @@ import jinja2
 import pandas as pd
 
 from adapters import registry
-from reports.cures import cure_paste, cure_text, recorded_fixes, setting_text
+from reports.cures import recorded_fixes, recorded_paste, recorded_text, setting_text
 from reports.listing import describe
 from reports.tables import unset_text
 from reports.wording import first_of, markdown, number, word_of
@@ -154,11 +154,7 @@ def passed() -> pd.DataFrame:
 def fixes(scene: str) -> list[dict[str, Any]]:
     """What is on record of engines as shipped on a scene: what mends it, in words and as lines to paste."""
     return [
-        {
-            "cure": cure,
-            "text": cure_text(cure, f"in {cure.dimension}-D"),
-            "paste": cure_paste(cure) if cure.helps else "",
-        }
+        {"cure": cure, "text": recorded_text(cure), "paste": recorded_paste(cure)}
         for cure in recorded_fixes(scene, registry.names())
     ]
 

@@ -145,7 +145,7 @@ def told_cures(engine: str, version: str, scene: str, shipped: str, dimensions: 
     known = known_cures(engine, version, scene, shipped, dimensions)
     if len(known) == 2 and not any(cure.helps for cure, _ in known):
         return [f"{NONE_HELPS} ({', '.join(f'{cure.tried} tried in {where}' for cure, where in known)})"]
-    return [_recorded(*each) for each in known]
+    return [recorded_text(*each) for each in known]
 
 
 def known_cures(
@@ -160,9 +160,10 @@ def known_cures(
     return [(cure, f"{cure.dimension}-D") for cure in known]
 
 
-def _recorded(cure: Cure, where: str) -> str:
-    """`cure_text` after what it achieves; only the count where it leaves most checks failing."""
-    if cure.helps and 2 * cure.left > cure.failing:
+def recorded_text(cure: Cure, where: str = "") -> str:
+    """`cure_text` after what it achieves; only the count where it is not `Cure.recommended`."""
+    where = where or f"{cure.dimension}-D"
+    if cure.helps and not cure.recommended:
         fixed = f"{cure.failing - cure.left} of {cure.failing} checks"
         return f"{where}: the best settings found fix {fixed} ({cure.tried} tried)"
     what = "smallest fix, " if not cure.left else "best settings found, "
@@ -351,6 +352,11 @@ def recorded_fixes(scene: str, engines: Iterable[str]) -> list[Cure]:
         own = [cure for (name, _), cure in cures_of(engine).items() if name == scene]
         found += [max(own, key=lambda cure: cure.dimension)] if own else []
     return found
+
+
+def recorded_paste(cure: Cure) -> str:
+    """`cure_paste` of a fix that is `Cure.recommended`; empty for another."""
+    return cure_paste(cure) if cure.recommended else ""
 
 
 def cure_paste(cure: Cure) -> str:

@@ -23,6 +23,15 @@ def test_each_scene_s_page_has_who_passes_it_in_the_published_report(monkeypatch
     assert (found.failed > 0).any() and (found.failed <= found.judged).all()
 
 
+def test_pages_give_lines_to_paste_for_fixes_that_are_recommended_alone(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    fixes = importlib.import_module("pages").fixes
+    told = [fix for scene in CATALOGUE for fix in fixes(scene)]
+    weak = [fix for fix in told if fix["cure"].helps and not fix["cure"].recommended]
+    assert weak and all("the best settings found fix" in fix["text"] and not fix["paste"] for fix in weak)
+    assert any(fix["paste"] for fix in told)
+
+
 def written_by_hand():
     """Every page for people but the theory of the solver and the list of models in `tests/models`."""
     tracked = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, check=True, capture_output=True, text=True)

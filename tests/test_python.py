@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,12 @@ def test_a_result_has_its_motion_its_table_and_its_explanation(engine):
     motion = result.trajectory
     assert motion.state_hash() == result.observation.state_hash
     assert motion.pose.shape == (len(motion.t), len(result.bodies), 7) and motion.contacts.rows.gap.size
+    samples, contacts = (
+        f"{len(motion.t)} samples until {motion.t[-1]:.6g} s",
+        f"{motion.contacts.rows.gap.size} contacts",
+    )
+    assert repr(motion) == f"<completed: 2 bodies in 3-D, {samples}, {contacts}>"
+    assert repr(replace(motion, contacts=None)).endswith(", contacts not recorded>"), "a cell of a notebook shows it"
     rows = result.frame()
     html = result._repr_html_()
     assert html.count("<tr") == 1 + len(rows) and "<table" in html and "FAIL" in html

@@ -40,6 +40,8 @@ NO_PLACE = {
     "mesh": "a scene has no meshes except convex hulls of vertices",
     "hfield": "a scene has no height fields",
 }
+#: Attributes with names of other elements, or of the element itself.
+NAMES = frozenset(["name", "class", "childclass", "model", "mesh", "geom1", "geom2", "prefix"])
 #: Attributes of a mesh that is the convex hull of its vertices, a solid of one density.
 HULL = frozenset(["name", "class", "vertex", "scale"])
 
@@ -126,6 +128,9 @@ def _clean(element: Element, drop: bool, dropped: list[str]) -> None:
             raise SceneError(f"model: line {child.line}: {one_line(name, 40)!r} cannot be a name")
         for attribute in ("material", "rgba", "user", "group"):
             child.attributes.pop(attribute, None)
+        for attribute, value in child.attributes.items():
+            if attribute not in NAMES and "nan" in value.lower().split():  # to MuJoCo: not given
+                raise SceneError(f"model: {child}: {attribute} is not a number: {one_line(value, 40)}")
         if element.tag == "default" and child.tag not in ("geom", "default", "pair", "joint", "mesh"):
             continue
         _clean(child, drop, dropped)

@@ -57,7 +57,7 @@ def read(text: str, drop: bool) -> Model:
             line = f"{joint}: a {kind} joint holds a link; bodies of a scene are free or fixed"
             if not drop:
                 raise SceneError(f"model: {line}")
-            dropped.append(f"{line}: and all links attached to it")
+            dropped.append(f"{line}; it and all links attached to it")
             _cut(root, joint)
     links = [child for child in root.children if child.tag == "link"]
     joints = [child for child in root.children if child.tag == "joint"]

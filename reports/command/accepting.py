@@ -82,7 +82,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
     path = folder / MEMBERS
-    write_members(folder, members)
+    if members or findings is not None:  # an empty list would make every failure of the engine new
+        write_members(folder, members)
     left = [change.family.id for change in changed if change.family.id not in chosen]
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
@@ -92,10 +93,13 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
         as_before = findings is not None and members == findings.members
-        click.echo(f"{engine}: {counted} listed in {path}{', as before' if as_before else ''}")
+        where = f"listed in {path}{', as before' if as_before else ''}"
+        click.echo(f"{engine}: {f'{counted} {where}' if members or findings is not None else 'nothing is listed'}")
     _show_refused(proposal.refused)
     if left:
-        click.echo(f"not accepted: {', '.join(left)}", err=True)
+        drafts = any(change.is_draft for change in changed if change.family.id in left)
+        hint = f" (without a terminal: write reasons into {folder / FAMILIES}, and name them by --family)"
+        click.echo(f"not accepted: {', '.join(left)}{hint if drafts else ''}", err=True)
     if proposal.left_out:
         click.echo(f"not named by --family: {plural(len(proposal.left_out), 'check')} new or changed", err=True)
     sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
@@ -151,13 +155,14 @@ def _is_of_this_code(observation: Observation) -> bool:
 
 
 def _table(engine: str, changes: Sequence[Change]) -> Table:
-    table = Table(title=f"Known failures of {engine}: checks per cause", title_justify="left")
+    title = f"Known failures of {engine}: checks per cause"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name in ("cause", "listed", "new", "changed", "gone", "bands", "why"):
-        table.add_column(name, justify="left" if name in ("cause", "why") else "right")
+        table.add_column(name, justify="left" if name in ("cause", "why") else "right", no_wrap=name == "cause")
     for change in changes:
         listed = len(change.same) + len(change.drifted) + len(change.gone) + len(change.bands)
         counts = (listed, len(change.new), len(change.drifted), len(change.gone), len(change.bands))
-        table.add_row(change.family.id, *map(str, counts), change.family.reason or "no reason is written yet")
+        table.add_row(change.family.id, *map(str, counts), change.family.reason or "none yet")
     return table
 
 

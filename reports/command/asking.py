@@ -18,7 +18,7 @@ from adapters import registry
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.cures import cure_paste, cure_text, nothing_to_paste, recorded_fixes
+from reports.cures import nothing_to_paste, recorded_fixes, recorded_paste, recorded_text
 from reports.terminal import terminal
 from reports.wording import number, reproduce
 from validation.field import CURED, Finding, ask, matching
@@ -60,7 +60,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
         plain = {
             "scene": best.scene, "command": best.command, "words": best.words, "missed": missed, "others": others,
             "report": best.report.source if best.report else None,
-            "fixes": [{**asdict(fix), "paste": cure_paste(fix)} for fix in fixes],
+            "fixes": [{**asdict(fix), "paste": recorded_paste(fix)} for fix in fixes],
         }  # fmt: skip
         click.echo(json.dumps(plain, indent=1, default=str))
         return
@@ -81,20 +81,18 @@ def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], text: s
     for fix in fixes:
         console.print()
         console.print(Text(f"{fix.engine} as shipped: {fix.failing} of {fix.judged} checks fail", style="bold"))
-        kind = "fix" if 2 * fix.left <= fix.failing else "best setting found"
-        console.print(Text(cure_text(fix, f"{kind} in {fix.dimension}-D" if fix.helps else f"{fix.dimension}-D")))
-        if fix.helps and fix.engine in named:
-            console.print(Text(cure_paste(fix) or nothing_to_paste(fix)), soft_wrap=True)
+        console.print(Text(recorded_text(fix)))
+        if fix.recommended and fix.engine in named:
+            console.print(Text(recorded_paste(fix) or nothing_to_paste(fix)), soft_wrap=True)
     for engine in named:
         if engine not in {fix.engine for fix in fixes}:
-            console.print(
-                Text(f"{engine}: {'no failure is on record' if cures_of(engine) else 'has no table of fixes'}")
-            )
+            search = f"no fix is on record; to search: crosscheck cure {engine} {scene}"
+            console.print(Text(f"{engine}: {search if cures_of(engine) else 'has no table of fixes'}"))
     if not fixes and not named:
-        console.print(Text("no failure of an engine as shipped is on record"))
+        console.print(Text("no fix of an engine as shipped is on record"))
     console.print()
     console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
-    helped = [fix.engine for fix in fixes if fix.helps and fix.engine not in named]
+    helped = [fix.engine for fix in fixes if fix.recommended and fix.engine not in named]
     if helped:
         engines = " or ".join(dict.fromkeys(helped))
         console.print(

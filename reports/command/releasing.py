@@ -14,6 +14,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from adapters.plain import one_line
 from adapters.scene import SceneError
 from reports import releases as rendering
 from reports.command import statuses
@@ -25,10 +26,11 @@ from reports.stages import say
 from reports.terminal import terminal
 from reports.wording import plural, profile_words
 from validation.canonical import SUITES
-from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, slot_from_dict
+from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, plane_of, slot_from_dict
+from validation.posed import resolve
 from validation.records.store import Store
 from validation.releases import environments, history
-from validation.releases.bisection import Unchanged, bisect
+from validation.releases.bisection import Unchanged, bisect, is_meant
 from validation.releases.choosing import Release, chosen
 from validation.releases.driving import Effort, drive, planned, time
 from validation.releases.floors import moved_starts
@@ -199,6 +201,10 @@ def bisect_(
     releases, and none whose results are in OUT already. Exits with 4 if A or B cannot run.
     """
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
+    known = dict.fromkeys(metric for slot in wanted for metric in _metrics(slot))
+    if not any(is_meant(metric, check) for metric in known):
+        kinds = ", ".join(dict.fromkeys(metric.partition("[")[0] for metric in known))
+        raise SceneError(f"check: {scene} has no check {one_line(check, 60)!r}; it has {kinds}")
     store = Store(out)
     try:
         found = bisect(
@@ -212,6 +218,14 @@ def bisect_(
     commands = _commands(engine, versions[found.before], versions[found.after], slot_from_dict(found.change.slot), out)
     plain = rendering.found_as_plain(found, engine, versions, commands)
     click.echo(json.dumps(plain, indent=1) if as_json else rendering.found_as_text(plain))
+
+
+def _metrics(slot: Slot) -> list[str]:
+    """Names of all checks of a case."""
+    canonical = resolve(slot.scene)
+    scene = canonical.scene(slot.dimension, dict(slot.params))
+    checks = (*canonical.checks(scene, slot.dt), *plane_of(canonical, scene, slot.dt))
+    return [check.metric for check in checks]
 
 
 def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene: str, as_json: bool) -> NoReturn:

@@ -82,6 +82,9 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     if as_json:
         click.echo(json.dumps(json.loads(found.to_json(orient="records", double_precision=15)), indent=1))
     console.print(counted(found))
+    unsupported = int((found["outcome"] == "unsupported").sum())
+    if unsupported:
+        console.print(f"unsupported: {plural(unsupported, 'case')}, which the engine cannot run", highlight=False)
     print_roles(((slot.engine, slot.profile) for slot in chosen), console)
     console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
     console.print(f"what fails and why: crosscheck findings{at(out)}", markup=False, highlight=False, soft_wrap=True)

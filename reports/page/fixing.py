@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from reports.answers import Answer, configured
-from reports.cures import cure_paste, is_standard, known_cures, told
+from reports.cures import cure_paste, is_standard, known_cures, told, told_cures
 from reports.page.source import Source
 from reports.wording import mark_of
 from validation.settings.cures import Cure
@@ -36,18 +36,18 @@ class Wrong:
 
 
 def wrongs(source: Source, answers: Iterable[Answer]) -> list[Wrong]:
-    """One line per answer: with the fixes of the committed table; without any, with the words of the answer."""
+    """One line per answer: with the fixes that are recommended; without any, with the words of the answer."""
     return [_wrong(source, answer) for answer in answers]
 
 
 def _wrong(source: Source, answer: Answer) -> Wrong:
     rows = configured(source.of(scene=answer.scene, engine=answer.engine, profile=answer.profile))
     dimensions = sorted({row["dimension"] for row in rows if mark_of(row) != "pass" and is_standard(row)})
-    known = known_cures(answer.engine, rows[0]["engine_version"], answer.scene, answer.profile, dimensions)
-    fixes = [_fix(cure, "" if len(known) == 1 else where) for cure, where in known if cure.helps]
+    which = (answer.engine, rows[0]["engine_version"], answer.scene, answer.profile, dimensions)
+    known = known_cures(*which)
+    fixes = [_fix(cure, "" if len(known) == 1 else where) for cure, where in known if cure.recommended]
     said = answer.cure.partition("; ")[0].partition(", by ")[0].replace("->", "→")
-    tried = [cure.tried for cure, _ in known if not cure.helps]
-    return Wrong(answer, fixes, f"{said}; no setting helps ({max(tried)} tried)" if tried and not fixes else said)
+    return Wrong(answer, fixes, said if fixes else "; ".join([said, *told_cures(*which)]))
 
 
 def _fix(cure: Cure, where: str) -> Fix:

@@ -127,6 +127,29 @@ def test_hostile_and_wrong_models_are_one_line(text, said):
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
 
 
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('density="1"', 'mass="nan"', "line 3: <geom>: mass is not a number: nan"),
+    ('size=".1"', 'size=".1 NaN"', "line 3: <geom>: size is not a number: .1 NaN"),
+    ('pos="0 0 1"', 'pos="0 nan 1"', "line 2: <body> 'nan': pos is not a number: 0 nan 1"),
+    ("<option/>", '<option timestep="0"/>', "its time step of 0 s must be positive"),
+    ("<option/>", '<option timestep="-.01"/>', "its time step of -0.01 s must be positive"),
+    ("<option/>", '<option gravity="0 0 nan"/>', "<option>: gravity is not a number"),
+    ("<option/>", "<option/>", ""),
+])  # fmt: skip
+def test_a_value_that_is_no_number_and_a_step_that_is_none_are_refused(old, new, said):
+    """MuJoCo takes nan for a value that is not given: a body of mass nan would weigh what its density says."""
+    text = (
+        f'<mujoco><option/><worldbody>{PLANE}\n<body name="nan" pos="0 0 1"><freejoint/>\n'
+        '<geom type="sphere" size=".1" density="1"/></body></worldbody></mujoco>'
+    )
+    try:
+        found = reading.read(text.replace(old, new), True)
+    except SceneError as error:
+        assert said and said in str(error)
+    else:
+        assert said == "" and found.dt == 0.002
+
+
 def test_the_compiler_s_complaint_names_the_line_of_the_text():
     with pytest.raises(SceneError, match=r"does not compile it: .*'sise'.* line 4"):
         reading.read(model_of("\n\n" + BALL.replace("<geom", "\n<geom").replace("size=", "\nsise=")), False)
@@ -361,9 +384,9 @@ def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
 
 def test_a_refusal_names_drop_where_it_helps_and_nowhere_else():
     text = f'<mujoco><worldbody>{PLANE}<body><freejoint/><geom size=".1" density="1"/></body></worldbody>{{}}</mujoco>'
-    with pytest.raises(SceneError, match=r"; --drop leaves it out$"):
+    with pytest.raises(SceneError, match=r"; run --drop leaves it out$"):
         read("mujoco", ".xml", text.format("<tendon/>"), False)
-    with pytest.raises(SceneError, match=r"; --drop leaves it out \(2 in all\)$"):
+    with pytest.raises(SceneError, match=r"; run --drop leaves it out \(2 in all\)$"):
         read("mujoco", ".xml", text.format('<tendon/><equality><weld body1="a"/></equality>'), False)
     for drop in (False, True):  # nothing is left that moves
         with pytest.raises(SceneError) as caught:

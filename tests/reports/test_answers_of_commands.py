@@ -254,10 +254,12 @@ def test_what_is_accepted_refused_and_left_out_is_said_and_counted(monkeypatch, 
         "engine": "chipmunk", "rows": 3, "families": ["f-1"], "file": str(tmp_path / accepting.MEMBERS),
         "refused": 14, "left_out": 2, "not_accepted": ["f-2"],
     }  # fmt: skip
+    reasons = f"write reasons into {tmp_path / accepting.FAMILIES}, and name them by --family"
     told = [
         "refused: 14 checks: a law covers it",
         *["  chipmunk/default stack 3-D {'n': 2.0} creep 0.123457"] * accepting.SHOWN,
-        "  and 2 more", "not accepted: f-2", "not named by --family: 2 checks new or changed",
+        "  and 2 more", f"not accepted: f-2 (without a terminal: {reasons})",
+        "not named by --family: 2 checks new or changed",
     ]  # fmt: skip
     assert err[-len(told) :] == told
     status, out, err = said(*call)

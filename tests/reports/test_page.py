@@ -19,11 +19,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import reports.cures
 from reports import page
 from reports.answers import answers
 from reports.command import main
 from reports.cures import Change
-from reports.page import Source, as_data, first_answers, load_source, policy, render, replay
+from reports.page import Source, as_data, first_answers, fixing, load_source, policy, render, replay
 from reports.page.choosing import Cure, choices, cures
 from reports.page.conclusions import NAMED, findings, scenes_text, sentences
 from reports.page.explorer import explorer
@@ -268,6 +269,19 @@ def test_of_many_things_that_are_wrong_the_worst_of_each_engine_and_family_come_
     assert f"The other {len(wrong) - len(first)}, scene by scene" in made
     table = made.partition("<table class=wrongs")[0] + made.partition('class="wrongs blocks"')[2]
     assert all(answer.wrong.replace("&", "&amp;") in table for answer in wrong if "<" not in answer.wrong)
+
+
+def test_settings_that_leave_most_checks_failing_are_counted_and_not_given_to_paste(page_source, monkeypatch):
+    wrong = answers(page_source.rows)
+    mended = [each.answer for each in fixing.wrongs(page_source, wrong) if each.fixes]
+    listed = reports.cures.cures_of
+
+    def weak(engine):
+        return {key: replace(cure, failing=20, left=19 if cure.helps else 20) for key, cure in listed(engine).items()}
+
+    monkeypatch.setattr("reports.cures.cures_of", weak)
+    found = [each for each in fixing.wrongs(page_source, wrong) if each.answer in mended]
+    assert found and all(not each.fixes and "the best settings found fix 1 of 20 checks" in each.said for each in found)
 
 
 def test_only_scenes_that_were_timed_have_a_first_choice(page_source):

@@ -123,6 +123,10 @@ def test_what_is_interrupted_goes_on_with_the_same_command(monkeypatch, tmp_path
         (("bisect", "chipmunk", "1.0", "impact", "--check", "apex"),
          "releases: 1.0 is one release; a comparison needs two"),
         (("releases", "chipmunk", "1.0", "bounce"), "scenes: no case fits this selection"),
+        (("bisect", "chipmunk", "1.0..2.0", "impact", "--check", "apex"),
+         "check: impact has no check 'apex'; it has rebound_ratio, "),
+        (("bisect", "chipmunk", "1.0..2.0", "impact", "--check", "rebound_ratio[1]"),
+         "check: impact has no check 'rebound_ratio[1]'"),
     ],
 )  # fmt: skip
 def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path, words, said):

@@ -67,6 +67,7 @@ def value_of(formula: float | str, names: Mapping[str, float]) -> float:
         raise FormulaError(f"{shown}: {error}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError, ZeroDivisionError) as error:
         why = "is no formula" if isinstance(error, SyntaxError | RecursionError | MemoryError) else one_line(error)
+        why = "its value is too large" if isinstance(error, OverflowError) else why
         raise FormulaError(f"{shown}: {why}") from None
     if not math.isfinite(found):
         raise FormulaError(f"{shown}: is {found}, not a finite number")

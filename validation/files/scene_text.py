@@ -76,8 +76,11 @@ def parsed(text: str, path: Path) -> Any:
 def said(errors: ValidationError) -> str:
     """All wrong fields in one line, or the first few."""
     found = errors.errors(include_url=False, include_context=False, include_input=False)
-    fields = [".".join(map(str, e["loc"])) or "file" for e in found]
-    return listed([one_line(f"{name}: {e['msg']}") for name, e in zip(fields, found, strict=True)])
+    # A number or a formula: pydantic has an error for each of both types, with the type as the last part of the place.
+    formulas = [e for e in found if e["type"] == "string_type" and e["loc"][-1:] == ("str",)]
+    either = {e["loc"][:-1] for e in formulas}
+    places = [(e["loc"][:-1] if e["loc"][:-1] in either else e["loc"], e) for e in found if e not in formulas]
+    return listed([one_line(f"{'.'.join(map(str, place)) or 'file'}: {e['msg']}") for place, e in places])
 
 
 def listed(wrong: list[str]) -> str:

@@ -75,7 +75,7 @@ class _Questions:
         if index not in self.asked:
             self.asked.append(index)
             told = self._ask(index, cells)
-            found = [row.as_dict() for row in told.rows if _meant(row.metric, self._metric)]
+            found = [row.as_dict() for row in told.rows if is_meant(row.metric, self._metric)]
             self.rows[index] = {_key(row): row for row in found if row["outcome"] in ANSWERS}
             if not self.rows[index]:
                 self.silent[index] = told.reason or next((row["reason"] for row in found), "it has no such check")
@@ -86,7 +86,7 @@ def _key(row: dict[str, Any]) -> str:
     return f"{slot_from_dict(row['slot']).key()} {row['metric']}"
 
 
-def _meant(metric: str, asked: str) -> bool:
+def is_meant(metric: str, asked: str) -> bool:
     """``apex`` means all of a series, ``apex[1]`` or ``bounce/apex[1]`` one of it."""
     asked = asked.rpartition("/")[2]
     return metric == asked or metric.partition("[")[0] == asked

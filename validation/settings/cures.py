@@ -128,6 +128,11 @@ class Cure:
         return self.left < self.failing
 
     @property
+    def recommended(self) -> bool:
+        """Whether it corrects at least half of the failing checks; otherwise most of what a user sees stays wrong."""
+        return self.helps and 2 * self.left <= self.failing
+
+    @property
     def times(self) -> float | None:
         """Cost of the fix over the cost as shipped."""
         return self.cost_after / self.cost_before if self.cost_before and self.cost_after else None

@@ -107,10 +107,10 @@ def test_a_check_that_no_row_has_is_said():
      ("apex[1", []), ("[1]", [])],
 )  # fmt: skip
 def test_a_check_is_meant_by_its_name_its_series_or_its_place_in_it(asked, meant):
-    from validation.releases.bisection import _meant
+    from validation.releases.bisection import is_meant
 
-    assert [metric for metric in ("apex[1]", "apex[2]", "rest[1][2]") if _meant(metric, asked)] == meant
-    assert not _meant("rest[1][2]", "rest[1]") and _meant("rest[1][2]", "rest")
+    assert [metric for metric in ("apex[1]", "apex[2]", "rest[1][2]") if is_meant(metric, asked)] == meant
+    assert not is_meant("rest[1][2]", "rest[1]") and is_meant("rest[1][2]", "rest")
 
 
 def test_who_was_asked_is_said_in_order_and_only_the_cell_that_is_followed_is_asked_between_the_ends():
