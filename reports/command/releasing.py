@@ -221,11 +221,11 @@ def bisect_(
 
 
 def _metrics(slot: Slot) -> list[str]:
-    """Names of all checks of a case."""
+    """Names of all checks of a case, and of those that judge several cases together."""
     canonical = resolve(slot.scene)
     scene = canonical.scene(slot.dimension, dict(slot.params))
     checks = (*canonical.checks(scene, slot.dt), *plane_of(canonical, scene, slot.dt))
-    return [check.metric for check in checks]
+    return [*(check.metric for check in checks), *(study.name for study in canonical.studies)]
 
 
 def _say_unchanged(found: Unchanged, versions: Sequence[str], check: str, scene: str, as_json: bool) -> NoReturn:

@@ -127,6 +127,7 @@ def test_what_is_interrupted_goes_on_with_the_same_command(monkeypatch, tmp_path
          "check: impact has no check 'apex'; it has rebound_ratio, "),
         (("bisect", "chipmunk", "1.0..2.0", "impact", "--check", "rebound_ratio[1]"),
          "check: impact has no check 'rebound_ratio[1]'"),
+        (("bisect", "chipmunk", "1.0..2.0", "incline", "--check", "apex"), ", threshold\n"),  # judged over several cases
     ],
 )  # fmt: skip
 def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path, words, said):
