@@ -93,6 +93,20 @@ class Simulation:
         self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0
 
+    def __copy__(self) -> Self:
+        """Return a simulation of its own that goes on from the same state, with the same bits.
+
+        Arrays that are copied one by one lose the strides of zero by which laws of pairs are one number: of such a
+        table all kernels would be compiled anew.
+        """
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), _world=self._world.copy())
+        return other
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """See `__copy__`: model and settings cannot change."""
+        return self.__copy__()
+
     @staticmethod
     def many(
         model: Callable[..., Model],

@@ -1,5 +1,6 @@
 """Recording, copies, determinism, and the uncompiled solver."""
 
+import copy
 import os
 import subprocess
 import sys
@@ -33,6 +34,20 @@ def test_two_runs_give_the_same_bits(profile):
     first, second = (Simulation(mixed_model(), profile(DT)).record(240, contacts=True) for _ in range(2))
     assert bits(first) == bits(second)
     assert len(first.contacts) > 500
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
+def test_a_copy_goes_on_alone_with_the_same_bits_and_kernels(copied):
+    """Laws of pairs that are one number stay one: a table of them has another type, and all kernels would compile."""
+    simulation = Simulation(mixed_model(), Settings.classical(DT))
+    simulation.advance(5)
+    pose, other = simulation.pose, copied(simulation)
+    other.advance(5)
+    assert np.array_equal(simulation.pose, pose) and simulation.time == 5 * DT
+    simulation.advance(5)
+    assert np.array_equal(other.pose, simulation.pose) and np.array_equal(other.twist, simulation.twist)
+    assert other.time == simulation.time
+    assert [x.strides for x in other._world._laws] == [x.strides for x in simulation._world._laws] == [(0, 0)] * 2
 
 
 @pytest.mark.parametrize("profile", PROFILES)

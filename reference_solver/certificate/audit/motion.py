@@ -127,12 +127,13 @@ def _spin(run: Run) -> float:
     over = 0.5 * length * way + length**2 * (first - last) / 12.0
     frozen = run.is_frozen[run.owner]
     gained = np.where(frozen[:, None], gained, gained + cross(way, mass * last) - cross(over, force))
-    # What that polynomial does not see of the way: h^5/720 of its fourth derivative, an acceleration times w^2.
-    spins = [np.linalg.norm(twist[:, run.d :], axis=1) for twist in (pieces.twist_before, pieces.twist_after)]
-    turning = np.linalg.norm(pieces.twist_after[:, run.d :] - pieces.twist_before[:, run.d :], axis=1)
+    # What that polynomial does not see of the way: h^5/720 of its fourth derivative, an acceleration times w^2 or the
+    # rate of w, with w the rate at which contacts turn. A ball that slides over another without friction turns them and
+    # does not spin. Each force turns with its own contact, so that forces count, and not their sum.
     load, time = np.linalg.norm(force, axis=1), length[:, 0]
-    pulled = load / mass[:, 0] * time + np.linalg.norm(last - first, axis=1)
-    unseen = UNSEEN * load * time**2 * pulled * ((time * np.maximum(*spins)) ** 2 + time * turning)
+    pulled = (load * time + size) / mass[:, 0]
+    passing = time * np.linalg.norm(last - first, axis=1) / np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
+    unseen = UNSEEN * load * time**2 * pulled * (turned_by(run)[run.owner] ** 2 + passing)
     # A body that spins about nothing has the momentum that its speed gives to a point at its outermost.
     arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
     speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1) + run.still[body]
@@ -179,8 +180,18 @@ def _bend(run: Run) -> Array:
 def swings(run: Run) -> Array:
     """Share (p,) by which accelerations of bodies may change in a piece.
 
-    By the angle that levers and normals turn through, with spins and with what spins change to; by contacts that go
-    along a body: a lever then changes by its way over it; and by forces that change, of which the way sees a sixth.
+    By the angle through which contacts turn, and by forces that change, of which the way sees a sixth.
+    """
+    share = np.zeros(len(run.pieces))
+    np.maximum.at(share, run.contact_owner, changes_of_force(run))
+    return turned_by(run) + 0.25 * share
+
+
+def turned_by(run: Run) -> Array:
+    """Angle (p,) through which levers and normals turn in a piece, at most [rad].
+
+    With spins and with what spins change to; and by contacts that go along a body: a lever then changes by its way
+    over it.
     """
     pieces, d = run.pieces, run.d
     spins = [np.linalg.norm(twist[:, d:], axis=1) for twist in (pieces.twist_before, pieces.twist_after)]
@@ -194,9 +205,7 @@ def swings(run: Run) -> Array:
         size = np.minimum(size, run.extent[body])
     slid = pieces.length[run.contact_owner] * np.linalg.norm(slip, axis=1) / size
     np.maximum.at(angle, run.contact_owner, slid)
-    share = np.zeros(len(pieces))
-    np.maximum.at(share, run.contact_owner, changes_of_force(run))
-    return np.asarray(angle + 0.25 * share)
+    return angle
 
 
 def _turn(run: Run) -> float:

@@ -7,6 +7,9 @@ In one piece the modes of the contacts are those of the record: closed or open, 
 impact: impulses) that the laws admit then are a convex set. They keep closed contacts closed, loaded now or not, and
 sticking contacts sticking; normal forces push; friction is ``mu p_n`` against a slip, and within its cone where a
 contact sticks. The extremes of the velocities over that set tell by how much two motions can differ.
+
+One other set of modes is considered: that bodies which rest go on resting. What is wedged can be held by contacts that
+press against each other, or start to move without any force of theirs.
 """
 
 from __future__ import annotations
@@ -32,6 +35,9 @@ ROUND_OFF = 1e-12
 #: Sides of the polygon that replaces the circle of sticking friction in space; at its corners friction exceeds mu p_n
 #: by 2 %.
 SIDES = 16
+_ANGLE = np.arange(SIDES) * 2.0 * np.pi / SIDES
+#: Directions of friction along the tangents, in the plane and in space.
+SIDES_OF = {2: np.array([[1.0], [-1.0]]), 3: np.column_stack([np.cos(_ANGLE), np.sin(_ANGLE)])}
 
 
 class Spread(NamedTuple):
@@ -51,6 +57,7 @@ class _Contacts(NamedTuple):
     held: NDArray[np.bool_]  # (c,) closed throughout its piece
     rubs: NDArray[np.bool_]  # (c,) held, slips, and has friction
     sticks: NDArray[np.bool_]  # (c,) held, does not slip, and has friction
+    starts: NDArray[np.bool_]  # (c,) of bodies at rest, one of which moves at the end of a force phase
     mu: Array  # (c,)
     given: Array  # (c, d) impulse: along the normal, along the tangents [N s]
     row: Indices  # (c, 2) rows of body A and body B; -1 where it is not free
@@ -69,6 +76,11 @@ def shared_loads(run: Run) -> Spread:
         for cluster in _clusters(own[contacts.held[own]], contacts.row):
             if len(cluster) > 1 and contacts.rubs[cluster].any():
                 _share(run, contacts, cluster, found)
+    for k in np.unique(owner[contacts.starts]):
+        own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
+        for cluster in _clusters(own, contacts.row):
+            if len(cluster) > 1 and contacts.starts[cluster].all() and contacts.mu[cluster].any():
+                _stand(run, contacts, cluster, found)
     return found
 
 
@@ -79,11 +91,11 @@ def distances(run: Run, t: Array) -> tuple[Array, str]:
     contacts of its piece with the largest spread; it is empty where there is none.
     """
     spread, pieces = shared_loads(run), run.pieces
-    found, told = np.zeros(len(t)), ""
+    found, told, still = np.zeros(len(t)), "", _at_rest(run, pieces.twist_after)
     for i in np.unique(pieces.body[list(spread.contacts)]):
         rows = np.flatnonzero(pieces.body == i)
         speed, way, ways = 0.0, 0.0, []
-        for gain, length, rests in zip(spread.gain[rows], run.length[rows], _rests(run, rows), strict=True):
+        for gain, length, rests in zip(spread.gain[rows], run.length[rows], still[rows], strict=True):
             speed = 0.0 if rests else speed + gain
             way += speed * length if length > 0.0 else 0.0
             ways.append(way)
@@ -100,11 +112,16 @@ def distances(run: Run, t: Array) -> tuple[Array, str]:
     return found, told
 
 
-def _rests(run: Run, rows: Indices) -> NDArray[np.bool_]:
-    """Whether (s,) a body stands still at the end of a piece."""
-    twist, i = run.pieces.twist_after[rows], run.pieces.body[rows]
-    speed = np.linalg.norm(twist[:, : run.d], axis=1) + run.reach[i] * np.linalg.norm(twist[:, run.d :], axis=1)
-    return np.asarray(speed <= SLIP_NOISE * run.pull * run.dt)
+def _fastest(run: Run, twist: Array) -> Array:
+    """Speed (m,) of the fastest point of the body of each row at most [m/s]."""
+    reach = np.where(run.free, run.reach, 0.0)[run.pieces.body]
+    speed: Array = np.linalg.norm(twist[:, : run.d], axis=1) + reach * np.linalg.norm(twist[:, run.d :], axis=1)
+    return speed
+
+
+def _at_rest(run: Run, twist: Array) -> NDArray[np.bool_]:
+    """Whether (m,) the body of each row stands still with ``twist``."""
+    return np.asarray(_fastest(run, twist) <= SLIP_NOISE * run.pull * run.dt)
 
 
 def _contacts(run: Run) -> _Contacts:
@@ -137,8 +154,15 @@ def _contacts(run: Run) -> _Contacts:
     for side, sign in ((0, -1.0), (1, 1.0)):
         for j in range(along.shape[1]):
             push[:, side, j] = _pushed(run, row[:, side], pieces.point, sign * along[:, j])
-    held &= np.isfinite(push).all(axis=(1, 2, 3))
-    return _Contacts(held, held & ~still & (mu > 0.0), held & still & (mu > 0.0), mu, given, row, push)
+    known = np.isfinite(push).all(axis=(1, 2, 3))
+    held &= known
+    rested, rests = (_at_rest(run, twist) for twist in (pieces.twist_before, pieces.twist_after))
+    began = asked & ~impact & known & (np.linalg.norm(before, axis=1) <= SLIP_NOISE * speed)
+    began &= ((row < 0) | rested[row]).all(axis=1)
+    moved = np.zeros(len(pieces), bool)
+    np.logical_or.at(moved, owner, ((row >= 0) & ~rests[row]).any(axis=1))
+    slips = held & ~still & (mu > 0.0)
+    return _Contacts(held, slips, held & still & (mu > 0.0), began & moved[owner], mu, given, row, push)
 
 
 def _pushed(run: Run, row: Indices, point: Array, impulse: Array) -> Array:
@@ -229,11 +253,38 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
             found.gain[rows[gain > 0.0]] += spread * gain[gain > 0.0]
 
 
+def _stand(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
+    """Enter any speed for bodies that leave rest in a piece, if the contacts of a cluster can as well hold them there.
+
+    They can if multiples of forces at the edges of their cones, and one of the loads, add up to nothing. When they let
+    go is for nobody to say.
+    """
+    d, pieces = run.d, run.pieces
+    rows = np.unique(contacts.row[own])
+    rows = rows[rows >= 0]
+    where = np.searchsorted(rows, contacts.row[own])
+    edges = np.zeros((len(own), len(SIDES_OF[d]), len(rows), contacts.push.shape[3]))
+    for side in range(2):
+        at = np.flatnonzero(contacts.row[own, side] >= 0)
+        normal, tangents = contacts.push[own[at], side, 0], contacts.push[own[at], side, 2:]
+        friction = contacts.mu[own[at], None, None] * np.einsum("sj,cjk->csk", SIDES_OF[d], tangents)
+        edges[at, :, where[at, side]] += normal[:, None] + friction
+    loads = run.force[pieces.body[rows]] / np.sqrt(run.mass[pieces.body[rows]])[:, None]
+    loads = np.column_stack([loads, _by_root_of_inertia(run, rows, run.torque[pieces.body[rows]])])
+    parts = np.vstack([edges.reshape(-1, loads.size), loads.reshape(1, -1)])
+    parts /= np.maximum(np.linalg.norm(parts, axis=1), np.finfo(float).tiny)[:, None]
+    _, strength, ways = np.linalg.svd(parts.T)
+    nothing = ways[np.count_nonzero(strength > REDUNDANT * strength[0]) :].T
+    if nothing.size and farthest(nothing[-1], nothing, np.zeros(len(nothing))) > 0.0:
+        for row in rows.tolist():
+            found.contacts[row] = np.union1d(found.contacts.get(row, own), own)
+        found.gain[rows] = np.inf
+
+
 def _limits(mu: Array, stuck: Indices, d: int) -> Array:
     """Rows (k, ..) whose products with admissible impulses are not negative: contacts push, friction is in its cone."""
     size = len(mu) + len(stuck) * (d - 1)
-    angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
-    sides = np.array([[1.0], [-1.0]]) if d == 2 else np.column_stack([np.cos(angle), np.sin(angle)])
+    sides = SIDES_OF[d]
     cones = np.zeros((len(stuck), len(sides), size))
     for j, i in enumerate(stuck):
         cones[j, :, i] = mu[i]

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
-from reference_solver import Body, Box, Capsule, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
 from reference_solver.certificate.audit import CHECKS, shared_loads, sharing
 from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.audit.sharing import farthest
@@ -265,6 +265,53 @@ def test_a_corner_that_an_impact_leaves_without_load_could_carry_as_well(restitu
     impulse[own] = load[:, None] * push
     gains = [sharing.shared_loads(Run(model, x, DT)).gain[row] for x in (pieces, replace(pieces, impulse=impulse))]
     assert gains[1] == pytest.approx(gains[0], rel=1e-9) and gains[0] > 1e-2
+
+
+def walls(dimension, slant, apart):
+    """Two walls that face each other, ``slant`` [rad] from the vertical, open upwards; ``apart`` [m] at the origin."""
+    co, si, fields = math.cos(slant), math.sin(slant), {"motion": "fixed"}
+    if dimension == 2:
+        return [Body(HalfSpace((s * co, si)), pose=(-0.5 * s * apart, 0.0, 0.0), **fields) for s in (1.0, -1.0)]
+    places = [(-0.5 * s * apart, 0.0, 0.0, *UPRIGHT) for s in (1.0, -1.0)]
+    normals = [(s * co, 0.0, si) for s in (1.0, -1.0)]
+    return [Body(HalfSpace(n), pose=place, **fields) for n, place in zip(normals, places, strict=True)]
+
+
+def drawn_out(dimension, slant):
+    """A ball at rest in a wedge that is drawn up out of it; contacts can hold it from ``mu = tan(slant)`` on."""
+    height = (0.5 / math.cos(slant) - 0.5) / math.tan(slant)
+    if dimension == 2:
+        return [*walls(2, slant, 1.0), Body(Disc(0.5), 1.0, 0.125, (0.0, height, 0.0), force=(0.0, 2.0 * G))], math.tan(
+            slant
+        )
+    ball = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, height, *UPRIGHT), force=(0.0, 0.0, 2.0 * G))
+    return [*walls(3, slant, 1.0), ball], math.tan(slant)
+
+
+def across_a_slot(dimension, angle):
+    """A rod at rest between two walls; contacts can hold it if the line through them lies within their cones."""
+    half, r = 0.4, 0.05
+    a, b = half * math.cos(angle) + r, half * math.sin(angle)
+    if dimension == 2:
+        return [*walls(2, 0.0, 2.0 * a), Body(Capsule(half, r), 1.0, 0.06, (0.0, 1.0, angle))], b / a
+    turn = (math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0)
+    rod = Body(Capsule(half, r), 1.0, (0.01, 0.06, 0.06), (0.0, 0.0, 1.0, *turn))
+    return [*walls(3, 0.0, 2.0 * a), rod], b / a
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+@pytest.mark.parametrize(("scene", "angle"), [(drawn_out, 0.05), (drawn_out, 0.4), (across_a_slot, 0.6)])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_may_be_wedged_or_not_is_refused(dimension, scene, angle, share):
+    """It leaves in the run. With friction above what can hold it, it might as well stay: neither has to be."""
+    bodies, threshold = scene(dimension, angle)
+    found = certify(world(bodies, share * threshold), Settings.reference(DT), 24)
+    moved = np.abs(found.pose[-1, 2, dimension - 1] - found.pose[0, 2, dimension - 1])
+    assert moved == pytest.approx(0.5 * G * (24 * DT) ** 2, rel=1e-9)
+    assert found.holds is (share < 1.0)
+    if share > 1.0:
+        assert found.determined == 0.0
+        assert "bodies 0, 1 and 2 can share their load among 2 contacts" in found.reasons[0]
 
 
 def test_a_load_without_bound_is_a_spread_without_bound():
