@@ -127,7 +127,6 @@ def test_what_is_interrupted_goes_on_with_the_same_command(monkeypatch, tmp_path
          "check: impact has no check 'apex'; it has rebound_ratio, "),
         (("bisect", "chipmunk", "1.0..2.0", "impact", "--check", "rebound_ratio[1]"),
          "check: impact has no check 'rebound_ratio[1]'"),
-        (("bisect", "chipmunk", "1.0..2.0", "incline", "--check", "apex"), ", threshold\n"),  # judged over several cases
     ],
 )  # fmt: skip
 def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path, words, said):
@@ -135,6 +134,10 @@ def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path
     done = CliRunner().invoke(main, [*words, "--out", str(tmp_path)])
     assert (done.exit_code, asked.driven) == (2, [])
     assert said in done.stderr
+
+
+def test_a_scene_has_the_checks_of_its_cases_and_those_that_judge_several_together():
+    assert {"creep", "threshold"} <= set(releasing._metrics(replace(SLOTS[0], scene="incline", params=())))
 
 
 def test_bisection_asks_the_ends_and_what_lies_between_and_names_both_sides(monkeypatch, tmp_path):
