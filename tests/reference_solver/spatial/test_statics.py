@@ -138,23 +138,6 @@ def plane(normal):
     return Body(HalfSpace(normal), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("n", [4, 8, 16])
-def test_sweeps_over_a_column_of_spheres_contract_as_theory_says(build, n):
-    """One row per interface: Gauss-Seidel contracts by cos^2(pi / 2 n) a sweep; 1 - rate within 1 %."""
-    spheres = [build.sphere((0.0, 0.0, 0.5 + i)) for i in range(n)]
-    bodies = [build.floor(), *spheres]
-    errors = []
-    weights = G * build.dt * np.arange(n, 0, -1)
-    late = 3 * n * n // 4  # the slowest mode alone is left by then
-    for sweeps in (late, late + 4):
-        settings = dataclasses.replace(Settings.classical(build.dt, iterations=sweeps), warm_starting=False)
-        simulation = build.simulation(bodies, settings, (0.0, 0.0, -G))
-        simulation.advance(1)
-        errors.append(np.linalg.norm(interface_sums(simulation, n) - weights))
-    rate = (errors[1] / errors[0]) ** 0.25
-    assert 1 - rate == pytest.approx(1 - math.cos(math.pi / (2 * n)) ** 2, rel=0.01)
-
-
 def test_overlap_goes_without_a_gain_of_speed(build, reference):
     """Two boxes deep in each other and in the floor are pushed apart by position alone."""
     bodies = [build.floor(), build.box((0.0, 0.0, 0.4)), build.box((0.1, 0.0, 1.2))]
