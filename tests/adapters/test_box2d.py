@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("Box2D", reason="Box2D is optional: pip install -e '.[box2d]'")
 
+from driven import driven
+
 from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import BLOWS, DEVIATIONS
 from adapters.box2d.profiles import FINEST, units
@@ -17,21 +19,12 @@ from adapters.law import exactly
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.single_precision import Method, rounded_law
-from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = Box2DEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "tuned")
 FLOOR = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
-
-
-def settings(scene, profile="tuned", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="tuned", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(*pairs, **changes):

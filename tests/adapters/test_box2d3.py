@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("pyb2d3", reason="Box2D 3.1 is optional: pip install -e '.[box2d3]'")
 
+from driven import driven
+
 from adapters.box2d3 import Box2D3Engine
 from adapters.box2d3.ball_on_plane import ball_law
 from adapters.box2d3.laws import BLOWS, DEVIATIONS, ON_A_PLANE
@@ -15,23 +17,14 @@ from adapters.box2d3.translation import frictions, restitutions
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.law import exactly
-from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = Box2D3Engine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "tuned")
 FLOOR = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
-
-
-def settings(scene, profile="tuned", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="tuned", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(*pairs, **changes):

@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.drake import DrakeEngine
 from adapters.drake.landing import landing_law
@@ -18,21 +20,13 @@ from adapters.lift import lift
 from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", dt=DT, **changes):
-    return run(ENGINE, scene, dt, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(mu=0.5, **changes):

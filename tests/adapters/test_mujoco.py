@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("mujoco")
 
+from driven import driven
+
 from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.moving import enter_motions
@@ -23,9 +25,10 @@ from adapters.needs import needs
 from adapters.receipts import _probe, receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Sampling
 
 ENGINE = MujocoEngine()
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 FLAT = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
 CUBE = (1.0 / 6.0,) * 3
@@ -61,14 +64,6 @@ def make(
     dimension = 2 if len(bodies[-1].pose) == 3 else 3
     pairs = (Pair(restitution=e, friction=mu), *pairs)
     return Scene("test", 1, dimension, bodies, pairs, g or (0.0,) * dimension, T)
-
-
-def settings(scene: Scene, profile: str, dt: float = DT, **changes: Any) -> dict[str, Any]:
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)} | changes
-
-
-def drive(scene: Scene, profile: str = "default", dt: float = DT, **changes: Any) -> Trajectory:
-    return run(ENGINE, scene, dt, settings(scene, profile, dt, **changes), Sampling(1, 0.0))
 
 
 def impact(e: float, v: float, phase: float, dt: float = DT, mu: float = 0.0, mass: float = 0.5) -> Scene:
