@@ -18,7 +18,7 @@ from adapters.bullet.contact_law import ContactLaw, Fall, fall
 from adapters.bullet.profiles import PROFILES, law_of
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.single_precision import Held
@@ -162,19 +162,14 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for metric in metrics
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "bullet",
-        (profile,),
-        "thin_wall",
-        metric,
-        passing_law(metric),
-        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
-        "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
-        CHECKED_ON,
-    )
-    for profile in ("tuned", "one")
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "bullet",
+    ("tuned", "one"),
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    lambda metric, profile: passing_law(metric),
+    "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
+    "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
+    CHECKED_ON,
 )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
 from adapters.needs import needs
 from adapters.physx.profiles import PROFILES, least_rebound
 from adapters.physx.shipped import BOUNCE_THRESHOLD, CONTACT_OFFSET
@@ -71,33 +71,24 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     if profile != "tuned" or scene not in CROWDED
     for metric in metrics
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "thin_wall",
-        metric,
-        wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
-        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
-        "other at the end of the next, passes through",
-        "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    lambda metric, profile: wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
+    "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+    "other at the end of the next, passes through",
+    "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
+    _RELEASES,
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "far_origin",
-        "stopping_distance",
-        standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-        "PxTransform, built of floats; motion in adapters/single_motions.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+    "PxTransform, built of floats; motion in adapters/single_motions.py",
+    _RELEASES,
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -113,18 +104,14 @@ DEVIATIONS += tuple(
     for scene in ("cradle", "rack")
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "off_centre",
-        "momentum_defect",
-        booked_law("momentum_defect"),
-        "single precision, 2^-24 relative",
-        "PxVec3, built of floats; band in adapters/single_motions.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "PxVec3, built of floats; band in adapters/single_motions.py",
+    _RELEASES,
 )
 
 #: Blows of edges and faces in free space after which the motion is planar to round-off, by profile; not in small steps,
