@@ -15,7 +15,7 @@ from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactl
 from adapters.lift import lift
 from adapters.scene import Box, Scene
 from adapters.single_precision import ROUNDINGS, Method, rounded_law
-from adapters.unswept import passing_law
+from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which friction does not change.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -207,22 +207,16 @@ DEVIATIONS += tuple(
 )
 
 
-def wall_law(metric: str, profile: str) -> Law:
-    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
-    passing, blow = passing_law(metric), blow_law(metric, profile)
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        passed = passing(scene, dt, measure)
-        return blow(scene, dt, measure) if passed is None else passed
-
-    return law
+def _wall_law(metric: str, profile: str) -> Law:
+    passing = passing_law(metric)
+    return wall_law(passing, blow_law(metric, profile)) if metric == "rebound_ratio" else passing
 
 
 DEVIATIONS += deviations(
     "dart",
     PROFILES,
     {"thin_wall": ("rebound_ratio", "beyond")},
-    lambda metric, profile: wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric),
+    _wall_law,
     "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
     "other at the end of the next, passes through; other blows yield by 1e-5",
     "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",

@@ -12,7 +12,7 @@ from adapters.physx.shipped import BOUNCE_THRESHOLD, CONTACT_OFFSET
 from adapters.scene import Scene
 from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
-from adapters.unswept import passing_law
+from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -44,15 +44,9 @@ def blow_law(metric: str, profile: str) -> Law:
     return law
 
 
-def wall_law(metric: str, profile: str) -> Law:
-    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
-    passing, blow = passing_law(metric, PLACES), blow_law(metric, profile)
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        passed = passing(scene, dt, measure)
-        return blow(scene, dt, measure) if passed is None else passed
-
-    return law
+def _wall_law(metric: str, profile: str) -> Law:
+    passing = passing_law(metric, PLACES)
+    return wall_law(passing, blow_law(metric, profile)) if metric == "rebound_ratio" else passing
 
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(
@@ -75,7 +69,7 @@ DEVIATIONS += deviations(
     "physx",
     PROFILES,
     {"thin_wall": ("rebound_ratio", "beyond")},
-    lambda metric, profile: wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
+    _wall_law,
     "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
     "other at the end of the next, passes through",
     "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
