@@ -19,23 +19,21 @@ from adapters.bullet.profiles import PROFILES, law_of
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
+from adapters.moved_starts import (
+    BALL_METRICS,
+    BLURRED,
+    GAP_ROUND_OFF,
+    PERTURBATIONS,
+    SPREAD_FACTOR,
+    SUM_ROUND_OFF,
+    scale_of,
+)
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from adapters.unswept import passing_law, shoved_law
-
-#: Gaps are differences of lengths of about ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
-GAP_ROUND_OFF = 1e-14
-#: Perturbations of the first gap, in units of its round-off; two of each sign, since jumps are one-sided.
-PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
-#: The true error may exceed the spread of five runs by this factor.
-SPREAD_FACTOR = 10.0
-#: A metric with more round-off than this share of its scale is not predicted.
-BLURRED = 1e-4
-#: Round-off of up to a thousand additions, relative to the scale of a metric.
-SUM_ROUND_OFF = 1e-12
 
 
 def _is_one_ball_over_a_floor(scene: Scene) -> bool:
@@ -80,14 +78,6 @@ def _measured(scene: Scene, dt: float, measure: Measure, law: ContactLaw, offset
     return measure(scene, _as_trajectory(scene, dt, path))
 
 
-def _scale(scene: Scene, metric: str) -> float:
-    """Size of a metric's values: speeds and impulses by the approach, heights by the drop, times in seconds."""
-    if metric.startswith("apex["):
-        return scene.params["height"]
-    speed = scene.params.get("v", 1.0)
-    return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
-
-
 @lru_cache(maxsize=4096)
 def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[str, Prediction]:
     """Value and band of every metric that can be predicted."""
@@ -104,7 +94,7 @@ def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[
         if value is None or reason.startswith("there are only") or any(other is None for other in others):
             continue
         spread = max(abs(other - value) for other in others if other is not None)
-        scale = _scale(scene, metric)
+        scale = scale_of(scene, metric)
         # Round-off of a gap becomes a speed once: over dt, relative to 1 m/s, independent of later steps.
         band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale + GAP_ROUND_OFF / dt
         if spread <= BLURRED * scale:
@@ -121,16 +111,6 @@ def _ball_law(profile: str, metric: str) -> Law:
     return law
 
 
-_BALL_METRICS = {
-    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
-    "bounce": (
-        *(f"apex[{n}]" for n in range(1, 6)),
-        "apex_interval_ratio",
-        "apex_growth",
-        "rest_time",
-        "force_in_flight",
-    ),
-}
 _BECAUSE = {
     "default": "speculative contact subtracts gap/dt from a rebound, Baumgarte correction adds 8 % of an overlap "
     "over dt, restitution includes gravity's g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v "
@@ -158,7 +138,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         CHECKED_ON,
     )
     for profile in ("default", "tuned", "one")
-    for scene, metrics in _BALL_METRICS.items()
+    for scene, metrics in BALL_METRICS.items()
     for metric in metrics
 )
 
