@@ -33,17 +33,10 @@ def blow_law(profile: str, metric: str) -> Law:
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-        return _law(metric, chosen["units_per_metre"], chosen["iterations"])(scene, dt, measure)
+        method = Method(Threshold(VELOCITY_THRESHOLD / chosen["units_per_metre"]), chosen["iterations"])
+        return rounded_law(metric, method)(scene, dt, measure)
 
     return law
-
-
-def _law(metric: str, units: float, sweeps: int) -> Law:
-    return rounded_law(metric, _method(units, sweeps))
-
-
-def _method(units: float, sweeps: int) -> Method:
-    return Method(Threshold(VELOCITY_THRESHOLD / units), sweeps)
 
 
 DEVIATIONS: tuple[Deviation, ...] = deviations(
