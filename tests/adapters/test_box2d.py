@@ -53,9 +53,8 @@ def test_default_is_what_a_fresh_world_and_polygon_hold():
      ({"continuous": 1}, "continuous"), ({"early_restitution": None}, "early_restitution"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_setting_and_a_mass_without_a_single_number_are_refused():

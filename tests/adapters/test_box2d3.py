@@ -72,9 +72,8 @@ def test_the_push_speed_of_default_is_the_one_that_is_not_told_again():
      ({"units_per_metre": 0.0}, "units_per_metre"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_what_has_no_single_number_and_tables_without_factors_are_refused():

@@ -85,9 +85,8 @@ def test_what_cannot_be_said_in_numbers_of_single_bodies_is_refused():
      ("fbf", {"detector": "none"}, "detector"), ("default", {"cfm": 0.0}, "cfm")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(sliding(), DT, settings(sliding(), profile, **changes))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("profile", ["default", "nsgs"])

@@ -192,9 +192,8 @@ def test_what_has_no_place_here_is_refused_in_one_line():
      ({"stiction_tolerance": math.nan}, "stiction_tolerance"), ({"iterations": 5}, "iterations")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_the_facets_of_a_surface_do_not_mirror_each_other():

@@ -511,9 +511,8 @@ def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, c
 )
 def test_bad_settings_are_refused_in_one_line(change: dict[str, Any], field: str) -> None:
     scene = make(FLOOR, ball("ball", 1.0))
-    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(scene, DT, settings(scene, "default") | change)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_setting_is_refused() -> None:

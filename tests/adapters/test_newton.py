@@ -78,9 +78,8 @@ def test_a_step_that_is_replayed_ends_in_the_bits_of_one_that_is_launched(name):
      ({"torsional": math.inf}, "torsional"), ({"rolling": -1.0}, "rolling"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_what_is_set_is_what_the_model_and_its_solver_hold():

@@ -70,9 +70,8 @@ def test_default_is_what_the_bindings_hold():
      ({"persistent_manifolds": 0}, "persistent_manifolds"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -59,9 +59,8 @@ def test_default_is_what_fresh_parameters_hold():
      ({"clustering": 0}, "clustering")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_along_the_normal_only():
