@@ -6,8 +6,6 @@ from starts moved by it differ, the band is as wide as they do, or there is no p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from adapters.scene import Scene
 
 #: Round-off of a gap [m]: of heights of some metres, each rounded to 2e-15 m, added up over a thousand steps; and the
@@ -20,17 +18,6 @@ SPREAD_FACTOR = 10.0
 BLURRED = 1e-4
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
-#: Metrics of a ball that meets a floor, by scene.
-BALL_METRICS: Mapping[str, tuple[str, ...]] = {
-    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
-    "bounce": (
-        *(f"apex[{n}]" for n in range(1, 6)),
-        "apex_interval_ratio",
-        "apex_growth",
-        "rest_time",
-        "force_in_flight",
-    ),
-}
 
 
 def scale_of(scene: Scene, metric: str) -> float:

@@ -19,15 +19,7 @@ from adapters.bullet.profiles import PROFILES, law_of
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.moved_starts import (
-    BALL_METRICS,
-    BLURRED,
-    GAP_ROUND_OFF,
-    PERTURBATIONS,
-    SPREAD_FACTOR,
-    SUM_ROUND_OFF,
-    scale_of,
-)
+from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.single_precision import Held
@@ -111,6 +103,16 @@ def _ball_law(profile: str, metric: str) -> Law:
     return law
 
 
+_BALL_METRICS = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "bounce": (
+        *(f"apex[{n}]" for n in range(1, 6)),
+        "apex_interval_ratio",
+        "apex_growth",
+        "rest_time",
+        "force_in_flight",
+    ),
+}
 _BECAUSE = {
     "default": "speculative contact subtracts gap/dt from a rebound, Baumgarte correction adds 8 % of an overlap "
     "over dt, restitution includes gravity's g dt and is dropped below 0.2 m/s, and drag 0.04 (1 + v) v "
@@ -138,7 +140,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         CHECKED_ON,
     )
     for profile in ("default", "tuned", "one")
-    for scene, metrics in BALL_METRICS.items()
+    for scene, metrics in _BALL_METRICS.items()
     for metric in metrics
 )
 

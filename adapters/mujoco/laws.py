@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from adapters.law import AskedLaw, Deviation, Law, deviations, exactly
-from adapters.moved_starts import BALL_METRICS
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.plates import on_a_plate
@@ -14,6 +13,16 @@ from adapters.unswept import passing_law, shoved_law
 
 #: Profiles whose contacts are MuJoCo's own law.
 SOFT = ("default", "tuned")
+_BALL_METRICS = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "bounce": (
+        *(f"apex[{n}]" for n in range(1, 6)),
+        "apex_interval_ratio",
+        "apex_growth",
+        "rest_time",
+        "force_in_flight",
+    ),
+}
 _BECAUSE = {
     ("default", "ball"): "contact is a critically damped spring (0.02 s) that never pulls, and e is none of its "
     "parameters",
@@ -66,7 +75,7 @@ DEVIATIONS: tuple[Deviation, ...] = (
     *(
         _deviation(profile, scene, metric, ball_law(profile, metric), "ball")
         for profile in SOFT
-        for scene, metrics in BALL_METRICS.items()
+        for scene, metrics in _BALL_METRICS.items()
         for metric in metrics
     ),
     *(
