@@ -9,7 +9,7 @@ the predicted one. It never changes PASS or FAIL.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -71,6 +71,32 @@ class Deviation:
             and fnmatchcase(metric, self.metric)
             and (not self.versions or version.startswith(self.versions))
         )
+
+
+def deviations(
+    engine: str,
+    profiles: Iterable[str],
+    rows: Mapping[str, Iterable[str]],
+    law: Callable[[str, str], Law],
+    because: str,
+    source: str,
+    versions: tuple[str, ...],
+) -> tuple[Deviation, ...]:
+    """One law for each profile and each row: see `Deviation`.
+
+    Parameters
+    ----------
+    rows
+        Metrics, not patterns, by scene.
+    law
+        ``law(metric, profile)``.
+    """
+    return tuple(
+        Deviation(engine, (profile,), scene, exactly(metric), law(metric, profile), because, source, versions)
+        for profile in profiles
+        for scene, metrics in rows.items()
+        for metric in metrics
+    )
 
 
 def exactly(metric: str) -> str:

@@ -207,6 +207,14 @@ def sleep(make: Make, rolls: bool = False) -> float:
     return math.inf
 
 
+class Touching(World, Protocol):
+    """A world that counts contacts."""
+
+    @property
+    def contacts(self) -> int:
+        """Contacts of the last step."""
+
+
 def reach(holds: Callable[[float], bool]) -> float:
     """Largest number below `RADIUS` up to which something holds; 0 where it does for none.
 
@@ -220,6 +228,17 @@ def reach(holds: Callable[[float], bool]) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def ahead(make: Callable[[Asked], Touching]) -> float:
+    """Largest gap across which there is a contact [m]."""
+
+    def sees(gap: float) -> bool:
+        world = make(Asked(gap=gap))
+        world.advance(1)
+        return world.contacts > 0
+
+    return reach(sees)
 
 
 def gravity(make: Make) -> float:

@@ -65,7 +65,17 @@ def passing_law(metric: str, round_off: float = ROUND_OFF) -> Law:
     return law
 
 
-def shoved_law(metric: str, push: Push | None = None, round_off: float = ROUND_OFF) -> Law:
+def wall_law(passing: Law, blow: Law) -> Law:
+    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        passed = passing(scene, dt, measure)
+        return blow(scene, dt, measure) if passed is None else passed
+
+    return law
+
+
+def shoved_law(metric: str, push: Push | None = None) -> Law:
     """A ball that is first found in a plate beyond its middle is pushed out on the far side, and keeps its velocity.
 
     The nearest way out points forward there, and the ball already moves that way, so that no impulse acts.
@@ -89,11 +99,11 @@ def shoved_law(metric: str, push: Push | None = None, round_off: float = ROUND_O
             x.append(x[-1] + (v + way * out) * dt)
             beyond = way * (x[-1] - plate.pose[0])
             overlap = reach - abs(beyond)
-            if overlap > 0.0 and beyond <= round_off * reach:  # at the very middle round-off decides on the side
+            if overlap > 0.0 and beyond <= ROUND_OFF * reach:  # at the very middle round-off decides on the side
                 return None
             found = found or overlap > 0.0
             out = push(scene, dt, overlap) if push and overlap > 0.0 else 0.0
         value = measure(scene, flown(scene, np.array(x), dt))[metric][0] if found else None
-        return None if value is None else (value, round_off * (1.0 + abs(v) * scene.duration))
+        return None if value is None else (value, ROUND_OFF * (1.0 + abs(v) * scene.duration))
 
     return law

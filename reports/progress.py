@@ -19,6 +19,19 @@ from validation.workers import TIMEOUT, run_cells
 from validation.workers.cluster import run_cells_on
 
 
+def progress_on(console: Console) -> Progress:
+    """A line of progress that goes when it is done, with the time that is left; nothing where no terminal shows it."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
 def run_plan(
     store: Store,
     title: str,
@@ -43,14 +56,6 @@ def run_plan(
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
         console.print(f"resuming run {run.id}: {len(done)} of {plural(len(slots), 'case')} done")
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
     left: dict[str, int] = {}
 
     def leave(slot: Slot, reason: str) -> None:
@@ -65,7 +70,7 @@ def run_plan(
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
         stage(console, plural(len(todo), "case")),
-        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
+        progress_on(console) as progress,
     ):
         task = progress.add_task("running cases", total=len(slots), completed=len(slots) - len(todo))
         try:

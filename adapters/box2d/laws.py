@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations
 from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.single_motions import Chosen, booked_law, corner_law, kept_law, standstill_law
@@ -33,33 +33,20 @@ def blow_law(profile: str, metric: str) -> Law:
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-        return _law(metric, chosen["units_per_metre"], chosen["iterations"])(scene, dt, measure)
+        method = Method(Threshold(VELOCITY_THRESHOLD / chosen["units_per_metre"]), chosen["iterations"])
+        return rounded_law(metric, method)(scene, dt, measure)
 
     return law
 
 
-def _law(metric: str, units: float, sweeps: int) -> Law:
-    return rounded_law(metric, _method(units, sweeps))
-
-
-def _method(units: float, sweeps: int) -> Method:
-    return Method(Threshold(VELOCITY_THRESHOLD / units), sweeps)
-
-
-DEVIATIONS: tuple[Deviation, ...] = tuple(
-    Deviation(
-        "box2d",
-        (profile,),
-        scene,
-        exactly(metric),
-        blow_law(profile, metric),
-        "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
-        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_precision.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for scene, metrics in BLOWS.items()
-    for metric in metrics
+DEVIATIONS: tuple[Deviation, ...] = deviations(
+    "box2d",
+    PROFILES,
+    BLOWS,
+    lambda metric, profile: blow_law(profile, metric),
+    "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
+    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_precision.py",
+    CHECKED_ON,
 )
 
 
@@ -73,33 +60,24 @@ def _chosen(profile: str) -> Chosen:
     return of
 
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d",
-        (profile,),
-        "far_origin",
-        "stopping_distance",
-        standstill_law("stopping_distance", _chosen(profile)),
-        "positions are in single precision: motion of a step below half their spacing (12 cm at 1e6 m) is lost",
-        "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "box2d",
+    PROFILES,
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(metric, _chosen(profile)),
+    "positions are in single precision: motion of a step below half their spacing (12 cm at 1e6 m) is lost",
+    "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/single_motions.py",
+    CHECKED_ON,
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d",
-        (profile,),
-        "edge_drop",
-        metric,
-        corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
-        "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
-        "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for metric in ("rise", "spin", "impulse")
+DEVIATIONS += deviations(
+    "box2d",
+    PROFILES,
+    {"edge_drop": ("rise", "spin", "impulse")},
+    lambda metric, profile: corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
+    "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
+    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_motions.py",
+    CHECKED_ON,
 )
 
 DEVIATIONS += tuple(
@@ -121,16 +99,12 @@ DEVIATIONS += tuple(
     for metric in metrics
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d",
-        (profile,),
-        "off_centre",
-        "momentum_defect",
-        booked_law("momentum_defect"),
-        "single precision, 2^-24 relative",
-        "b2Settings.h, float32; band in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "box2d",
+    PROFILES,
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "b2Settings.h, float32; band in adapters/single_motions.py",
+    CHECKED_ON,
 )

@@ -9,7 +9,7 @@ from typing import Any
 from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations
 from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.single_motions import booked_law, corner_law, kept_law, standstill_law
@@ -61,51 +61,35 @@ def blow_law(profile: str, metric: str) -> Law:
     return law
 
 
-DEVIATIONS: tuple[Deviation, ...] = tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        scene,
-        exactly(metric),
-        blow_law(profile, metric),
-        "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
-        "of compression only, as restitution is applied last",
-        "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for scene, metrics in BLOWS.items()
-    for metric in metrics
+DEVIATIONS: tuple[Deviation, ...] = deviations(
+    "box2d3",
+    PROFILES,
+    BLOWS,
+    lambda metric, profile: blow_law(profile, metric),
+    "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
+    "of compression only, as restitution is applied last",
+    "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
+    CHECKED_ON,
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        scene,
-        metric,
-        ball_law(metric, _chosen(profile), sampled=metric == "rest_time"),
-        "restitution uses the velocity at the start of the step, is applied after friction and above the threshold "
-        "only, and the rest of the step is lost; the contact point is fixed to the ball within a step, turns with "
-        "it and lifts it",
-        "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for scene, metrics in ON_A_PLANE.items()
-    for metric in metrics
+DEVIATIONS += deviations(
+    "box2d3",
+    PROFILES,
+    ON_A_PLANE,
+    lambda metric, profile: ball_law(metric, _chosen(profile), sampled=metric == "rest_time"),
+    "restitution uses the velocity at the start of the step, is applied after friction and above the threshold "
+    "only, and the rest of the step is lost; the contact point is fixed to the ball within a step, turns with "
+    "it and lifts it",
+    "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
+    CHECKED_ON,
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        "far_origin",
-        "stopping_distance",
-        standstill_law("stopping_distance", _lengths(profile)),
-        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-        "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "box2d3",
+    PROFILES,
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(metric, _lengths(profile)),
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+    "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
+    CHECKED_ON,
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -125,30 +109,22 @@ DEVIATIONS += tuple(
     for metric in ("rise", "spin")
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        "rack",
-        "momentum_defect",
-        kept_law("momentum_defect"),
-        "single precision, 2^-24 relative, in each blow of each pair",
-        "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "box2d3",
+    PROFILES,
+    {"rack": ("momentum_defect",)},
+    lambda metric, profile: kept_law(metric),
+    "single precision, 2^-24 relative, in each blow of each pair",
+    "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
+    CHECKED_ON,
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d3",
-        (profile,),
-        "off_centre",
-        "momentum_defect",
-        booked_law("momentum_defect"),
-        "single precision, 2^-24 relative",
-        "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "box2d3",
+    PROFILES,
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
+    CHECKED_ON,
 )

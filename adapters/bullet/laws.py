@@ -18,24 +18,14 @@ from adapters.bullet.contact_law import ContactLaw, Fall, fall
 from adapters.bullet.profiles import PROFILES, law_of
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
+from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from adapters.unswept import passing_law, shoved_law
-
-#: Gaps are differences of lengths of about ten metres (the floor's half depth, the drop), each rounded to 2e-15 m.
-GAP_ROUND_OFF = 1e-14
-#: Perturbations of the first gap, in units of its round-off; two of each sign, since jumps are one-sided.
-PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
-#: The true error may exceed the spread of five runs by this factor.
-SPREAD_FACTOR = 10.0
-#: A metric with more round-off than this share of its scale is not predicted.
-BLURRED = 1e-4
-#: Round-off of up to a thousand additions, relative to the scale of a metric.
-SUM_ROUND_OFF = 1e-12
 
 
 def _is_one_ball_over_a_floor(scene: Scene) -> bool:
@@ -80,14 +70,6 @@ def _measured(scene: Scene, dt: float, measure: Measure, law: ContactLaw, offset
     return measure(scene, _as_trajectory(scene, dt, path))
 
 
-def _scale(scene: Scene, metric: str) -> float:
-    """Size of a metric's values: speeds and impulses by the approach, heights by the drop, times in seconds."""
-    if metric.startswith("apex["):
-        return scene.params["height"]
-    speed = scene.params.get("v", 1.0)
-    return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
-
-
 @lru_cache(maxsize=4096)
 def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[str, Prediction]:
     """Value and band of every metric that can be predicted."""
@@ -104,7 +86,7 @@ def _predictions(profile: str, held: Held, dt: float, measure: Measure) -> dict[
         if value is None or reason.startswith("there are only") or any(other is None for other in others):
             continue
         spread = max(abs(other - value) for other in others if other is not None)
-        scale = _scale(scene, metric)
+        scale = scale_of(scene, metric)
         # Round-off of a gap becomes a speed once: over dt, relative to 1 m/s, independent of later steps.
         band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale + GAP_ROUND_OFF / dt
         if spread <= BLURRED * scale:
@@ -162,19 +144,14 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for metric in metrics
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "bullet",
-        (profile,),
-        "thin_wall",
-        metric,
-        passing_law(metric),
-        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
-        "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
-        CHECKED_ON,
-    )
-    for profile in ("tuned", "one")
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "bullet",
+    ("tuned", "one"),
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    lambda metric, profile: passing_law(metric),
+    "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
+    "contactProcessingThreshold 0: btPersistentManifold.cpp (bullet3 6c888f4); ccdSweptSphereRadius is not set",
+    CHECKED_ON,
 )
 
 

@@ -60,12 +60,6 @@ class Bare:
         return Told(place[2] - self._lowest, velocity[0], velocity[2], spin[2])
 
 
-def _sees(gap: float) -> bool:
-    world = Bare(Asked(gap=gap))
-    world.advance(1)
-    return world.contacts > 0
-
-
 def _step() -> float:
     """Step [s]: the speed gained in it by a gravity of 1 m/s^2."""
     world = Bare(Asked(gravity=1.0))
@@ -95,7 +89,7 @@ UNSET = (
     Unset("at 1 mm/s asleep after [s]", "never: sleeping is asked for by a flag", f"{_GUIDE}, loadURDF", math.inf,
           partial(unset.sleep, Bare)),
     Unset("contacts from this gap on [m]", "0.02 of a size: contactBreakingThreshold", f"{_GUIDE}; {_BREAKS}", None,
-          partial(unset.reach, _sees)),
+          partial(unset.ahead, Bare)),
     Unset("gap at rest [m]", "not documented", _GUIDE, None, partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "not documented", _GUIDE, None, partial(unset.left, Bare)),
     Unset("gravity, upwards [m/s^2]", "0", f"{_GUIDE}, setGravity", 0.0, partial(unset.gravity, Bare), 1e-9),

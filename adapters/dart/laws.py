@@ -11,11 +11,11 @@ from adapters.dart.pyramid import pyramid_law
 from adapters.dart.rubbing import rubbing_law
 from adapters.dart.shipped import MIXING, PUSH_OUT, Rebound
 from adapters.dart.slipping import slipping_law
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
 from adapters.lift import lift
 from adapters.scene import Box, Scene
 from adapters.single_precision import ROUNDINGS, Method, rounded_law
-from adapters.unswept import passing_law
+from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which friction does not change.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -131,19 +131,14 @@ def shared_law(metric: str, profile: str) -> Law:
     return law
 
 
-DEVIATIONS += tuple(
-    Deviation(
-        "dart",
-        (profile,),
-        "flat_box",
-        metric,
-        shared_law(metric, profile),
-        "a contact yields by 1e-5 of its response, and the iterations do not determine how corners share a blow",
-        "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
-        ("6.20.",),
-    )
-    for profile in SWEEPERS
-    for metric in BLOWS["flat_box"]
+DEVIATIONS += deviations(
+    "dart",
+    SWEEPERS,
+    {"flat_box": BLOWS["flat_box"]},
+    shared_law,
+    "a contact yields by 1e-5 of its response, and the iterations do not determine how corners share a blow",
+    "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
+    ("6.20.",),
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -160,49 +155,34 @@ DEVIATIONS += tuple(
     for scene, metrics, profiles, because, band in MEETING
     for metric in metrics
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "dart",
-        (profile,),
-        "kane",
-        metric,
-        rubbing_law(metric, profile),
-        "the contact point lies half-way into the overlap, which makes the lever arm shorter; Dantzig's friction is "
-        "limited by the load without friction",
-        "FCLCollisionDetector, DantzigBoxedLcpSolver; blow in adapters/dart/rubbing.py",
-        ("6.20.",),
-    )
-    for profile in PROFILES
-    for metric in ("rise", "ahead", "spin", "gain")
+DEVIATIONS += deviations(
+    "dart",
+    PROFILES,
+    {"kane": ("rise", "ahead", "spin", "gain")},
+    rubbing_law,
+    "the contact point lies half-way into the overlap, which makes the lever arm shorter; Dantzig's friction is "
+    "limited by the load without friction",
+    "FCLCollisionDetector, DantzigBoxedLcpSolver; blow in adapters/dart/rubbing.py",
+    ("6.20.",),
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "dart",
-        (profile,),
-        "edge_drop",
-        metric,
-        landing_law(metric, profile),
-        "a contact yields by 1e-5 of its response, corners that share a blow by more than a single one",
-        "ContactConstraint, constraint force mixing; blow in adapters/dart/landing.py",
-        ("6.20.",),
-    )
-    for profile in PROFILES
-    for metric in ("impulse", "rise", "spin")
+DEVIATIONS += deviations(
+    "dart",
+    PROFILES,
+    {"edge_drop": ("impulse", "rise", "spin")},
+    landing_law,
+    "a contact yields by 1e-5 of its response, corners that share a blow by more than a single one",
+    "ContactConstraint, constraint force mixing; blow in adapters/dart/landing.py",
+    ("6.20.",),
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "dart",
-        (profile,),
-        "oblique",
-        metric,
-        slipping_law(metric, profile),
-        "a contact yields by 1e-5 of the speed that it changes, and so does friction; where the friction cone is a "
-        "pyramid each axis of the floor has full friction",
-        "ContactConstraint, constraint force mixing; blow in adapters/dart/slipping.py",
-        ("6.20.",),
-    )
-    for profile in PROFILES
-    for metric in ("forward_speed", "sideways", "spin_speed")
+DEVIATIONS += deviations(
+    "dart",
+    PROFILES,
+    {"oblique": ("forward_speed", "sideways", "spin_speed")},
+    slipping_law,
+    "a contact yields by 1e-5 of the speed that it changes, and so does friction; where the friction cone is a "
+    "pyramid each axis of the floor has full friction",
+    "ContactConstraint, constraint force mixing; blow in adapters/dart/slipping.py",
+    ("6.20.",),
 )
 #: Scenes with slip over a floor along both of its axes, and the metrics determined by the motion.
 SLIPPING: Mapping[str, tuple[str, ...]] = {
@@ -227,29 +207,18 @@ DEVIATIONS += tuple(
 )
 
 
-def wall_law(metric: str, profile: str) -> Law:
-    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
-    passing, blow = passing_law(metric), blow_law(metric, profile)
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        passed = passing(scene, dt, measure)
-        return blow(scene, dt, measure) if passed is None else passed
-
-    return law
+def _wall_law(metric: str, profile: str) -> Law:
+    passing = passing_law(metric)
+    return wall_law(passing, blow_law(metric, profile)) if metric == "rebound_ratio" else passing
 
 
-DEVIATIONS += tuple(
-    Deviation(
-        "dart",
-        (profile,),
-        "thin_wall",
-        metric,
-        wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric),
-        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
-        "other at the end of the next, passes through; other blows yield by 1e-5",
-        "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",
-        ("6.20.",),
-    )
-    for profile in PROFILES
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "dart",
+    PROFILES,
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    _wall_law,
+    "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+    "other at the end of the next, passes through; other blows yield by 1e-5",
+    "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",
+    ("6.20.",),
 )

@@ -38,7 +38,7 @@ def rubbing_law(metric: str, profile: str) -> Law:
         found = []
         for mixing in (MIXING, 0.0) if profile in SWEEPERS else (MIXING,):
             after = _after(spatial, dt, mixing, profile == "default")
-            value = None if after is None else measure(scene, _told(scene, after, dt))[metric][0]
+            value = None if after is None else measure(scene, ended(scene, after, dt))[metric][0]
             if value is None:
                 return None
             found.append(value)
@@ -127,8 +127,8 @@ def _found(box: Body, speed: float, dt: float) -> float | None:
     return None if min(late, 1.0 - late) < CLEAR or steps < 0.0 else late * speed * dt
 
 
-def _told(scene: Scene, after: Array, dt: float) -> Trajectory:
-    """Start and end of the run, without places."""
+def ended(scene: Scene, after: Array, dt: float) -> Trajectory:
+    """Start and end of a run after which the second body moves with ``after`` (6,), without places."""
     pose = np.array([[body.pose for body in scene.bodies]] * 2)
     twist = np.array([[body.twist for body in scene.bodies]] * 2)
     twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0]

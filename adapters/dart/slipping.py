@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.dart.profiles import PYRAMIDS, solved
+from adapters.dart.rubbing import ended
 from adapters.dart.shipped import THRESHOLD, restitution
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift, lower_twist
+from adapters.lift import lift
 from adapters.scene import HalfSpace, Scene, Sphere
-from adapters.trajectory import Trajectory
 
 
 def slipping_law(metric: str, profile: str) -> Law:
@@ -29,7 +29,7 @@ def slipping_law(metric: str, profile: str) -> Law:
         found = []
         for late in (0.0, dt):
             after = _after(spatial, late, profile in PYRAMIDS)
-            value = None if after is None else measure(scene, _told(scene, after, dt))[metric][0]
+            value = None if after is None else measure(scene, ended(scene, after, dt))[metric][0]
             if value is None:
                 return None
             found.append(value)
@@ -65,11 +65,3 @@ def _after(scene: Scene, late: float, pyramid: bool) -> Array | None:
         rubbed = -most * slip / np.linalg.norm(slip)
     impulse = np.array([*rubbed, blow])
     return np.concatenate([velocity + impulse / ball.mass, spin + np.cross(arm, impulse) / moment])
-
-
-def _told(scene: Scene, after: Array, dt: float) -> Trajectory:
-    """Start and end of the run, without places."""
-    pose = np.array([[body.pose for body in scene.bodies]] * 2)
-    twist = np.array([[body.twist for body in scene.bodies]] * 2)
-    twist[1, 1] = after if scene.dimension == 3 else lower_twist(np.array([after]))[0]
-    return Trajectory(np.array([0.0, scene.duration]), pose, twist, None, dt, "completed")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from adapters.drake.landing import landing_law
 from adapters.drake.profiles import PROFILES
-from adapters.law import Deviation, exactly
+from adapters.law import Deviation, deviations
 
 #: Scenes of a ball that falls straight onto a floor without restitution, or of two overlapping balls, and the metrics
 #: that this determines.
@@ -16,19 +16,13 @@ FALLING: Mapping[str, tuple[str, ...]] = {
     "overlap": ("thrown",),
 }
 
-DEVIATIONS: tuple[Deviation, ...] = tuple(
-    Deviation(
-        "drake",
-        (profile,),
-        scene,
-        exactly(metric),
-        landing_law(metric, profile),
-        "contacts are springs with dissipation: an overlap is corrected, with Hunt and Crossley's dissipation at up "
-        "to 1/d, 20 mm/s as shipped, with SAP within its relaxation time",
-        "MultibodyPlant, discrete contact; recurrence in adapters/drake/landing.py",
-        ("1.51.",),
-    )
-    for profile in PROFILES
-    for scene, metrics in FALLING.items()
-    for metric in metrics
+DEVIATIONS: tuple[Deviation, ...] = deviations(
+    "drake",
+    PROFILES,
+    FALLING,
+    landing_law,
+    "contacts are springs with dissipation: an overlap is corrected, with Hunt and Crossley's dissipation at up "
+    "to 1/d, 20 mm/s as shipped, with SAP within its relaxation time",
+    "MultibodyPlant, discrete contact; recurrence in adapters/drake/landing.py",
+    ("1.51.",),
 )

@@ -92,12 +92,6 @@ class Bare:
         return told.along - spin * (RADIUS + 0.5 * told.gap)
 
 
-def _sees(gap: float) -> bool:
-    world = Bare(Asked(gap=gap))
-    world.advance(1)
-    return world.contacts > 0
-
-
 def _stiffness() -> float:
     """Weight of a ball of 1 kg over the overlap at which it rests [N/m]."""
     return -GRAVITY / unset.ran(Bare, Asked(gap=0.0, gravity=GRAVITY), SETTLING)[0].gap
@@ -131,7 +125,7 @@ UNSET = (
     Unset("angular damping [1/s]", "0", _CONFIG, 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
     Unset("at 1 mm/s asleep after [s]", "never: bodies do not sleep", _CONFIG, math.inf, partial(unset.sleep, Bare)),
     Unset("contacts from this gap on [m]", "0: no margin is set", _PROPERTIES, 0.0,
-          partial(unset.reach, _sees), 1e-12),
+          partial(unset.ahead, Bare), 1e-12),
     Unset("stiffness of a contact [N/m]", f"{0.5 * POINT_STIFFNESS:g}: two of {POINT_STIFFNESS:g} in series",
           f"{_PROPERTIES}, point_stiffness", 0.5 * POINT_STIFFNESS, _stiffness, 1.0),
     Unset("gap below a box on a box after 2 s [m]", "not documented: they have one contact point, and it sinks in",

@@ -20,21 +20,12 @@ import numpy as np
 
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
+from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR
 from adapters.mujoco.box_on_face import BoxOnFace, Triple
 from adapters.mujoco.contact_law import ContactLaw
 from adapters.mujoco.motions import along_a_heading
 from adapters.mujoco.pairs import pair_solreffriction
-from adapters.mujoco.predictions import (
-    BLURRED,
-    EITHER,
-    EPS,
-    GAP_ROUND_OFF,
-    PERTURBATIONS,
-    SPREAD_FACTOR,
-    law_of,
-    settings_of,
-    solver_error,
-)
+from adapters.mujoco.predictions import EITHER, EPS, law_of, settings_of, solver_error
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adapters.law import AskedLaw, Deviation, Law, exactly
+from adapters.law import AskedLaw, Deviation, Law, deviations, exactly
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.plates import on_a_plate
@@ -130,19 +130,14 @@ DEVIATIONS: tuple[Deviation, ...] = (
     ),
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "mujoco",
-        (profile,),
-        "thin_wall",
-        metric,
-        passing_law(metric),
-        "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
-        "MuJoCo documentation, computation: collision detection at the start of a step",
-        CHECKED_ON,
-    )
-    for profile in PROFILES
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "mujoco",
+    PROFILES,
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    lambda metric, profile: passing_law(metric),
+    "there is no swept collision detection: no step ends with the ball in the plate, so the contact is never found",
+    "MuJoCo documentation, computation: collision detection at the start of a step",
+    CHECKED_ON,
 )
 
 DEVIATIONS += tuple(

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.law import AskedLaw, Law, Measure, Prediction
+from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.mujoco.blows import blow_of, metrics_of, steps_of
 from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.contact_law import ContactLaw
@@ -39,22 +40,12 @@ from adapters.trajectory import Measured
 Array = NDArray[np.float64]
 
 EPS = float(np.finfo(float).eps)
-#: Round-off of a gap [m] (heights of some metres, added up over a thousand steps), and the multiples of it by which
-#: starts are moved: two of each sign, since a contact found a step later is a jump.
-GAP_ROUND_OFF = 1e-14
-PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
-#: Factor on the differences of moved runs, as the engine's own error may be larger.
-SPREAD_FACTOR = 10.0
-#: A metric that changes by more than this share of its scale is not predicted.
-BLURRED = 1e-4
 #: Largest difference of two paths of a box for a prediction, as a share of the scale.
 EITHER = 1e-2
 #: A box is at rest below this share of the speed of a step's fall (as in the scenes of columns).
 STILL = 0.01
 #: Newton's method ends when the active faces are right: fewer steps than this for the two of a pair.
 ENOUGH = 10
-#: Round-off of up to a thousand additions, relative to the scale of a metric.
-SUM_ROUND_OFF = 1e-12
 
 
 def settings_of(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
@@ -100,14 +91,6 @@ def _force_round_off(law: ContactLaw) -> float:
     return 2.0 * CORNERS * EPS * d / (4.0 * law.softness * (1.0 - d))
 
 
-def _scale(scene: Scene, metric: str) -> float:
-    """Size of a metric's values: speeds and impulses by the approach, heights by the drop, times in seconds."""
-    if metric.startswith("apex["):
-        return scene.params["height"]
-    speed = scene.params.get("v", 1.0)
-    return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
-
-
 def ball_law(profile: str, metric: str) -> Law:
     """A ball on a floor, from several starts that differ by the round-off of its gap."""
 
@@ -120,7 +103,7 @@ def ball_law(profile: str, metric: str) -> Law:
         )
         if value is None or None in others:
             return None
-        scale = _scale(scene, metric)
+        scale = scale_of(scene, metric)
         spread = max(abs(other - value) for other in others if other is not None)
         band = SPREAD_FACTOR * spread + SUM_ROUND_OFF * scale
         if metric in ("impulse", "momentum_defect"):

@@ -47,12 +47,6 @@ class Bare:
         return Told(gap, float(velocity[0]), float(velocity[2]), float(velocity[5]))
 
 
-def _sees(gap: float) -> bool:
-    world = Bare(Asked(gap=gap))
-    world.advance(1)
-    return world.contacts > 0
-
-
 def _mass() -> float:
     """Mass of a box of 1 m^3 [kg]."""
     import mujoco
@@ -92,7 +86,7 @@ UNSET = (
     Unset("gap at rest [m]", "an overlap: d = 0.9 to 0.95 leaves a part of the load", _SOFT, None,
           partial(unset.rest, Bare)),
     Unset("left of 0.2 m of overlap [m]", "as at rest", _SOFT, None, partial(unset.left, Bare)),
-    Unset("contacts from this gap on [m]", "0: margin", _XML, 0.0, partial(unset.reach, _sees), 1e-12),
+    Unset("contacts from this gap on [m]", "0: margin", _XML, 0.0, partial(unset.ahead, Bare), 1e-12),
     Unset("gravity, upwards [m/s^2]", "-9.81", _OPTION, -9.81, partial(unset.gravity, Bare), 1e-9),
     Unset("step [s]", "0.002", _OPTION, 0.002, lambda: Bare(Asked()).dt, 1e-12),
     Unset("mass of a cubic metre [kg]", "1000: density", _XML, 1000.0, _mass, 1e-6),

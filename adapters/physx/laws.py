@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from adapters.law import Deviation, Law, Measure, Prediction, exactly
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
 from adapters.needs import needs
 from adapters.physx.profiles import PROFILES, least_rebound
 from adapters.physx.shipped import BOUNCE_THRESHOLD, CONTACT_OFFSET
 from adapters.scene import Scene
 from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
-from adapters.unswept import passing_law
+from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -44,15 +44,9 @@ def blow_law(metric: str, profile: str) -> Law:
     return law
 
 
-def wall_law(metric: str, profile: str) -> Law:
-    """A ball that no step finds in a thin wall passes it; otherwise it rebounds as in any other blow."""
-    passing, blow = passing_law(metric, PLACES), blow_law(metric, profile)
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        passed = passing(scene, dt, measure)
-        return blow(scene, dt, measure) if passed is None else passed
-
-    return law
+def _wall_law(metric: str, profile: str) -> Law:
+    passing = passing_law(metric, PLACES)
+    return wall_law(passing, blow_law(metric, profile)) if metric == "rebound_ratio" else passing
 
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(
@@ -71,33 +65,24 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     if profile != "tuned" or scene not in CROWDED
     for metric in metrics
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "thin_wall",
-        metric,
-        wall_law(metric, profile) if metric == "rebound_ratio" else passing_law(metric, PLACES),
-        "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
-        "other at the end of the next, passes through",
-        "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
-    for metric in ("rebound_ratio", "beyond")
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"thin_wall": ("rebound_ratio", "beyond")},
+    _wall_law,
+    "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
+    "other at the end of the next, passes through",
+    "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
+    _RELEASES,
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "far_origin",
-        "stopping_distance",
-        standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-        "PxTransform, built of floats; motion in adapters/single_motions.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+    "PxTransform, built of floats; motion in adapters/single_motions.py",
+    _RELEASES,
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -113,18 +98,14 @@ DEVIATIONS += tuple(
     for scene in ("cradle", "rack")
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        (profile,),
-        "off_centre",
-        "momentum_defect",
-        booked_law("momentum_defect"),
-        "single precision, 2^-24 relative",
-        "PxVec3, built of floats; band in adapters/single_motions.py",
-        _RELEASES,
-    )
-    for profile in PROFILES
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "PxVec3, built of floats; band in adapters/single_motions.py",
+    _RELEASES,
 )
 
 #: Blows of edges and faces in free space after which the motion is planar to round-off, by profile; not in small steps,

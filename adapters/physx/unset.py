@@ -89,12 +89,6 @@ class Bare:
         return Told(gap, float(velocity[0]), float(velocity[2]), float(spin[2]))
 
 
-def _sees(gap: float) -> bool:
-    world = Bare(Asked(gap=gap))
-    world.advance(1)
-    return world.contacts > 0
-
-
 def _rubs(gap: float) -> bool:
     """Whether a box that falls through a gap within half a step is slowed down along the ground."""
     blow = Asked("box", gap, along=SLIDE_SPEED, up=-2.0 * gap / Bare(Asked()).dt)
@@ -132,7 +126,7 @@ UNSET = (
           f"{_BODY}.sleep_threshold; {_ASLEEP}", math.sqrt(2.0 * _AWAKE) / _SUMMED,
           partial(unset.reach, _falls_asleep), _HALVED),
     Unset("contacts from this gap on [m]", f"{2.0 * CONTACT_OFFSET:g}: {CONTACT_OFFSET:g} of each shape",
-          "sapien.physx.get_shape_config, contact_offset", 2.0 * CONTACT_OFFSET, partial(unset.reach, _sees), _HALVED),
+          "sapien.physx.get_shape_config, contact_offset", 2.0 * CONTACT_OFFSET, partial(unset.ahead, Bare), _HALVED),
     Unset("gap at rest [m]", "0: rest_offset", "sapien.physx.get_shape_config", 0.0, partial(unset.rest, Bare), 1e-6),
     Unset("left of 0.2 m of overlap [m]", "0: max_depenetration_velocity of 1e32 m/s", _BODY, 0.0,
           partial(unset.left, Bare), 1e-6),

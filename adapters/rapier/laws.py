@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from adapters.law import Deviation, exactly
+from adapters.law import Deviation, deviations, exactly
 from adapters.single_motions import booked_law, kept_law, standstill_law
 from adapters.single_precision import Method, rounded_law
 
@@ -43,18 +43,14 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for scene, metrics in BLOWS.items()
     for metric in metrics
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "rapier",
-        (profile,),
-        "far_origin",
-        "stopping_distance",
-        standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0)),
-        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-        "rapier3d, built for f32; motion in adapters/single_motions.py",
-        ("0.36.",),
-    )
-    for profile in ("default", "tuned")
+DEVIATIONS += deviations(
+    "rapier",
+    ("default", "tuned"),
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+    "rapier3d, built for f32; motion in adapters/single_motions.py",
+    ("0.36.",),
 )
 DEVIATIONS += tuple(
     Deviation(
@@ -70,16 +66,12 @@ DEVIATIONS += tuple(
     for scene in ("cradle", "rack")
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "rapier",
-        (profile,),
-        "off_centre",
-        "momentum_defect",
-        booked_law("momentum_defect"),
-        "single precision, 2^-24 relative",
-        "rapier3d, built for f32; band in adapters/single_motions.py",
-        ("0.36.",),
-    )
-    for profile in ("default", "tuned")
+DEVIATIONS += deviations(
+    "rapier",
+    ("default", "tuned"),
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "rapier3d, built for f32; band in adapters/single_motions.py",
+    ("0.36.",),
 )

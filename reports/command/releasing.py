@@ -12,7 +12,6 @@ from typing import Any, NoReturn
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from adapters.plain import one_line
 from adapters.scene import SceneError
@@ -21,12 +20,13 @@ from reports.command import statuses
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import JOBS, SECONDS, SET, request_from
+from reports.command.selection import HOW, JOBS, SECONDS, request_from
+from reports.progress import progress_on
 from reports.stages import say
 from reports.terminal import terminal
 from reports.wording import plural, profile_words
 from validation.canonical import SUITES
-from validation.cells import MOST_ITERATIONS, Observation, Slot, format_dt, plane_of, slot_from_dict
+from validation.cells import Observation, Slot, format_dt, plane_of, slot_from_dict
 from validation.posed import resolve
 from validation.records.store import Store
 from validation.releases import environments, history
@@ -44,15 +44,7 @@ def _cells(command: Command) -> Command:
     options = (
         click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
         click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
-        SET,
-        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
-        click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
-        click.option(
-            "--iterations",
-            multiple=True,
-            type=click.IntRange(1, MOST_ITERATIONS),
-            help="Solver iterations, instead of the profile's own.",
-        ),
+        *HOW,
         click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core."),
         click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s]."),
         click.option("--fresh", is_flag=True, help="Run again what OUT has already."),
@@ -136,15 +128,7 @@ def _drive(
     store: Store, release: Release, wanted: Sequence[Slot], effort: Effort, console: Console, times: bool = False
 ) -> history.Told:
     """Run one release with a progress line, time it if wanted, and judge it."""
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+    with progress_on(console) as progress:
         task = progress.add_task(release.name, total=len(wanted))
 
         def seen(observation: Observation) -> None:

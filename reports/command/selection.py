@@ -155,6 +155,20 @@ def asked(request: Request, options: dict[str, Any]) -> str:
     return shlex.join([*request.scenes, *narrowing])
 
 
+#: Settings, dimension, step and iterations of cases.
+HOW = (
+    SET,
+    click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
+    click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
+    click.option(
+        "--iterations",
+        multiple=True,
+        type=click.IntRange(1, MOST_ITERATIONS),
+        help="Solver iterations, instead of the profile's own.",
+    ),
+)
+
+
 def selection(command: Callable[..., None]) -> Callable[..., None]:
     """Options that select cases, common to all commands that run some."""
     options = (
@@ -170,15 +184,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--profile", multiple=True, metavar="P", help="Only this profile, by its name or role (repeat for more)."
         ),
-        SET,
-        click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
-        click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
-        click.option(
-            "--iterations",
-            multiple=True,
-            type=click.IntRange(1, MOST_ITERATIONS),
-            help="Solver iterations, instead of the profile's own.",
-        ),
+        *HOW,
         click.option(
             "--ulp",
             multiple=True,

@@ -147,12 +147,8 @@ def _runs(store: Store, kept: Kept, say: Callable[[str], None]) -> list[_Entry]:
         if run.id in timed and last and not last.ratios and last.commit == run.commit:
             last.ratios = summary.times
         else:
-            entries.append(_Entry(_day(run), _said(run), run.id, summary, summary.times, run.commit))
+            entries.append(_Entry(run.date[5:10], _said(run), run.id, summary, summary.times, run.commit))
     return entries
-
-
-def _day(run: Run) -> str:
-    return run.date[5:10]
 
 
 def _said(run: Run) -> str:

@@ -137,13 +137,9 @@ def matrix_lines(source: Source, found: Matrix, wanted: Sequence[tuple[str, int]
         for fields, label in ((found.fields, ""), (found.swept, ", swept")):
             own = [fields.get((line, column)) for column in source.columns]
             if any(own) or not label:
-                marks = [_matrix_mark(f, line, c) for f, c in zip(own, source.columns, strict=True)]
+                marks = [family_mark(f, slug(*line, *c)) for f, c in zip(own, source.columns, strict=True)]
                 lines.append(MatrixLine(scene, f"{dimension}-D{label}", slug(*line), marks))
     return lines
-
-
-def _matrix_mark(field: Field | None, line: tuple[str, int], column: tuple[str, str]) -> Mark:
-    return family_mark(field, slug(*line, *column))
 
 
 def family_mark(field: Field | None, anchor: str) -> Mark:

@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("Box2D", reason="Box2D is optional: pip install -e '.[box2d]'")
 
+from driven import driven
+
 from adapters.box2d import Box2DEngine
 from adapters.box2d.laws import BLOWS, DEVIATIONS
 from adapters.box2d.profiles import FINEST, units
@@ -17,21 +19,12 @@ from adapters.law import exactly
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.single_precision import Method, rounded_law
-from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = Box2DEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "tuned")
 FLOOR = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
-
-
-def settings(scene, profile="tuned", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="tuned", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(*pairs, **changes):
@@ -60,9 +53,8 @@ def test_default_is_what_a_fresh_world_and_polygon_hold():
      ({"continuous": 1}, "continuous"), ({"early_restitution": None}, "early_restitution"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_setting_and_a_mass_without_a_single_number_are_refused():

@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("pyb2d3", reason="Box2D 3.1 is optional: pip install -e '.[box2d3]'")
 
+from driven import driven
+
 from adapters.box2d3 import Box2D3Engine
 from adapters.box2d3.ball_on_plane import ball_law
 from adapters.box2d3.laws import BLOWS, DEVIATIONS, ON_A_PLANE
@@ -15,23 +17,14 @@ from adapters.box2d3.translation import frictions, restitutions
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.law import exactly
-from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = Box2D3Engine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "tuned")
 FLOOR = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
-
-
-def settings(scene, profile="tuned", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="tuned", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(*pairs, **changes):
@@ -79,9 +72,8 @@ def test_the_push_speed_of_default_is_the_one_that_is_not_told_again():
      ({"units_per_metre": 0.0}, "units_per_metre"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_what_has_no_single_number_and_tables_without_factors_are_refused():

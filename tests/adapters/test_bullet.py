@@ -20,6 +20,7 @@ from adapters.bullet.profiles import law_of
 from adapters.bullet.shipped import WARM_STARTING
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
+from adapters.moved_starts import GAP_ROUND_OFF
 from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
 from adapters.scene import Hull, Polygon
@@ -748,7 +749,7 @@ def test_when_a_ball_rests_as_shipped_round_off_decides_in_the_law_as_in_bullet(
     """
     canonical, dt = CATALOGUE["bounce"], 1.0 / 120.0
     scene = canonical.scene(2, params)
-    moved = [k * laws.GAP_ROUND_OFF for k in range(-20, 21)]
+    moved = [k * GAP_ROUND_OFF for k in range(-20, 21)]
     shipped, better = (law_of(profile, needs(scene), dt) for profile in ("default", "tuned"))
     times = [laws._measured(scene, dt, canonical.measure, shipped, by)["rest_time"][0] for by in moved]
     found = canonical.measure(scene, drive(scene, "default", dt, canonical.sampling(scene)))["rest_time"][0]

@@ -93,9 +93,8 @@ def test_tuned_follows_the_needs_and_gives_a_reason_for_each_number() -> None:
     ],
 )
 def test_a_setting_that_would_abort_or_be_ignored_is_refused_in_one_line(changes: dict, field: str) -> None:
-    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(make(FLOOR, Body("ball", Disc(0.5))), DT, settings(**changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_setting_is_refused() -> None:

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.mujoco import ball_on_face, blows, motions, predictions, profiles
-from adapters.mujoco.predictions import BLURRED, EITHER, ENOUGH, PERTURBATIONS, SPREAD_FACTOR
+from adapters.mujoco.predictions import EITHER, ENOUGH
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 
@@ -131,7 +132,7 @@ def test_a_ball_s_band_grows_with_the_widest_of_its_paths_until_they_are_blurred
         return law(scene, DT, None)
 
     value, floor = said()
-    assert value == 2.0 and floor == predictions.SUM_ROUND_OFF * 4.0
+    assert value == 2.0 and floor == SUM_ROUND_OFF * 4.0
     edge = BLURRED * 4.0
     for off in ((0.25 * edge,), (-0.25 * edge,), (0.125 * edge, -0.25 * edge)):
         assert said(*off) == (2.0, pytest.approx(floor + SPREAD_FACTOR * 0.25 * edge, rel=1e-9))
@@ -144,14 +145,14 @@ def test_a_ball_s_band_grows_with_the_widest_of_its_paths_until_they_are_blurred
         monkeypatch.setattr(predictions, "_ball_metrics", lambda *asked: dict.fromkeys(
             ("impulse", "momentum_defect", "rebound_speed"), (2.0,)))  # fmt: skip
         _, band = predictions.ball_law("default", metric)(scene, DT, None)
-        assert (band > 1.1 * predictions.SUM_ROUND_OFF * predictions._scale(scene, metric)) == more
+        assert (band > 1.1 * SUM_ROUND_OFF * scale_of(scene, metric)) == more
 
 
 def test_sizes_of_what_is_measured_of_a_ball():
     scene = replace(scene_of(3, Sphere(0.5)), params={"v": 4.0, "height": 3.0})
     sizes = {"apex[2]": 3.0, "rebound_speed": 4.0, "velocity_change": 4.0, "impulse": 8.0, "flight_time": 1.0}
-    assert {name: predictions._scale(scene, name) for name in sizes} == sizes
-    assert predictions._scale(replace(scene, params={}), "impulse") == 2.0
+    assert {name: scale_of(scene, name) for name in sizes} == sizes
+    assert scale_of(replace(scene, params={}), "impulse") == 2.0
 
 
 def test_a_column_s_prediction_lies_between_faces_that_touch_and_that_do_not(monkeypatch):
@@ -170,7 +171,7 @@ def test_a_column_s_prediction_lies_between_faces_that_touch_and_that_do_not(mon
 
     monkeypatch.setattr(predictions, "_trembles", lambda *asked: 0.0)
     value, band = said("sinking", 0.125, 0.125)
-    assert value == 0.125 and 0.0 < band < 1e-4 and values == [0.0, predictions.GAP_ROUND_OFF]
+    assert value == 0.125 and 0.0 < band < 1e-4 and values == [0.0, GAP_ROUND_OFF]
     assert said("sinking", 0.125, 0.1) == (0.125, pytest.approx(band + 0.05))
     assert said("sinking", 0.1, 0.125)[1] == pytest.approx(band + 0.05, abs=0.2 * band)
     assert said("sinking", 0.125, 0.0625) is not None and said("sinking", 0.125, 0.0624) is None

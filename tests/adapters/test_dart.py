@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.dart import DartEngine
 from adapters.dart.landing import landing_law
@@ -16,14 +18,12 @@ from adapters.dart.profiles import PYRAMIDS
 from adapters.dart.pyramid import pyramid_law
 from adapters.dart.shipped import restitution
 from adapters.engine import EngineError
-from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
-from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 
 
@@ -33,14 +33,6 @@ def sliding(heading=0.0, mu=0.3, **changes):
     return Scene(
         "slide", 1, 3, (FLOOR, replace(box, twist=twist, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.25
     )
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)
@@ -93,9 +85,8 @@ def test_what_cannot_be_said_in_numbers_of_single_bodies_is_refused():
      ("fbf", {"detector": "none"}, "detector"), ("default", {"cfm": 0.0}, "cfm")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(sliding(), DT, settings(sliding(), profile, **changes))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("profile", ["default", "nsgs"])

@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.drake import DrakeEngine
 from adapters.drake.landing import landing_law
@@ -18,21 +20,13 @@ from adapters.lift import lift
 from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", dt=DT, **changes):
-    return run(ENGINE, scene, dt, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(mu=0.5, **changes):
@@ -198,9 +192,8 @@ def test_what_has_no_place_here_is_refused_in_one_line():
      ({"stiction_tolerance": math.nan}, "stiction_tolerance"), ({"iterations": 5}, "iterations")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_the_facets_of_a_surface_do_not_mirror_each_other():

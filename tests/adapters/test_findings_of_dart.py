@@ -1,10 +1,13 @@
 """Reasons of DART: laws of blows that are shared or rub, and second choices, against the engine."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
+
+from driven import measured_of
 
 from adapters.dart import DartEngine
 from adapters.dart.laws import DEVIATIONS
@@ -12,7 +15,6 @@ from adapters.dart.meeting import meeting_law
 from adapters.dart.profiles import CONES, MOST_BOXES, SWEEPERS, checked
 from adapters.dart.rubbing import rubbing_law
 from adapters.engine import EngineError
-from adapters.needs import needs
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.bounds import planar
@@ -21,16 +23,7 @@ from validation.cells import Slot, prepare, settings_of
 
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
-
-
-def settings(scene, profile, **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def measured(name, profile, dimension=2, params=None, **changes):
-    scene = CATALOGUE[name].scene(dimension, params or {})
-    found = run(ENGINE, scene, DT, settings(scene, profile, **changes), CATALOGUE[name].sampling(scene))
-    return {metric: value for metric, (value, _) in CATALOGUE[name].measure(scene, found).items()}
+measured = partial(measured_of, ENGINE)
 
 
 def told(name, profile, metric, dimension=2, params=None):

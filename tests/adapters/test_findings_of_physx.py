@@ -1,13 +1,15 @@
 """Reasons of PhysX that no setting switches off: figures that hold without the engine, and what it makes of them."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
 
-from adapters.needs import needs
+from driven import driven, measured_of
+
 from adapters.physx import PhysxEngine
 from adapters.scene import Body, HalfSpace, Pair, Scene, Sphere
 from adapters.single_precision import ROUNDINGS, UNIT
@@ -17,17 +19,9 @@ from validation.catalogue import CATALOGUE
 
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
+settings, _ = driven(ENGINE, "default")
+measured = partial(measured_of, ENGINE)
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
-
-
-def settings(scene, profile, **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def measured(name, profile, dimension=2, params=None, **changes):
-    scene = CATALOGUE[name].scene(dimension, params or {})
-    found = run(ENGINE, scene, DT, settings(scene, profile, **changes), CATALOGUE[name].sampling(scene))
-    return {metric: value for metric, (value, _) in CATALOGUE[name].measure(scene, found).items()}
 
 
 def pushed(solver, speed, spin, mu=0.2, steps=10):

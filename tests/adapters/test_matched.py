@@ -11,6 +11,8 @@ import pytest
 
 pytest.importorskip("mujoco")
 
+from driven import driven
+
 from adapters.engine import EngineError
 from adapters.lift import lift
 from adapters.mujoco import MujocoEngine
@@ -18,11 +20,11 @@ from adapters.mujoco.matched import AGREED, SETTLED, by_geoms, law_of, matched_s
 from adapters.needs import needs
 from adapters.registry import is_ranked
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
-from adapters.stepping import run
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Trajectory
 from validation.posed import resolve
 
 ENGINE = MujocoEngine()
+settings, drive = driven(ENGINE, "matched")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 DT, G = 1.0 / 240.0, 9.81
 DOWN = (0.0, 0.0, -G)
@@ -49,14 +51,6 @@ def scene_of(
     *bodies: Body, e: float = 0.0, mu: float = 0.0, g: tuple[float, ...] = (0.0, 0.0, 0.0), T: float = 0.5
 ) -> Scene:
     return Scene("test", 1, 3, bodies, (Pair(restitution=e, friction=mu),), g, T)
-
-
-def settings(scene: Scene, profile: str = "matched", dt: float = DT, **changes: Any) -> dict[str, Any]:
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)} | changes
-
-
-def drive(scene: Scene, profile: str = "matched", dt: float = DT, **changes: Any) -> Trajectory:
-    return run(ENGINE, scene, dt, settings(scene, profile, dt, **changes), Sampling(1, 0.0))
 
 
 def settled(trajectory: Trajectory) -> bool:

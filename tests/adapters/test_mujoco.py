@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("mujoco")
 
+from driven import driven
+
 from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.moving import enter_motions
@@ -23,9 +25,10 @@ from adapters.needs import needs
 from adapters.receipts import _probe, receipts
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
-from adapters.trajectory import Sampling, Trajectory
+from adapters.trajectory import Sampling
 
 ENGINE = MujocoEngine()
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 FLAT = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
 CUBE = (1.0 / 6.0,) * 3
@@ -61,14 +64,6 @@ def make(
     dimension = 2 if len(bodies[-1].pose) == 3 else 3
     pairs = (Pair(restitution=e, friction=mu), *pairs)
     return Scene("test", 1, dimension, bodies, pairs, g or (0.0,) * dimension, T)
-
-
-def settings(scene: Scene, profile: str, dt: float = DT, **changes: Any) -> dict[str, Any]:
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)} | changes
-
-
-def drive(scene: Scene, profile: str = "default", dt: float = DT, **changes: Any) -> Trajectory:
-    return run(ENGINE, scene, dt, settings(scene, profile, dt, **changes), Sampling(1, 0.0))
 
 
 def impact(e: float, v: float, phase: float, dt: float = DT, mu: float = 0.0, mass: float = 0.5) -> Scene:
@@ -516,9 +511,8 @@ def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, c
 )
 def test_bad_settings_are_refused_in_one_line(change: dict[str, Any], field: str) -> None:
     scene = make(FLOOR, ball("ball", 1.0))
-    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(scene, DT, settings(scene, "default") | change)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_setting_is_refused() -> None:

@@ -8,10 +8,11 @@ import pytest
 
 pytest.importorskip("newton", reason="Newton is optional: pip install -e '.[newton]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.drives import Harmonic
 from adapters.engine import EngineError
-from adapters.needs import needs
 from adapters.newton import NewtonEngine
 from adapters.newton.laws import DEVIATIONS, MOTIONS
 from adapters.newton.motion import DRAWS, LONGER, followed, held_plane, motion_law, moved, settings_of
@@ -21,7 +22,6 @@ from adapters.newton.simulation import imported
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
 from adapters.stepping import posed_for, run
-from adapters.trajectory import Sampling
 from validation import metrics
 from validation.catalogue import CATALOGUE
 from validation.scenes import card_tent
@@ -29,17 +29,10 @@ from validation.truths import leaning
 
 ENGINE = NewtonEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, *UPRIGHT))
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 def resting(mu=0.5, duration=0.25, **changes):
@@ -85,9 +78,8 @@ def test_a_step_that_is_replayed_ends_in_the_bits_of_one_that_is_launched(name):
      ({"torsional": math.inf}, "torsional"), ({"rolling": -1.0}, "rolling"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_what_is_set_is_what_the_model_and_its_solver_hold():

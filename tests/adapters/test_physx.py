@@ -8,11 +8,12 @@ import pytest
 
 pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.drives import Harmonic
 from adapters.engine import EngineError
 from adapters.means import means
-from adapters.needs import needs
 from adapters.physx import PhysxEngine
 from adapters.physx.laws import DEVIATIONS
 from adapters.physx.shipped import FRICTION_GAP, TOLERANCE_LENGTH
@@ -20,12 +21,11 @@ from adapters.physx.simulation import imported
 from adapters.physx.translation import turn_to
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
-from adapters.stepping import run
-from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -38,14 +38,6 @@ def resting(mu=0.5, duration=0.5, **changes):
 def struck(e, speed, gap, mu=0.0, slip=0.0, steps=12):
     ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5 + gap, *UPRIGHT), (slip, 0, -speed, 0, 0, 0))
     return Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e, friction=mu),), (0.0, 0.0, 0.0), steps * DT)
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)
@@ -78,9 +70,8 @@ def test_default_is_what_the_bindings_hold():
      ({"persistent_manifolds": 0}, "persistent_manifolds"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

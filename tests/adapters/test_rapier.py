@@ -8,31 +8,24 @@ import pytest
 
 pytest.importorskip("rapier3d", reason="Rapier is optional: pip install -e '.[rapier]'")
 
+from driven import driven
+
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.rapier import RapierEngine
 from adapters.receipts import receipts
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
-from adapters.stepping import run
-from adapters.trajectory import Sampling
 
 ENGINE = RapierEngine()
 DT = 1.0 / 240.0
+settings, drive = driven(ENGINE, "default")
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 
 
 def resting(mu=0.5, duration=0.5, **changes):
     box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
     return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
-
-
-def settings(scene, profile="default", **changes):
-    return {s.name: s.value for s in ENGINE.settings(profile, needs(scene), DT)} | changes
-
-
-def drive(scene, profile="default", **changes):
-    return run(ENGINE, scene, DT, settings(scene, profile, **changes), Sampling(1, 0.0))
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)
@@ -66,9 +59,8 @@ def test_default_is_what_fresh_parameters_hold():
      ({"clustering": 0}, "clustering")],
 )  # fmt: skip
 def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
-    with pytest.raises(EngineError, match=rf"^{field}") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
-    assert "\n" not in str(caught.value)
 
 
 def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_along_the_normal_only():

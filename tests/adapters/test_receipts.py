@@ -94,7 +94,9 @@ def test_probes_run_at_the_settings_and_the_step_of_the_judged_scene(toy_class):
     assert {iterations for iterations, _, _ in seen} == {12}
 
 
-def test_probes_are_measured_once_per_configuration(toy_class):
+@pytest.fixture
+def counting(toy_class):
+    """A toy engine, and the names of the scenes of which it has built a world."""
     builds = []
 
     class Counting(toy_class):
@@ -102,7 +104,11 @@ def test_probes_are_measured_once_per_configuration(toy_class):
             builds.append(scene.name)
             return super().build(scene, dt, settings)
 
-    engine = Counting()
+    return Counting(), builds
+
+
+def test_probes_are_measured_once_per_configuration(counting):
+    engine, builds = counting
     first = receipts(engine, "default", IMPACT, DT)
     assert len(builds) == len(PROBES)
     # top_speed chooses no setting of the toy: the same configuration.
@@ -422,15 +428,8 @@ def test_an_engine_is_asked_for_the_profile_the_needs_and_the_step_that_are_judg
     }
 
 
-def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(toy_class):
-    builds = []
-
-    class Counting(toy_class):
-        def build(self, scene, dt, settings):
-            builds.append(scene.name)
-            return super().build(scene, dt, settings)
-
-    engine = Counting()
+def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(counting):
+    engine, builds = counting
     receipts(engine, "default", IMPACT, DT)
     builds.clear()
     receipts(engine, "default", replace(IMPACT, friction=0.25), DT)

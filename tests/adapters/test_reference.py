@@ -217,9 +217,8 @@ def test_an_iteration_count_reaches_classical_and_is_refused_by_reference() -> N
     [({"iterations": 0}, "iterations"), ({"slop": -1.0}, "slop"), ({"speed": 1.0}, "speed"), ({"beta": 2.0}, "beta")],
 )
 def test_a_bad_setting_is_refused_in_one_line(settings: dict[str, Any], field: str) -> None:
-    with pytest.raises(EngineError, match=f"^{field}: ") as caught:
+    with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(make(floor(2), body("ball", 2, (0.0, 1.0))), DT, settings)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("e", [0.1, 0.5, 1.0])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Box, Disc, Model, Settings, Simulation, Sphere
 from reference_solver import tally as entries
 from reference_solver.coulomb import cone_defect, into_cone
 from reference_solver.exact_contact import coulomb_solutions
@@ -17,23 +17,20 @@ from reference_solver.planar.columns import GAP, PN, PT
 from reference_solver.spatial.certificate import certify as certify_spatial
 from reference_solver.spatial.certificate import open_solve as open_spatial
 from reference_solver.tally_summary import GATES, reasons
+from reference_solver.verification.space import SPACES
 
 DT, G = 1.0 / 240.0, 9.81
 FRAME = (1.0, 0.0, 0.0, 0.0)
 
 
 def floor(dimension, **fields):
-    if dimension == 2:
-        return Body(HalfSpace((0.0, 1.0)), **({"motion": "fixed"} | fields))
-    return Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *FRAME), **({"motion": "fixed"} | fields))
+    return SPACES[dimension - 2].floor(**fields)
 
 
 def box(dimension, x, height, speed=0.0, angle=0.0, mass=1.0):
     """A unit cube, or square, that moves along x, turned about the horizontal axis across x."""
-    if dimension == 2:
-        return Body(Box((0.5, 0.5)), mass, mass / 6.0, (x, height, angle), (speed, 0.0, 0.0))
-    turn = (math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0)
-    return Body(Box((0.5,) * 3), mass, (mass / 6.0,) * 3, (x, 0.0, height, *turn), (speed, 0.0, 0.0, 0.0, 0.0, 0.0))
+    space = SPACES[dimension - 2]
+    return space.box(x, height, space.twist(speed), mass=mass, angle=angle)
 
 
 def gravity(dimension):

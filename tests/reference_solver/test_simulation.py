@@ -1,10 +1,6 @@
 """Recording, copies, determinism, and the uncompiled solver."""
 
 import copy
-import os
-import subprocess
-import sys
-import textwrap
 
 import numpy as np
 import pytest
@@ -113,34 +109,6 @@ def test_a_free_body_falls_as_semi_implicit_euler_says():
     start = np.array([0.5, -1.0, 2.0])
     assert simulation.twist[0] == pytest.approx(start + rate, rel=1e-13)
     assert simulation.pose[0] == pytest.approx(np.array([1.0, 2.0, 0.3]) + start + 0.5 * rate * (1.0 + DT), rel=1e-13)
-
-
-SCRIPT = """
-import sys
-sys.path.insert(0, {folder!r})
-from test_simulation import Settings, Simulation, mixed_model, DT
-import hashlib
-for profile in (Settings.classical, Settings.reference):
-    simulation = Simulation(mixed_model(), profile(DT))
-    simulation.advance(40)
-    print(simulation.pose.tobytes().hex(), simulation.twist.tobytes().hex())
-"""
-
-
-def test_the_uncompiled_solver_gives_the_same_answer():
-    """NUMBA_DISABLE_JIT=1 runs the same arithmetic in Python.
-
-    Only sine and cosine may come from another library, in their last place: 40 steps let that grow to 1e-13.
-    """
-    code = textwrap.dedent(SCRIPT).format(folder=os.path.dirname(__file__))
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
-    for line, profile in zip(done.stdout.split("\n"), PROFILES, strict=False):
-        pose, twist = (np.frombuffer(bytes.fromhex(part)).reshape(-1, 3) for part in line.split())
-        simulation = Simulation(mixed_model(), profile(DT))
-        simulation.advance(40)
-        assert simulation.pose == pytest.approx(pose, abs=1e-12)
-        assert simulation.twist == pytest.approx(twist, abs=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -7,31 +7,17 @@ import textwrap
 import numpy as np
 import pytest
 
-from reference_solver.model import Body, Box, HalfSpace, Model
 from reference_solver.planar import step as planar
 from reference_solver.settings import Settings
-from reference_solver.simulation import Simulation
 from reference_solver.spatial import step as spatial
 from reference_solver.timeline import timeline
-
-DT = 1 / 240
+from reference_solver.verification.space import GRAVITY, SPACES
 
 
 def column(dimension):
     """Two boxes on a floor."""
-    up = (0.0,) * (dimension - 1)
-    turn = (0.0,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
-    moment = 1 / 6 if dimension == 2 else (1 / 6,) * 3
-    still = (0.0,) * (3 if dimension == 2 else 6)
-    boxes = [Body(Box((0.5,) * dimension), 1.0, moment, (*up, k + 0.5, *turn), still) for k in (0, 1)]
-    model = Model(
-        dimension=dimension,
-        bodies=(Body(HalfSpace((*up, 1.0), 0.0), 0.0, 0.0, (*up, 0.0, *turn), still, "fixed"), *boxes),
-        gravity=(*up, -9.81),
-        restitution=np.zeros((3, 3)),
-        friction=np.full((3, 3), 0.5),
-    )
-    return Simulation(model, Settings.classical(DT))
+    space = SPACES[dimension - 2]
+    return space.simulation(space.column([1.0, 1.0]), Settings.classical(1 / 240), GRAVITY, 0.0, 0.5)
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])

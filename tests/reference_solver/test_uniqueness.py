@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Disc, Settings, Sphere
 from reference_solver.exact_contact import coulomb_solutions
+from reference_solver.verification.space import SPACES
 
 DT, G = 1.0 / 240.0, 9.81
 
@@ -20,12 +21,6 @@ def test_a_planar_contact_below_the_bound_has_one_answer():
         assert len(found) == 1
 
 
-def floor(dimension):
-    normal = (0.0,) * (dimension - 1) + (1.0,)
-    pose = (0.0, 0.0, 0.0) if dimension == 2 else (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    return Body(HalfSpace(normal), motion="fixed", pose=pose)
-
-
 def round_body(dimension, x):
     if dimension == 2:
         return Body(Disc(0.5), 1.0, 0.125, (x, 0.5, 0.0), (1.0, 0.0, 0.0))
@@ -33,15 +28,13 @@ def round_body(dimension, x):
 
 
 def box(dimension, x):
-    if dimension == 2:
-        return Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (x, 0.5, 0.0), (1.0, 0.0, 0.0))
-    twist = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Body(Box((0.5,) * 3), 1.0, (1.0 / 6.0,) * 3, (x, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0), twist)
+    space = SPACES[dimension - 2]
+    return space.box(x, 0.5, space.twist(1.0))
 
 
 def certificate(dimension, bodies, friction, profile):
-    gravity = (0.0,) * (dimension - 1) + (-G,)
-    simulation = Simulation(Model(dimension, [floor(dimension), *bodies], gravity, 0.0, friction), profile(DT))
+    space = SPACES[dimension - 2]
+    simulation = space.simulation([space.floor(), *bodies], profile(DT), G, 0.0, friction)
     simulation.advance(5)
     return simulation.certificate
 
@@ -65,7 +58,7 @@ def test_a_box_on_several_rough_points_is_not_proven(dimension):
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_ball_in_a_rough_corner_is_not_proven_in_a_smooth_one_it_is(dimension, profile):
     """It is body B of both contacts: friction of one presses it into the other."""
-    wall = Body(HalfSpace((-1.0,) + (0.0,) * (dimension - 1), -0.5), motion="fixed", pose=floor(dimension).pose)
+    wall = SPACES[dimension - 2].wall(-1.0, -0.5)
     for friction, share in ((0.4, 0.0), (0.0, 1.0)):
         found = certificate(dimension, [wall, round_body(dimension, 0.0)], friction, profile)
         assert found["unique"] == share * found["solves"] and found["solves"] > 0

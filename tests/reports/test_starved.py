@@ -2,19 +2,13 @@
 
 import pytest
 
-from reports.starved import RANGE, Starved, chart, starved_stack, table
+from reports.starved import Starved, chart, starved_stack
 
 ROWS = [
     Starved(10, 1, 9.0, 1.6, 1.0, False),
     Starved(10, 20, 0.0077, 0.002, 0.15, True),
     Starved(1, 100, 0.0, 0.0, 0.0, True),
 ]
-
-
-def test_tiles_say_falls_stands_or_how_far():
-    data = table(ROWS)
-    assert data["word"].tolist() == ["falls", "0.8 %", "stands"]
-    assert data["depth"].tolist() == [RANGE[1], 0.0077, RANGE[0]]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -100,7 +100,8 @@ def _engine_slots(
     for profile in profiles:
         if request.profiles and profile not in request.profiles:
             continue
-        for variation in _variations(request, canonical):
+        asked = [Variation(request.params)] if request.params else canonical.variations(request.suite)
+        for variation in asked:
             if not variation.runs_in(dimension):
                 continue
             if not _is_asked(request, canonical, variation, name, profile):
@@ -198,10 +199,6 @@ def _moves(
 ) -> tuple[int, ...]:
     wanted = request.floors and dt == QUICK_DT and iterations is None and canonical.stands_for_it(variation.params)
     return (1, 2) if wanted else ()
-
-
-def _variations(request: Request, canonical: CanonicalScene) -> Sequence[Variation]:
-    return [Variation(request.params)] if request.params else canonical.variations(request.suite)
 
 
 def _steps(request: Request, engine: Engine | None, profile: str) -> Iterable[float]:

@@ -182,9 +182,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Relative error of the horizontal speed."""
-    truth = exact(scene)["level_speed"]
-    value, reason = found["level_speed"]
-    return (None, reason) if value is None else (abs(value / truth - 1.0), "")
+    return metrics.relative_error(found, exact(scene), ["level_speed"])
 
 
 SCENE = CanonicalScene(

@@ -35,7 +35,7 @@ def friction(p: Params) -> float:
     return p["ratio"] * needed(p)
 
 
-def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -> tuple[float, float, float]:
+def _forces(p: Params, lean: float, square: float) -> tuple[float, float, float]:
     """Acceleration of the lean [rad/s^2], and loads of floor and wall over the weight.
 
     The foot is at (-L cos(lean), 0), the head at distance L along the ladder at the wall, the centre at half of it and
@@ -43,7 +43,7 @@ def _forces(p: Params, lean: float, square: float, ratio: float | None = None) -
     """
     length, half, thick = p["length"], 0.5 * p["length"], 0.5 * p["aspect"] * p["length"]
     c, s = math.cos(lean), math.sin(lean)
-    mu = needed(p) * (p["ratio"] if ratio is None else ratio)
+    mu = friction(p)
     # Centre (-half c - thick s, half s + thick c): first and second derivative by the lean.
     by = np.array([half * s - thick * c, half * c - thick * s])
     twice = np.array([half * c + thick * s, -half * s - thick * c])

@@ -211,8 +211,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Relative error of the rod's spin at the measurement."""
     metric = "passing_spin" if scene.params["ratio"] >= 1.0 else "turning_spin"
-    value, reason = found[metric]
-    return (None, reason) if value is None else (abs(value / exact(scene)[metric] - 1.0), "")
+    return metrics.relative_error(found, exact(scene), [metric])
 
 
 SCENE = CanonicalScene(

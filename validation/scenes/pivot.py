@@ -113,9 +113,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Relative error of the time at which the angle is passed."""
-    truth = exact(scene)["passing_time"]
-    value, reason = found["passing_time"]
-    return (None, reason) if value is None else (abs(value / truth - 1.0), "")
+    return metrics.relative_error(found, exact(scene), ["passing_time"])
 
 
 SCENE = CanonicalScene(

@@ -192,9 +192,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
     """Relative error of the time of a swing."""
-    truth = exact(scene)["swing_time"]
-    value, reason = found["swing_time"]
-    return (None, reason) if value is None else (abs(value / truth - 1.0), "")
+    return metrics.relative_error(found, exact(scene), ["swing_time"])
 
 
 SCENE = CanonicalScene(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Simulation
 
 DT = 1.0 / 240.0
 
@@ -38,23 +38,3 @@ class Build:
 @pytest.fixture
 def build():
     return Build()
-
-
-@pytest.fixture(params=["classical", "reference"])
-def settings(request):
-    return getattr(Settings, request.param)(DT)
-
-
-@pytest.fixture
-def reference():
-    return Settings.reference(DT)
-
-
-@pytest.fixture
-def classical():
-    return Settings.classical(DT)
-
-
-@pytest.fixture
-def fixed_step():
-    return Settings.fixed_step(DT)

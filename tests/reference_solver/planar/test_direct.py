@@ -1,7 +1,5 @@
 """The direct solver inside a step: when it is asked, and whether its answers are those of the sweeps."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -55,50 +53,6 @@ def test_easy_steps_never_ask(build, fixed_step):
     column = build.column(3, fixed_step)
     column.advance(100)
     assert simulation.certificate["factorisations"] == column.certificate["factorisations"] == 0
-
-
-def pushed_stack(build, settings):
-    """Five boxes of different masses, the lowest pushed along, the highest sliding back: sticking and sliding rows."""
-    boxes = [build.box(0.02 * i, 0.5 + i, (0.4 - 0.2 * i, 0.0, 0.0), mass=1.0 + i) for i in range(5)]
-    return build.simulation([build.floor(), *boxes], settings, (0.0, -G), 0.0, 0.4)
-
-
-def test_direct_answer_is_that_of_the_sweeps(build, fixed_step):
-    answers = []
-    for direct in (True, False):
-        simulation = pushed_stack(build, replace(fixed_step, direct=direct, max_sweeps=100_000))
-        simulation.advance(1)
-        assert simulation.certificate["converged"]
-        assert (simulation.certificate["direct"] > 0) is direct
-        answers.append(simulation.twist)
-    # A residual of 1e-13 of g h over the contraction per sweep, at least 1e-3 here.
-    assert answers[0] == pytest.approx(answers[1], abs=1e-11)
-
-
-@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
-def test_interfaces_of_alternating_masses_in_every_step(build, fixed_step, ratio):
-    """Impulse i is the weight above; the unit in the last place of g h is what a light box may miss."""
-    masses = np.array([1.0, ratio] * 4)
-    boxes = [build.box(0.0, 0.5 + i, mass=m) for i, m in enumerate(masses)]
-    simulation = build.simulation([build.floor(), *boxes], fixed_step, (0.0, -G), 0.0, 0.5)
-    weight = G * build.dt * np.cumsum(masses[::-1])[::-1]
-    for _ in range(50):
-        simulation.advance(1)
-        contacts = simulation.contacts()
-        carried = np.bincount(contacts.body_b - 1, contacts.impulse[:, 1])
-        assert np.abs(carried / weight - 1.0).max() <= 1e-14 * ratio
-    assert simulation.certificate["direct"] > 0
-
-
-def test_frictionless_worlds_without_rotation_are_solved_as_well(build, fixed_step):
-    """A column of 40 discs, mu = 0: normal rows only, and bodies that do not turn."""
-    n = 40
-    discs = [build.disc(0.0, 0.5 + i) for i in range(n)]
-    simulation = build.simulation([build.floor(), *discs], fixed_step, (0.0, -G))
-    simulation.advance(1)
-    assert "rotation" in simulation.left_out and simulation.certificate["direct"] == 1
-    weight = G * build.dt * np.arange(n, 0, -1)
-    assert simulation.contacts().impulse[:, 1] / weight == pytest.approx(1.0, abs=1e-13)
 
 
 def test_room_grows_with_the_contacts(build, fixed_step):

@@ -59,23 +59,6 @@ def test_sliding_box_decelerates_at_mu_g_and_then_stands(build, reference, direc
     assert np.abs(simulation.twist).max() <= 1e-12
 
 
-@pytest.mark.parametrize("dt_scale", [1.0, 4.0])
-def test_sliding_disc_rolls_at_two_thirds_of_its_speed_at_any_step(build, dt_scale):
-    """Angular momentum about the contact line is conserved: v_f = v0 / (1 + k), k = 1/2 (scene S-C4)."""
-    from reference_solver import Settings
-
-    simulation = build.simulation(
-        [build.floor(), build.disc(0.0, 0.5, (3.0, 0.0, 0.0))],
-        Settings.reference(build.dt * dt_scale),
-        (0.0, -G),
-        0.0,
-        0.2,
-    )
-    simulation.advance(int(240 / dt_scale))
-    vx, vy, omega = simulation.twist[1]
-    assert (vx, vy, omega) == pytest.approx((2.0, 0.0, -4.0), abs=1e-12)
-
-
 def test_disc_rolls_down_an_incline_at_two_thirds_of_g_sin(build, reference):
     theta, gravity = tilted(0.8)
     simulation = build.simulation([build.floor(), build.disc(0.0, 0.5)], reference, gravity, 0.0, MU)

@@ -52,20 +52,6 @@ def test_scalar_rows_and_blocks_converge_to_the_same_answer(build, fixed_step):
     assert twists[0] == pytest.approx(twists[1], abs=1e-9)
 
 
-@pytest.mark.parametrize("n", [2, 4, 8, 16])
-def test_a_column_of_discs_contracts_by_cos_squared_of_pi_over_2n(build, n):
-    """One scalar row per interface, mu = 0: Gauss-Seidel contracts by exactly cos^2(pi / 2n) per sweep."""
-    errors = []
-    for sweeps in (4 * n * n, 4 * n * n + n):  # the slowest mode alone is left, far above round-off
-        discs = [build.disc(0.0, 0.5 + i) for i in range(n)]
-        simulation = build.simulation([build.floor(), *discs], Settings.classical(build.dt, sweeps), (0.0, -G))
-        simulation.advance(1)
-        weight = G * build.dt * np.arange(n, 0, -1)
-        errors.append(np.abs(simulation.contacts().impulse[:, 1] - weight).max())
-    rate = (errors[1] / errors[0]) ** (1.0 / n)
-    assert 1.0 - rate == pytest.approx(1.0 - math.cos(math.pi / (2 * n)) ** 2, rel=0.01)
-
-
 def test_the_residual_is_a_certificate_of_the_error(build):
     """Stopping earlier leaves a larger error, and none larger than the condition of the column allows."""
     n, errors = 10, []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Box, HalfSpace, Model, Simulation, Sphere
 
 DT = 1.0 / 240.0
 
@@ -102,23 +102,3 @@ def build():
 @pytest.fixture
 def mechanics():
     return Mechanics()
-
-
-@pytest.fixture(params=["classical", "reference"])
-def settings(request):
-    return getattr(Settings, request.param)(DT)
-
-
-@pytest.fixture
-def reference():
-    return Settings.reference(DT)
-
-
-@pytest.fixture
-def classical():
-    return Settings.classical(DT)
-
-
-@pytest.fixture
-def fixed_step():
-    return Settings.fixed_step(DT)

@@ -1,9 +1,6 @@
 """The spatial world as a whole: agreement with the planar solver, nothing lost by leaving out, same bits."""
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -129,33 +126,3 @@ def test_arrays_grow_when_contacts_outnumber_the_first_guess():
     assert len(simulation.contacts()) > 4 * 40 + 16
     assert record.offset[-1] == len(record.contacts)
     assert np.isfinite(record.pose).all()
-
-
-SCRIPT = """
-import numpy as np
-from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
-ground = Body(HalfSpace((0.0, 0.0, 1.0)), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
-q = np.array([0.9, 0.2, -0.3, 0.1]); q /= np.linalg.norm(q)
-box = Body(Box((0.5, 0.4, 0.3)), 1.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.7, *q), (1.0, 0.5, -2.0, 1.0, 2.0, 0.5))
-lower = Body(Box((0.6, 0.6, 0.2)), 2.0, (0.3, 0.3, 0.5), (2.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0))
-upper = Body(Box((0.5, 0.5, 0.2)), 1.0, (0.1, 0.1, 0.2), (2.1, 0.1, 0.6, 1.0, 0.0, 0.0, 0.0))
-ball = Body(Sphere(0.3), 0.5, (0.02, 0.02, 0.02), (2.0, 0.0, 1.2, 1.0, 0.0, 0.0, 0.0), (0.3, 0.2, -3.0, 4.0, 0.0, 0.0))
-model = Model(3, [ground, box, lower, upper, ball], (0.0, 0.0, -9.81), 0.3, 0.5)
-for settings in (Settings.classical(1 / 240), Settings.reference(1 / 240)):
-    simulation = Simulation(model, settings)
-    simulation.advance(25)
-    print(" ".join(x.hex() for x in np.concatenate([simulation.pose.ravel(), simulation.twist.ravel()])))
-"""
-
-
-def test_uncompiled_kernels_give_the_same_answer():
-    """Sines and cosines come from another library and may differ in the last bit: 1e-12 after 25 steps."""
-    answers = []
-    for switch in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": switch}
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
-        )
-        answers.append(np.array([[float.fromhex(x) for x in line.split()] for line in done.stdout.splitlines()]))
-    assert answers[0].shape == (2, 5 * 13)
-    assert np.abs(answers[0] - answers[1]).max() <= 1e-12

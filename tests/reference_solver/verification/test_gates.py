@@ -19,14 +19,20 @@ from reference_solver.verification import (
 from reference_solver.verification.space import SPACES
 from reference_solver.verification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 
-#: Piles of half a minute of CPU or more each: `crosscheck certify` measures them, and `make test-all`.
+
+def long(*call):
+    """A gate of several seconds of CPU or more: `crosscheck certify` measures it, and `make test-all`."""
+    return pytest.param(call, marks=pytest.mark.long)
+
+
+#: Piles of half a minute of CPU or more each.
 LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes", "50 boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),
     (impact.apexes,),
     (impact.rest_time,),
-    (impact.elastic_bounces,),
+    long(impact.elastic_bounces),
     (impact.closing_wall,),
     (impact.thin_wall,),
     (friction.stopping,),
@@ -41,7 +47,7 @@ IN_BOTH = [
     (friction.sliding,),
     (friction.slide_to_roll,),
     (columns.convergence,),
-    (columns.column, 10, 100_000),
+    long(columns.column, 10, 100_000),
     (columns.column, 50, 1000),
     (columns.column, 200, 1000),
     (columns.heavy_on_light, 1e2, 1e-12),
@@ -61,10 +67,10 @@ ALONE = [
     *[(gate, PLANE, name) for gate in (turning.errors, turning.order) for name in CASES[2]],
     *[(turning.impulse_order, PLANE, name) for name in SMOOTH[2]],
     (turning.long_board,),
-    (random_scenes.gates,),
+    long(random_scenes.gates),
     (falling.dominoes,),
     (falling.rocking,),
-    *[pytest.param((piles.laws, name), marks=[pytest.mark.long] if name in LONG else []) for name in piles.KINDS],
+    *[long(piles.laws, name) if name in LONG else (piles.laws, name) for name in piles.KINDS],
     *[(gate, SPATIAL, name) for gate in (turning.errors, turning.order) for name in CASES[3]],
     (detection.seams, SPACES[0], "polygon"),
     (detection.slender_rod,),
@@ -75,7 +81,6 @@ def named(call):
     return "-".join(str(getattr(part, "name", getattr(part, "__name__", part))) for part in call)
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("call", IN_BOTH, ids=named)
 def test_gate_holds_in_both_dimensions(call, space):
@@ -85,7 +90,6 @@ def test_gate_holds_in_both_dimensions(call, space):
     assert [row for row in rows if not row.holds] == []
 
 
-@pytest.mark.few(10)
 @pytest.mark.parametrize("call", ALONE, ids=named)
 def test_gate_holds(call):
     function, *arguments = call

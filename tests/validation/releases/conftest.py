@@ -10,6 +10,7 @@ import pytest
 
 from adapters import registry
 from validation import identity
+from validation.records.store import Store
 from validation.releases import choosing
 
 HERE = Path(__file__).parent
@@ -101,3 +102,11 @@ def toy(local, tmp_path_factory, monkeypatch):
     for cached in (registry.find, identity.adapter_hash):
         cached.cache_clear()
     sys.modules.pop("toy_plugin", None)
+
+
+@pytest.fixture
+def store(tmp_path):
+    """A store of results in a folder of its own."""
+    found = Store(tmp_path / "out")
+    yield found
+    found.close()

@@ -8,19 +8,11 @@ from types import SimpleNamespace
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
-from validation.records.store import Store
 from validation.releases import driven as other_end
 from validation.releases import driving
 from validation.releases.driving import Effort, drive
 
 ONE = Effort(jobs=1)
-
-
-@pytest.fixture
-def store(tmp_path):
-    found = Store(tmp_path / "out")
-    yield found
-    found.close()
 
 
 def test_what_a_release_answers_and_what_it_left_comes_over_the_line_as_it_is(store, monkeypatch):

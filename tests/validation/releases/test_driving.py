@@ -14,7 +14,6 @@ from adapters import registry
 from validation.cells import Outcome, Slot
 from validation.judging.rows import rows_of
 from validation.posed import pinned
-from validation.records.store import Store
 from validation.releases import environments, history
 from validation.releases.choosing import RegistryError, chosen, offered
 from validation.releases.driving import Effort, answered, drive, planned
@@ -23,13 +22,6 @@ from validation.running.plan import Request
 ONE = Effort(jobs=1)
 REQUEST = Request(scenes=["impact"], engines=["toy"], dimensions=[2], params={"e": 0.5, "v": 4.0})
 SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
-
-
-@pytest.fixture
-def store(tmp_path):
-    found = Store(tmp_path / "out")
-    yield found
-    found.close()
 
 
 def release(version):

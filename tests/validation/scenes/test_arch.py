@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made, still
 
-from adapters.engine import Contacts
 from adapters.scene import SceneError
-from adapters.trajectory import ContactRecord, Trajectory
+from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.files.mass_properties import moments, volume
 from validation.geometry import overlap
@@ -17,11 +16,6 @@ from validation.scenes.arch import BASE, KEY, NARROW, TALL, _held, motion, neede
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["arch"]
-    return canonical, canonical.scene(2, params)
 
 
 def faces(scene):
@@ -80,20 +74,15 @@ def run(scene, dt=DT, order=0.0, factors=(1.0, 1.0, 1.0), loads=None):
         )
     rates = at[:6].reshape(3, 2) * np.array(factors)[:, None]
     t = np.arange(round(scene.duration / dt) + 1) * dt
-    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
-    twist = np.zeros_like(pose)
+    pose, twist = still(scene, len(t))
     for k, rate in enumerate(rates, 1):
         twist[:, k, :2] = np.outer(t, rate)
         pose[:, k, :2] += np.outer(0.5 * t * t + order * dt * t, rate)
     forces = at[6:] if loads is None else np.array(loads) * p["mass"] * p["g"]
     normals = [np.array([0.0, 1.0])] * 2 + [normal for _, normal in faces(scene)]
     each = np.array([force * normal for force, normal in zip(forces, normals, strict=True)]) * dt
-    n = len(t)
-    rows = Contacts(
-        np.tile([0, 0, 1, 2], n), np.tile([1, 2, 3, 3], n), np.zeros((4 * n, 2)), np.zeros((4 * n, 2)),
-        np.tile(each, (n, 1)), np.zeros(4 * n),
-    )  # fmt: skip
-    return Trajectory(t, pose, twist, ContactRecord(np.arange(n), 4 * np.arange(n + 1), rows), dt, "completed")
+    contacts = carried([(0, 1), (0, 2), (1, 3), (2, 3)], np.tile(each, (len(t), 1, 1)))
+    return Trajectory(t, pose, twist, contacts, dt, "completed")
 
 
 SHAPES = [{}, {"beta": 40.0}, {"heavy": 10.0}, {"g": 3.0, "mass": 7.0}]
@@ -101,7 +90,7 @@ SHAPES = [{}, {"beta": 40.0}, {"heavy": 10.0}, {"g": 3.0, "mass": 7.0}]
 
 @pytest.mark.parametrize("params", SHAPES)
 def test_the_stones_are_uniform_touch_and_overlap_nowhere(params):
-    _, scene = made(**params)
+    _, scene = made("arch", **params)
     for stone in scene.bodies[1:]:
         assert stone.inertia == pytest.approx(moments(stone.shape, stone.mass, 2))
         corners = np.array(stone.shape.vertices) + stone.pose[:2]
@@ -117,14 +106,14 @@ def test_the_stones_are_uniform_touch_and_overlap_nowhere(params):
 
 @pytest.mark.parametrize("params", SHAPES)
 def test_it_takes_as_much_friction_as_balances_the_springers(params):
-    _, scene = made(**params)
+    _, scene = made("arch", **params)
     assert needed(scene.params) == pytest.approx(least_friction(scene), rel=1e-9)
 
 
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
 def test_it_gives_way_as_newton_s_laws_say(params, ratio):
-    _, scene = made(ratio=ratio, **params)
+    _, scene = made("arch", ratio=ratio, **params)
     p = scene.params
     found = accelerations(scene, ratio * least_friction(scene), p["g"])
     out, load = motion(p)
@@ -137,13 +126,13 @@ def test_it_gives_way_as_newton_s_laws_say(params, ratio):
 @pytest.mark.parametrize("ratio", [0.8, 1.05])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5])
 def test_what_goes_or_stays_by_newton_s_laws_passes_in_every_step_order(params, ratio, order):
-    canonical, scene = made(ratio=ratio, **params)
+    canonical, scene = made("arch", ratio=ratio, **params)
     assert failing(canonical, scene, run(scene, order=order)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_an_arch_that_goes_otherwise_fails(size):
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("arch", ratio=0.8)
     for factors, metric in (
         ((1.0 - 3.0 * size, 1.0, 1.0), "parting[left]"),
         ((1.0, 1.0 + 3.0 * size, 1.0), "parting[right]"),
@@ -165,7 +154,7 @@ def test_an_arch_that_goes_otherwise_fails(size):
 
 @pytest.mark.parametrize("size", SIZES)
 def test_what_should_stay_and_moves_or_bears_otherwise_fails(size):
-    canonical, scene = made()
+    canonical, scene = made("arch")
     still = run(scene)
     for k in (1, 2, 3):
         for axis in range(3):
@@ -180,23 +169,23 @@ def test_what_should_stay_and_moves_or_bears_otherwise_fails(size):
 
 
 def test_an_arch_that_stands_where_it_gives_way_or_gives_way_where_it_stands_fails():
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("arch", ratio=0.8)
     assert {"parting[left]", "parting[right]", "sinking"} <= failing(
         canonical, slides, run(slides, factors=(0.0, 0.0, 0.0))
     )
-    canonical, stands = made()
-    fallen = run(replace(made(ratio=0.95)[1], duration=1.0))
+    canonical, stands = made("arch")
+    fallen = run(replace(made("arch", ratio=0.95)[1], duration=1.0))
     assert {"moved", "face_load[left]", "floor_load[right]"} <= failing(canonical, stands, fallen)
 
 
 def test_the_replay_s_ghost_sinks_with_the_keystone():
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("arch", ratio=0.8)
     record = run(scene)
     assert canonical.track(scene).position(record.t[-1]) == pytest.approx(tuple(record.pose[-1, 3, :2]), abs=1e-12)
 
 
 def test_all_stones_that_rise_together_fail():
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("arch", ratio=0.8)
     raised = run(scene)
     raised.pose[-1, 1:, 1] += 1e-3
     assert "off_the_faces" in failing(canonical, scene, raised)
@@ -234,4 +223,4 @@ def test_what_tips_is_what_the_floor_cannot_hold_at_rest_and_on_its_way():
 
 def test_springers_that_would_tip_are_refused_by_name():
     with pytest.raises(SceneError, match=r"arch\.beta"):
-        made(beta=12.0)
+        made("arch", beta=12.0)

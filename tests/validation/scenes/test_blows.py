@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import still
 
 from adapters.scene import SceneError
 from adapters.single_motions import booked_law
@@ -52,9 +53,7 @@ def made(name, dimension=2, **params):
 
 def ended(scene, velocities, spin=None):
     """A record that ends with these velocities along the first axis or the vertical; impulses are not reported."""
-    width = 3 if scene.dimension == 2 else 6
-    pose = np.array([[body.pose for body in scene.bodies]] * 2)
-    twist = np.zeros((2, len(scene.bodies), width))
+    pose, twist = still(scene, 2)
     for body, axis, speed in velocities:
         twist[-1, body, axis] = speed
     if spin is not None:

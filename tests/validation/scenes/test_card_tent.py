@@ -5,23 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made
 from scipy.integrate import solve_ivp
 
-from adapters.engine import Contacts
 from adapters.scene import SceneError
-from adapters.trajectory import ContactRecord, Trajectory
+from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.files.mass_properties import moments
 from validation.scenes.card_tent import _forces, friction, needed
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["card_tent"]
-    return canonical, canonical.scene(2, params)
 
 
 def gaps(scene, q):
@@ -93,11 +87,7 @@ def recorded(scene, dt, places, speeds, loads=None):
     if loads is not None:
         left, right, heads = np.array(loads) * scene.params["mass"] * scene.params["g"] * dt
         each = np.array([[heads, left], [-heads, right], [heads, 0.0]])
-        rows = Contacts(
-            np.tile([0, 0, 1], n), np.tile([1, 2, 2], n), np.zeros((3 * n, 2)), np.zeros((3 * n, 2)),
-            np.tile(each, (n, 1)), np.zeros(3 * n),
-        )  # fmt: skip
-        contacts = ContactRecord(np.arange(n), 3 * np.arange(n + 1), rows)
+        contacts = carried([(0, 1), (0, 2), (1, 2)], np.tile(each, (n, 1, 1)))
     return Trajectory(np.arange(n) * dt, pose, twist, contacts, dt, "completed")
 
 
@@ -120,7 +110,7 @@ SHAPES = [{}, {"lean": 45.0}, {"lean": 75.0}, {"aspect": 0.2}]
 
 @pytest.mark.parametrize("params", SHAPES)
 def test_a_tent_touches_the_floor_and_itself_and_its_cards_are_uniform(params):
-    _, scene = made(**params)
+    _, scene = made("card_tent", **params)
     card = scene.bodies[1]
     assert gaps(scene, start_of(scene)) == pytest.approx(np.zeros(3), abs=1e-15)
     assert card.inertia == pytest.approx(moments(card.shape, card.mass, 2), rel=1e-14)
@@ -129,7 +119,7 @@ def test_a_tent_touches_the_floor_and_itself_and_its_cards_are_uniform(params):
 
 @pytest.mark.parametrize("params", SHAPES)
 def test_a_tent_stands_with_the_loads_of_its_balance_and_just_where_friction_is_as_large(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("card_tent", **params)
     assert failing(canonical, scene, standing(scene)) == set()
     least, q = needed(scene.params), start_of(scene)
     assert accelerations(scene, q, np.zeros(6), 0.999 * least, 9.81)[2] < 0.0
@@ -144,7 +134,7 @@ def test_thin_cards_need_half_the_tangent_of_their_angle_against_the_upright():
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
 def test_a_tent_slides_out_as_forces_at_feet_and_heads_move_its_cards(params, ratio):
-    canonical, scene = made(ratio=ratio, **params)
+    canonical, scene = made("card_tent", ratio=ratio, **params)
     measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
     for name in ("passing_time[left]", "passing_time[right]", "passing_spin[left]", "passing_spin[right]"):
         assert measured[name][0] == pytest.approx(truth[name], rel=1e-5)
@@ -153,7 +143,7 @@ def test_a_tent_slides_out_as_forces_at_feet_and_heads_move_its_cards(params, ra
 
 @pytest.mark.parametrize("params", SHAPES)
 def test_feet_and_heads_push_as_forces_at_them_say_all_the_way(params):
-    _, scene = made(ratio=0.5, **params)
+    _, scene = made("card_tent", ratio=0.5, **params)
     record, p = sliding(scene), scene.params
     for k in (0, 30, 60):
         q, v = record.pose[k, 1:].ravel(), record.twist[k, 1:].ravel()
@@ -163,7 +153,7 @@ def test_feet_and_heads_push_as_forces_at_them_say_all_the_way(params):
 
 
 def test_an_end_that_is_found_a_step_late_passes_and_one_that_is_three_late_does_not():
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("card_tent", ratio=0.8)
     for steps, said in ((1.0, set()), (3.0, {"let_go"})):
         found = sliding(scene, 1 / 60)
         found.pose[5, 1, 1] -= 1.4 * steps * 9.81 * found.dt**2
@@ -174,13 +164,13 @@ def test_an_end_that_is_found_a_step_late_passes_and_one_that_is_three_late_does
 @pytest.mark.parametrize("late", [0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 def test_step_orders_and_late_contacts_pass(dt, late, offset):
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("card_tent", ratio=0.8)
     assert failing(canonical, scene, sliding(scene, dt, offset=offset, late=late)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_friction_gravity_inertia_and_loads_fail(size):
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("card_tent", ratio=0.8)
     dt = DT if size > 0.05 else 1 / 1920
     mu = friction(slides.params)
     times = {"passing_time[left]", "passing_time[right]"}
@@ -196,7 +186,7 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
         slow = replace(plain, twist=plain.twist.copy(), pose=plain.pose.copy())
         slow.twist[:, k, 2] *= 1.0 - 10.0 * size
         assert size < 0.01 or f"passing_spin[{name}]" in failing(canonical, slides, slow)
-    canonical, stands = made()
+    canonical, stands = made("card_tent")
     least = needed(stands.params)
     for loads, metric in (
         ((1.0, 1.0, least * (1.0 + size)), "head_load"),
@@ -212,16 +202,16 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
 
 
 def test_a_tent_that_stands_where_it_slides_or_slides_where_it_stands_fails():
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("card_tent", ratio=0.8)
     names = {f"passing_{what}[{side}]" for what in ("time", "spin") for side in ("left", "right")}
     assert failing(canonical, slides, standing(slides)) == names
-    canonical, stands = made()
-    fallen = sliding(replace(made(ratio=0.95)[1], duration=1.0))
+    canonical, stands = made("card_tent")
+    fallen = sliding(replace(made("card_tent", ratio=0.95)[1], duration=1.0))
     assert failing(canonical, stands, fallen) == {"moved", "head_load", "floor_load"}
 
 
 def test_a_tent_of_which_one_card_stays_fails():
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("card_tent", ratio=0.8)
     half = sliding(slides)
     half.pose[:, 2], half.twist[:, 2] = half.pose[0, 2], 0.0
     assert failing(canonical, slides, half) == {"passing_time[right]", "passing_spin[right]", "let_go"}
@@ -229,4 +219,4 @@ def test_a_tent_of_which_one_card_stays_fails():
 
 def test_cards_that_let_go_of_each_other_on_their_way_are_refused_by_name():
     with pytest.raises(SceneError, match=r"card_tent\.ratio"):
-        made(ratio=0.01, lean=20.0)
+        made("card_tent", ratio=0.01, lean=20.0)

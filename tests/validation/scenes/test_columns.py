@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import carried, still
 
-from adapters.engine import Contacts
 from adapters.scene import Box, Disc, Sphere
-from adapters.trajectory import ContactRecord, Sampling, Trajectory
+from adapters.trajectory import Sampling, Trajectory
 from validation.catalogue import CATALOGUE
 from validation.truths import columns
 
@@ -23,18 +23,14 @@ def column(dimension=2, n=3, mass=2.0):
 
 def resting(scene, shares=None, first=0):
     """The scene at rest; interface i carries ``shares[i]`` (one number, or one per step) of the weight above it."""
-    d, n, steps = scene.dimension, len(scene.bodies) - 1, np.arange(first, STEPS + 1)
-    pose = np.array([[body.pose for body in scene.bodies]] * (STEPS + 1))
-    twist = np.zeros((STEPS + 1, n + 1, 3 if d == 2 else 6))
+    d, n = scene.dimension, len(scene.bodies) - 1
+    pose, twist = still(scene, STEPS + 1)
     contacts = None
     if shares is not None:
-        impulse = np.zeros((len(steps), n, d))
+        impulse = np.zeros((STEPS + 1 - first, n, d))
         for i in range(n):
             impulse[:, i, -1] = np.broadcast_to(shares[i], STEPS + 1)[first:] * (n - i) * 2.0 * G * DT
-        a = np.tile(np.arange(n), len(steps))
-        flat = impulse.reshape(-1, d)
-        rows = Contacts(a, a + 1, np.zeros_like(flat), np.zeros_like(flat), flat, np.zeros(len(a)))
-        contacts = ContactRecord(steps, n * np.arange(len(steps) + 1), rows)
+        contacts = carried([(i, i + 1) for i in range(n)], impulse, first)
     return Trajectory(np.arange(STEPS + 1) * DT, pose, twist, contacts, DT, "completed")
 
 

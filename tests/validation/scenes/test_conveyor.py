@@ -5,17 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
-
-
-def made(dimension=2, **params):
-    canonical = CATALOGUE["conveyor"]
-    return canonical, canonical.scene(dimension, params)
 
 
 def ridden(scene, dt=DT, mu=None, belt=None, offset=0.0):
@@ -33,8 +27,7 @@ def ridden(scene, dt=DT, mu=None, belt=None, offset=0.0):
         x += 0.5 * (before + v) * h
     place, speed = np.array(path).T
     n, d = len(path), scene.dimension
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, n)
     angle = math.radians(p["heading"])
     line = np.array([1.0]) if d == 2 else np.array([math.cos(angle), math.sin(angle)])
     pose[:, 1, : d - 1] = np.outer(place + offset * dt * speed, line)
@@ -46,7 +39,7 @@ def ridden(scene, dt=DT, mu=None, belt=None, offset=0.0):
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 @pytest.mark.parametrize(("dimension", "heading"), [(2, 0.0), (3, 0.0), (3, 30.0)])
 def test_coulomb_s_law_integrated_in_the_room_passes_in_every_step_order(dimension, heading, dt, offset):
-    canonical, scene = made(dimension, heading=heading)
+    canonical, scene = made("conveyor", dimension, heading=heading)
     trajectory = ridden(scene, dt, offset=offset)
     assert failing(canonical, scene, trajectory) == set()
     if not offset and dt == DT:
@@ -55,14 +48,14 @@ def test_coulomb_s_law_integrated_in_the_room_passes_in_every_step_order(dimensi
 
 
 def test_the_ghost_of_the_replay_goes_where_the_box_goes():
-    canonical, scene = made(3, heading=30.0)
+    canonical, scene = made("conveyor", 3, heading=30.0)
     trajectory, track = ridden(scene), canonical.track(scene)
     for k in (0, 40, 120, len(trajectory.t) - 1):
         assert track.position(trajectory.t[k]) == pytest.approx(trajectory.pose[k, 1, :3], abs=1e-5)
 
 
 def test_a_belt_that_is_taken_for_a_floor_and_one_that_runs_backwards_fail():
-    canonical, scene = made()
+    canonical, scene = made("conveyor")
     still = ridden(scene, belt=0.0)
     assert {"slipped", "pull", "slip_speed"} == failing(canonical, scene, still)
     back = ridden(scene)
@@ -72,7 +65,7 @@ def test_a_belt_that_is_taken_for_a_floor_and_one_that_runs_backwards_fail():
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_wrong_friction_a_wrong_belt_a_hop_a_turn_or_a_bend_fails(size):
-    canonical, scene = made(3)
+    canonical, scene = made("conveyor", 3)
     wrong = failing(canonical, scene, ridden(scene, mu=0.4 * (1.0 - size)))
     assert "pull" in wrong and (size < 0.05 or "slipped" in wrong)
     # A belt of another speed shows in the speed at the end at once, and in the mark once it is 5 % of it.
@@ -89,7 +82,7 @@ def test_wrong_friction_a_wrong_belt_a_hop_a_turn_or_a_bend_fails(size):
 
 
 def test_the_belt_stays_where_it_is_and_its_surface_runs_along_the_heading():
-    _, scene = made(3, heading=30.0)
+    _, scene = made("conveyor", 3, heading=30.0)
     belt = scene.bodies[0]
     assert belt.motion == "fixed" and not any(belt.twist)
     assert belt.surface_velocity == pytest.approx([2.0 * math.sqrt(0.75), 1.0, 0.0])

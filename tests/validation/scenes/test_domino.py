@@ -5,21 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.domino import STRUCK
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(dimension=2, **params):
-    canonical = CATALOGUE["domino"]
-    return canonical, canonical.scene(dimension, params)
 
 
 def fall(p, g=None, heavy=1.0):
@@ -105,8 +99,7 @@ def motion(scene, dt=DT, g=None, heavy=1.0, e=None, offset=0.0, late=0.0):
         turns[0], spins[0] = before.sol(times)
     turns = turns + offset * dt * spins
     n = len(times)
-    pose = np.array([[b.pose for b in scene.bodies]] * n)
-    twist = np.zeros((n, 3, 3))
+    pose, twist = still(scene, n)
     for k, foot in enumerate((0.0, p["gap"] * height + width)):
         x, z = centre(p, turns[k])
         pose[:, 1 + k] = np.column_stack([foot + x, z, -turns[k]])
@@ -119,7 +112,7 @@ CELLS = [{}, {"ratio": 0.9}, {"ratio": 2.0}, {"ratio": 0.5}, {"ratio": 1.3}, {"e
 
 @pytest.mark.parametrize("params", CELLS)
 def test_a_domino_turns_and_strikes_as_its_equations_say(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("domino", **params)
     measured, truth = canonical.measure(scene, motion(scene, 1 / 960)), canonical.exact(scene)
     for name, value in truth.items():
         assert measured[name][0] == pytest.approx(value, abs=2e-5), name
@@ -127,7 +120,7 @@ def test_a_domino_turns_and_strikes_as_its_equations_say(params):
 
 @pytest.mark.parametrize("params", CELLS)
 def test_feet_that_are_said_to_hold_do_so_in_the_blow(params):
-    _, scene = made(**params)
+    _, scene = made("domino", **params)
     p = scene.params
     theta = math.asin(p["gap"])
     _, needed = blow(p, theta, 1.0)
@@ -135,11 +128,11 @@ def test_feet_that_are_said_to_hold_do_so_in_the_blow(params):
 
 
 def test_feet_that_need_more_in_the_blow_than_friction_gives_are_refused():
-    _, scene = made()
+    _, scene = made("domino")
     _, needed = blow(scene.params, math.asin(0.6), 1.0)
-    made(mu=1.02 * max(needed))
+    made("domino", mu=1.02 * max(needed))
     with pytest.raises(SceneError, match=r"domino\.mu: .* both feet where"):
-        made(mu=0.98 * max(needed))
+        made("domino", mu=0.98 * max(needed))
 
 
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
@@ -147,13 +140,13 @@ def test_feet_that_need_more_in_the_blow_than_friction_gives_are_refused():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"ratio": 0.9}, {"ratio": 1.3}])
 def test_step_orders_and_a_blow_that_is_found_late_pass(params, dt, late, offset):
-    canonical, scene = made(**params)
+    canonical, scene = made("domino", **params)
     assert failing(canonical, scene, motion(scene, dt, offset=offset, late=late)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_restitution_gravity_or_inertia_and_feet_that_slip_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("domino")
     dt = DT if size > 0.05 else 1 / 3840
     assert size < 0.05 or "struck_spin" in failing(canonical, scene, motion(scene, dt, e=0.5 * (1.0 - 2.0 * size)))
     seen = failing(canonical, scene, motion(scene, dt, g=9.81 * (1.0 + size)))
@@ -162,7 +155,7 @@ def test_wrong_restitution_gravity_or_inertia_and_feet_that_slip_fail(size):
     slipped = motion(scene)
     slipped.pose[50:, 1, 0] -= 10.0 * size
     assert failing(canonical, scene, slipped) == {"edge_moved"}
-    canonical, back = made(ratio=0.9)
+    canonical, back = made("domino", ratio=0.9)
     less = motion(back, dt, g=9.81 * (1.0 + size))
     assert size < 0.005 or "highest" in failing(canonical, back, less)
     touched = motion(back)
@@ -171,7 +164,7 @@ def test_wrong_restitution_gravity_or_inertia_and_feet_that_slip_fail(size):
 
 
 def test_a_domino_that_is_not_pushed_far_enough_or_goes_through_the_next_one_fails():
-    canonical, scene = made()
+    canonical, scene = made("domino")
     still = motion(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0), twist=0.0 * still.twist)
     assert failing(canonical, scene, still) == {"passing_time", "passing_spin", "struck_time", "struck_spin"}
@@ -193,9 +186,9 @@ def test_a_domino_that_is_not_pushed_far_enough_or_goes_through_the_next_one_fai
 )
 def test_what_does_not_end_as_said_is_refused_by_name(params, named):
     with pytest.raises(SceneError, match=rf"domino\.{named}"):
-        made(**params)
+        made("domino", **params)
 
 
 def test_the_next_domino_is_told_while_it_rises():
-    _, scene = made()
+    _, scene = made("domino")
     assert math.atan(scene.params["aspect"]) > STRUCK

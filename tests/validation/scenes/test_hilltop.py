@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
@@ -13,11 +13,6 @@ from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
-
-
-def made(**params):
-    canonical = CATALOGUE["hilltop"]
-    return canonical, canonical.scene(2, params)
 
 
 def integrated(scene, dt=DT, g=None, stuck=0.0, drag=0.0, late=0.0):
@@ -59,8 +54,7 @@ def integrated(scene, dt=DT, g=None, stuck=0.0, drag=0.0, late=0.0):
         runs.append((since, found.sol))
     end, y = since, start
     times = np.arange(round(scene.duration / dt) + 1) * dt
-    pose = np.array([[b.pose for b in scene.bodies]] * len(times))
-    twist = np.zeros((len(times), 2, 3))
+    pose, twist = still(scene, len(times))
     for k, t in enumerate(np.maximum(0.0, times - late * dt)):
         if t <= end:
             now = next(path for until, path in runs if t <= until)(t)
@@ -73,7 +67,7 @@ def integrated(scene, dt=DT, g=None, stuck=0.0, drag=0.0, late=0.0):
 
 @pytest.mark.parametrize("params", [{}, {"mu": 0.0}, {"mu": 0.1}, {"mu": 2.0, "v": 0.5}, {"mu": 0.0, "v": 2.0}])
 def test_a_disc_leaves_where_the_force_on_it_is_nothing(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("hilltop", **params)
     trajectory, angle, end = integrated(scene)
     truth, measured = canonical.exact(scene), canonical.measure(scene, trajectory)
     assert truth["leaving_angle"] == pytest.approx(angle, abs=1e-3)
@@ -83,7 +77,7 @@ def test_a_disc_leaves_where_the_force_on_it_is_nothing(params):
 
 
 def test_without_friction_it_is_the_textbook_s_two_thirds():
-    _, scene = made(mu=0.0, v=1e-3)
+    _, scene = made("hilltop", mu=0.0, v=1e-3)
     truth = CATALOGUE["hilltop"].exact(scene)
     assert math.cos(math.radians(truth["leaving_angle"])) == pytest.approx(2.0 / 3.0, abs=1e-6)
 
@@ -92,7 +86,7 @@ def test_without_friction_it_is_the_textbook_s_two_thirds():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"mu": 0.1}, {"mu": 0.0}])
 def test_the_motion_passes_in_every_step(params, dt, late):
-    canonical, scene = made(**params)
+    canonical, scene = made("hilltop", **params)
     assert failing(canonical, scene, integrated(scene, dt, late=late)[0]) == set()
 
 
@@ -117,7 +111,7 @@ def held(scene, dt, new):
         if not new:
             place = place + dt * velocity
     r = np.array(rows)
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * len(r)), np.zeros((len(r), 2, 3))
+    pose, twist = still(scene, len(r))
     pose[:, 1, :2], twist[:, 1, :2] = r[:, :2], r[:, 2:]
     return Trajectory(np.arange(len(r)) * dt, pose, twist, None, dt, "completed")
 
@@ -126,13 +120,13 @@ def held(scene, dt, new):
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 120, DT, 1 / 960])
 @pytest.mark.parametrize("v", [0.5, 1.0, 2.0])
 def test_steps_of_first_order_pass(v, dt, new):
-    canonical, scene = made(mu=0.0, v=v)
+    canonical, scene = made("hilltop", mu=0.0, v=v)
     assert failing(canonical, scene, held(scene, dt, new)) == set()
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_a_hill_that_holds_on_wrong_gravity_and_drag_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("hilltop")
     dt = DT if size > 0.05 else 1 / 3840
     assert size < 0.005 or {"level_speed", "leaving_time"} <= failing(
         canonical, scene, integrated(scene, dt, drag=size)[0]
@@ -142,7 +136,7 @@ def test_a_hill_that_holds_on_wrong_gravity_and_drag_fail(size):
 
 
 def test_a_disc_that_stays_does_not_leave():
-    canonical, scene = made()
+    canonical, scene = made("hilltop")
     still = integrated(scene)[0]
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))
     assert canonical.measure(scene, still)["leaving_angle"] == (None, "it does not leave")
@@ -150,14 +144,14 @@ def test_a_disc_that_stays_does_not_leave():
 
 def test_a_disc_that_takes_off_at_the_top_is_refused():
     with pytest.raises(SceneError, match=r"hilltop\.v"):
-        made(v=3.0)
+        made("hilltop", v=3.0)
 
 
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("v", [0.5, 1.0, 2.0])
 def test_bounds_owe_what_the_hill_turns_by_and_a_step_and_a_half(v, dt):
     """Without friction the hill's force over the angle has a closed form: 3 g sin(phi) - (2 g + v^2/reach) phi."""
-    canonical, scene = made(mu=0.0, v=v)
+    canonical, scene = made("hilltop", mu=0.0, v=v)
     g, reach = scene.params["g"], scene.params["hill"] + scene.params["radius"]
     truth = canonical.exact(scene)
     phi = math.radians(truth["leaving_angle"])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
@@ -14,11 +14,6 @@ from validation.scenes.kane import answers
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
 CELLS = [{}, {"mu": 0.1, "e": 0.5}, {"along": -0.727}, {"along": 1.5, "mu": 0.1}, {"aspect": 0.4, "lean": 65.0}]
-
-
-def made(**params):
-    canonical = CATALOGUE["kane"]
-    return canonical, canonical.scene(2, params)
 
 
 def blown(scene, e=None, mu=None, heavy=1.0):
@@ -57,8 +52,7 @@ def blown(scene, e=None, mu=None, heavy=1.0):
 def recorded(scene, after, dt=DT):
     """A record that ends with the velocities ``after``."""
     n = round(scene.duration / dt) + 1
-    pose = np.array([[b.pose for b in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3))
+    pose, twist = still(scene, n)
     twist[:, 1] = scene.bodies[1].twist
     twist[n // 2 :, 1] = after
     return Trajectory(np.arange(n) * dt, pose, twist, None, dt, "completed")
@@ -66,28 +60,28 @@ def recorded(scene, after, dt=DT):
 
 @pytest.mark.parametrize("params", CELLS)
 def test_the_blow_is_that_of_the_equations_of_a_rigid_body(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("kane", **params)
     assert failing(canonical, scene, recorded(scene, blown(scene))) == set()
 
 
 def test_the_landing_gains_energy_as_published_for_a_thin_rod():
     """.1236 m v^2 for a rod without thickness: twice that is over the energy of the approach."""
-    _, scene = made(aspect=1e-9)
+    _, scene = made("kane", aspect=1e-9)
     assert CATALOGUE["kane"].exact(scene)["gain"] == pytest.approx(2.0 * 0.1236, abs=1e-4)
 
 
 def test_without_a_slide_or_without_friction_nothing_is_gained():
     for params in ({"along": 0.0, "mu": 0.0}, {"mu": 0.0}, {"along": -0.727}):
-        _, scene = made(**params)
+        _, scene = made("kane", **params)
         assert CATALOGUE["kane"].exact(scene)["gain"] < 1e-12
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_restitution_friction_or_inertia_fails(size):
-    canonical, scene = made()
+    canonical, scene = made("kane")
     assert failing(canonical, scene, recorded(scene, blown(scene, e=0.9988 * (1.0 - size)))) >= {"rise", "gain"}
     assert failing(canonical, scene, recorded(scene, blown(scene, heavy=1.0 + size))) >= {"spin", "gain"}
-    canonical, slips = made(mu=0.1, e=0.5)
+    canonical, slips = made("kane", mu=0.1, e=0.5)
     wrong = failing(canonical, slips, recorded(slips, blown(slips, mu=0.1 * (1.0 + size))))
     assert wrong == {"rise", "ahead", "spin", "gain"}
     for component, metric in enumerate(("ahead", "rise", "spin")):
@@ -98,7 +92,7 @@ def test_wrong_restitution_friction_or_inertia_fails(size):
 
 def test_whoever_takes_the_gain_away_fails():
     """Energy clipped by a smaller normal rebound, the end sticking as it should."""
-    canonical, scene = made()
+    canonical, scene = made("kane")
     assert failing(canonical, scene, recorded(scene, blown(scene, e=0.8))) >= {"rise", "spin", "gain"}
 
 
@@ -107,7 +101,7 @@ def test_whoever_takes_the_gain_away_fails():
 )
 def test_what_lands_twice_or_is_no_rod_is_refused(params, named):
     with pytest.raises(SceneError, match=rf"kane\.{named}"):
-        made(**params)
+        made("kane", **params)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e3])

@@ -5,22 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made, still
 from scipy.integrate import solve_ivp
 
-from adapters.engine import Contacts
 from adapters.scene import SceneError
-from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
+from adapters.trajectory import Trajectory
 from validation.scenes.ladder import friction
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["ladder"]
-    return canonical, canonical.scene(2, params)
 
 
 def centre_of(scene, tilt):
@@ -68,18 +61,14 @@ def sliding(scene, dt=DT, mu=None, g=None, heavy=1.0, offset=0.0, late=0.0):
 def recorded(scene, dt, tilt, spin, wall=None, foot=1.0):
     """A record with these angles; ``wall`` and ``foot`` are loads over the weight, at every step."""
     n = len(tilt)
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 3, 3))
+    pose, twist = still(scene, n)
     pose[:, 2] = [(*centre_of(scene, each), each) for each in tilt]
     twist[:, 2, 2] = spin
     contacts = None
     if wall is not None:
         weight = scene.params["mass"] * scene.params["g"] * dt
         each = np.array([[wall, foot], [-wall, 0.0]]) * weight
-        rows = Contacts(
-            np.tile([0, 1], n), np.full(2 * n, 2), np.zeros((2 * n, 2)), np.zeros((2 * n, 2)), np.tile(each, (n, 1)),
-            np.zeros(2 * n),
-        )  # fmt: skip
-        contacts = ContactRecord(np.arange(n), 2 * np.arange(n + 1), rows)
+        contacts = carried([(0, 2), (1, 2)], np.tile(each, (n, 1, 1)))
     return Trajectory(np.arange(n) * dt, pose, twist, contacts, dt, "completed")
 
 
@@ -102,7 +91,7 @@ LEANS = [{}, {"lean": 45.0}, {"lean": 75.0}, {"aspect": 0.2}]
 
 @pytest.mark.parametrize("params", LEANS)
 def test_a_ladder_stands_with_the_loads_of_its_balance_and_just_where_friction_is_as_large(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("ladder", **params)
     assert failing(canonical, scene, standing(scene)) == set()
     start = scene.bodies[2].pose[2]
     least = canonical.exact(scene)["wall_load"]
@@ -112,7 +101,7 @@ def test_a_ladder_stands_with_the_loads_of_its_balance_and_just_where_friction_i
 @pytest.mark.parametrize("params", LEANS)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
 def test_a_ladder_slides_as_forces_at_its_ends_move_it(params, ratio):
-    canonical, scene = made(ratio=ratio, **params)
+    canonical, scene = made("ladder", ratio=ratio, **params)
     measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
     assert measured["passing_time"][0] == pytest.approx(truth["passing_time"], rel=1e-5)
     assert measured["passing_spin"][0] == pytest.approx(truth["passing_spin"], rel=1e-5)
@@ -123,13 +112,13 @@ def test_a_ladder_slides_as_forces_at_its_ends_move_it(params, ratio):
 @pytest.mark.parametrize("late", [0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 def test_step_orders_and_late_contacts_pass(dt, late, offset):
-    canonical, scene = made(ratio=0.8)
+    canonical, scene = made("ladder", ratio=0.8)
     assert failing(canonical, scene, sliding(scene, dt, offset=offset, late=late)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_friction_gravity_inertia_and_loads_fail(size):
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("ladder", ratio=0.8)
     dt = DT if size > 0.05 else 1 / 1920
     mu = friction(slides.params)
     assert size < 0.005 or failing(canonical, slides, sliding(slides, dt, mu * (1.0 - size))) >= {"passing_time"}
@@ -138,7 +127,7 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
     gone = sliding(slides)
     gone.pose[40:, 2, 0] -= 10.0 * size
     assert failing(canonical, slides, gone) == {"let_go"}
-    canonical, stands = made()
+    canonical, stands = made("ladder")
     for loads, metric in (((1.0 + size, 1.0), "wall_load"), ((1.0, 1.0 - size), "floor_load")):
         found = standing(stands, wall=canonical.exact(stands)["wall_load"] * loads[0], foot=loads[1])
         assert failing(canonical, stands, found) == {metric}
@@ -148,10 +137,10 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
 
 
 def test_a_ladder_that_stands_where_it_slides_or_slides_where_it_stands_fails():
-    canonical, slides = made(ratio=0.8)
+    canonical, slides = made("ladder", ratio=0.8)
     assert failing(canonical, slides, standing(slides)) == {"passing_time", "passing_spin"}
-    canonical, stands = made()
-    fallen = sliding(replace(made(ratio=0.95)[1], duration=1.0))
+    canonical, stands = made("ladder")
+    fallen = sliding(replace(made("ladder", ratio=0.95)[1], duration=1.0))
     assert failing(canonical, stands, fallen) == {"moved", "wall_load", "floor_load"}
 
 
@@ -160,4 +149,4 @@ def test_a_ladder_that_stands_where_it_slides_or_slides_where_it_stands_fails():
 )
 def test_what_needs_no_wall_or_lets_it_go_is_refused_by_name(params, named):
     with pytest.raises(SceneError, match=rf"ladder\.{named}"):
-        made(**params)
+        made("ladder", **params)

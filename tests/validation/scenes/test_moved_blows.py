@@ -5,22 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made
 from scipy.integrate import solve_ivp
 
-from adapters.engine import Contacts
 from adapters.stepping import step_count
-from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
+from adapters.trajectory import Trajectory
 from validation.scenes.closing_wall import _turned_back
 
 DT = 1 / 240
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
 
 
 # ---- a wall that closes in ----
@@ -148,11 +141,9 @@ def landed(scene, dt=DT, e=None, share=(0.5, 0.5), moment=1.0):
         y = np.array([-half[1], half[1]])
         twist[after:, 1, 3] += (y @ share) * blow * c / box.inertia[0]
         twist[after:, 1, 4] += -x * blow / (moment * i)
-    impulse = np.zeros((n, d))
-    impulse[after, -1] = blow
-    rows = Contacts(np.zeros(n, int), np.ones(n, int), 0 * impulse, 0 * impulse, impulse, np.zeros(n))
-    record = ContactRecord(np.arange(n), np.arange(n + 1), rows)
-    return Trajectory(np.arange(n) * dt, pose, twist, record, dt, "completed")
+    impulse = np.zeros((n, 1, d))
+    impulse[after, 0, -1] = blow
+    return Trajectory(np.arange(n) * dt, pose, twist, carried([(0, 1)], impulse), dt, "completed")
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

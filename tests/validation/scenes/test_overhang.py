@@ -4,39 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, loaded, made
 
-from adapters.engine import Contacts
-from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.overhang import HEIGHT, LENGTH
 
 DT = 1 / 240
 
 
-def made(**params):
-    canonical = CATALOGUE["overhang"]
-    return canonical, canonical.scene(2, params)
-
-
 def at_rest(scene, duration=2.0):
     """A record in which nothing moves and each face carries the weight of all above it."""
-    n, blocks = round(duration / DT) + 1, len(scene.bodies) - 1
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    lower = np.tile(np.arange(blocks), n)
-    weights = np.array([[0.0, scene.params["g"] * (blocks - k) * DT] for k in range(blocks)])
-    rows = Contacts(
-        lower, lower + 1, *(np.zeros((n * blocks, 2)) for _ in range(2)), np.tile(weights, (n, 1)), 0.0 * lower
-    )
-    record = ContactRecord(np.arange(n), blocks * np.arange(n + 1), rows)
-    return Trajectory(np.arange(n) * DT, pose, np.zeros_like(pose), record, DT, "completed")
+    blocks = len(scene.bodies) - 1
+    weights = {(k, k + 1): (0.0, scene.params["g"] * (blocks - k) * DT) for k in range(blocks)}
+    return loaded(scene, weights, DT, duration)
 
 
 @pytest.mark.parametrize("n", [2, 4, 8])
 @pytest.mark.parametrize("margin", [0.3, 0.05, 1e-6, -1e-6, -0.05])
 def test_moments_about_each_edge_say_whether_it_stands(n, margin):
     """The centre of all above an interface, against the face that both blocks share there."""
-    canonical, scene = made(n=float(n), margin=margin)
+    canonical, scene = made("overhang", n=float(n), margin=margin)
     x = np.array([body.pose[0] for body in scene.bodies[1:]])
     stands = all(
         x[k - 1] - LENGTH / 2 < x[k:].mean() < x[k - 1] + LENGTH / 2 and x[k] - LENGTH / 2 < x[k:].mean()
@@ -47,13 +33,13 @@ def test_moments_about_each_edge_say_whether_it_stands(n, margin):
 
 def test_without_a_margin_the_reach_is_the_harmonic_sum():
     """Four blocks reach L/2 (1 + 1/2 + 1/3) beyond the one that stands on the floor: 11/12 of a block."""
-    _, scene = made(margin=0.0)
+    _, scene = made("overhang", margin=0.0)
     assert scene.bodies[-1].pose[0] - scene.bodies[1].pose[0] == pytest.approx(LENGTH * 11 / 12)
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_a_stack_that_sinks_slips_shakes_or_carries_too_little_fails(size):
-    canonical, scene = made()
+    canonical, scene = made("overhang")
     good = at_rest(scene)
     assert failing(canonical, scene, good) == set()
     for axis, metric in ((1, "penetration"), (0, "drift")):
@@ -70,7 +56,7 @@ def test_a_stack_that_sinks_slips_shakes_or_carries_too_little_fails(size):
 
 def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
     for margin, fails in ((0.05, True), (-0.05, False)):
-        canonical, scene = made(margin=margin)
+        canonical, scene = made("overhang", margin=margin)
         fallen = at_rest(scene)
         fallen.pose[-1, -1, :2] += [LENGTH, -2.0 * HEIGHT]
         assert ("stands" in failing(canonical, scene, fallen)) is fails
@@ -79,7 +65,7 @@ def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
 
 def test_a_block_that_leans_on_the_one_below_has_fallen():
     """Its end stands on the floor: it has turned by .53 rad and sunk by .17 blocks, less than half of one."""
-    canonical, scene = made(n=2.0, margin=-0.05)
+    canonical, scene = made("overhang", n=2.0, margin=-0.05)
     leaning = at_rest(scene)
     leaning.pose[-1, -1] += [0.0, -0.17 * HEIGHT, -0.53]
     assert failing(canonical, scene, leaning) == set()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.reference.start import overlap_at_the_start
 from adapters.trajectory import Trajectory
@@ -10,11 +10,6 @@ from validation.catalogue import CATALOGUE
 
 DT, G = 1 / 240, 9.81
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
 
 
 def parting(scene, share=0.2, kept=0.0, dt=DT, pull=0.0):
@@ -69,7 +64,7 @@ def test_what_a_share_of_the_overlap_throws_depends_on_the_step_alone():
 def coming_up(scene, share=0.2, kept=0.0, dt=DT):
     """A box that is pushed out of the floor; a share ``kept`` of the correction stays as speed, and it falls back."""
     n = round(scene.duration / dt) + 1
-    pose, twist = np.array([[body.pose for body in scene.bodies]] * n), np.zeros((n, 2, 3))
+    pose, twist = still(scene, n)
     y, v = pose[0, 1, 1], 0.0
     for k in range(1, n):
         depth = 0.5 - y

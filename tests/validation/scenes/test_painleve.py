@@ -5,22 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.painleve import critical
 from validation.truths.leaning import turn
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["painleve"]
-    return canonical, canonical.scene(2, params)
 
 
 def end_of(scene, tilt):
@@ -81,7 +75,7 @@ def moved(scene, dt=DT, mu=None, g=None, heavy=1.0, offset=0.0, late=0.0, stick=
     states[:, 0] += late * dt * p["v"] * ~waits + p["v"] * times * waits
     states[:, :3] += offset * dt * states[:, 3:] * (times > 0.0)[:, None]
     n = len(times)
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 2, 3))
+    pose, twist = still(scene, n)
     pose[:, 1], twist[:, 1] = states[:, :3], states[:, 3:]
     return Trajectory(times, pose, twist, None, dt, "completed")
 
@@ -91,7 +85,7 @@ CELLS = [{}, {"ratio": 0.6}, {"ratio": 0.2}, {"ratio": 2.0}, {"ratio": 1.05, "le
 
 @pytest.mark.parametrize("params", CELLS)
 def test_a_rod_slides_or_jams_as_forces_and_impulses_at_its_end_say(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("painleve", **params)
     measured, truth = canonical.measure(scene, moved(scene, 1 / 960)), canonical.exact(scene)
     for name, value in truth.items():
         assert measured[name][0] == pytest.approx(value, abs=2e-4 if name == "slowed" else 1e-6), name
@@ -100,7 +94,7 @@ def test_a_rod_slides_or_jams_as_forces_and_impulses_at_its_end_say(params):
 def test_the_critical_friction_is_where_pressing_the_end_pulls_it_down():
     """And the impulse that stops the end is just within the cone there; for a thin rod as published."""
     for lean in (30.0, 60.0, 75.0):
-        _, scene = made(ratio=0.3, lean=lean, v=50.0)
+        _, scene = made("painleve", ratio=0.3, lean=lean, v=50.0)
         p, rod = scene.params, scene.bodies[1]
         arm, turned = end_of(scene, rod.pose[2])
         push = np.array([-critical(p), 1.0])
@@ -118,7 +112,7 @@ def test_the_critical_friction_is_where_pressing_the_end_pulls_it_down():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"ratio": 0.6}, {"ratio": 0.2}])
 def test_step_orders_and_a_contact_that_is_found_late_pass(params, dt, late, offset):
-    canonical, scene = made(**params)
+    canonical, scene = made("painleve", **params)
     assert failing(canonical, scene, moved(scene, dt, offset=offset, late=late)) == set()
 
 
@@ -143,7 +137,7 @@ def first_order(scene, dt):
         pose = pose + dt * twist
     r = np.array(rows)
     n = len(r)
-    poses, twists = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 2, 3))
+    poses, twists = still(scene, n)
     poses[:, 1], twists[:, 1] = r[:, :3], r[:, 3:]
     return Trajectory(np.arange(n) * dt, poses, twists, None, dt, "completed")
 
@@ -151,13 +145,13 @@ def first_order(scene, dt):
 @pytest.mark.parametrize("dt", [1 / 120, DT, 1 / 960])
 @pytest.mark.parametrize("params", CELLS)
 def test_a_step_of_first_order_passes(params, dt):
-    canonical, scene = made(**params)
+    canonical, scene = made("painleve", **params)
     assert failing(canonical, scene, first_order(scene, dt)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_friction_gravity_or_inertia_and_ends_that_slip_or_lift_fail(size):
-    canonical, slides = made(ratio=0.6)
+    canonical, slides = made("painleve", ratio=0.6)
     dt = DT if size > 0.05 else 1 / 3840
     wrong = failing(canonical, slides, moved(slides, dt, mu=0.6 * critical(slides.params) * (1.0 - size)))
     assert size < 0.005 or wrong >= {"turning_time", "turning_spin"}
@@ -168,17 +162,17 @@ def test_wrong_friction_gravity_or_inertia_and_ends_that_slip_or_lift_fail(size)
     up = moved(slides)
     up.pose[20:30, 1, 1] += size
     assert failing(canonical, slides, up) == ({"lifted"})
-    canonical, jams = made()
+    canonical, jams = made("painleve")
     assert size < 0.005 or "passing_spin" in failing(canonical, jams, moved(jams, dt, heavy=1.0 + 3.0 * size))
     assert size < 0.005 or "edge_moved" in failing(canonical, jams, moved(jams, dt, stick=1.0 - 3.0 * size))
     assert size < 0.005 or "passing_spin" in failing(canonical, jams, moved(jams, dt, stick=1.0 - size))
 
 
 def test_a_rod_that_slides_where_it_jams_or_stops_where_it_slides_fails():
-    canonical, jams = made()
-    sliding = moved(made(ratio=0.6)[1], late=0.0)
+    canonical, jams = made("painleve")
+    sliding = moved(made("painleve", ratio=0.6)[1], late=0.0)
     assert "edge_moved" in failing(canonical, jams, sliding)
-    canonical, slides = made(ratio=0.6)
+    canonical, slides = made("painleve", ratio=0.6)
     stopped = moved(replace(jams, duration=slides.duration))
     assert failing(canonical, slides, stopped) >= {"turning_time", "turning_spin"}
 
@@ -186,7 +180,7 @@ def test_a_rod_that_slides_where_it_jams_or_stops_where_it_slides_fails():
 @pytest.mark.parametrize(("params", "named"), [({"ratio": 0.6, "v": 1.0}, "v"), ({"v": 0.1}, "v"), ({"v": 20.0}, "v")])
 def test_what_neither_slides_nor_stays_jammed_is_refused_by_name(params, named):
     with pytest.raises(SceneError, match=rf"painleve\.{named}"):
-        made(**params)
+        made("painleve", **params)
 
 
 def test_a_turn_that_does_not_get_there_is_none_and_others_are_integrated():

@@ -2,28 +2,21 @@
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.pair_matrix import GAP, RADIUS, materials
 from validation.scenes.pair_matrix import _times as times
 
 DT = 1 / 240
 
 
-def made(dimension=2, **params):
-    canonical = CATALOGUE["pair_matrix"]
-    return canonical, canonical.scene(dimension, params)
-
-
 def bouncing(scene, table, dt=DT):
     """Balls stepped between both faces, with Newton's and Coulomb's laws of impacts that slip at each, found late."""
     d, p = scene.dimension, scene.params
     times = np.arange(round(scene.duration / dt) + 1) * dt
-    pose = np.array([[b.pose for b in scene.bodies]] * len(times))
-    twist = np.zeros((len(times), 4, 3 if d == 2 else 6))
+    pose, twist = still(scene, len(times))
     for ball in (0, 1):
         height, along, up = RADIUS + p["fall"] * p["delay"], p["v"], -p["fall"]
         for k in range(len(times)):
@@ -43,7 +36,7 @@ def bouncing(scene, table, dt=DT):
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("cross", [0.5, 1.0, 1.5])
 def test_balls_that_obey_the_table_pass_in_every_phase(cross, dt, dimension):
-    canonical, scene = made(dimension, cross=cross)
+    canonical, scene = made("pair_matrix", dimension, cross=cross)
     table = materials(scene.params)
     assert table[3] == pytest.approx((0.4 * cross, 0.05 * cross))
     assert failing(canonical, scene, bouncing(scene, table, dt)) == set()
@@ -52,7 +45,7 @@ def test_balls_that_obey_the_table_pass_in_every_phase(cross, dt, dimension):
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("pair", [0, 1, 2, 3])
 def test_a_pair_that_is_off_is_named(pair, size):
-    canonical, scene = made()
+    canonical, scene = made("pair_matrix")
     for quantity, name in ((0, "restitution"), (1, "friction")):
         table = [list(row) for row in materials(scene.params)]
         table[pair][quantity] *= 1.0 - size
@@ -62,7 +55,7 @@ def test_a_pair_that_is_off_is_named(pair, size):
 @pytest.mark.parametrize("rule", [np.minimum, np.maximum, lambda a, b: 0.5 * (a + b), lambda a, b: np.sqrt(a * b)])
 def test_rules_that_combine_two_numbers_otherwise_fail(rule):
     """Each face's and ball's number is its pairs' mean; no such rule gives all four pairs back."""
-    canonical, scene = made(cross=1.5)
+    canonical, scene = made("pair_matrix", cross=1.5)
     table = np.array(materials(scene.params)).reshape(2, 2, 2)
     balls, faces = table.mean(axis=1), table.mean(axis=0)
     combined = [tuple(rule(balls[i], faces[j])) for i in (0, 1) for j in (0, 1)]
@@ -70,7 +63,7 @@ def test_rules_that_combine_two_numbers_otherwise_fail(rule):
 
 
 def test_a_ball_that_does_not_come_back_has_no_restitution():
-    canonical, scene = made()
+    canonical, scene = made("pair_matrix")
     table = [(0.0, 0.2), *materials(scene.params)[1:]]
     measured = canonical.measure(scene, bouncing(scene, table))
     assert measured["restitution[1]"] == (0.0, "")
@@ -79,11 +72,11 @@ def test_a_ball_that_does_not_come_back_has_no_restitution():
 
 def test_impacts_that_would_grip_are_refused():
     with pytest.raises(SceneError, match=r"pair_matrix\.v"):
-        made(v=1.0)
+        made("pair_matrix", v=1.0)
 
 
 def test_a_record_that_ends_before_the_second_impact_has_no_coefficients_of_the_ceiling():
-    canonical, scene = made()
+    canonical, scene = made("pair_matrix")
     whole = bouncing(scene, materials(scene.params))
     (first, _), _ = times(scene.params)
     kept = int(np.searchsorted(whole.t, first + 5.0 * DT))
@@ -109,7 +102,7 @@ def slips_at_all(v, p, spinning):
 @pytest.mark.parametrize(("dimension", "spinning"), [(2, 0.5), (3, 0.4)])
 def test_the_slowest_ball_that_is_a_scene_is_the_slowest_that_slips_at_every_face(dimension, spinning):
     """A disc's and a sphere's own moments; the speed between is found by halves, down to a millionth of it."""
-    canonical, scene = made(dimension)
+    canonical, scene = made("pair_matrix", dimension)
 
     def is_a_scene(v):
         try:

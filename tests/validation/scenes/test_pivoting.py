@@ -5,28 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.truths.pivoting import Pivot
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
 
 
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
 def recorded(scene, times, place, tilt, velocity, spin, dt=DT):
     """A record of a body's centre (s, 2), tilt, velocity and spin in the upright plane."""
     d, n = scene.dimension, len(times)
-    pose = np.array([[b.pose for b in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, n)
     if d == 2:
         pose[:, 1] = np.column_stack([place, tilt])
         twist[:, 1] = np.column_stack([velocity, spin])

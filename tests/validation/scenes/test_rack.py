@@ -5,18 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["rack"]
-    return canonical, canonical.scene(2, params)
 
 
 def broken(scene, dt=DT, e=1.0):
@@ -59,7 +53,7 @@ def broken(scene, dt=DT, e=1.0):
 
 @pytest.mark.parametrize("params", [{"rows": 1.0}, {"apart": 0.05}, {"rows": 3.0, "apart": 0.2, "v": 5.0}])
 def test_pairs_that_collide_one_after_the_other_keep_momentum_energy_and_mirror(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("rack", **params)
     trajectory = broken(scene)
     assert failing(canonical, scene, trajectory) == set()
     moved = np.linalg.norm(trajectory.twist[-1, 1:, :2], axis=1) > 1e-3
@@ -68,7 +62,7 @@ def test_pairs_that_collide_one_after_the_other_keep_momentum_energy_and_mirror(
 
 @pytest.mark.parametrize("size", SIZES)
 def test_lost_energy_momentum_and_mirror_and_overlaps_fail(size):
-    canonical, scene = made(apart=0.05)
+    canonical, scene = made("rack", apart=0.05)
     assert failing(canonical, scene, broken(scene, e=1.0 - size)) == {"energy_defect"}
     last = len(scene.bodies) - 1
     faster = broken(scene)
@@ -84,7 +78,7 @@ def test_lost_energy_momentum_and_mirror_and_overlaps_fail(size):
 
 
 def test_a_cue_that_passes_fails_though_it_keeps_everything_else():
-    canonical, scene = made()
+    canonical, scene = made("rack")
     free = broken(replace(scene, bodies=scene.bodies[:1]))
     pose = np.array([[b.pose for b in scene.bodies]] * len(free.t))
     twist = np.array([[b.twist for b in scene.bodies]] * len(free.t))
@@ -93,6 +87,6 @@ def test_a_cue_that_passes_fails_though_it_keeps_everything_else():
 
 
 def test_the_bound_of_an_overlap_shrinks_with_the_step():
-    canonical, scene = made()
+    canonical, scene = made("rack")
     bounds = [{c.metric: c.bound for c in canonical.checks(scene, dt)}["penetration"] for dt in (1 / 60, 1 / 240)]
     assert bounds[0] == pytest.approx(4.0 * bounds[1]) and bounds[0] < 0.1

@@ -5,34 +5,14 @@ from itertools import chain
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, loaded, made, still
 from scipy.optimize import linprog
 
-from adapters.engine import Contacts
-from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
+from adapters.trajectory import Trajectory
 from validation.scenes import pyramid
 
 DT, G = 1 / 240, 9.81
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
-def at_rest(scene, impulses, duration=2.0):
-    """A record in which nothing moves and each pair (a, b) carries its impulse on b, step by step."""
-    n, d = round(duration / DT) + 1, scene.dimension
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    pairs = np.array(list(impulses))
-    each = np.array([impulses[tuple(pair)] for pair in pairs])
-    a, b = np.tile(pairs[:, 0], n), np.tile(pairs[:, 1], n)
-    rows = Contacts(a, b, *(np.zeros((n * len(pairs), d)) for _ in range(2)), np.tile(each, (n, 1)), np.zeros(len(a)))
-    record = ContactRecord(np.arange(n), len(pairs) * np.arange(n + 1), rows)
-    twist = np.zeros((n, len(scene.bodies), 3 if d == 2 else 6))
-    return Trajectory(np.arange(n) * DT, pose, twist, record, DT, "completed")
 
 
 def scaled(trajectory, share, axis=slice(None)):
@@ -94,7 +74,7 @@ def test_whatever_balances_a_wall_its_rows_carry_the_weight_above_them(n):
 def test_a_wall_that_sinks_leans_shakes_or_carries_too_little_fails(dimension):
     canonical, scene = made("pyramid", dimension, rows=2)
     up = np.eye(dimension)[-1] * G * DT
-    good = at_rest(scene, {(0, 1): 1.4 * up, (0, 2): 1.6 * up, (1, 3): 0.4 * up, (2, 3): 0.6 * up})
+    good = loaded(scene, {(0, 1): 1.4 * up, (0, 2): 1.6 * up, (1, 3): 0.4 * up, (2, 3): 0.6 * up}, DT, 2.0)
     assert failing(canonical, scene, good) == set()
     loads = {"interface_impulse[1]", "interface_impulse[2]"}
     for size in SIZES:
@@ -147,15 +127,10 @@ def pushed(scene, dt=DT, order=0.0, mu=None):
             impulse[k, 0] -= grip * dt / fine
         impulse[k, -1] = normal * dt
         track[k] = x, v
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, n)
     pose[:, 1, 0] = track[:, 0] + order * dt * track[:, 1]
     twist[:, 1, 0] = track[:, 1]
-    zeros = np.zeros((n, d))
-    rows = Contacts(np.zeros(n, int), np.ones(n, int), zeros, zeros, impulse, np.zeros(n))
-    return Trajectory(
-        np.arange(n) * dt, pose, twist, ContactRecord(np.arange(n), np.arange(n + 1), rows), dt, "completed"
-    )
+    return Trajectory(np.arange(n) * dt, pose, twist, carried([(0, 1)], impulse[:, None]), dt, "completed")
 
 
 CASES = ({}, {"load": 0.0}, {"load": 9.0, "shear": 4.9}, {"load": 3.0, "shear": 2.5})

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made
 
 from adapters import registry
 from adapters.drives import asked_abilities
@@ -13,15 +13,9 @@ from adapters.meeting import meeting_pairs
 from adapters.needs import needs
 from adapters.scene import Pair, Scene, SceneError, scene_from_dict
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(**params):
-    canonical = CATALOGUE["restitution_above_one"]
-    return canonical, canonical.scene(2, params)
 
 
 def thrown(scene, dt=DT, e=None, late=0.0):
@@ -43,13 +37,13 @@ def thrown(scene, dt=DT, e=None, late=0.0):
 @pytest.mark.parametrize("params", [{}, {"e": 1.5}, {"e": 2.0}, {"v": 0.1}, {"e": 1.0}])
 @pytest.mark.parametrize("late", [0.0, 1.0, 2.0])
 def test_a_ball_that_is_thrown_back_as_asked_passes_at_every_phase(params, late):
-    canonical, scene = made(**params)
+    canonical, scene = made("restitution_above_one", **params)
     assert failing(canonical, scene, thrown(scene, late=late)) == set()
 
 
 @pytest.mark.parametrize("params", [{}, {"e": 1.5}])
 def test_the_ghost_is_where_blows_one_by_one_take_it(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("restitution_above_one", **params)
     fine = thrown(scene, 1e-5)
     place = canonical.track(scene).position
     off = [abs(place(t)[0] - x) for t, x in zip(fine.t[::500], fine.pose[::500, 2, 0], strict=True)]
@@ -59,7 +53,7 @@ def test_the_ghost_is_where_blows_one_by_one_take_it(params):
 
 @pytest.mark.parametrize("size", SIZES)
 def test_another_gain_and_a_speed_across_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("restitution_above_one")
     for e in (1.1 * (1.0 - size), 1.1 * (1.0 + size)):
         assert "growth" in failing(canonical, scene, thrown(scene, e=e))
     askew = thrown(scene)
@@ -68,7 +62,7 @@ def test_another_gain_and_a_speed_across_fail(size):
 
 
 def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
-    canonical, scene = made()
+    canonical, scene = made("restitution_above_one")
     assert failing(canonical, scene, thrown(scene, e=1.0)) == {"growth", "blows"}
     tired = thrown(scene)
     tired.twist[-1] *= 0.99
@@ -79,18 +73,18 @@ def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
 
 
 def test_a_scene_must_mean_it_and_says_so_when_it_is_kept():
-    _, scene = made()
+    _, scene = made("restitution_above_one")
     with pytest.raises(SceneError, match=r"restitution: 1\.1 must lie in \[0, 1\]"):
         replace(scene, gaining=False)
     with pytest.raises(SceneError, match=r"restitution: 2\.1 must lie in \[0, 2\]"):
         replace(scene, pairs=(Pair(restitution=2.1),))
     assert scene_from_dict(scene.as_dict()).hash() == scene.hash()
-    passive = made(e=1.0)[1]
+    passive = made("restitution_above_one", e=1.0)[1]
     assert "gaining" not in passive.as_dict() and list(asked_abilities(passive)) == []
 
 
 def test_only_adapters_that_say_so_get_it():
-    _, scene = made()
+    _, scene = made("restitution_above_one")
     assert list(asked_abilities(scene)) == [("pairs", "restitution above 1")]
     assert list(asked_abilities(lift(scene))) == [("pairs", "restitution above 1")]
     assert needs(scene).restitution == 1.1
@@ -101,6 +95,6 @@ def test_only_adapters_that_say_so_get_it():
 
 
 def test_nobody_says_how_far_bodies_get_that_gain_energy():
-    _, scene = made()
+    _, scene = made("restitution_above_one")
     assert isinstance(scene, Scene) and len(meeting_pairs(replace(scene, duration=1e-3))) == 2
-    assert len(meeting_pairs(replace(made(e=1.0)[1], duration=1e-3))) < 2
+    assert len(meeting_pairs(replace(made("restitution_above_one", e=1.0)[1], duration=1e-3))) < 2

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.scene import SceneError
@@ -14,11 +14,6 @@ from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(dimension=2, **params):
-    canonical = CATALOGUE["rocker"]
-    return canonical, canonical.scene(dimension, params)
 
 
 def place_of(p, theta):
@@ -54,8 +49,7 @@ def integrated(scene, dt=DT, drag=0.0, g=None, slip=0.0, heavy=1.0):
     place = place_of(p, theta).T
     place = place + slip * np.linspace(0.0, 1.0, len(times))[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])
     n, d = len(times), scene.dimension
-    pose = np.array([[b.pose for b in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, n)
     if d == 2:
         pose[:, 1] = np.column_stack([place, theta])
         twist[:, 1, 2] = spin
@@ -72,7 +66,7 @@ def integrated(scene, dt=DT, drag=0.0, g=None, slip=0.0, heavy=1.0):
     [(2, {}), (3, {}), (2, {"tilt": 2.0}), (2, {"thickness": 0.4}), (2, {"tilt": 30.0, "mu": 2.0})],
 )
 def test_a_board_swings_as_forces_at_its_contact_move_it(dimension, params):
-    canonical, scene = made(dimension, **params)
+    canonical, scene = made("rocker", dimension, **params)
     trajectory = integrated(scene)
     measured, truth = canonical.measure(scene, trajectory), canonical.exact(scene)
     assert measured["swing_time"][0] == pytest.approx(truth["swing_time"], rel=1e-6)
@@ -83,7 +77,7 @@ def test_a_board_swings_as_forces_at_its_contact_move_it(dimension, params):
 
 
 def test_small_swings_have_the_period_of_the_formula():
-    _, scene = made(tilt=0.1)
+    _, scene = made("rocker", tilt=0.1)
     h, r, square = 0.05, 0.5, (4.0 + 0.01) / 12.0
     rate = math.sqrt(9.81 * (r - h) / (h * h + square))
     assert CATALOGUE["rocker"].exact(scene)["swing_time"] == pytest.approx(math.pi / rate, rel=1e-5)
@@ -91,7 +85,7 @@ def test_small_swings_have_the_period_of_the_formula():
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_gravity_or_inertia_drag_slip_and_yaw_fail(size):
-    canonical, scene = made(3)
+    canonical, scene = made("rocker", 3)
     dt = DT if size > 0.05 else 1 / 960
     assert size < 0.05 or "swing_time" in failing(canonical, scene, integrated(scene, dt, g=9.81 * (1.0 - size)))
     assert size < 0.05 or "swing_time" in failing(canonical, scene, integrated(scene, dt, heavy=1.0 + size))
@@ -109,11 +103,11 @@ def test_wrong_gravity_or_inertia_drag_slip_and_yaw_fail(size):
 )
 def test_boards_that_fall_off_or_slip_are_refused(params, named):
     with pytest.raises(SceneError, match=rf"rocker\.{named}"):
-        made(**params)
+        made("rocker", **params)
 
 
 def test_a_board_that_stays_has_no_swings():
-    canonical, scene = made()
+    canonical, scene = made("rocker")
     still = integrated(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0), twist=0.0 * still.twist)
     assert canonical.measure(scene, still)["swing_time"] == (None, "it never arrives there")

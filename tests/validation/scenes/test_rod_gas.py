@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made
 
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -14,11 +14,6 @@ from validation.scenes.parts import phases
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["rod_gas"]
-    return canonical, canonical.scene(2, params)
 
 
 def bodies(scene):
@@ -87,7 +82,7 @@ def stepped(scene, dt):
     "params", [{}, {"n": 1.0}, {"n": 3.0, "room": 3.0}, {"n": 10.0, "v": 7.0}, {"n": 40.0, "room": 8.0}]
 )
 def test_rods_that_meet_one_after_the_other_are_where_sorted_free_flights_are(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("rod_gas", **params)
     x, v, count = meeting(scene)
     p = scene.params
     place, velocity = rod_gas.rods(p, p["delay"] + p["duration"])
@@ -100,7 +95,7 @@ def test_rods_that_meet_one_after_the_other_are_where_sorted_free_flights_are(pa
 
 def test_meetings_say_which_rods_meet_and_how_fast():
     """Between the meetings of a list each rod flies straight, and at each the two it names touch."""
-    _, scene = made(n=6.0)
+    _, scene = made("rod_gas", n=6.0)
     p, r = scene.params, rod_gas.RADIUS
     length = p["room"] + 12.0 * r
     for m in rod_gas.meetings(p):
@@ -116,7 +111,7 @@ def test_meetings_say_which_rods_meet_and_how_fast():
 @pytest.mark.parametrize("k", range(0, 16, 3))
 def test_a_method_of_fixed_steps_that_finds_meetings_late_stays_within_the_bounds(dt, k):
     dt = 3.75 / math.ceil(3.75 / dt)  # whole steps
-    canonical, scene = made(**phases(dt)[k])
+    canonical, scene = made("rod_gas", **phases(dt)[k])
     assert any(check.bound is not None for check in canonical.checks(scene, dt))
     assert failing(canonical, scene, stepped(scene, dt)) == set()
 
@@ -133,7 +128,7 @@ def test_what_is_late_uses_a_good_part_of_what_is_allowed():
 
 
 def test_steps_that_take_two_meetings_for_one_are_not_judged():
-    canonical, scene = made()
+    canonical, scene = made("rod_gas")
     coarsest = rod_gas.coarsest(scene.params)
     assert all(check.bound is not None for check in canonical.checks(scene, coarsest))
     assert all(check.bound is None for check in canonical.checks(scene, math.nextafter(coarsest, 1.0)))
@@ -141,7 +136,7 @@ def test_steps_that_take_two_meetings_for_one_are_not_judged():
 
 @pytest.mark.parametrize("size", SIZES)
 def test_lost_energy_other_masses_places_and_speeds_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("rod_gas")
     x, v, _ = meeting(scene, e=1.0 - size)
     lossy = failing(canonical, scene, recorded(scene, x, v))
     assert {"wrong_speed", "energy_defect"} <= lossy
@@ -194,7 +189,7 @@ def rounded(scene, off, seed):
 @pytest.mark.parametrize("params", [{}, {"room": 10.0, "duration": 7.5}, {"n": 10.0, "room": 20.0, "duration": 2.5}])
 def test_round_ends_spread_what_normals_are_rounded_by_and_no_farther_than_allowed(params, monkeypatch):
     """With roundings a million times as coarse, so that nothing else is as large."""
-    _, scene = made(**params)
+    _, scene = made("rod_gas", **params)
     p = scene.params
     monkeypatch.setattr(rod_gas, "NORMAL", 1e6 * rod_gas.NORMAL)
     allowed = rod_gas.strayed(p, [m for m in rod_gas.meetings(p) if m.time < p["delay"] + p["duration"]])
@@ -204,7 +199,7 @@ def test_round_ends_spread_what_normals_are_rounded_by_and_no_farther_than_allow
 
 @pytest.mark.parametrize("missed", [1, 5, 13])
 def test_a_meeting_that_is_missed_fails_though_it_keeps_the_energy(missed):
-    canonical, scene = made()
+    canonical, scene = made("rod_gas")
     x, v, _ = meeting(scene, missed=missed)
     found = failing(canonical, scene, recorded(scene, x, v))
     assert "wrong_speed" in found and "energy_defect" not in found

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
@@ -13,11 +13,6 @@ from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
 
 
 def integrated(scene, dt=DT, mu=None, k=None, resistance=0.0, late=0.0, offset=0.0):
@@ -77,8 +72,7 @@ def integrated(scene, dt=DT, mu=None, k=None, resistance=0.0, late=0.0, offset=0
 def recorded(scene, times, states, dt=DT, offset=0.0):
     """A record of places (2), velocities (2) and spins (3), level."""
     d, body = scene.dimension, scene.bodies[1]
-    pose = np.array([[b.pose for b in scene.bodies]] * len(times))
-    twist = np.zeros((len(times), 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, len(times))
     place = states[:, :2] + offset * dt * (states[:, 2:4] - states[0, 2:4])
     if d == 2:
         pose[:, 1, 0] = body.pose[0] + place[:, 0]
@@ -239,8 +233,7 @@ def test_the_worked_examples_of_the_field():
 def left(scene, forward, spin, rebound, sideways=0.0):
     """A record that ends with these velocities [m/s]."""
     d, r = scene.dimension, scene.params["radius"]
-    pose = np.array([[b.pose for b in scene.bodies]] * 2)
-    twist = np.zeros((2, 2, 3 if d == 2 else 6))
+    pose, twist = still(scene, 2)
     twist[-1, 1, d - 1] = rebound
     if d == 2:
         twist[-1, 1, 0], twist[-1, 1, 2] = forward, -spin / r

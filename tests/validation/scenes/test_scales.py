@@ -4,21 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.scales import DROP, MU, RADIUS, SPEED
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
 LENGTHS = [1e-6, 1e-3, 1.0, 1e3]
-
-
-def made(dimension=2, **params):
-    canonical = CATALOGUE["scales"]
-    return canonical, canonical.scene(dimension, params)
 
 
 def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
@@ -50,7 +44,7 @@ def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
     stop = SPEED * length / (mu * g)
     t = np.minimum(times, stop)
     n = len(times)
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 3, 3 * up))
+    pose, twist = still(scene, n)
     pose[:, 1, up], twist[:, 1, up] = RADIUS * length + height, speed
     pose[:, 2, 0], twist[:, 2, 0] = SPEED * length * t - 0.5 * mu * g * t * t, SPEED * length - mu * g * t
     pose[1:, 2, up] -= sunk
@@ -61,32 +55,32 @@ def moved(scene, dt=DT, mu=MU, e=0.5, threshold=0.0, sunk=0.0, late=0.0):
 @pytest.mark.parametrize("length", LENGTHS)
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_newton_s_laws_pass_in_every_unit_and_give_the_same_answers(length, late, dimension):
-    canonical, scene = made(dimension, length=length)
+    canonical, scene = made("scales", dimension, length=length)
     assert failing(canonical, scene, moved(scene, late=late)) == set()
     truth = canonical.exact(scene)
-    assert truth == pytest.approx(canonical.exact(made(dimension, length=1.0)[1]), rel=1e-12)
+    assert truth == pytest.approx(canonical.exact(made("scales", dimension, length=1.0)[1]), rel=1e-12)
     found = canonical.measure(scene, moved(scene))
     assert [found[name][0] for name in truth] == pytest.approx(list(truth.values()), abs=1e-5)
 
 
 def test_bounds_are_the_same_in_every_unit():
-    canonical, metres = made(length=1.0)
+    canonical, metres = made("scales", length=1.0)
     there = {check.metric: check.bound for check in canonical.checks(metres, DT)}
     for length in LENGTHS:
-        found = {check.metric: check.bound for check in canonical.checks(made(length=length)[1], DT)}
+        found = {check.metric: check.bound for check in canonical.checks(made("scales", length=length)[1], DT)}
         assert found == pytest.approx(there, rel=1e-9)
 
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("length", [1e-3, 1e3])
 def test_wrong_friction_restitution_and_boxes_that_sink_fail(length, size):
-    canonical, scene = made(length=length)
+    canonical, scene = made("scales", length=length)
     dt = DT if size > 0.05 else 1 / 1920
     wrong = failing(canonical, scene, moved(scene, dt, mu=MU * (1.0 - size)))
     assert "braking" in wrong and (size < 0.05 or "stopping_distance" in wrong)
     assert size < 0.005 or "apex" in failing(canonical, scene, moved(scene, dt, e=0.5 * (1.0 - 2.0 * size)))
     assert failing(canonical, scene, moved(scene, sunk=size * length)) == {"hop"}
-    canonical, spatial = made(3, length=length)
+    canonical, spatial = made("scales", 3, length=length)
     bent = moved(spatial)
     bent.pose[-1, 2, 1] += size * length
     assert failing(canonical, spatial, bent) == {"astray"}
@@ -94,9 +88,9 @@ def test_wrong_friction_restitution_and_boxes_that_sink_fail(length, size):
 
 def test_numbers_in_metres_are_seen_where_they_are_large():
     """A threshold of 0.2 m/s and a slop of 1 mm: nothing for a mountain, all of a pebble."""
-    canonical, pebble = made(length=1e-3)
+    canonical, pebble = made("scales", length=1e-3)
     assert failing(canonical, pebble, moved(pebble, threshold=0.2)) == {"apex"}
     assert failing(canonical, pebble, moved(pebble, sunk=1e-3)) == {"hop"}
-    canonical, mountain = made(length=1e3)
+    canonical, mountain = made("scales", length=1e3)
     assert failing(canonical, mountain, moved(mountain, threshold=0.2, sunk=1e-3)) == set()
     assert math.isclose(pebble.gravity[1], -9.81e-3) and math.isclose(mountain.gravity[1], -9810.0)

@@ -6,20 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 NAMES = ("seam", "far_origin")
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
 
 
 def sliding(scene, dt=DT, mu=None, offset=0.0):
@@ -35,8 +29,7 @@ def sliding(scene, dt=DT, mu=None, offset=0.0):
     found = solve_ivp(lambda t, y: [y[1], -mu * p["g"]], (0.0, 1e3), [0.0, p["v"]], "DOP853", dense_output=True,
                       events=stop, rtol=1e-12, atol=1e-12)  # fmt: skip
     y = found.sol(np.minimum(times, found.t[-1]))
-    pose = np.array([[body.pose for body in scene.bodies]] * len(times))
-    twist = np.zeros((len(times), len(scene.bodies), 3 if scene.dimension == 2 else 6))
+    pose, twist = still(scene, len(times))
     pose[:, box, 0] += y[0] + offset * dt * (y[1] - p["v"])
     twist[:, box, 0] = np.where(times < found.t[-1], y[1], 0.0)
     return Trajectory(times, pose, twist, None, dt, "completed")

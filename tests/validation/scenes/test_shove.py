@@ -4,20 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made, still
 
-from adapters.engine import Contacts
 from adapters.scene import SceneError
-from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
+from adapters.trajectory import Trajectory
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["shove"]
-    return canonical, canonical.scene(2, params)
 
 
 def corners(body):
@@ -59,14 +52,11 @@ def moving(scene, dt=DT, heavy=1.0, offset=0.0):
     rates, forces = held(scene)
     n = round(scene.duration / dt) + 1
     t = np.arange(n) * dt
-    pose, twist = np.array([[b.pose for b in scene.bodies]] * n), np.zeros((n, 4, 3))
+    pose, twist = still(scene, n)
     twist[:, 2:] = t[:, None, None] * rates.reshape(2, 3) / heavy
     pose[:, 2:] += (0.5 * t**2 + offset * dt * t)[:, None, None] * rates.reshape(2, 3) / heavy
-    rows = Contacts(
-        np.full(n, 2), np.full(n, 3), np.zeros((n, 2)), np.zeros((n, 2)), np.tile([forces[4] * dt, 0.0], (n, 1)),
-        np.zeros(n),
-    )  # fmt: skip
-    return Trajectory(t, pose, twist, ContactRecord(np.arange(n), np.arange(n + 1), rows), dt, "completed")
+    contacts = carried([(2, 3)], np.tile([forces[4] * dt, 0.0], (n, 1, 1)))
+    return Trajectory(t, pose, twist, contacts, dt, "completed")
 
 
 CELLS = [{}, {"ratio": 20.0}, {"ratio": 0.5}, {"angle": 60.0}, {"mass": 5.0, "g": 3.0}]
@@ -75,7 +65,7 @@ CELLS = [{}, {"ratio": 20.0}, {"ratio": 0.5}, {"angle": 60.0}, {"mass": 5.0, "g"
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("params", CELLS)
 def test_boxes_move_as_five_contacts_that_hold_make_them(params, offset):
-    canonical, scene = made(**params)
+    canonical, scene = made("shove", **params)
     _, forces = held(scene)
     assert (forces > 0.0).all(), "nothing tips: every corner pushes"
     trajectory = moving(scene, offset=offset)
@@ -90,7 +80,7 @@ def test_boxes_move_as_five_contacts_that_hold_make_them(params, offset):
 @pytest.mark.parametrize(("share", "fails"), [(0.99, set()), (1.01, {"down", "ahead"})])
 def test_an_end_that_is_a_hundredth_of_a_step_s_fall_too_fast_is_just_forgiven(params, dt, share, fails):
     """Speeds that go wrong by g dt/100 over the second half of the run, whatever its length, and no more."""
-    canonical, scene = made(**params)
+    canonical, scene = made("shove", **params)
     trajectory = moving(scene, dt)
     middle = len(trajectory.t) // 2
     late = (trajectory.t - trajectory.t[middle]).clip(0.0) / (trajectory.t[-1] - trajectory.t[middle])
@@ -102,7 +92,7 @@ def test_an_end_that_is_a_hundredth_of_a_step_s_fall_too_fast_is_just_forgiven(p
 
 @pytest.mark.parametrize("size", SIZES)
 def test_wrong_accelerations_and_forces_gaps_and_turns_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("shove")
     assert failing(canonical, scene, moving(scene, heavy=1.0 + size)) >= {"down", "ahead"}
     weak = moving(scene)
     weak.contacts.rows.impulse[:] *= 1.0 - size
@@ -116,7 +106,7 @@ def test_wrong_accelerations_and_forces_gaps_and_turns_fail(size):
 
 
 def test_boxes_that_stay_fail():
-    canonical, scene = made()
+    canonical, scene = made("shove")
     still = moving(scene, heavy=1e12)
     still.contacts.rows.impulse[:] = 0.0
     assert failing(canonical, scene, still) == {"down", "ahead", "force"}
@@ -125,4 +115,4 @@ def test_boxes_that_stay_fail():
 @pytest.mark.parametrize(("params", "named"), [({"angle": 30.0}, "angle"), ({"ratio": 1e-2, "angle": 65.0}, "angle")])
 def test_boxes_that_do_not_meet_for_all_of_the_run_are_refused(params, named):
     with pytest.raises(SceneError, match=rf"shove\.{named}"):
-        made(**params)
+        made("shove", **params)

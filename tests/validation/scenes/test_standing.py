@@ -5,32 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, loaded, made, still
 
 from adapters.engine import Contacts
 from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes import pinch
 
 DT = 1 / 240
 G = 9.81
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
-def at_rest(scene, impulses, duration=3.0):
-    """A planar record in which nothing moves and each pair (a, b) carries its impulse on b, step by step."""
-    n = round(duration / DT) + 1
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    pairs = np.array(list(impulses))
-    each = np.array([impulses[tuple(pair)] for pair in pairs])
-    a, b = np.tile(pairs[:, 0], n), np.tile(pairs[:, 1], n)
-    rows = Contacts(a, b, *(np.zeros((n * len(pairs), 2)) for _ in range(2)), np.tile(each, (n, 1)), np.zeros(len(a)))
-    record = ContactRecord(np.arange(n), len(pairs) * np.arange(n + 1), rows)
-    return Trajectory(np.arange(n) * DT, pose, np.zeros_like(pose), record, DT, "completed")
 
 
 def scaled(trajectory, share):
@@ -47,7 +29,7 @@ def groove(left, right):
     canonical, scene = made("v_groove", left=left, right=right)
     normals = np.array([body.shape.normal for body in scene.bodies[:2]]).T
     loads = np.linalg.solve(normals, [0.0, scene.params["mass"] * G])
-    return canonical, scene, at_rest(scene, {(k, 2): loads[k] * DT * normals[:, k] for k in (0, 1)}), loads
+    return canonical, scene, loaded(scene, {(k, 2): loads[k] * DT * normals[:, k] for k in (0, 1)}, DT, 3.0), loads
 
 
 @pytest.mark.parametrize(("left", "right"), [(45.0, 45.0), (60.0, 20.0), (10.0, 80.0), (85.0, 85.0)])
@@ -79,7 +61,7 @@ def test_a_plane_that_pushes_too_little_and_a_ball_that_moves_fail(size):
 def test_a_pair_that_carries_passes_and_one_that_does_not_fails(ratio):
     canonical, scene = made("heavy_on_light", ratio=ratio)
     heavy, both = ratio * G, (1.0 + ratio) * G
-    good = at_rest(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, heavy * DT])})
+    good = loaded(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, heavy * DT])}, DT, 3.0)
     assert failing(canonical, scene, good) == set()
     for size in (0.1, 0.01, 0.001):
         assert failing(canonical, scene, scaled(good, 1.0 - size)) == {"interface_impulse[1]", "interface_impulse[2]"}
@@ -89,7 +71,7 @@ def test_a_pair_that_carries_passes_and_one_that_does_not_fails(ratio):
         aside = good.pose.copy()
         aside[1:, 2, 0] += size
         assert failing(canonical, scene, replace(good, pose=aside)) == {"drift"}
-    light = at_rest(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, 0.99 * heavy * DT])})
+    light = loaded(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, 0.99 * heavy * DT])}, DT, 3.0)
     assert failing(canonical, scene, light) == {"interface_impulse[2]"}
 
 
@@ -111,7 +93,7 @@ def test_a_grip_in_balance_passes_however_wall_and_pad_share_the_weight(margin, 
     assert pad + floor + DT * (np.array(scene.bodies[3].force) + [0.0, -p["pad"] * G]) == pytest.approx(
         [0, 0], abs=1e-12
     )
-    good = at_rest(scene, {(0, 3): floor, (1, 2): wall, (2, 3): pad})
+    good = loaded(scene, {(0, 3): floor, (1, 2): wall, (2, 3): pad}, DT, 3.0)
     assert failing(canonical, scene, good) == set()
     for size in (0.1, 0.01, 0.001):
         steps = {f"{load}[{by}]" for load in ("grip", "carried") for by in ("least", "greatest")}
@@ -131,7 +113,7 @@ def test_a_grip_that_comes_and_goes_or_differs_from_side_to_side_fails():
     p, force = scene.params, pinch.grip(scene.params)
     weight = p["mass"] * G
     held = np.array([force, 0.5 * weight]) * DT
-    good = at_rest(scene, {(1, 2): held, (2, 3): held * [1.0, -1.0]})
+    good = loaded(scene, {(1, 2): held, (2, 3): held * [1.0, -1.0]}, DT, 3.0)
     assert failing(canonical, scene, good) == set()
 
     def pushed(pair, axis, share):
@@ -177,8 +159,7 @@ def sliding(scene, dt, mu=None, offset=0.0):
         x += 0.5 * (before + v) * h
     path = np.array(path)
     n = len(path)
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    twist = np.zeros((n, 2, pose.shape[2] if pose.shape[2] == 3 else 6))
+    pose, twist = still(scene, n)
     heading = np.array([1.0]) if scene.dimension == 2 else np.array(
         [math.cos(math.radians(p["heading"])), math.sin(math.radians(p["heading"]))]
     )  # fmt: skip

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import carried, failing, made
 
-from adapters.engine import Contacts
-from adapters.trajectory import ContactRecord, Trajectory
+from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot
 from validation.running.execution import execute
@@ -16,11 +15,6 @@ from validation.scenes import starved
 
 DT = 1 / 240
 SIZES = [0.1, 0.01, 0.001]
-
-
-def made(**params):
-    canonical = CATALOGUE["starved"]
-    return canonical, canonical.scene(2, params)
 
 
 def sweep(impulse, v, mass, closed):
@@ -62,11 +56,7 @@ def recorded(scene, places, speeds, impulses, dt=DT):
     steps, n = len(places), len(scene.bodies) - 1
     pose, twist = np.zeros((steps, n + 1, 3)), np.zeros((steps, n + 1, 3))
     pose[:, 1:, 0], twist[:, 1:, 0] = places, speeds
-    flat = np.zeros((steps * n, 2))
-    flat[:, 0] = impulses.ravel()
-    a = np.tile(np.arange(n), steps)
-    rows = Contacts(a, a + 1, np.zeros_like(flat), np.zeros_like(flat), flat, np.zeros(len(a)))
-    contacts = ContactRecord(np.arange(steps), n * np.arange(steps + 1), rows)
+    contacts = carried([(k, k + 1) for k in range(n)], np.stack([impulses, np.zeros((steps, n))], axis=2))
     return Trajectory(np.arange(steps) * dt, pose, twist, contacts, dt, "completed")
 
 
@@ -89,7 +79,7 @@ def test_what_a_sweep_leaves_shrinks_as_the_scene_says(n):
 
 @pytest.mark.parametrize(("n", "dt"), [(1, DT), (3, 1 / 60), (5, DT)])
 def test_a_row_that_is_solved_passes(n, dt):
-    canonical, scene = made(n=float(n))
+    canonical, scene = made("starved", n=float(n))
     assert failing(canonical, scene, resting(scene, dt=dt)) == set()
     assert failing(canonical, scene, swept(replace(scene, duration=1.0), 20 * n, dt)) == set()
 
@@ -97,7 +87,7 @@ def test_a_row_that_is_solved_passes(n, dt):
 @pytest.mark.parametrize(("sweeps", "warm"), [(1, True), (1, False), (2, False), (4, False), (10, False)])
 def test_a_row_that_is_starved_gives_way(sweeps, warm):
     """Impulses of the step before are half of the answer: who throws them away starves with ten sweeps."""
-    canonical, scene = made()
+    canonical, scene = made("starved")
     found = failing(canonical, scene, swept(scene, sweeps, warm=warm))
     assert {"displacement", "penetration"} <= found
 
@@ -109,7 +99,7 @@ def test_forty_sweeps_are_a_factor_of_e_for_ten_balls():
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 def test_contacts_that_are_found_a_step_late_are_allowed_and_two_steps_are_not(dt):
     """The press acts for one step on a ball that nothing holds; for two it goes 3 g dt^2 deep."""
-    canonical, scene = made()
+    canonical, scene = made("starved")
     fallen = scene.params["press"] / scene.params["mass"] * dt * dt
     late, later = resting(scene, dt=dt), resting(scene, dt=dt)
     late.pose[1:, -1, 0] -= fallen
@@ -120,7 +110,7 @@ def test_contacts_that_are_found_a_step_late_are_allowed_and_two_steps_are_not(d
 
 @pytest.mark.parametrize("size", SIZES)
 def test_faults_of_three_sizes_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("starved")
     allowed = {check.metric: check.bound for check in canonical.checks(scene, DT)}
     for share in (1.0 - size, 1.0 + size):
         assert failing(canonical, scene, resting(scene, share)) == {"load_error"}
@@ -136,7 +126,7 @@ def test_faults_of_three_sizes_fail(size):
 
 
 def test_one_contact_that_carries_nothing_is_seen_and_none_is_no_value():
-    canonical, scene = made()
+    canonical, scene = made("starved")
     trajectory = resting(scene)
     trajectory.contacts.rows.impulse[3 :: len(scene.bodies) - 1] = 0.0
     assert canonical.measure(scene, trajectory)["load_error"] == (1.0, "")
@@ -145,7 +135,7 @@ def test_one_contact_that_carries_nothing_is_seen_and_none_is_no_value():
 
 
 def test_a_row_gave_way_or_held():
-    _, scene = made()
+    _, scene = made("starved")
     assert starved.fate(scene, {"displacement": (0.09, ""), "penetration": (0.0, "")}) == ""
     assert starved.fate(scene, {"displacement": (0.11, ""), "penetration": (0.0, "")}) == "gave way"
     assert starved.fate(scene, {"displacement": (0.0, ""), "penetration": (0.11, "")}) == "gave way"

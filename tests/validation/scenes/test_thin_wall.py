@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
@@ -12,18 +12,12 @@ from validation.catalogue import CATALOGUE
 DT = 1 / 240
 
 
-def made(dimension=2, **params):
-    canonical = CATALOGUE["thin_wall"]
-    return canonical, canonical.scene(dimension, params)
-
-
 def thrown(scene, dt=DT, swept=True, e=None):
     """A ball stepped in a line; unless it is swept it is found only where a step ends in the plate."""
     p = scene.params
     e = p["e"] if e is None else e
     n = step_count(scene.duration, dt) + 1
-    pose = np.array([[b.pose for b in scene.bodies]] * n)
-    twist = np.zeros((n, 2, 3 if scene.dimension == 2 else 6))
+    pose, twist = still(scene, n)
     x, v = -p["radius"] - p["v"] * p["delay"], p["v"]
     for k in range(n):
         pose[k, 1, 0], twist[k, 1, 0] = x, v
@@ -38,13 +32,13 @@ def thrown(scene, dt=DT, swept=True, e=None):
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("v", [1.0, 20.0, 200.0, 1e4])
 def test_a_ball_that_comes_back_passes_however_late_it_is_found(v, dt, dimension):
-    canonical, scene = made(dimension, v=v)
+    canonical, scene = made("thin_wall", dimension, v=v)
     assert failing(canonical, scene, thrown(scene, dt)) == set()
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_a_wrong_rebound_and_a_ball_that_goes_deeper_than_a_step_fail(size):
-    canonical, scene = made()
+    canonical, scene = made("thin_wall")
     assert failing(canonical, scene, thrown(scene, e=0.5 * (1.0 - size))) == {"rebound_ratio"}
     deep = thrown(scene)
     k = int(np.argmax(deep.pose[:, 1, 0]))
@@ -53,7 +47,7 @@ def test_a_wrong_rebound_and_a_ball_that_goes_deeper_than_a_step_fail(size):
 
 
 def test_a_ball_that_passes_fails_both():
-    canonical, scene = made(v=200.0)
+    canonical, scene = made("thin_wall", v=200.0)
     passed = thrown(scene, swept=False)
     assert failing(canonical, scene, passed) == {"rebound_ratio", "beyond"}
     assert canonical.measure(scene, passed)["rebound_ratio"] == (-1.0, "")
@@ -62,7 +56,7 @@ def test_a_ball_that_passes_fails_both():
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("v", [20.0, 33.0, 60.0, 100.0, 200.0, 500.0])
 def test_the_law_says_which_balls_pass_a_method_that_does_not_sweep_and_where_they_end(v, dt):
-    canonical, scene = made(v=v)
+    canonical, scene = made("thin_wall", v=v)
     measured = canonical.measure(scene, thrown(scene, dt, swept=False))
     passes = measured["rebound_ratio"][0] == -1.0
     for metric in ("rebound_ratio", "beyond"):

@@ -5,27 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 from scipy.integrate import solve_ivp
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.tilt_table import TOLD, angle, outcome
 
 DT = 1 / 240
 SIZES = (0.1, 0.01, 0.001)
 
 
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
 def recorded(scene, dt, x, z, turn, vx=0.0, vz=0.0, spin=0.0, stride=1):
     """A record of a planar motion of body 1: centre (x, z), turn and spin clockwise."""
     n, d = round(scene.duration / dt / stride) + 1, scene.dimension
-    pose = np.array([[body.pose for body in scene.bodies]] * n)
-    twist = np.zeros((n, len(scene.bodies), 3 if d == 2 else 6))
+    pose, twist = still(scene, n)
     pose[:, 1, 0], pose[:, 1, d - 1] = x, z
     twist[:, 1, 0], twist[:, 1, d - 1] = vx, vz
     if d == 2:

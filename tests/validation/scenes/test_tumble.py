@@ -2,22 +2,16 @@
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes.tumble import moments
 
 DT = 1 / 240
 CELLS = [{}, {"delta": 0.01, "spin": 6.0}, {"delta": 1.0, "spin": 1.0}, {"delta": 1e-4, "spin": 2.0}]
-
-
-def made(**params):
-    canonical = CATALOGUE["tumble"]
-    return canonical, canonical.scene(3, params)
 
 
 def quaternion_rate(q, w):
@@ -53,7 +47,7 @@ def integrated(scene, dt=DT, own=None, braking=0.0):
 
 @pytest.mark.parametrize("params", CELLS)
 def test_the_period_is_jacobi_s_and_the_integrated_one(params):
-    canonical, scene = made(**params)
+    canonical, scene = made("tumble", 3, **params)
     p, (i1, i2, i3) = scene.params, moments(1.0)
     twice_energy, square = p["spin"] ** 2 * np.array([i2 + i3 * p["delta"] ** 2, i2**2 + i3**2 * p["delta"] ** 2])
     # Landau and Lifshitz, (37.10): with M^2 > 2 E I2, from w2 = sn at its largest.
@@ -83,14 +77,14 @@ def explicit(scene, dt, world=False):
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 120, DT, 1 / 960])
 @pytest.mark.parametrize("params", CELLS[:3])
 def test_steps_of_first_order_pass(params, dt, new_spin):
-    canonical, scene = made(**params)
+    canonical, scene = made("tumble", 3, **params)
     assert failing(canonical, scene, explicit(scene, dt, new_spin)) == set()
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 def test_wrong_inertia_and_a_spin_that_is_braked_fail(size):
     """As small as a step of first order is fine: at 1/240 s its own drift is 1.5 per cent, at 1/3840 s 1e-3."""
-    canonical, scene = made()
+    canonical, scene = made("tumble", 3)
     dt = DT if size > 0.05 else 1 / 3840
     braked = failing(canonical, scene, integrated(scene, dt, braking=size))
     assert size < 0.005 or {"energy_drift", "momentum_drift"} <= braked
@@ -99,7 +93,7 @@ def test_wrong_inertia_and_a_spin_that_is_braked_fail(size):
 
 
 def test_a_box_that_does_not_turn_over_has_no_time():
-    canonical, scene = made()
+    canonical, scene = made("tumble", 3)
     times = np.arange(10) * DT
     steady = recorded(times, np.tile([1.0, 0.0, 0.0, 0.0], (10, 1)), np.tile([0.0, 3.0, 0.0], (10, 1)), DT)
     assert canonical.measure(scene, steady)["flip_time"] == (None, "it never arrives there")

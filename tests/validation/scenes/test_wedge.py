@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -14,11 +14,6 @@ from validation.scenes.wedge import FACE, motion
 
 DT = 1 / 240
 SIZES = (0.1, 0.01, 0.001)
-
-
-def made(**params):
-    canonical = CATALOGUE["wedge"]
-    return canonical, canonical.scene(2, params)
 
 
 def accelerations(p):
@@ -41,8 +36,7 @@ def slid(scene, dt=DT, order=0.0, wedge=1.0, block=1.0):
     a = math.radians(p["slope"])
     push, pull, _ = accelerations(p)
     t = np.arange(round(scene.duration / dt) + 1) * dt
-    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
-    twist = np.zeros_like(pose)
+    pose, twist = still(scene, len(t))
     for k, rate in (
         (1, np.array([wedge * push, 0.0])),
         (2, np.array([wedge * push + block * pull * math.cos(a), -block * pull * math.sin(a)])),
@@ -55,7 +49,7 @@ def slid(scene, dt=DT, order=0.0, wedge=1.0, block=1.0):
 @pytest.mark.parametrize("params", [{}, {"mu": 0.0}, {"ratio": 0.5}, {"slope": 50.0, "mu": 0.1}, {"ratio": 100.0}])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5])
 def test_lagrange_s_equations_pass_in_every_step_order(params, order):
-    canonical, scene = made(**params)
+    canonical, scene = made("wedge", **params)
     trajectory = slid(scene, order=order)
     assert failing(canonical, scene, trajectory) == set()
     push, pull, load = accelerations(scene.params)
@@ -83,7 +77,7 @@ def test_it_stays_from_the_angle_of_friction_on():
 
 @pytest.mark.parametrize("size", SIZES)
 def test_a_wedge_or_a_block_that_goes_otherwise_fails(size):
-    canonical, scene = made()
+    canonical, scene = made("wedge")
     assert {"given_way", "momentum"} <= failing(canonical, scene, slid(scene, wedge=1.0 - size))
     assert {"acceleration", "momentum"} <= failing(canonical, scene, slid(scene, block=1.0 + size))
     for axis, k in ((1, 1), (1, 2), (0, 2)):
@@ -103,13 +97,13 @@ def test_a_wedge_or_a_block_that_goes_otherwise_fails(size):
 
 
 def test_a_wedge_that_is_held_fails():
-    canonical, scene = made()
+    canonical, scene = made("wedge")
     assert {"given_way", "momentum"} <= failing(canonical, scene, slid(scene, wedge=0.0))
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_what_should_stay_and_moves_or_turns_fails(size):
-    canonical, scene = made(mu=0.7)
+    canonical, scene = made("wedge", mu=0.7)
     still = slid(scene, wedge=0.0, block=0.0)
     assert failing(canonical, scene, still) == set()
     for k in (1, 2):
@@ -120,7 +114,7 @@ def test_what_should_stay_and_moves_or_turns_fails(size):
 
 
 def test_the_block_lies_on_the_face_and_the_wedge_is_a_right_triangle():
-    _, scene = made(slope=40.0)
+    _, scene = made("wedge", slope=40.0)
     _, wedge, block = scene.bodies
     a = math.radians(40.0)
     assert wedge.inertia == pytest.approx(moments(wedge.shape, wedge.mass, 2))
@@ -134,4 +128,4 @@ def test_the_block_lies_on_the_face_and_the_wedge_is_a_right_triangle():
 @pytest.mark.parametrize("params", [{"slope": 60.0, "ratio": 0.01}, {"slope": 60.0, "mu": 1.5}])
 def test_what_tips_is_refused_by_name(params):
     with pytest.raises(ValueError, match=r"wedge\.ratio"):
-        made(**params)
+        made("wedge", **params)

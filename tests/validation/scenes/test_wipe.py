@@ -4,21 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import failing
+from planted import failing, made, still
 
 from adapters.engine import Contacts
 from adapters.trajectory import ContactRecord, Trajectory
-from validation.catalogue import CATALOGUE
 from validation.scenes import wipe
 
 DT = 1 / 240
 TABLE, STOP, HAND = range(3)
 ALL = {f"{force}[{by}]" for force in wipe.FORCES for by in ("mean", "least", "greatest")}
-
-
-def made(dimension=2, **params):
-    canonical = CATALOGUE["wipe"]
-    return canonical, canonical.scene(dimension, params)
 
 
 def held(scene, dt=DT, late=0):
@@ -47,8 +41,7 @@ def held(scene, dt=DT, late=0):
         rows += [(TABLE, HAND, (0.0,) * d, (0.0,) * d, (0.5 * drag, *across, 0.5 * normal), 0.0)] * 2
         rows.append((STOP, HAND, (0.0,) * d, (0.0,) * d, (-push, *across, 0.0), 0.0))
     n = len(pose)
-    poses = np.array([[body.pose for body in scene.bodies]] * n)
-    twists = np.zeros((n, 3, 3 if d == 2 else 6))
+    poses, twists = still(scene, n)
     poses[:, HAND, [0, d - 1]] += np.array(pose)
     twists[:, HAND, [0, d - 1]] = np.array(twist)
     record = ContactRecord(np.arange(1, n), 3 * np.arange(n), Contacts.from_rows(rows, d))
@@ -66,7 +59,7 @@ def changed(trajectory, table=1.0, stop=1.0, axes=None):
 
 def test_the_hand_lies_on_the_table_and_against_the_stop():
     for dimension in (2, 3):
-        _, scene = made(dimension, v=0.5, mu=0.25, mass=2.0)
+        _, scene = made("wipe", dimension, v=0.5, mu=0.25, mass=2.0)
         table, stop, hand = scene.bodies
         assert table.surface_velocity == (0.5, *(0.0,) * (dimension - 1)) and table.motion == "fixed"
         assert stop.shape.normal == (-1.0, *(0.0,) * (dimension - 1)) and stop.shape.offset == 0.0
@@ -79,7 +72,7 @@ def test_the_hand_lies_on_the_table_and_against_the_stop():
 @pytest.mark.parametrize("params", [{}, {"v": 1.0}, {"mu": 0.1, "mass": 3.0}, {"mu": 1.0, "g": 3.7}])
 @pytest.mark.parametrize("late", [0, 1])
 def test_coulomb_s_law_stepped_passes_whether_contacts_are_found_at_once_or_a_step_late(dimension, dt, params, late):
-    canonical, scene = made(dimension, **params)
+    canonical, scene = made("wipe", dimension, **params)
     trajectory = held(scene, dt, late)
     measured, truth = canonical.measure(scene, trajectory), canonical.exact(scene)
     assert failing(canonical, scene, trajectory) == set()
@@ -87,7 +80,7 @@ def test_coulomb_s_law_stepped_passes_whether_contacts_are_found_at_once_or_a_st
 
 
 def test_bounds_are_two_hundredths_of_the_weight_at_any_step_and_a_step_of_fall_and_drag():
-    canonical, scene = made(mu=0.25, g=8.0)
+    canonical, scene = made("wipe", mu=0.25, g=8.0)
     allowed = {check.metric: (check.unit, check.truth, check.bound) for check in canonical.checks(scene, 1 / 64)}
     expected = {"moved": ("m", 0.0, pytest.approx(1.5 * 8.0 / 64**2, rel=1e-9))}
     for force, share in (("normal", 1.0), ("friction", 1.0), ("stop", 5.0)):
@@ -97,7 +90,7 @@ def test_bounds_are_two_hundredths_of_the_weight_at_any_step_and_a_step_of_fall_
 
 
 def test_forces_that_come_and_go_fail_although_every_mean_is_right():
-    canonical, scene = made()
+    canonical, scene = made("wipe")
     good = held(scene)
     by_turns = 1.0 + np.repeat((-1.0) ** np.arange(len(good.contacts.step)), 3)
     wrong = failing(canonical, scene, changed(good, by_turns, by_turns))
@@ -115,7 +108,7 @@ def test_forces_that_come_and_go_fail_although_every_mean_is_right():
 
 
 def test_a_contact_that_is_left_out_a_sign_and_a_friction_that_is_off_fail():
-    canonical, scene = made(3)
+    canonical, scene = made("wipe", 3)
     good = held(scene)
     of = {force: {f"{force}[{by}]" for by in ("mean", "least", "greatest")} for force in wipe.FORCES}
     one_of_two = np.tile([1.0, 0.0, 1.0], len(good.contacts.step))
@@ -127,7 +120,7 @@ def test_a_contact_that_is_left_out_a_sign_and_a_friction_that_is_off_fail():
 
 
 def test_a_hand_that_gives_way_fails():
-    canonical, scene = made()
+    canonical, scene = made("wipe")
     good = held(scene)
     for axis in (0, 1):
         moved = good.pose.copy()
@@ -136,7 +129,7 @@ def test_a_hand_that_gives_way_fails():
 
 
 def test_what_an_engine_does_not_tell_cannot_be_said():
-    canonical, scene = made()
+    canonical, scene = made("wipe")
     measured = canonical.measure(scene, changed(held(scene), np.nan, np.nan))
     assert {measured[name] for name in ALL} == {(None, "the engine does not tell the impulses of these contacts")}
     measured = canonical.measure(scene, replace(held(scene), contacts=None))

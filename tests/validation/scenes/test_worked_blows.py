@@ -4,22 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import made, stated
 
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 64
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
-def stated(canonical, scene, dt=DT):
-    found = canonical.checks(scene, dt)
-    assert all(check.because and check.source for check in found)
-    return {check.metric: (check.unit, check.bound) for check in found}
 
 
 def near(value):
@@ -59,7 +48,7 @@ def test_two_balls_start_inside_each_other_and_move_side_by_side(dimension):
 def test_an_overlap_is_forgiven_the_round_off_of_what_takes_it_out_in_a_step():
     """1/4 m in 1/64 s are 16 m/s, beside 2 m/s; places reach 1/2 m and the 1 m of the way."""
     canonical, scene = made("overlap", **INSIDE)
-    assert stated(canonical, scene) == {
+    assert stated(canonical.checks(scene, DT)) == {
         "thrown": ("m/s", near(18e-12)),
         "centre_moved": ("m", near(1.5e-12)),
         "grown": ("m", near(1.5e-12)),
@@ -148,7 +137,7 @@ def test_wall_plate_and_ball_stand_in_a_row(dimension):
 
 def test_what_a_closing_plate_forgives_grows_by_four_steps_a_blow():
     canonical, scene = made("closing_wall", **CLOSING)
-    assert stated(canonical, scene) == {
+    assert stated(canonical.checks(scene, DT)) == {
         "speed[1]": ("m/s", near(7e-12)),
         "time[1]": ("s", near(1 / 64 + 2e-12)),
         "speed[2]": ("m/s", near(7e-12)),

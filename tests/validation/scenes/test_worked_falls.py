@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from planted import made, stated, still
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -15,16 +16,6 @@ from validation.scenes.tilt_table import TOLD
 from validation.truths.pivoting import Pivot, fall_checks
 
 DT = 1 / 64
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
-def stated(found):
-    assert all(check.because and check.source for check in found)
-    return {check.metric: (check.unit, check.bound) for check in found}
 
 
 def near(value):
@@ -188,8 +179,7 @@ def test_what_is_measured_on_a_tilted_table():
     """A block of 1.2 by 2 m: it goes 0.3 m and back, turns by 1/100, and its edge goes with it."""
     canonical, scene = made("tilt_table", 3, aspect=0.6, height=2.0, mu=2.0)
     t = np.arange(9) * DT
-    pose = np.array([[body.pose for body in scene.bodies]] * 9)
-    twist = np.zeros((9, 2, 6))
+    pose, twist = still(scene, 9)
     pose[1, 1, :3] += (0.02, 0.0, 0.0)
     pose[3, 1, :3] += (0.1, 0.2, 0.2)
     pose[-1, 1, 3:] = (math.cos(0.005), 0.0, math.sin(0.005), 0.0)

@@ -4,23 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from planted import made, stated, still
 from scipy.integrate import quad, solve_ivp
 
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory
-from validation.catalogue import CATALOGUE
 
 DT = 1 / 64
-
-
-def made(name, dimension=2, **params):
-    canonical = CATALOGUE[name]
-    return canonical, canonical.scene(dimension, params)
-
-
-def stated(found):
-    assert all(check.because and check.source for check in found)
-    return {check.metric: (check.unit, check.bound) for check in found}
 
 
 BOARD = {"tilt": 20.0, "radius": 0.6, "thickness": 0.4, "length": 1.8, "mu": 2.0, "g": 8.0, "mass": 3.0}
@@ -169,8 +159,7 @@ def test_what_is_measured_of_a_rocking_board():
     own = 0.95 * swing  # it swings faster than it should
     phi = 0.4 * THETA * np.cos(np.pi * t / own)
     spin = -0.4 * THETA * np.pi / own * np.sin(np.pi * t / own)
-    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
-    twist = np.zeros((len(t), 2, 6))
+    pose, twist = still(scene, len(t))
     slipped = 0.1 + 0.02 * (np.arange(len(t)) == 7) - 0.01 * (np.arange(len(t)) == 1)
     rolled = R * phi + slipped
     pose[:, 1, 0] = -(R + H) * np.sin(phi) + rolled * np.cos(phi)
@@ -196,8 +185,7 @@ def swinging(scene, period, share):
     """A board that swings in ``period`` [s] from side to side, by ``share`` (of times) of its first tilt."""
     t = np.arange(round(scene.duration / DT) + 1) * DT
     phi = share(t) * THETA * np.cos(np.pi * t / period)
-    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
-    twist = np.zeros((len(t), 2, 3))
+    pose, twist = still(scene, len(t))
     pose[:, 1, 2], twist[:, 1, 2] = phi, -share(t) * THETA * np.pi / period * np.sin(np.pi * t / period)
     return Trajectory(t, pose, twist, None, DT, "completed")
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import stated, still
 
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
@@ -18,12 +19,6 @@ PARAMS = {"v": 4.0, "mu": 0.5, "g": 8.0, "aspect": 2.0}
 def made(name, dimension=2, **params):
     canonical = CATALOGUE[name]
     return canonical, canonical.scene(dimension, PARAMS | params)
-
-
-def stated(canonical, scene, dt=DT):
-    found = canonical.checks(scene, dt)
-    assert all(check.because and check.source for check in found)
-    return {check.metric: (check.unit, check.bound) for check in found}
 
 
 def near(value):
@@ -63,7 +58,7 @@ def test_what_a_slide_forgives_is_a_step_of_everything():
     """At 1/64 s and 8 m/s^2: v dt = 1/16 m, g dt^2 = 1/512 m, g dt/100 = 1/800 m/s; places to 1e-12 of 2 m."""
     canonical, scene = made("slide", 3)
     fall, still = 1 / 512, 1 / 800
-    assert stated(canonical, scene) == {
+    assert stated(canonical.checks(scene, DT)) == {
         "stopping_distance": ("m", near(1.5 / 16 + 1.5 * fall + 2e-12)),
         "braking": ("m/s^2", near(still / (31 / 64))),
         "end_speed": ("m/s", near(still)),
@@ -80,27 +75,26 @@ def test_what_a_slide_forgives_is_a_step_of_everything():
 
 def test_a_slide_of_two_steps_is_told_over_one():
     canonical, scene = made("slide", v=0.125)
-    found = stated(canonical, scene)
+    found = stated(canonical.checks(scene, DT))
     assert found["braking"] == ("m/s^2", near(64 / 800))
     assert found["hop"] == ("m", near(1 / 512 + 1e-12 / 512))  # the way is 1/512 m
 
 
 def test_places_on_plates_are_told_to_the_round_off_of_the_farthest():
     canonical, scene = made("seam", 3, plate=1.0)
-    found = stated(canonical, scene)
+    found = stated(canonical.checks(scene, DT))
     for metric in ("hop", "turned", "astray"):
         assert found[metric] == ("m", near(1 / 512 + 4e-12))
     assert found["stopping_distance"] == ("m", near(1.5 / 16 + 1.5 / 512 + 4e-12))
     # Plates that end before the way does add nothing.
     canonical, short = made("far_origin", far=0.0)
-    assert stated(canonical, short)["hop"] == ("m", near(1 / 512 + 2e-12))
+    assert stated(canonical.checks(short, DT))["hop"] == ("m", near(1 / 512 + 2e-12))
 
 
 def moved(scene, dt=DT):
     """A box that does all that can be measured: brakes as (2 - t)^2/4 does, ends 1.2 m on, hops, turns and goes on."""
     box, t = len(scene.bodies) - 1, np.arange(round(scene.duration / dt) + 1) * dt
-    pose = np.array([[body.pose for body in scene.bodies]] * len(t))
-    twist = np.zeros((len(t), len(scene.bodies), 6))
+    pose, twist = still(scene, len(t))
     twist[:, box, 0] = (2.0 - t) ** 2 / 4.0
     twist[-1, box, :3] = (0.3, 0.4, 1.2)
     pose[-1, box, :2] += (1.2, 0.5)
