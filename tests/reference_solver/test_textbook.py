@@ -50,8 +50,8 @@ def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(space, shape,
     # Each of some hundred events rounds position and time once: 1e2 units in the last place of a metre.
     assert np.abs(record.pose[:, 1, up] - 0.5 - exact[:, 0]).max() < 3e-14
     moving = np.abs(exact[:, 1]) > 1e-6  # at an impact, round-off decides on which side of it a sample lies
-    # Round-off of a height moves an impact at v by 1e-16 m / v. At steps of 1 ms bounces of 5 mm/s are still seen: 2e-14
-    # s each, for some ten of them. Gravity multiplies the sum.
+    # Round-off of a height moves an impact at v by 1e-16 m / v: at most 2e-14 s for bounces of 5 mm/s, which steps of
+    # 1 ms still see, some ten of them. Gravity multiplies the sum.
     assert record.twist[moving, 1, up] == pytest.approx(exact[moving, 1], abs=1e-11)
     assert np.abs(record.twist[-1, 1]).max() <= 1e-14
     place = record.pose[-1, 1, : space.dimension]
