@@ -1,14 +1,15 @@
 """The one decorator of all kernels, and the folder that keeps their machine code.
 
 numba's own cache key covers only the file a kernel stands in: after an edit elsewhere a caller would run stale
-code. The folder is therefore named after a hash of *all* solver sources and the numba version. If no folder is
-writable, kernels compile anew in every process: slower, never wrong, and an import never fails for it.
+code. The folder is therefore named after a hash of *all* solver sources and the versions of numba and Python. If no
+folder is writable, kernels compile anew in every process: slower, never wrong, and an import never fails for it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -33,9 +34,9 @@ WITH_KERNELS = ("verification", "event_driven")
 
 
 def source_hash() -> str:
-    """Return 16 hex digits over all sources that kernels can stand in, numba's version, and whether it is known."""
+    """Return 16 hex digits over all sources that kernels can stand in and versions of Python and numba."""
     root = Path(__file__).parent
-    digest = hashlib.sha256(f"{numba.__version__} {KNOWN}".encode())
+    digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__} {KNOWN}".encode())
     for path in sorted(root.rglob("*.py")):
         parts = path.relative_to(root).parts
         if parts[0] in WITHOUT_KERNELS and parts[:2] != WITH_KERNELS:

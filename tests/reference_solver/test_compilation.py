@@ -48,6 +48,13 @@ def test_the_hash_covers_every_source_in_which_kernels_can_stand(tmp_path, monke
     assert (compilation.source_hash() != before) == covered
 
 
+def test_another_python_has_a_folder_of_its_own(monkeypatch):
+    """A mark in the folder says that kernels are compiled: it is true of one Python only."""
+    before = compilation.source_hash()
+    monkeypatch.setattr(sys.implementation, "cache_tag", "cpython-399")
+    assert compilation.source_hash() != before
+
+
 def test_what_the_hash_leaves_out_compiles_nothing():
     """An edit there would leave machine code of what stood there before."""
     folder = Path(compilation.__file__).parent
