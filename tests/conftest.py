@@ -64,6 +64,12 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item in items if item not in out]
 
 
+@pytest.fixture
+def bullet():
+    """A test that needs Bullet is skipped where it is not installed."""
+    pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _what_is_there_stays():
     """Searches for garbage go through what a file makes, not through a gigabyte of kernels and tests, a second each."""

@@ -97,6 +97,7 @@ def test_running_box_drags_along_its_top_and_does_not_push_with_its_end(engine, 
     assert abs(met.twist[-1, 1, 0]) < 0.05
 
 
+@pytest.mark.usefixtures("bullet")
 def test_an_engine_whose_conveyor_is_a_moving_half_space_refuses_a_running_box():
     belt = Body("belt", Box((2.0, 0.5)), pose=(0.0, -0.5, 0.0), motion="fixed", surface_velocity=(1.0, 0.0))
     with pytest.raises(

@@ -19,6 +19,8 @@ WITH_RELEASES = ["chipmunk", "bullet", "mujoco"]
 
 @pytest.mark.parametrize("name", WITH_RELEASES)
 def test_the_installed_release_is_one_that_the_adapter_knows(name):
+    if name == "bullet":
+        pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
     releases = registry.adapter(name).releases
     assert SpecifierSet(releases.known).contains(registry.load(name).version())
     for requirement in releases.requirements:

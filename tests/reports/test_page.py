@@ -170,6 +170,7 @@ def test_the_same_run_gives_the_same_page(page_source, text):
     assert render(page_source) == text
 
 
+@pytest.mark.usefixtures("bullet")
 def test_every_judged_value_stands_in_a_table(page_source, text):
     grids = re.findall(r"<table[^>]* class=grid.*?</table>", text, re.DOTALL)
     values = [cell for grid in grids for row in grid.split("<tr")[2:] for cell in row.split("<td")[3:]]
@@ -252,6 +253,7 @@ def test_a_sentence_names_few_scenes_and_counts_many():
     assert scenes_text([*few, "more"], 40) == f"{NAMED + 1} of 40 scenes"
 
 
+@pytest.mark.usefixtures("bullet")
 def test_of_many_things_that_are_wrong_the_worst_of_each_engine_and_family_come_first(page_source, monkeypatch):
     wrong = answers(page_source.rows)
     assert first_answers(page_source, wrong) == wrong
@@ -321,6 +323,7 @@ def test_findings_hold_every_failing_value_once(page_source):
     assert sum(f.count for _, _, families in findings(page_source) for f in families) == len(failing)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_finding_says_the_number_of_a_row_of_its_own_that_is_farthest_out(page_source):
     """The text's numbers, read back: value, truth and tolerance of one row, and none of the family is worse."""
     looked = 0
@@ -359,6 +362,7 @@ def test_every_scene_stands_in_one_family_and_unknown_ones_in_the_last(page_sour
     assert sorted(lines) == sorted((scene, f"{dimension}-D") for scene, dimension in page_source.lines)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_familys_marks_count_the_rows_of_its_scenes(page_source):
     (rebound, *_) = families(page_source)
     column = page_source.columns.index(("bullet", "default"))
@@ -428,6 +432,7 @@ def test_times_of_a_busy_machine_rank_nobody(page_source, monkeypatch):
     assert not any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     cure = next(c for c in cures(page_source) if (c.engine, c.scene, c.dimension) == ("bullet", "impact", 2))
     assert cure.before.mark != "pass" and cure.after.mark == "pass"
@@ -435,6 +440,7 @@ def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
     assert all(change.because and change.before != change.after for change in cure.changes)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_explorer_holds_measured_heights_and_names_who_rebounds_wrongly(page_source):
     found = explorer(page_source)
     tuned = next(s for s in found.data["series"] if s["name"] == "chipmunk/tuned")
@@ -489,6 +495,7 @@ def _recordings(source, scene, dimension):
     return [(slot, r) for slot, r in source.replays if (slot.scene, slot.dimension) == (scene, dimension)]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_first_departure_is_told_for_engines_that_leave_and_for_no_other(page_source):
     found = next(r for r in replays(page_source) if r.id == "replay-bounce-2")
     gone = {f"{engine}/{profile}": departure for engine, profile, departure, *_ in found.departures}

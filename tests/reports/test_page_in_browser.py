@@ -110,6 +110,7 @@ def test_what_a_link_leads_to_opens_without_javascript(browser, page_file):
             assert page.locator(anchor).is_visible()
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_reason_of_a_worst_value_stands_in_the_findings_with_what_cures_it(browser, page_file):
     with opened(browser, page_file, "#bounce-2") as page:
         page.locator("#bounce-2 details.check").first.evaluate("node => node.open = true")
@@ -122,6 +123,7 @@ def picture(page):
     return page.locator("#replay-canvas").evaluate("node => node.toDataURL()")
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_replay_plays_steps_jumps_and_magnifies_by_mouse_and_keyboard(browser, page_file):
     with opened(browser, page_file, "#replay") as page:
         page.locator("#player").wait_for(state="visible")
@@ -159,6 +161,7 @@ def test_the_replay_plays_steps_jumps_and_magnifies_by_mouse_and_keyboard(browse
         assert share == pytest.approx(0.75, abs=0.05)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_both_layouts_show_every_engine(browser, page_file):
     with opened(browser, page_file, "#replay") as page:
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
@@ -206,6 +209,7 @@ def test_gravity_points_down_so_that_an_incline_is_inclined(browser, page_file, 
         assert (right - left > 0.1) if falls else (abs(right - left) < 0.01)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_no_name_of_a_lane_is_cut_off_by_the_next_lane(browser, page_file):
     """On a phone lanes stand in several rows: the name of each must fit beside its square."""
     with opened(browser, page_file, "#replay", width=320) as page:
@@ -223,6 +227,7 @@ def test_no_name_of_a_lane_is_cut_off_by_the_next_lane(browser, page_file):
     assert [entry for entry in found if entry[1] > entry[2]] == []
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_spatial_replay_offers_three_views(browser, page_file):
     with opened(browser, page_file, "#replay") as page:
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
@@ -254,6 +259,7 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
         assert page.locator("#explorer-plot").inner_html() != linear
 
 
+@pytest.mark.usefixtures("bullet")
 def test_who_is_switched_off_leaves_tables_charts_and_replay_and_the_address_keeps_it(browser, page_file):
     who, other = "bullet/default", "bullet/tuned"
     charts, rows = f".canvas [data-who='{who}']", f"#impact-2 tr[data-who='{who}']"
@@ -304,6 +310,7 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
     assert content.startswith(heads[kind])
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, page_file):
     with opened(browser, page_file, "#impact-2") as page:
         figure = page.locator("#scene-impact figure.plot").first

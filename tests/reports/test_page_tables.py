@@ -130,6 +130,7 @@ def test_of_the_receipts_of_a_quantity_the_one_farthest_from_what_is_declared_is
     assert (unmeasured.measured, unmeasured.holds, unmeasured.differs) == ("not measured", "1/1", False)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
     findings = fairness.findings_of("bullet")
     listed = {entry.id: entry.count for entry in fairness._listed(page_source, "bullet")}
@@ -140,6 +141,7 @@ def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
     assert len(rows) < sum(len(rows) - listed[name] for name in findings.families), "most reasons are of other rows"
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monkeypatch):
     """Where it was measured what decides, a setting that only completes another says so."""
     kept = page_source.observations

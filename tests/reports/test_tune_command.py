@@ -39,6 +39,7 @@ def lines(text):
     return [line.strip() for line in text.splitlines()]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_all_groups_are_searched_from_the_tuned_profile_in_all_dimensions_of_the_engine(tune):
     done, asked = tune("chipmunk")
     assert done.exit_code == 0 and asked == [("chipmunk", "tuned", name, 1, (2,)) for name in groups()]

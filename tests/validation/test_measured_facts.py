@@ -19,7 +19,14 @@ from validation.running.execution import execute
 from validation.settings.switching import observe, switched
 
 
+def needs(engine):
+    """Skip a test of Bullet where it is not installed."""
+    if engine == "bullet":
+        pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
+
+
 def measure(scene, engine, profile, dt, dimension=2, iterations=None, **params):
+    needs(engine)
     slot = Slot(scene, tuple(sorted(params.items())), dimension, engine, profile, dt, iterations)
     observation = execute(slot)
     assert observation.outcome is Outcome.OK, observation.reason
@@ -69,17 +76,15 @@ def test_mujoco_tuned_reflects_the_velocity_to_2e_minus_5(e):
     assert abs(measure("impact", "mujoco", "tuned", 1 / 240, e=e, v=1.0)["rebound_ratio"] - e) <= 2e-5
 
 
-def test_the_worked_example_holds_on_every_engine_that_can_bounce():
-    for engine, profile in (
-        ("chipmunk", "tuned"),
-        ("bullet", "tuned"),
-        ("mujoco", "tuned"),
-        ("reference", "classical"),
-    ):
-        found = measure("impact", engine, profile, 1 / 240, e=0.8, v=6.0, mass=0.5)
-        assert found["rebound_speed"] == pytest.approx(4.8, abs=1e-9)
-        assert found["impulse"] == pytest.approx(5.4, abs=1e-9)
-        assert found["velocity_change"] == pytest.approx(10.8, abs=1e-9)
+@pytest.mark.parametrize(
+    ("engine", "profile"),
+    [("chipmunk", "tuned"), ("bullet", "tuned"), ("mujoco", "tuned"), ("reference", "classical")],
+)
+def test_the_worked_example_holds_on_every_engine_that_can_bounce(engine, profile):
+    found = measure("impact", engine, profile, 1 / 240, e=0.8, v=6.0, mass=0.5)
+    assert found["rebound_speed"] == pytest.approx(4.8, abs=1e-9)
+    assert found["impulse"] == pytest.approx(5.4, abs=1e-9)
+    assert found["velocity_change"] == pytest.approx(10.8, abs=1e-9)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -110,6 +115,7 @@ class TestReference:
 
 def ran(slot, changed=lambda posed: posed):
     """Trajectory of a spatial cell, whose scene may be changed before it is posed."""
+    needs(slot.engine)
     canonical = resolve(slot.scene)
     posed, loaded = changed(canonical.scene(slot.dimension, dict(slot.params))), load(slot.engine)
     settings = {setting.name: setting.value for setting in settings_of(loaded, slot, posed)}
