@@ -9,10 +9,9 @@ from __future__ import annotations
 import ast
 import random
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -179,13 +178,6 @@ def mutants(seed: int, only: str) -> Iterator[Change]:
     while True:
         if found := mutants_of(source.choices(names, lines)[0]):
             yield source.choice(found)()
-
-
-def listed(rows: Iterable[tuple[str, str]]) -> Iterator[Change]:
-    """Yield the mutants of ``(module, old -> new)`` rows whose text still stands."""
-    for module, told in rows:
-        found = mutants_of(module) if (ROOT / module).exists() else []
-        yield from islice((change for each in found if (change := each()).told == told), 1)
 
 
 def faults(seed: int, only: str) -> Iterator[Change]:

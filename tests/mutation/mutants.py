@@ -30,7 +30,7 @@ from pathlib import Path
 
 import psutil
 from coverage import CoverageData
-from faults import ROOT, Change, faults, listed, mutants
+from faults import ROOT, Change, faults, mutants
 from scipy.stats import binomtest
 
 #: Seconds of CPU of the tests that one change meets, and of wall time.
@@ -138,16 +138,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--count", type=int, default=60, help="how many are drawn")
     parser.add_argument("--kernels", action="store_true", help="change the solver's kernels")
-    parser.add_argument("--again", type=Path, help="list of mutants that are planted instead of drawn ones")
     parser.add_argument("--only", default="", help="beginning of the paths of modules that are changed")
     options = parser.parse_args()
     with EQUIVALENT.open(newline="", encoding="utf-8") as stream:
         known = {(row["module"], row["change"]) for row in csv.DictReader(stream)}
     drawn = (faults if options.kernels else mutants)(options.seed, options.only)
-    if options.again:
-        with options.again.open(newline="", encoding="utf-8") as stream:
-            drawn = listed([(row["module"], row["change"]) for row in csv.DictReader(stream)])
-            options.count = None
     drawn = (each for each in drawn if (each.module, each.told) not in known)
     reach, found = Reach(options.record), list[str]()
     with copied() as tree:
