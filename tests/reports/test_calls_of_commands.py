@@ -171,7 +171,7 @@ def test_kernels_are_compiled_for_the_cells_that_are_named(monkeypatch):
 
 
 def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_path):
-    table = pd.DataFrame([{"scene": "impact", "e": 0.5, "off": 0.1234567890123456}, {"scene": "impact", "e": 0.7}])
+    table = pd.DataFrame([{"e": 0.5, "off": 0.1234567890123456, "outcome": "ok"}, {"e": 0.7, "outcome": "unsupported"}])
     monkeypatch.setattr(sweeping, "table", lambda rows: table)
     monkeypatch.setattr(sweeping, "counted", lambda found: f"{len(found)} lines")
     ran.rows = [row()]
@@ -180,12 +180,13 @@ def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_p
             "--out", str(out))  # fmt: skip
     status, told, err = said(*call, "--jobs", "2", "--timeout", "9")
     assert (status, told) == (0, "") and err == [
-        "2 lines", f"table: {out / 'sweep.csv'}", f"what fails and why: crosscheck findings --out {out}"
+        "2 lines", "unsupported: 1 case, which the engine cannot run", f"table: {out / 'sweep.csv'}",
+        f"what fails and why: crosscheck findings --out {out}",
     ]  # fmt: skip
     assert ran.calls == [("sweep: impact", 3, 2, 9.0, None, False, "")]
     assert pd.read_csv(out / "sweep.csv").equals(table)
     status, told, _ = said(*call, "--json", "--fresh", "--csv", str(tmp_path / "t.csv"))
-    plain = [{"scene": "impact", "e": 0.5, "off": 0.123456789012346}, {"scene": "impact", "e": 0.7, "off": None}]
+    plain = [{"e": 0.5, "off": 0.123456789012346, "outcome": "ok"}, {"e": 0.7, "off": None, "outcome": "unsupported"}]
     assert (status, json.loads(told)) == (0, plain) and ran.calls[-1][5] and told.count("\n") > 4
     assert pd.read_csv(tmp_path / "t.csv").equals(table)
     assert (

@@ -156,11 +156,15 @@ def _contacts(run: Run) -> _Contacts:
             push[:, side, j] = _pushed(run, row[:, side], pieces.point, sign * along[:, j])
     known = np.isfinite(push).all(axis=(1, 2, 3))
     held &= known
-    rested, rests = (_at_rest(run, twist) for twist in (pieces.twist_before, pieces.twist_after))
     began = asked & ~impact & known & (np.linalg.norm(before, axis=1) <= SLIP_NOISE * speed)
-    began &= ((row < 0) | rested[row]).all(axis=1)
+    began &= ((row < 0) | _at_rest(run, pieces.twist_before)[row]).all(axis=1)
+    # What carries many times its own weight moves by the round-off of that load.
+    load = np.zeros(len(pieces.body))
+    for side in row.T:
+        np.add.at(load, side[side >= 0], np.linalg.norm(pieces.impulse[side >= 0], axis=1))
+    unseen = SLIP_NOISE * (run.pull * run.dt + load / run.mass[pieces.body])
     moved = np.zeros(len(pieces), bool)
-    np.logical_or.at(moved, owner, ((row >= 0) & ~rests[row]).any(axis=1))
+    np.logical_or.at(moved, owner, ((row >= 0) & (_fastest(run, pieces.twist_after) > unseen)[row]).any(axis=1))
     slips = held & ~still & (mu > 0.0)
     return _Contacts(held, slips, held & still & (mu > 0.0), began & moved[owner], mu, given, row, push)
 
