@@ -30,7 +30,7 @@ touch each other meet in one instant and round-off decides which of them comes f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from math import gcd, sqrt
 from typing import Any
@@ -113,18 +113,18 @@ class Certificate:
 
     holds: bool
     reasons: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    t: Array
-    error: Array
-    growth: Array
+    findings: tuple[Finding, ...] = field(repr=False)
+    t: Array = field(repr=False)
+    error: Array = field(repr=False)
+    growth: Array = field(repr=False)
     horizon: float
     determined: float
-    disturbed: Array
+    disturbed: Array = field(repr=False)
     dt: float
     gap: float
-    grazed: Array
-    light: dict[str, Any]
-    pose: Array
+    grazed: Array = field(repr=False)
+    light: dict[str, Any] = field(repr=False)
+    pose: Array = field(repr=False)
 
     def error_until(self, t: float) -> float:
         """Return the bound of the error up to the time ``t`` [m]; infinite beyond the horizon."""
@@ -160,7 +160,7 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs about twelve runs, or twenty, and the audit.
+    """Run ``model`` and certify the run; costs twelve to twenty runs and the audit.
 
     Raises
     ------

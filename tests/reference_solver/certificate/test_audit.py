@@ -248,6 +248,7 @@ class TestTruth:
         assert certificate.error[-1] < 2e-12  # solves leave 1e-13 of 5 m/s, which grows up to fourfold in a second
         assert certificate.error_until(0.5) <= certificate.error[-1]
         assert certificate.horizon == math.inf and certificate.growth[-1] < 10.0
+        assert "holds=True" in repr(certificate) and "\n" not in repr(certificate), "no arrays"
 
     def test_beyond_the_horizon_only_laws_are_certified(self):
         """A ball in the room between four discs that touch: each bounce spreads a disturbance about twofold."""
