@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from adapters.scene import Scene
 
-#: Round-off of a gap [m]: of heights of some metres, each rounded to 2e-15 m, added up over a thousand steps; and the
-#: multiples of it by which starts are moved: two of each sign, since jumps are one-sided.
+#: Round-off of a gap [m]: of heights of some metres, each rounded to 2e-15 m, added up over a thousand steps.
 GAP_ROUND_OFF = 1e-14
+#: Multiples of that by which starts are moved: up and down, since a motion may jump in one direction only.
 PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
 #: Factor on the differences of moved runs, as the engine's own error may be larger.
 SPREAD_FACTOR = 10.0

@@ -34,7 +34,7 @@ WITH_KERNELS = ("verification", "event_driven")
 
 
 def source_hash() -> str:
-    """Return 16 hex digits over all sources that kernels can stand in and versions of Python and numba."""
+    """Return 16 hex digits: a hash of all sources that can have kernels, and of the versions of Python and numba."""
     root = Path(__file__).parent
     digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__} {KNOWN}".encode())
     for path in sorted(root.rglob("*.py")):

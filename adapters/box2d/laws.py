@@ -87,7 +87,7 @@ DEVIATIONS += tuple(
         "rack",
         metric,
         kept_law(metric),
-        "single precision, 2^-24 relative, in each blow of each pair",
+        "the impulse of every impact is rounded to single precision, 2^-24 relative",
         "b2Settings.h, float32; band in adapters/single_motions.py",
         CHECKED_ON,
     )

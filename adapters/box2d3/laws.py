@@ -114,7 +114,7 @@ DEVIATIONS += deviations(
     PROFILES,
     {"rack": ("momentum_defect",)},
     lambda metric, profile: kept_law(metric),
-    "single precision, 2^-24 relative, in each blow of each pair",
+    "the impulse of every impact is rounded to single precision, 2^-24 relative",
     "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
     CHECKED_ON,
 )

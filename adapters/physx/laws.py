@@ -91,7 +91,7 @@ DEVIATIONS += tuple(
         scene,
         "momentum_defect",
         kept_law("momentum_defect"),
-        "single precision, 2^-24 relative, in each blow of each pair",
+        "the impulse of every impact is rounded to single precision, 2^-24 relative",
         "PxVec3, built of floats; band in adapters/single_motions.py",
         _RELEASES,
     )

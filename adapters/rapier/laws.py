@@ -59,7 +59,7 @@ DEVIATIONS += tuple(
         scene,
         "momentum_defect",
         kept_law("momentum_defect"),
-        "single precision, 2^-24 relative, in each blow of each pair",
+        "the impulse of every impact is rounded to single precision, 2^-24 relative",
         "rapier3d, built for f32; band in adapters/single_motions.py",
         ("0.36.",),
     )

@@ -113,8 +113,8 @@ class Wide(NamedTuple):
     """Room for manifolds in blocks of `LANES` (`planar.wide`). A block has one slot for each lane."""
 
     last: Indices  # (n,): level of a body's last manifold, plus 1
-    level: Indices  # (m,): group of each manifold, 2 level + points - 1
-    begin: Indices  # (2 m + 3,): first slot of each group
+    level: Indices  # (m,): group of each manifold: 2 level, plus 1 if it has two points
+    begin: Indices  # (2 m + 3,): number of the first slot of each group
     order: Indices  # (blocks, LANES): manifold of each slot, -1 where there is none
     body: Indices  # (blocks, 2, LANES): rows of `velocity` of A and B
     row: Indices  # (blocks, 2, LANES): rows of `Rows.real`

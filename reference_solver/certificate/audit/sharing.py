@@ -8,8 +8,8 @@ impact: impulses) that the laws admit then are a convex set. They keep closed co
 sticking contacts sticking; normal forces push; friction is ``mu p_n`` against a slip, and within its cone where a
 contact sticks. The extremes of the velocities over that set tell by how much two motions can differ.
 
-One other set of modes is considered: that bodies which rest go on resting. What is wedged can be held by contacts that
-press against each other, or start to move without any force of theirs.
+One other set of modes is considered: that bodies at rest stay at rest. Contacts that press against each other can hold
+a wedged body; without such forces it starts to move.
 """
 
 from __future__ import annotations
@@ -113,14 +113,14 @@ def distances(run: Run, t: Array) -> tuple[Array, str]:
 
 
 def _fastest(run: Run, twist: Array) -> Array:
-    """Speed (m,) of the fastest point of the body of each row at most [m/s]."""
+    """Upper bound (m,) of the speed of any point of the body of each row [m/s]."""
     reach = np.where(run.free, run.reach, 0.0)[run.pieces.body]
     speed: Array = np.linalg.norm(twist[:, : run.d], axis=1) + reach * np.linalg.norm(twist[:, run.d :], axis=1)
     return speed
 
 
 def _at_rest(run: Run, twist: Array) -> NDArray[np.bool_]:
-    """Whether (m,) the body of each row stands still with ``twist``."""
+    """Whether the body of each row is at rest (m,) if its velocity is ``twist`` (m, 3 | 6)."""
     return np.asarray(_fastest(run, twist) <= SLIP_NOISE * run.pull * run.dt)
 
 
@@ -158,7 +158,7 @@ def _contacts(run: Run) -> _Contacts:
     held &= known
     began = asked & ~impact & known & (np.linalg.norm(before, axis=1) <= SLIP_NOISE * speed)
     began &= ((row < 0) | _at_rest(run, pieces.twist_before)[row]).all(axis=1)
-    # What carries many times its own weight moves by the round-off of that load.
+    # A body that carries many times its own weight gets a speed from the round-off of that load.
     load = np.zeros(len(pieces.body))
     for side in row.T:
         np.add.at(load, side[side >= 0], np.linalg.norm(pieces.impulse[side >= 0], axis=1))
@@ -258,10 +258,10 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
 
 
 def _stand(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
-    """Enter any speed for bodies that leave rest in a piece, if the contacts of a cluster can as well hold them there.
+    """Enter an infinite speed for bodies that leave rest in a piece although the contacts of a cluster can hold them.
 
-    They can if multiples of forces at the edges of their cones, and one of the loads, add up to nothing. When they let
-    go is for nobody to say.
+    They can hold them if some sum of forces at the edges of their cones, with factors of at least 0, balances the
+    loads. The laws then do not say whether and when the bodies start to move.
     """
     d, pieces = run.d, run.pieces
     rows = np.unique(contacts.row[own])

@@ -69,9 +69,9 @@ def recalled(remembered, found):
     Parameters
     ----------
     remembered
-        Feature, x [m] and normal impulse [N s] of each point of the step before.
+        Contact points of the step before: (feature, x [m], normal impulse [N s]) each.
     found
-        Feature and x [m] of each point of this step.
+        Contact points of this step: (feature, x [m]) each.
     """
     manifolds, memory = allocate_manifolds(1), allocate_memory(1)
     manifolds.frame[0] = np.eye(3)
