@@ -138,7 +138,7 @@ def problems() -> list[str]:
 
 def forget() -> None:
     """Clear caches, so that installed packages are searched again."""
-    registry.find.cache_clear()
+    registry.forget()
     for each in (laws_of, unset_of, _laws, _experiments, _tuning, _module):
         each.cache_clear()
 

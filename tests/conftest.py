@@ -205,8 +205,8 @@ def plugins(tmp_path_factory, monkeypatch):
     entries = "evil = evil_engine:EvilEngine\nbroken = broken_engine:Nothing\n"
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{entries}")
     monkeypatch.syspath_prepend(str(folder))
-    registry.find.cache_clear()
+    registry.forget()
     yield folder
-    registry.find.cache_clear()
+    registry.forget()
     for name in ("evil_engine", "broken_engine"):
         sys.modules.pop(name, None)

@@ -42,7 +42,7 @@ def own(monkeypatch):
     """Engines that a test introduces are gone after it."""
     monkeypatch.setattr(registry, "_introduced", {})
     yield
-    registry.find.cache_clear()
+    registry.forget()
 
 
 @pytest.fixture

@@ -15,8 +15,9 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 
+from adapters import registry
 from adapters.plain import NAME, one_line
 from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
@@ -30,7 +31,7 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 @cache
 def _entries() -> dict[str, EntryPoint]:
     """Entry points of other packages by scene, without those that use the name of one of ours."""
-    return {entry.name: entry for entry in sorted(entry_points(group=GROUP)) if entry.name not in OURS}
+    return {entry.name: entry for entry in sorted(registry.installed(GROUP)) if entry.name not in OURS}
 
 
 @cache
@@ -64,6 +65,7 @@ def broken() -> list[str]:
 
 def forget() -> None:
     """Forget loaded scenes, so that installed packages are searched again."""
+    registry.forget()
     _entries.cache_clear()
     _loaded.cache_clear()
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
 import pytest
 
-from adapters import registry
+from adapters import engine_folder, registry
 from adapters.engine import EngineError
 from adapters.extras import install, packages
 from adapters.needs import needs
 from reports.listing import engines
+from validation import catalogue
 from validation.catalogue import CATALOGUE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,10 +79,10 @@ def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         "chipmunk": "tests_plugin_base:Healthy",
     }
     entries = [EntryPoint(name, value, registry.GROUP) for name, value in values.items()]
-    monkeypatch.setattr(registry, "entry_points", lambda group: [e for e in entries if e.group == group])
-    registry.find.cache_clear()
+    registry.forget()
+    monkeypatch.setattr(registry, "entry_points", lambda: EntryPoints(entries))
     yield
-    registry.find.cache_clear()
+    registry.forget()
     for name in [name for name in sys.modules if name.startswith("tests_plugin")]:
         del sys.modules[name]
 
@@ -89,6 +90,19 @@ def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_our_engines_come_first_and_others_by_name(plugins: None) -> None:
     names = registry.names()
     assert names == sorted(names) and len(names) == 12  # an engine of others under a name of ours is none of ours
+
+
+def test_entry_points_of_installed_packages_are_read_once_a_process(plugins: None, monkeypatch) -> None:
+    calls, read = [], registry.entry_points
+    monkeypatch.setattr(registry, "entry_points", lambda: calls.append("read") or read())
+    catalogue.forget()
+    for _ in range(2):
+        for name in registry.names():
+            registry.find(name), registry.facts(name), registry.entry(name), registry.is_ranked(name, "default")
+        registry.usual(), catalogue.broken(), len(CATALOGUE), engine_folder.folder_of("healthy")
+    assert calls == ["read"]
+    registry.forget()
+    assert registry.names() and calls == ["read", "read"]
 
 
 def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
@@ -109,10 +123,10 @@ def test_the_distribution_of_an_engine_that_cannot_be_imported_at_all_is_named(t
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hollow-adapter\nVersion: 1\n")
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\nhollow = hollow:Engine\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    registry.find.cache_clear()
+    registry.forget()
     reason = registry.find("hollow").reason
     assert "a_package_that_is_not_there" in reason and "it is an engine of hollow-adapter" in reason
-    registry.find.cache_clear()
+    registry.forget()
 
 
 def test_a_missing_engine_of_ours_comes_with_our_extra(monkeypatch) -> None:
@@ -123,10 +137,10 @@ def test_a_missing_engine_of_ours_comes_with_our_extra(monkeypatch) -> None:
         raise ImportError("No module named 'it'")
 
     monkeypatch.setattr(adapter, "version", missing)
-    registry.find.cache_clear()
+    registry.forget()
     reason = registry.find(name).reason
     assert reason.endswith(f"; {install(name)}") and packages(name) and all(each in reason for each in packages(name))
-    registry.find.cache_clear()
+    registry.forget()
 
 
 def test_an_engine_set_apart_is_left_out_of_a_run_that_names_none_unless_it_is_there_or_required(monkeypatch):

@@ -56,8 +56,8 @@ def faulty(tmp_path_factory, monkeypatch):
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{entries}")
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    registry.find.cache_clear()
+    registry.forget()
     yield folder
-    registry.find.cache_clear()
+    registry.forget()
     for name in ("faulty_engine", *IMPORTS):
         sys.modules.pop(name, None)

@@ -256,9 +256,9 @@ def weak(tmp_path, monkeypatch):
         entries += f"weak{fault} = weak_{fault}:{fault.title()}\n"
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{entries}")
     monkeypatch.syspath_prepend(str(folder))
-    registry.find.cache_clear()
+    registry.forget()
     yield
-    registry.find.cache_clear()
+    registry.forget()
     for fault in ("impulse", "friction"):
         sys.modules.pop(f"weak_{fault}", None)
 

@@ -47,7 +47,8 @@ releases = ">=0"
 
 
 def forget():
-    for cached in (registry.find, files.findings_of, adapter_hash):
+    registry.forget()
+    for cached in (files.findings_of, adapter_hash):
         cached.cache_clear()
 
 

@@ -100,9 +100,9 @@ def clockwork(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: clockwork\nVersion: 1\n")
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\nclockwork = clockwork_engine:ClockworkEngine\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    registry.find.cache_clear()
+    registry.forget()
     yield
-    registry.find.cache_clear()
+    registry.forget()
     sys.modules.pop("clockwork_engine", None)
 
 

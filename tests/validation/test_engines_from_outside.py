@@ -179,7 +179,7 @@ def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_p
 
 def test_where_a_plugin_raised_what_is_wrong_is_kept_and_told_by_the_doctor(site):
     (site / "numbers.py").write_text("def colour():\n    raise LookupError('no\x1b[31m colour')\nCOLOUR = colour()\n")
-    registry.find.cache_clear()
+    registry.forget()
     found = registry.find("toy")
     assert found.reason == r"LookupError: no\u{1b}[31m colour"
     told = doctor()["traces"]["toy"]
@@ -188,7 +188,7 @@ def test_where_a_plugin_raised_what_is_wrong_is_kept_and_told_by_the_doctor(site
     said = CliRunner().invoke(main, ["doctor"]).output
     assert "traceback of toy" in said and "in colour" in said
     (site / "numbers.py").write_text('COLOUR = "#102030"\n')
-    registry.find.cache_clear()
+    registry.forget()
     assert registry.find("toy").trace == "" and doctor()["traces"] == {}
 
 

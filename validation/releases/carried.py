@@ -14,7 +14,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -39,9 +39,9 @@ def code(engine: str, scenes: Iterable[str]) -> Path:
     EngineError
         If the source of a plugin is not a file that can be copied.
     """
-    entries = [e for e in entry_points(group=registry.GROUP) if e.name == engine or registry.is_ours(e)]
+    entries = [e for e in registry.installed(registry.GROUP) if e.name == engine or registry.is_ours(e)]
     wanted = set(scenes)
-    entries += [e for e in entry_points(group=catalogue.GROUP) if e.name in wanted]
+    entries += [e for e in registry.installed(catalogue.GROUP) if e.name in wanted]
     modules = list(dict.fromkeys([*PACKAGES, *(entry.module.partition(".")[0] for entry in entries)]))
     sources = {name: _source(name) for name in modules}
     listed = _entry_points(entries)

@@ -96,11 +96,11 @@ def toy(local, tmp_path_factory, monkeypatch):
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\ntoy = toy_plugin:ToyEngine\n")
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    for cached in (registry.find, identity.adapter_hash):
-        cached.cache_clear()
+    registry.forget()
+    identity.adapter_hash.cache_clear()
     yield folder
-    for cached in (registry.find, identity.adapter_hash):
-        cached.cache_clear()
+    registry.forget()
+    identity.adapter_hash.cache_clear()
     sys.modules.pop("toy_plugin", None)
 
 

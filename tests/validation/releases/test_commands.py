@@ -17,7 +17,7 @@ CELL = ["--dim", "2", "--param", "e=0.5", "--param", "v=10", "--jobs", "1"]
 @pytest.fixture
 def call(toy, tmp_path):
     def run(*words, status=0):
-        registry.find.cache_clear()
+        registry.forget()
         done = CliRunner().invoke(main, [*words, "--out", str(tmp_path / "out")])
         assert done.exit_code == status, done.output + repr(done.exception)
         return done

@@ -143,7 +143,7 @@ def test_a_yardstick_is_milliseconds_of_cpu_time():
 @pytest.mark.long
 def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatch):
     def call(*more):
-        registry.find.cache_clear()
+        registry.forget()
         words = ["releases", "toy", "1.0.0,1.2.0", "impact", "--dim", "2", "--param", "e=0.5", "--param", "v=10"]
         done = CliRunner().invoke(main, [*words, "--jobs", "1", "--out", str(tmp_path), *more])
         assert done.exit_code == 0, done.output + repr(done.exception)
