@@ -4,7 +4,8 @@
        ^ an answer; or the reason of the child's end and its last output
 
 The pipe needs no file and no semaphore, so neither a full temporary folder nor a missing /dev/shm matters. Stopping a
-child also stops everything that it started.
+child also stops everything that it started. Each question has a mark, which its answer must bear: what foreign code
+writes into the pipe, or a process that it forks, cannot answer in the child's place.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import contextlib
 import ctypes
 import multiprocessing
 import os
+import secrets
 import signal
 import sys
 import time
 import weakref
 from collections.abc import Callable
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, cast
 
 from adapters.plain import lines, one_line
 
@@ -32,6 +34,8 @@ LOG_BYTES = 2**16
 LOG_LINES = 5
 #: Largest answer [bytes]: an observation takes some kilobytes, a recording about one megabyte.
 MOST_BYTES = 2**26
+#: Mark of what a child sends before the first question; others are random and as long.
+UNASKED = bytes(16)
 _children: weakref.WeakSet[Child] = weakref.WeakSet()
 
 
@@ -41,6 +45,10 @@ class IsolationError(RuntimeError):
 
 class Lost(RuntimeError):
     """A child ended, or did not answer; the reason in one line."""
+
+
+class Mistaken(Lost):
+    """An answer is not that of the question; one line."""
 
 
 class Child:
@@ -73,6 +81,7 @@ class Child:
         os.set_blocking(self.log.fileno(), False)
         self.written = b""
         self._reason = ""
+        self._mark = UNASKED
         _children.add(self)
 
     @property
@@ -82,9 +91,10 @@ class Child:
         return [self.connection, *written, self._process.sentinel]
 
     def send(self, message: bytes) -> None:
-        """Send a message; a dead child is noticed when its answer is read."""
+        """Ask a question; a dead child is noticed when its answer is read."""
+        self._mark = secrets.token_bytes(len(UNASKED))
         with contextlib.suppress(OSError):
-            self.connection.send_bytes(message)
+            self.connection.send_bytes(self._mark + message)
 
     def has_answer(self) -> bool:
         """Whether `receive` returns or raises at once; also reads the child's output."""
@@ -95,12 +105,14 @@ class Child:
             return True
 
     def receive(self, timeout: float | None = None) -> bytes:
-        """Answer of the child.
+        """Answer to the last question.
 
         Raises
         ------
         Lost
             If it ended, closed its end, answered too much, or not within ``timeout`` [s].
+        Mistaken
+            If it answers anything else; it is stopped.
         """
         ends = None if timeout is None else time.monotonic() + timeout
         while not self.has_answer():
@@ -110,9 +122,13 @@ class Child:
             if self._process.sentinel in wait(self.sentinels, left) and not self.has_answer():
                 raise Lost(self.stop())
         try:
-            return self.connection.recv_bytes(MOST_BYTES)
+            answer = self.connection.recv_bytes(len(UNASKED) + MOST_BYTES)
         except (EOFError, OSError):
             raise Lost(self.stop()) from None
+        if not answer.startswith(self._mark):
+            self.stop()
+            raise Mistaken("its process answered what it was not asked")
+        return answer[len(UNASKED) :]
 
     def drain(self) -> bool:
         """Read the child's output and keep its end; False if it closed its output."""
@@ -180,7 +196,29 @@ def _main(
         os.dup2(log.fileno(), stream)
     log.close()
     limit(memory)
-    serve(connection)
+    serve(cast(Connection, _Marked(connection)))
+
+
+class _Marked:
+    """The child's end: answers bear the mark of the last question, and copies of the child give none."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self._mark, self._home = connection, UNASKED, os.getpid()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._connection, name)
+
+    def recv_bytes(self) -> bytes:
+        """Next question."""
+        message = self._connection.recv_bytes()
+        self._mark = message[: len(UNASKED)]
+        return message[len(UNASKED) :]
+
+    def send_bytes(self, answer: bytes) -> None:
+        """Answer it."""
+        if os.getpid() != self._home:  # a library has forked, and its copy has come back to our code
+            os._exit(0)
+        self._connection.send_bytes(self._mark + answer)
 
 
 def end_with(parent: int) -> None:

@@ -326,7 +326,8 @@ def bench(
             if lost and not any(unit.purpose == "work" for unit in units):
                 raise SceneError(f"bench: {lost[0]}")
             time_units(store, run, [name], units, FULL if full else QUICK, seed, console)
-            store.finish(run)
+            if not store.missing(run):
+                store.finish(run)
             tables = speed.tables_of(store, run)
         primary = primary_of(name)
         for table in tables.values():

@@ -47,10 +47,10 @@ def run_plan(
 ) -> Run:
     """Run the cases of this plan that the store lacks; the observations are in the store afterwards.
 
-    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run with cases left after
-    time-outs is not complete: it prints that, and the same command resumes it. ``cluster`` is the address of a Dask
-    cluster to run on; its motions are not recorded, and OUT/cluster.jsonl lists which worker ran each case. ``known``
-    are results of another run for cases of this plan, which are stored instead of being run again.
+    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run with missing cases, as of
+    those left after time-outs, is not complete: it prints that, and the same command resumes it. ``cluster`` is the
+    address of a Dask cluster to run on; its motions are not recorded, and OUT/cluster.jsonl lists which worker ran each
+    case. ``known`` are results of another run for cases of this plan, which are stored instead of being run again.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
@@ -87,7 +87,7 @@ def run_plan(
             raise
     for reason, count in left.items():
         console.print(f"not run: {plural(count, 'case')}, {reason}", markup=False, highlight=False, soft_wrap=True)
-    if left:
+    if store.missing(run):
         console.print("this run is not complete; the same command resumes it", markup=False)
     elif finish:
         store.finish(run)

@@ -127,7 +127,8 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
             store.close()
             sys.exit(statuses.INCOMPLETE)
         time_units(store, run, request.scenes, units, limits, seed, console)
-    store.finish(run)
+    if not store.missing(run):
+        store.finish(run)
     _show(store, run, out, as_json, brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from adapters import isolation
-from adapters.isolation import LOG_BYTES, LOG_LINES, Child, IsolationError, Lost
+from adapters.isolation import LOG_BYTES, LOG_LINES, Child, IsolationError, Lost, Mistaken
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="guardians and /proc are Linux's")
 #: What a child serves: it runs what it is sent, and answers what that says.
@@ -156,6 +156,27 @@ def test_nothing_that_a_child_has_started_outlives_it(child, leaves):
             child.receive(PATIENCE)
     child.stop()
     assert within(isolation.GRACE, lambda: not any(map(is_running, pids)))
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        "connection._connection.send_bytes(b'an answer that was not asked for')",
+        "answer('first'), answer('second')",
+    ],
+)
+def test_an_answer_that_was_not_asked_for(child, order):
+    """It ends the child at the next question."""
+    child.send(order.encode())
+    with pytest.raises(Mistaken, match="not asked"):
+        child.receive(PATIENCE), asked(child, "answer('third')")
+    assert child.ended()
+
+
+def test_a_copy_that_a_child_forks(child):
+    """Both come back to the child's code; one answers."""
+    assert asked(child, "os.fork(); answer('once')") == "once"
+    assert [asked(child, f"answer({k})") for k in range(3)] == ["0", "1", "2"]
 
 
 #: A parent that says which processes hang on it, and hangs itself.

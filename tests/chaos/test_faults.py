@@ -60,6 +60,7 @@ CRASHES = {
     "refusal_raise": "refused to say",
     "declares_none": "",
     "build_none": "",
+    "answer_for_another": "answered what it was not asked",
 }
 #: Faults that change what cells share, or give odd values beside a sound motion: the cell itself is as it is.
 ODD = {
@@ -68,7 +69,7 @@ ODD = {
     "block_signals", "patch_math", "patch_numpy", "patch_loop", "patch_class", "patch_json", "patch_module",
     "stop_collecting", "lower_recursion", "clear_path", "leave_thread", "leave_child", "leave_session",
     "readback_cyclic", "readback_odd", "readback_large", "long_change", "settings_object",
-    "pose_jumps",
+    "pose_jumps", "fork",
 }  # fmt: skip
 DIVERGES = {"pose_nan"}
 REFUSES = {"refusal_long"}
@@ -122,6 +123,21 @@ def test_no_fault_reaches_another_cell(faulty, dice, tmp_path):
     ElementTree.fromstring(exports.as_junit(rows))
     exports.as_json(rows), exports.as_csv(rows), exports.as_markdown(rows)
     assert not [line for line in processes() if "sleep 360" in line]
+
+
+def test_an_answer_for_another_case(faulty, tmp_path):
+    """No row of another engine is written, every case has its own answer, and none is missing."""
+    slots = [faulty_slot("answer_for_another"), *[faulty_slot("fork", v=float(v)) for v in range(1, 6)]]
+    slots += [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (2.0, 3.0)]
+    expected = execute(slots[-2])
+    store, said = Store(tmp_path), StringIO()
+    run = run_plan(store, "mistaken", slots, Console(file=said, width=200), jobs=1, timeout=60.0)
+    found = {observation.slot: observation for observation in store.observations(run)}
+    assert run.finished and list(found) == slots
+    assert found[slots[0]].outcome is Outcome.CRASHED and "not asked" in found[slots[0]].reason
+    assert all(found[slot].outcome is Outcome.OK for slot in slots[1:]), [found[slot].reason for slot in slots[1:]]
+    assert len({found[slot].state_hash for slot in slots[1:6]}) == 5
+    assert found[slots[-2]].metrics == expected.metrics and found[slots[-2]].state_hash == expected.state_hash
 
 
 def processes():

@@ -81,6 +81,14 @@ def test_what_was_left_is_said_by_reason_and_the_same_plan_goes_on_with_it_alone
     assert min(counted(said)) == (1, 4) and max(counted(said)) == (4, 4)
 
 
+def test_a_run_with_missing_cases_is_not_finished(planned):
+    run, said = planned(lambda todo, leave: map(answer, todo[:3]))
+    assert not run.finished and "the same command resumes it" in said
+    asked = []
+    again, _ = planned(lambda todo, leave: map(answer, asked.extend(todo) or todo))
+    assert asked == SLOTS[3:] and again.id == run.id and again.finished
+
+
 def test_ctrl_c_says_that_nothing_is_lost_and_loses_nothing(planned):
     def cells(todo, leave):
         yield answer(todo[0])

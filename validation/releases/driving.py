@@ -93,6 +93,8 @@ def drive(
         found: dict[Slot, Observation] = {}
         try:
             for observation in _asked(store, run, release, todo, effort, say):
+                if observation.slot not in todo:  # answered in another case's place
+                    continue
                 found[observation.slot] = observation
                 store.add(run, observation)
                 progress(observation)
@@ -104,7 +106,8 @@ def drive(
                     found[slot] = lost
                     store.add(run, lost)
                     progress(lost)
-        store.finish(run)
+        if not store.missing(run):
+            store.finish(run)
         have |= found
     return [have[slot] for slot in wanted if slot in have]
 

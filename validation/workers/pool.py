@@ -14,7 +14,7 @@ from pathlib import Path
 
 from adapters import registry
 from adapters.foreign import said_by
-from adapters.isolation import Child, Lost
+from adapters.isolation import Child, Lost, Mistaken
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare
 from validation.running.tracks import Recording, recording_from_bytes
@@ -61,6 +61,8 @@ def run_cells(
 ) -> Iterator[Observation]:
     """Yield an observation per slot, in the order in which they finish.
 
+    A cell whose worker answers for another one runs again in a new process, once.
+
     An error while cells run is raised after all running cells have ended, so that no result is lost except of cells
     whose trajectory or recording could not be stored. Later errors are not reported.
 
@@ -95,6 +97,7 @@ def run_cells(
     for wanted in slots:
         waiting.setdefault(wanted.engine, deque()).append(wanted)
     timeouts: Counter[tuple[str, str]] = Counter()
+    repeated: set[Slot] = set()
     seats = [_Seat() for _ in range(jobs)]
     try:
         yield from _never_started(waiting)
@@ -127,6 +130,12 @@ def run_cells(
                 except Unwritten as error:
                     failure = failure or error
                     continue
+                except Mistaken as mistaken:
+                    if slot not in repeated:
+                        repeated.add(slot)
+                        waiting.setdefault(slot.engine, deque()).appendleft(slot)
+                        continue
+                    observation, recording = _lost(slot, Outcome.CRASHED, str(mistaken), ""), None
                 if observation.outcome is Outcome.TIMED_OUT:
                     timeouts[slot.engine, slot.scene] += 1
                 # Before the result is used, so that a worker does not wait while it is stored. No worker is started
@@ -257,11 +266,15 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
         if answer["unwritten"]:
             raise Unwritten(*answer["unwritten"])
         observation = observation_from_dict(answer["observation"])
+        if observation.slot != slot:
+            raise Mistaken("its process answered for another case")
         recording = recording_from_bytes(base64.b64decode(answer["recording"])) if answer["recording"] else None
         changed = answer["changed"]
     except Lost as lost:
         seat.child = None
         child.stop()
+        if isinstance(lost, Mistaken):
+            raise
         return _lost(slot, Outcome.CRASHED, str(lost), child.tail()), None
     except Unwritten:
         raise
