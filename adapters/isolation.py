@@ -27,8 +27,8 @@ from typing import Any, cast
 from adapters.plain import lines, one_line
 
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # <linux/prctl.h>
-#: Time limit [s] of a child's guardian to end the child's processes.
-GRACE = 10.0
+#: Time limit [s] of a child's guardian to end the child's processes: what survives a minute hangs in the kernel.
+GRACE = 60.0
 #: Stored bytes of a child's output: enough for the last lines of a traceback.
 LOG_BYTES = 2**16
 LOG_LINES = 5
@@ -161,6 +161,7 @@ class Child:
         ended = _has_ended(process)
         if not ended:
             process.terminate()  # its guardian ends all its processes, and then itself
+            _kill(process.pid, signal.SIGCONT)  # the child may have stopped it
             process.join(GRACE)
             for other in _descendants(process.pid):  # for a guardian that was stopped by its child
                 _kill(other)
@@ -248,6 +249,7 @@ def _guard(parent: int, connection: Connection) -> None:
     guardian = os.getpid()
     child = os.fork()
     if child == 0:
+        os.setpgid(0, 0)
         libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         libc.prctl(_PR_SET_CHILD_SUBREAPER, 0)
         if os.getppid() != guardian:
@@ -257,18 +259,21 @@ def _guard(parent: int, connection: Connection) -> None:
     connection.close()
     while True:
         if signal.sigwait(blocked) == signal.SIGTERM:
+            _kill(-child)
             _sweep()
             os._exit(1)
-        while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-            if ended[0] == child:
+        while (ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)) is not None:
+            if ended.si_pid == child:
+                _kill(-child)  # its group, whose number is not given to others before the child is waited for
+            status = os.waitpid(ended.si_pid, 0)[1]
+            if ended.si_pid == child:
                 _sweep()
-                _end_like(ended[1])
+                _end_like(status)
 
 
 def _sweep() -> None:
-    """End all descendants: killing one may orphan others, which this process adopts."""
-    ends = time.monotonic() + GRACE / 2.0
-    while time.monotonic() < ends:
+    """End all descendants: killing one may orphan others, which this process adopts, so until none is left."""
+    while True:
         for other in _descendants(os.getpid()):
             _kill(other)
         try:
@@ -351,9 +356,9 @@ def _descendants(pid: int | None) -> list[int]:
     return found
 
 
-def _kill(pid: int) -> None:
+def _kill(pid: int, number: int = signal.SIGKILL) -> None:
     with contextlib.suppress(OSError):
-        os.kill(pid, signal.SIGKILL)
+        os.kill(pid, number)
 
 
 @atexit.register

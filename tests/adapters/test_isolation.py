@@ -179,6 +179,33 @@ def test_a_copy_that_a_child_forks(child):
     assert [asked(child, f"answer({k})") for k in range(3)] == ["0", "1", "2"]
 
 
+def test_many_processes_that_a_child_forks(child):
+    """None is left once it is stopped, also where the child has stopped its guardian."""
+    order = "pids = [os.fork() or time.sleep(600) for _ in range(200)]; answer(*pids)"
+    pids = [int(word) for word in asked(child, order).split()]
+    child.send(b"os.kill(os.getppid(), signal.SIGSTOP); time.sleep(600)")
+    assert within(PATIENCE, lambda: Path(f"/proc/{child._process.pid}/stat").read_text().rpartition(")")[2][1] == "T")
+    child.stop()
+    assert len(pids) == 200 and not any(map(is_running, pids))
+
+
+SWEEP = """
+import ctypes, os, subprocess
+from adapters import isolation
+isolation.GRACE = 0.0
+ctypes.CDLL(None).prctl(36, 1)  # adopts orphans, as a guardian does
+subprocess.run(["sh", "-c", "for k in 1 2 3 4 5; do setsid sleep 600 >&- 2>&- & done"])
+isolation._sweep()
+print(isolation._descendants(os.getpid()))
+"""
+
+
+def test_a_sweep_on_a_busy_machine():
+    """However long it takes, it ends with the last process."""
+    done = subprocess.run([sys.executable, "-c", SWEEP], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
 #: A parent that says which processes hang on it, and hangs itself.
 PARENT = """
 import sys, time
