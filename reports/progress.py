@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -10,11 +9,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from reports.stages import stage, warm_up
+from reports.stages import compiling, stage
 from reports.wording import plural
 from validation.cells import Observation, Slot
 from validation.records.store import Run, Store
 from validation.running.tracks import representatives
+from validation.running.warming import key_of, missing
 from validation.workers import TIMEOUT, run_cells
 from validation.workers.cluster import run_cells_on
 
@@ -61,9 +61,10 @@ def run_plan(
     def leave(slot: Slot, reason: str) -> None:
         left[reason] = left.get(reason, 0) + 1
 
-    if not cluster:
-        warm_up(todo, jobs or min(len(todo) or 1, os.cpu_count() or 1), console)
     todo = _without(known, store, run, todo)
+    parts = [] if cluster else missing(todo)  # machines of a cluster have kernels of their own
+    waiting = {part.key for part in parts}
+    compiled = compiling(parts, console, any(key_of(slot) not in waiting for slot in todo))
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
     shown = representatives(slots) if finish else set()
@@ -78,7 +79,8 @@ def run_plan(
             if cluster:
                 cells = run_cells_on(cluster, todo, timeout, store.path.parent / "cluster.jsonl", leave)
             else:
-                cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave)
+                cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave,
+                                  parts=parts, compiled=compiled)  # fmt: skip
             for observation in cells:
                 store.add(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")

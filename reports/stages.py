@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from validation.cells import Slot
-from validation.running.warming import Warming
+from validation.running.warming import Part
+
+#: How long all kernels of our solver take: 1 min 10 s and 2 min 40 s on idle machines with 2 cores of two kinds.
+WAIT = "one to three minutes"
 
 
 def clock(seconds: float) -> str:
@@ -26,12 +26,6 @@ def say(console: Console, text: str) -> None:
     console.print(Text(text), soft_wrap=True)
 
 
-def _busy() -> str:
-    """Addition to the expected time of a stage if cores are not idle."""
-    load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0, os.cpu_count() or 1
-    return f"; longer now, the machine is busy (load {load:.0f} on {cores} cores)" if load > 0.5 * cores else ""
-
-
 @contextmanager
 def stage(console: Console, name: str) -> Iterator[None]:
     """Print the time of the block, unless it fails."""
@@ -40,28 +34,18 @@ def stage(console: Console, name: str) -> Iterator[None]:
     say(console, f"{name}: {clock(time.monotonic() - started)}")
 
 
-def warm_up(slots: Sequence[Slot], jobs: int, console: Console) -> list[str]:
-    """Compile the code that the engines of these cases compile at their first steps, outside timings and time limits.
+def compiling(parts: Sequence[Part], console: Console, beside: bool = False) -> Callable[[Part], None]:
+    """Say which kernels are compiled now; returns a function that says of each part when it is done.
 
-    Returns engine and dimension of each compilation.
+    ``beside``: whether there are cases that run meanwhile.
     """
-    warming = Warming(slots)
-    names: list[str] = []
-    if not len(warming):
-        return names
-    jobs = jobs or os.cpu_count() or 1
-    expected = clock(warming.estimate(jobs))
-    if warming.begun:
-        say(console, "kernels are compiled; checking what else these cases need")
-    else:
-        say(console, f"compiling the solver's kernels (once): about {expected} on idle cores{_busy()}")
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with (
-        stage(console, "compiled"),
-        Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress,
-    ):
-        task = progress.add_task(f"compiling, about {expected}", total=len(warming))
-        for done in warming.run(jobs):
-            names.append(done)
-            progress.update(task, advance=1, description=f"compiled {done}; about {expected} in all")
-    return names
+    started = time.monotonic()
+    if parts:
+        engines = ", ".join(dict.fromkeys(part.key[0] for part in parts))
+        others = "; other engines run meanwhile" if beside else ""
+        say(console, f"compiling the kernels of {engines}, once: {WAIT}{others}")
+
+    def done(part: Part) -> None:
+        say(console, f"compiled {part} after {clock(time.monotonic() - started)}")
+
+    return done

@@ -22,7 +22,7 @@ from reports.command.posing import cells_of, compare_and_show
 from reports.command.selection import CLUSTER, JOBS, SECONDS, asked, missing, request_from, selection
 from reports.progress import run_plan
 from reports.spread import spread_lines
-from reports.stages import warm_up
+from reports.stages import compiling
 from reports.summary import show
 from reports.terminal import terminal
 from reports.wording import plural
@@ -34,6 +34,7 @@ from validation.questions.nulls import null_rows, with_skill
 from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.plan import slots
+from validation.running.warming import missing as kernels_missing
 from validation.workers import TIMEOUT, run_cells
 
 
@@ -144,9 +145,12 @@ def compile_kernels(as_json: bool, **options: Any) -> None:
     Compiles what these scenes and engines need for their first steps. `run` and `bench` do this by themselves. Call it
     before processes that run side by side, which would each compile the same.
     """
-    done = warm_up(slots(request_from(options)), 0, terminal(stderr=True))
+    parts = kernels_missing(slots(request_from(options)))
+    said = compiling(parts, terminal(stderr=True))
+    for _ in run_cells((), jobs=0, parts=parts, compiled=said):
+        pass
     if as_json:
-        click.echo(json.dumps({"compiled": done}))
+        click.echo(json.dumps({"compiled": [str(part) for part in parts]}))
 
 
 @main.command("run-cell", epilog="Example: crosscheck run-cell < slots.json")

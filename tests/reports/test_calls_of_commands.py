@@ -15,6 +15,7 @@ from reports.command import inspecting, main, running, statuses, sweeping, tunin
 from reports.palette import PAPER
 from validation import posed
 from validation.cells import Observation, Outcome, Slot
+from validation.running.warming import Part
 from validation.settings.tuning import Score, Search
 
 pytest.importorskip("pymunk")
@@ -159,12 +160,23 @@ def test_cells_as_lines_are_run_once_each_and_every_line_gets_an_answer(monkeypa
         assert said("run-cell", input=text) == (2, "", [f"crosscheck: {why}"])
 
 
-def test_kernels_are_compiled_for_the_cells_that_are_named(monkeypatch):
+def test_kernels_are_compiled_for_the_cells_that_are_named(monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr(running, "warm_up", lambda cells, jobs, console: asked.append((len(cells), jobs)) or 3)
+    part = Part(("toy", "tuned", 2), (SLOT,), tmp_path / "mark")
+
+    def run_cells(cells, jobs, parts, compiled):
+        assert list(cells) == [] and jobs == 0
+        for each in parts:
+            compiled(each)
+        return iter(())
+
+    monkeypatch.setattr(running, "run_cells", run_cells)
+    monkeypatch.setattr(running, "kernels_missing", lambda cells: asked.append(len(cells)) or [part])
     call = ("compile", "impact", "--engine", "chipmunk", "--dim", "2")
-    assert said(*call) == (0, "", []) and said(*call, "--json") == (0, '{"compiled": 3}\n', [])
-    assert asked[0] == asked[1] and asked[0][0] > 1 and asked[0][1] == 0
+    status, out, err = said(*call)
+    assert (status, out) == (0, "") and err[-1].startswith("compiled toy/tuned 2-D after ")
+    assert said(*call, "--json")[:2] == (0, '{"compiled": ["toy/tuned 2-D"]}\n')
+    assert asked[0] == asked[1] > 1
 
 
 # ---- studies ---------------------------------------------------------------------------------------------------------

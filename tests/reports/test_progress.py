@@ -2,6 +2,7 @@
 
 import io
 import re
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -9,6 +10,7 @@ from rich.console import Console
 from reports import progress
 from validation.cells import Observation, Outcome, Slot
 from validation.records.store import Store
+from validation.running.warming import Part, key_of
 
 SLOTS = [Slot("impact", (("v", float(v)),), 2, "toy", "default", 1 / 240) for v in range(1, 5)]
 
@@ -21,10 +23,13 @@ def answer(slot):
 def planned(tmp_path, monkeypatch):
     """`planned(cells, slots, **options)`: the run of a plan that `cells(todo, leave)` answers, and the text."""
     store = Store(tmp_path)
-    monkeypatch.setattr(progress, "warm_up", lambda *of: None)
+    monkeypatch.setattr(progress, "missing", lambda slots: [])
 
     def make(cells, slots=SLOTS, terminal=True, **options):
-        def run_cells(todo, jobs, timeout, keep, shown, record, leave):
+        def run_cells(todo, jobs, timeout, keep, shown, record, leave, parts, compiled):
+            make.parts = parts
+            for part in parts:
+                compiled(part)
             return cells(todo, leave)
 
         monkeypatch.setattr(progress, "run_cells", run_cells)
@@ -48,14 +53,19 @@ def test_the_line_counts_every_cell_that_ends_and_names_the_last(planned):
     assert run.finished and {o.slot for o in planned.store.observations(run)} == set(SLOTS)
 
 
-def test_kernels_are_compiled_before_the_first_cell_has_a_clock_and_for_no_cluster(planned, monkeypatch):
-    order = []
-    monkeypatch.setattr(progress, "warm_up", lambda slots, jobs, console: order.append((list(slots), jobs)))
-    planned(lambda todo, leave: order.append("cells") or map(answer, todo), jobs=1)
-    assert order == [(SLOTS, 1), "cells"]
+def test_kernels_that_are_missing_are_compiled_beside_the_cells_and_for_no_cluster(planned, monkeypatch, tmp_path):
+    part = Part(key_of(SLOTS[0]), tuple(SLOTS), tmp_path / "mark")
+    monkeypatch.setattr(progress, "missing", lambda slots: [part] if slots else [])
+    _, said = planned(lambda todo, leave: map(answer, todo))
+    assert planned.parts == [part]
+    assert "compiling the kernels of toy, once: one to three minutes\n" in said and "compiled toy/default 2-D" in said
+    _, said = planned(lambda todo, leave: map(answer, todo), [*SLOTS, replace(SLOTS[0], engine="other")])
+    assert "; other engines run meanwhile\n" in said
+    _, said = planned(lambda todo, leave: map(answer, todo), SLOTS[:2], known=[answer(slot) for slot in SLOTS])
+    assert planned.parts == [] and "compil" not in said  # results that are known need no kernels
     monkeypatch.setattr(progress, "run_cells_on", lambda where, todo, *rest: map(answer, todo))
-    planned(None, cluster="tcp://elsewhere:1", fresh=True)
-    assert order[2:] == []  # its machines have caches of their own
+    _, said = planned(None, cluster="tcp://elsewhere:1", fresh=True)
+    assert "compil" not in said  # its machines have caches of their own
 
 
 def test_who_writes_into_a_file_gets_no_line(planned):

@@ -1,17 +1,14 @@
 """A packed replay gives back what was recorded: places, turns, contacts, times, in the units that its head states."""
 
 import base64
-import io
 import zlib
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from adapters.scene import Body, Box, HalfSpace, Scene
-from reports import stages
 from reports.page import replay
 from validation.cells import Slot
 from validation.running.tracks import Recording
@@ -89,48 +86,3 @@ def test_what_should_stay_stands_still_wherever_it_is_and_what_should_move_along
         (place + ramp * [0.0, 1.0], False),
     ):  # fmt: skip
         assert replay._packed(SimpleNamespace(columns=WHO), scene, members, run.t, exact, 0)[0]["static"] is still
-
-
-def test_a_bar_goes_on_by_one_for_each_part_that_is_compiled(monkeypatch):
-    class Warming:
-        begun = False
-
-        def __init__(self, slots):
-            self.parts = ["a 2-D", "a 3-D", "b 2-D"]
-
-        def __len__(self):
-            return len(self.parts)
-
-        def estimate(self, jobs):
-            return 30.0 * jobs
-
-        def run(self, jobs):
-            yield from self.parts
-
-    seen = []
-
-    class Progress:
-        def __init__(self, *columns, **given):
-            seen.append(("made", given["transient"], given["disable"]))
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *ended):
-            return None
-
-        def add_task(self, description, total):
-            seen.append((description, total))
-            return 7
-
-        def update(self, task, advance, description):
-            seen.append((task, advance, description))
-
-    monkeypatch.setattr(stages, "Warming", Warming)
-    monkeypatch.setattr(stages, "Progress", Progress)
-    console = Console(file=io.StringIO(), width=120)
-    assert stages.warm_up(["slots"], 2, console) == ["a 2-D", "a 3-D", "b 2-D"]
-    assert seen == [
-        ("made", True, True), ("compiling, about 1 min 00 s", 3),
-        *((7, 1, f"compiled {part}; about 1 min 00 s in all") for part in ("a 2-D", "a 3-D", "b 2-D")),
-    ]  # fmt: skip

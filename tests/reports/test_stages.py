@@ -1,12 +1,13 @@
 """What a long command says of its stages: how long each took, and what it waits for."""
 
 import io
-import os
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from reports import stages
+from validation.running.warming import Part
 
 
 @pytest.fixture
@@ -46,67 +47,22 @@ def test_a_stage_that_fails_says_no_time(console):
     assert said(console) == ""
 
 
-class Warming:
-    """What is left to compile: two parts, of a minute each."""
-
-    parts = ("reference 2-D", "reference 3-D")
-    begun = False
-
-    def __init__(self, slots):
-        assert slots == ["slots"]
-
-    def __len__(self):
-        return len(self.parts)
-
-    def estimate(self, jobs):
-        return 60.0 * len(self.parts) / jobs
-
-    def run(self, jobs):
-        assert jobs in (2, 3)
-        return iter(self.parts)
+PARTS = [Part(("toy", profile, 2), (), Path("mark")) for profile in ("tuned", "[red]")]
 
 
-@pytest.mark.parametrize(
-    ("load", "busy"), [(0.0, ""), (2.0, ""), (2.4, "; longer now, the machine is busy (load 2 on 4 cores)"),
-                       (9.6, "; longer now, the machine is busy (load 10 on 4 cores)")],
-)  # fmt: skip
-def test_who_waits_for_a_compilation_is_told_for_how_long_and_that_a_busy_machine_takes_longer(
-    console, monkeypatch, load, busy
-):
-    monkeypatch.setattr(stages, "Warming", Warming)
-    monkeypatch.setattr(os, "cpu_count", lambda: 4)
-    monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
-    assert stages.warm_up(["slots"], 2, console) == ["reference 2-D", "reference 3-D"]
-    first, last = said(console).splitlines()
-    assert first == f"compiling the solver's kernels (once): about 1 min 00 s on idle cores{busy}"
-    assert last == "compiled: 0 s"
+@pytest.mark.parametrize(("beside", "others"), [(False, ""), (True, "; other engines run meanwhile")])
+def test_compilation_is_announced_with_its_time_and_each_part_when_it_is_done(console, monkeypatch, beside, others):
+    ticks = iter([100.0, 111.0, 185.0])
+    monkeypatch.setattr(stages.time, "monotonic", lambda: next(ticks))
+    done = stages.compiling(PARTS, console, beside)
+    for part in PARTS:
+        done(part)
+    assert said(console).splitlines() == [
+        f"compiling the kernels of toy, once: one to three minutes{others}",
+        "compiled toy/tuned 2-D after 11 s", "compiled toy/[red] 2-D after 1 min 25 s",
+    ]  # fmt: skip
 
 
-def test_without_a_number_of_jobs_every_core_compiles(console, monkeypatch):
-    monkeypatch.setattr(stages, "Warming", Warming)
-    monkeypatch.setattr(os, "cpu_count", lambda: 3)
-    asked = []
-    monkeypatch.setattr(Warming, "run", lambda self, jobs: asked.append(jobs) or iter(()))
-    stages.warm_up(["slots"], 0, console)
-    assert asked == [3] and "about 40 s" in said(console)
-
-
-def test_who_waits_for_little_is_not_told_of_a_minute(console, monkeypatch):
-    monkeypatch.setattr(stages, "Warming", Warming)
-    monkeypatch.setattr(Warming, "begun", True)
-    stages.warm_up(["slots"], 2, console)
-    first = "kernels are compiled; checking what else these cases need"
-    assert said(console).splitlines() == [first, "compiled: 0 s"]
-
-
-def test_a_terminal_sees_each_part_as_it_is_done(monkeypatch):
-    monkeypatch.setattr(stages, "Warming", Warming)
-    shown = Console(file=io.StringIO(), width=120, force_terminal=True, color_system=None)
-    stages.warm_up(["slots"], 2, shown)
-    assert "compiled reference 3-D; about 1 min 00 s in all" in said(shown)
-
-
-def test_where_nothing_is_left_to_compile_nothing_is_said(console, monkeypatch):
-    monkeypatch.setattr(stages, "Warming", Warming)
-    monkeypatch.setattr(Warming, "parts", ())
-    assert stages.warm_up(["slots"], 2, console) == [] and said(console) == ""
+def test_where_nothing_is_left_to_compile_nothing_is_said(console):
+    stages.compiling([], console)
+    assert said(console) == ""

@@ -1,11 +1,14 @@
 """What has been computed is handed out, whatever happens to the cells that come after it; workers here are scripted."""
 
 import json
+from typing import ClassVar
 
 import pytest
 
 from adapters.foreign import Found
+from adapters.isolation import Lost
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
+from validation.running import warming
 from validation.workers import limits, pool, run_cells
 from validation.workers.pool import Unwritten
 
@@ -25,7 +28,9 @@ class Worker:
         self.told, self.written, self.asked = told, b"", []
 
     def send(self, message):
-        self.asked.append(json.loads(message)["slot"])
+        self.job = json.loads(message)
+        if "slot" in self.job:
+            self.asked.append(self.job["slot"])
 
     def has_answer(self):
         return True
@@ -34,6 +39,8 @@ class Worker:
         return False
 
     def receive(self, timeout):
+        if "compile" in self.job:
+            raise Lost("no part is compiled here")
         slot = slot_from_dict(self.asked[-1])
         answer = {"changed": "", "unwritten": None, "outcome": Outcome.OK} | self.told.get(slot, {})
         observation = Observation(slot, "", 1, "1", answer.pop("outcome")).as_dict()
@@ -136,10 +143,140 @@ def test_a_worker_is_asked_by_one_engine_alone(run, jobs):
 
 def test_cells_of_a_plugin_that_ends_its_importer_reach_no_worker(monkeypatch):
     reason = "the plugin ended its process: SIGABRT"
-    monkeypatch.setattr(pool.registry, "find", lambda name: Found(name, None, "6.6", reason, fatal=True))
+    for module in (pool.registry, warming):
+        monkeypatch.setattr(module, "find", lambda name: Found(name, None, "6.6", reason, fatal=True))
     monkeypatch.setattr(pool, "_started", lambda memory: pytest.fail("a worker was started"))
     slots = [cell("ending", v) for v in (1.0, 2.0)]
     told = list(run_cells(slots))
     assert [answer.slot for answer in told] == slots
     assert {(answer.outcome, answer.reason, answer.log) for answer in told} == {(Outcome.CRASHED, reason, "")}
     assert {answer.engine_version for answer in told} == {"6.6"}
+
+
+class Compiler(Worker):
+    """Writes what it is asked into `log`; compiles for so many rounds of the pool, while others answer at once."""
+
+    log: ClassVar[list] = []
+    fails = None
+    rounds = 5
+
+    def send(self, message):
+        super().send(message)
+        slots = self.job.get("compile")
+        self.left = self.rounds if slots else 0
+        told = [slot_from_dict(data) for data in slots or [self.job["slot"]]]
+        self.log.append(("compile" if slots else "cell", told))
+
+    def has_answer(self):
+        self.left -= 1
+        return self.left < 0
+
+    def receive(self, timeout):
+        if "compile" not in self.job:
+            return super().receive(timeout)
+        if self.job["compile"][0]["profile"] == self.fails or self.left >= 0:
+            raise Lost("the process was killed by SIGKILL")
+        return b'{"compiled": true}'
+
+
+@pytest.fixture
+def compiled(run, monkeypatch, tmp_path):
+    """`compiled(slots, jobs, fails)`: what workers were asked, in order, with kernels for ``mujoco`` alone."""
+    monkeypatch.setattr(warming, "_folder", lambda name: tmp_path if name == "mujoco" else None)
+    monkeypatch.setitem(globals(), "Worker", Compiler)
+    monkeypatch.setattr(pool, "wait", lambda watched, left: [])
+
+    def _compiled(slots, jobs, fails=None, **options):
+        Compiler.log, Compiler.fails = [], fails
+        found, raised = run(slots, {}, 20, jobs=jobs, **options)
+        assert raised is None and sorted(found, key=slots.index) == slots
+        return Compiler.log
+
+    return _compiled
+
+
+#: Eight cells, four of which need kernels, of two profiles.
+MIXED = [Slot("impact", (("v", v),), 2, engine, profile, DT)
+         for v in (1.0, 2.0) for engine in ("mujoco", "chipmunk") for profile in ("first", "then")]  # fmt: skip
+
+
+def needs_kernels(slot):
+    return slot.engine == "mujoco"
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3, 8])
+def test_no_cell_starts_before_its_kernels_are_compiled(compiled, jobs):
+    done = []
+    log = compiled(MIXED, jobs, compiled=lambda part: done.append((part.key, len(Compiler.log))))
+    for slot in filter(needs_kernels, MIXED):
+        assert log.index(("cell", [slot])) >= dict(done)[warming.key_of(slot)]
+    assert [key[1] for key, _ in done] == ["first", "then"]
+    assert [slots[0].profile for kind, slots in log if kind == "compile"] == ["first", "then"]
+
+
+def test_one_of_two_workers_compiles_while_the_other_runs_cells_without_kernels(compiled):
+    log = compiled(MIXED, 2)
+    assert log[0][0] == "compile" and not any(needs_kernels(slots[0]) for _, slots in log[1:5])
+    at = log.index(("compile", [MIXED[1]]))
+    assert at > 4  # then the second profile's kernels, while cells of the first run
+    assert ("cell", [MIXED[0]]) in log[at:]
+
+
+def test_one_worker_runs_cells_without_kernels_first(compiled):
+    log = compiled(MIXED, 1)
+    assert [kind for kind, _ in log] == ["cell"] * 4 + ["compile"] + ["cell"] * 2 + ["compile"] + ["cell"] * 2
+    assert not any(needs_kernels(slots[0]) for _, slots in log[:4])
+
+
+def test_all_workers_compile_where_all_cells_need_kernels(compiled):
+    log = compiled(list(filter(needs_kernels, MIXED)), 2)
+    assert [kind for kind, _ in log[:2]] == ["compile"] * 2
+
+
+def test_nothing_is_compiled_twice_and_what_failed_is_tried_again(compiled):
+    """Cells whose kernels could not be compiled run all the same: they report why."""
+    log = compiled(MIXED, 2, fails="first")
+    assert [slots[0].profile for kind, slots in log if kind == "compile"] == ["first", "then"]
+    log = compiled(MIXED, 2)
+    assert [slots[0].profile for kind, slots in log if kind == "compile"] == ["first"]
+    assert all(kind == "cell" for kind, _ in compiled(MIXED, 2))
+
+
+def test_an_interrupted_compilation_is_resumed(compiled, monkeypatch):
+    """What was compiled stays so; the rest is compiled by the next run."""
+    monkeypatch.setattr(Compiler, "rounds", 12)  # longer than the cells that can run meanwhile
+
+    def wait(watched, left):
+        if Compiler.log[-1][0] == "compile" and Compiler.log[-1][1][0].profile == "then":
+            raise KeyboardInterrupt
+        return []
+
+    monkeypatch.setattr(pool, "wait", wait)
+    with pytest.raises(KeyboardInterrupt):
+        compiled(MIXED, 1)
+    assert [part.key[1] for part in warming.missing(MIXED)] == ["then"]
+    monkeypatch.setattr(pool, "wait", lambda watched, left: [])
+    assert [slots[0].profile for kind, slots in compiled(MIXED, 1) if kind == "compile"] == ["then"]
+
+
+def test_kernels_are_compiled_without_cells(compiled):
+    assert compiled([], 2, parts=warming.missing(MIXED)) == [("compile", [slot]) for slot in MIXED[:2]]
+    assert compiled([], 2, parts=[]) == []
+
+
+def test_time_limits_of_cells_do_not_include_compilation(compiled, monkeypatch):
+    """The clock advances a second at each look at it: a compilation takes more than the limit of a cell."""
+    clock = iter(range(10**6))
+    monkeypatch.setattr(pool.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr(Compiler, "rounds", 200)
+    late = []
+    log = compiled(MIXED, 1, timeout=100.0, leave=lambda slot, reason: late.append(slot))
+    assert len(log) == 10 and late == [] and warming.missing(MIXED) == []
+
+
+def test_a_compilation_that_hangs_ends_and_its_cells_run(compiled, monkeypatch):
+    clock = iter(range(10**6))
+    monkeypatch.setattr(pool.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr(Compiler, "rounds", 10**6)
+    monkeypatch.setattr(pool, "COMPILING", 50.0)
+    assert len(compiled(MIXED, 2)) == 10 and len(warming.missing(MIXED)) == 2

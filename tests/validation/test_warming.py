@@ -1,23 +1,17 @@
-"""What is compiled ahead of the clock is all that cells need, and takes no more than their first steps."""
+"""What is compiled before a cell's clock starts is all that cells need, and takes no more than first steps."""
 
-import os
 import sys
-import time
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import pytest
 
 from adapters.engine import Engine
-from adapters.isolation import end_with
 from validation.catalogue import OURS
 from validation.cells import Slot
 from validation.running import warming
 from validation.running.execution import execute
 from validation.running.plan import Request, slots
-from validation.running.warming import Warming
 
 SLOT = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
 
@@ -31,162 +25,108 @@ def compiled():
 
 @pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_whole_cells_call_no_kernel_that_first_steps_left_alone(dimension):
-    """One cell of each scene and profile of the quick suite, moved by an ulp: run once, not again for a certificate."""
-    request = Request(scenes=list(OURS), engines=["reference"], dimensions=[dimension], ulps=[1])
-    group = [slot for found in warming._groups(slots(request)).values() for slot in found.values()]
-    assert len(group) > 30
-    warming._compile([slot.as_dict() for slot in group])
+def test_whole_cells_call_no_kernel_that_first_steps_left_alone(dimension, monkeypatch, tmp_path):
+    """One cell of each scene of the quick suite, moved by an ulp: run once, not again for a certificate.
+
+    The first steps are those of one scene for each profile.
+    """
+    monkeypatch.setattr(warming, "_folder", lambda name: tmp_path)
+    parts = warming.missing(slots(Request(list(OURS), ["reference"], dimensions=[dimension], ulps=[1])))
+    assert [part.key[1] for part in parts] == ["classical", "reference"]
+    assert all(warming.compile_one(part.slots) for part in parts)
     ready = compiled()
     assert {"run_located", "run_steps"} <= {name for _, name, _ in ready}
-    for slot in group:
+    for slot in (slot for part in parts for slot in part.slots):
         execute(slot)
         assert compiled() == ready, slot
 
 
-def test_a_warmed_cell_makes_its_first_steps_and_no_more(monkeypatch):
+def test_compilation_makes_the_first_steps_of_one_cell(monkeypatch):
     made = []
     run = warming.run
     monkeypatch.setattr(warming, "run", lambda *arguments: made.append(run(*arguments)))
-    warming._compile([SLOT.as_dict()])
+    assert warming.compile_one([SLOT, replace(SLOT, params=(("v", 2.0),))])
     assert [len(trajectory.t) - 1 for trajectory in made] == [warming.STEPS]
 
 
-def test_what_fails_while_it_is_warmed_stops_nothing(monkeypatch):
-    made = []
+def test_compilation_takes_the_next_cell_where_the_engine_refuses_one(monkeypatch):
+    asked = []
 
-    def fail(*arguments):
-        made.append(arguments)
-        raise RuntimeError("planted")
+    def first_steps(slot):
+        asked.append(slot)
+        if len(asked) < 3:
+            raise RuntimeError("planted")
 
-    monkeypatch.setattr(warming, "run", fail)
-    warming._compile([SLOT.as_dict(), SLOT.as_dict()])
-    assert len(made) == 2
-
-
-def test_a_compilation_is_remembered_by_its_cpu_time(monkeypatch):
-    """Waiting is what a busy machine adds; it must not make the next estimate longer."""
-    monkeypatch.setattr(warming, "first_steps", lambda slot: time.sleep(0.5))
-    assert warming._compile([SLOT.as_dict()]) < 0.25
+    monkeypatch.setattr(warming, "first_steps", first_steps)
+    assert warming.compile_one([SLOT] * 4) and len(asked) == 3
+    asked.clear()
+    assert not warming.compile_one([SLOT] * 2)
 
 
 class Compiling(Engine):
-    """An engine that compiles into a folder, of a version of its sources; nothing of it runs here."""
+    """An engine that compiles into a folder; nothing of it runs here."""
 
     profiles = MappingProxyType({})
 
-    def __init__(self, folder, version):
-        self.folder = folder / version
+    def __init__(self, folder):
+        self.folder = folder
 
     def kernels(self):
-        self.folder.mkdir(parents=True, exist_ok=True)
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
         return self.folder
 
     version = build = declares = refuses = None
 
 
-PLAN = [replace(SLOT, engine="toy", dimension=d, scene=s, params=p) for d in (2, 3)
-        for s, p in (("impact", ()), ("impact", (("e", 0.0),)), ("bounce", ()))]  # fmt: skip
+PLAN = [Slot(scene, params, dimension, engine, profile, 1 / 240)
+        for scene in ("impact", "bounce") for dimension in (3, 2) for engine in ("toy", "chipmunk")
+        for profile in ("tuned", "default") for params in ((), (("e", 0.0),))]  # fmt: skip
 
 
 @pytest.fixture
 def toy(monkeypatch, tmp_path):
-    """`toy(version, taken, fails)`: what is left to compile for `PLAN`, and the cells that are asked for it.
+    """`toy(plan, version)`: kernels that a plan lacks; the toy engine alone compiles."""
 
-    Parts run in this process one after another, for ``taken`` seconds each; that of the dimension ``fails`` dies.
-    """
-    asked = []
-
-    class Pool:
-        def __init__(self, workers, context, begin, parent):
-            asked.append(workers)
-            assert (begin, parent) == (end_with, (os.getpid(),))
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *of):
-            return None
-
-        def submit(self, work, slots):
-            future = Future()
-            asked.append(slots)
-            if slots[0]["dimension"] == self.fails:
-                future.set_exception(BrokenProcessPool("it died"))
-            else:
-                future.set_result(self.taken)
-            return future
-
-    def make(version="a", taken=10.0, fails=0):
-        Pool.taken, Pool.fails = taken, fails
-        engine = Compiling(tmp_path, version)
+    def make(plan=PLAN, version="a"):
+        engine = Compiling(version and tmp_path / version)
         monkeypatch.setattr(warming, "find", lambda name: SimpleNamespace(engine=engine if name == "toy" else None))
-        monkeypatch.setattr(warming, "ProcessPoolExecutor", Pool)
-        return Warming(PLAN)
+        return warming.missing(plan)
 
-    make.asked = asked
     return make
 
 
-def test_each_scene_and_profile_of_a_dimension_is_compiled_once_and_a_part_a_dimension(toy):
-    left = toy()
-    assert len(left) == 2 and sorted(left.run(8)) == ["toy 2-D", "toy 3-D"]
-    workers, *parts = toy.asked
-    assert workers == 2  # no more than there are parts
-    assert [[(cell["dimension"], cell["scene"], cell["params"]) for cell in part] for part in parts] == [
-        [(d, "impact", {}), (d, "bounce", {})] for d in (2, 3)
-    ]
+def test_parts_in_the_order_of_the_profiles_of_a_plan(toy):
+    parts = toy()
+    assert [str(part) for part in parts] == ["toy/tuned 2-D", "toy/tuned 3-D", "toy/default 2-D", "toy/default 3-D"]
+    for part in parts:  # one cell a scene
+        assert [(slot.scene, slot.params) for slot in part.slots] == [("impact", ()), ("bounce", ())]
+        assert {warming.key_of(slot) for slot in part.slots} == {part.key}
 
 
-def test_what_was_compiled_is_not_again_until_the_sources_or_the_plan_are_others(toy, monkeypatch):
-    list(toy().run(1))
-    assert toy.asked[0] == 1 and len(toy()) == 0
-    assert len(toy("b")) == 2
-    monkeypatch.setitem(globals(), "PLAN", [*PLAN, replace(PLAN[0], profile="another")])
-    assert len(toy()) == 1
+def test_parts_that_are_compiled_are_not_missing_for_any_scene(toy):
+    first, *rest = toy(PLAN[:16])
+    first.keep()
+    assert first.mark.read_text() == "toy/tuned 2-D\n"
+    assert toy(PLAN[:16]) == rest
+    assert [part.key for part in toy()] == [part.key for part in rest]  # other scenes as well
+    assert len(toy(version="b")) == 4  # other sources
 
 
-def test_a_part_that_dies_is_told_and_left_for_the_next_time(toy):
-    assert sorted(toy(fails=3).run(2)) == ["toy 2-D", "toy 3-D"]
-    left = toy()
-    assert len(left) == 1 and list(left.run(2)) == ["toy 3-D"]
+def test_parts_of_a_profile_with_own_settings(toy):
+    for part in toy():
+        part.keep()
+    own = [slot.with_own((("iterations", 9),)) for slot in PLAN]
+    assert [part.key[1] for part in toy(own)] == ["tuned+iterations=9"] * 2 + ["default+iterations=9"] * 2
+    assert toy([replace(slot, iterations=9, dt=1 / 60, ulp=1) for slot in PLAN]) == []
 
 
-def test_what_is_expected_is_the_longest_of_before_for_each_round_of_processes(toy):
-    least = warming.FIRST / 2.0  # where none is known, or it found its kernels ready
-    assert [toy().estimate(jobs) for jobs in (0, 1, 2, 3)] == [2.0 * least, 2.0 * least, least, least]
-    list(toy(taken=10.0).run(1))
-    assert toy("b").estimate(2) == least
-    list(toy("b", taken=400.04).run(1))
-    assert toy("c").estimate(1) == 800.0 and toy("c").estimate(2) == 400.0
+def test_no_parts_of_engines_that_compile_nothing_or_are_not_installed(toy):
+    assert toy(version=None) == [] and toy([SLOT]) == [] and toy([]) == []
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"cpu_seconds": null}', '{"cpu_seconds": "long"}'])
-def test_a_mark_that_cannot_be_read_says_nothing_and_stops_nothing(toy, text, tmp_path):
-    (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "warm-0.json").write_text(text)
-    assert toy().estimate(2) == warming.FIRST / 2.0
-
-
-def test_engines_that_compile_nothing_or_are_not_here_have_nothing_to_do(toy, monkeypatch):
-    toy()
-    monkeypatch.setattr(Compiling, "kernels", lambda self: None)
-    assert len(Warming(PLAN)) == 0 and len(Warming([SLOT])) == 0 and len(Warming([])) == 0
-
-
-@pytest.mark.parametrize(("before", "begun"), [([], False), ([2], True), ([3], False), ([3, 2], True)])
-def test_kernels_that_other_cells_have_compiled_are_said_to_be_there(tmp_path, monkeypatch, before, begun):
-    """A mark beside the kernels says of which dimension they are; new cells of one that is there wait for little."""
-
-    class Compiling(Engine):
-        profiles = MappingProxyType({})
-
-        def kernels(self):
-            return tmp_path
-
-    Compiling.__abstractmethods__ = frozenset()
-    monkeypatch.setattr(warming, "find", lambda name: SimpleNamespace(engine=Compiling()))
-    for dimension in before:
-        (tmp_path / f"warm-{dimension}.json").write_text(f'{{"cpu_seconds": 1.0, "dimension": {dimension}}}')
-    assert Warming([SLOT]).begun is begun
-    assert Warming([SLOT, replace(SLOT, dimension=3)]).begun is (len(before) == 2)
+def test_a_mark_that_cannot_be_written_stops_nothing(toy):
+    part = toy()[0]
+    part.mark.parent.rmdir()
+    part.keep()
+    assert len(toy()) == 4

@@ -1,113 +1,103 @@
-"""Compiles engines that compile at their first steps, before any clock or time limit starts.
+"""Which kernels a plan still needs, and how they are compiled: by the first steps of one of their cells.
 
-Engines store their kernels on disk (`adapters.engine.Engine.kernels`). One small cell per scene and profile of a plan
-makes its first steps and is discarded, in one process per dimension, so that nothing is compiled twice. A mark beside
-the kernels lists what was compiled, so the next run of the same sources does not wait.
+Engines that compile at their first steps store the machine code on disk (`adapters.engine.Engine.kernels`). Which
+kernels a cell calls depends on its dimension and profile alone, so these are compiled once for all scenes, by
+`validation.workers` before their cells start and outside of time limits. A mark beside the kernels says that they are
+there: a run that needs nothing compiled looks for files, and starts no process.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
-import multiprocessing
-import os
-import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from adapters.engine import Engine
-from adapters.isolation import end_with
 from adapters.registry import find
 from adapters.stepping import run
 from adapters.trajectory import Sampling
-from validation.cells import Slot, prepare, settings_of, slot_from_dict
+from validation.cells import Slot, prepare, settings_of
 
 #: Steps of each cell. A kernel is compiled at its first call with everything that it calls; two more steps are for data
 #: that an engine keeps from the step before.
 STEPS = 3
 
-#: Time of a first compilation where none is on record: CPU [s], twice that of the longer of two parts (ours in 3-D, 76
-#: s on an idle machine with 2 cores).
-FIRST = 152.0
+#: Engine, profile with a user's own settings, and dimension: cells in which these are equal call the same kernels.
+Key = tuple[str, str, int]
 
 
-class Warming:
-    """The kernels that a plan still needs.
+@dataclass(frozen=True)
+class Part:
+    """Kernels to compile.
 
     Parameters
     ----------
+    key
+        Of the cells that call them.
     slots
-        Cells of the plan.
+        A cell of each scene of the plan; the first that the engine does not refuse is stepped.
+    mark
+        File that says that they are compiled.
     """
 
-    def __init__(self, slots: Sequence[Slot]) -> None:
-        self._tasks: list[tuple[list[dict[str, object]], Path]] = []
-        for (name, dimension), group in _groups(slots).items():
-            engine = find(name).engine
-            folder = engine.kernels() if isinstance(engine, Engine) else None
-            if folder is not None:
-                wanted = [slot.as_dict() for slot in group.values()]
-                of = repr((dimension, sorted(group))).encode()
-                mark = folder / f"warm-{hashlib.sha256(of).hexdigest()[:12]}.json"
-                if not mark.is_file():
-                    self._tasks.append((wanted, mark))
+    key: Key
+    slots: tuple[Slot, ...]
+    mark: Path
 
-    @property
-    def begun(self) -> bool:
-        """Whether all parts have been compiled for other cells: only kernels that those did not call are missing."""
-        return all(any(_dimension(path) == wanted[0]["dimension"] for path in mark.parent.glob("warm-*.json"))
-                   for wanted, mark in self._tasks)  # fmt: skip
+    def __str__(self) -> str:
+        """``reference/classical 2-D``."""
+        engine, profile, dimension = self.key
+        return f"{engine}/{profile} {dimension}-D"
 
-    def __len__(self) -> int:
-        """Number of parts, an engine and a dimension each."""
-        return len(self._tasks)
-
-    def estimate(self, jobs: int) -> float:
-        """Expected time on idle cores [s]: the longest of earlier compilations here and the one on another machine.
-
-        CPU time, which a busy machine hardly changes. Earlier compilations may have found kernels in the cache.
-        """
-        known = [_seconds(path) for _, mark in self._tasks for path in mark.parent.parent.glob("*/warm-*.json")]
-        each = max([*known, FIRST / 2.0])
-        return each * -(-len(self._tasks) // max(1, min(jobs, len(self._tasks))))
-
-    def run(self, jobs: int) -> Iterator[str]:
-        """Compile; yields the name of each finished part. A failure here is reported later by its cell."""
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(max(1, min(jobs, len(self._tasks))), context, end_with, (os.getpid(),)) as pool:
-            running = {pool.submit(_compile, slots): (slots, mark) for slots, mark in self._tasks}
-            for future in as_completed(running):
-                slots, mark = running[future]
-                with contextlib.suppress(BrokenProcessPool, Exception):
-                    seconds = future.result()
-                    mark.write_text(
-                        json.dumps({"cpu_seconds": round(seconds, 1), "dimension": slots[0]["dimension"]}),
-                        encoding="utf-8",
-                    )
-                yield f"{slots[0]['engine']} {slots[0]['dimension']}-D"
+    def keep(self) -> None:
+        """Write the mark; without a writable folder the kernels are not kept either."""
+        with contextlib.suppress(OSError):
+            self.mark.write_text(f"{self}\n", encoding="utf-8")
 
 
-def _groups(slots: Sequence[Slot]) -> dict[tuple[str, int], dict[tuple[str, str], Slot]]:
-    """First cell of every profile and scene, by engine and dimension, which share kernels."""
-    found: dict[tuple[str, int], dict[tuple[str, str], Slot]] = defaultdict(dict)
+def key_of(slot: Slot) -> Key:
+    """What determines the kernels of a cell."""
+    return slot.engine, slot.profile, slot.dimension
+
+
+def missing(slots: Iterable[Slot]) -> list[Part]:
+    """Kernels of these cells that are not compiled yet, in the order of the profiles: a textbook step before others.
+
+    Empty for engines that compile nothing, have nowhere to keep kernels, or are not installed.
+    """
+    cells: dict[Key, dict[str, Slot]] = defaultdict(dict)
     for slot in slots:
-        found[slot.engine, slot.dimension].setdefault((slot.profile, slot.scene), slot)
+        cells[key_of(slot)].setdefault(slot.scene, slot)
+    folders = {name: _folder(name) for name in {name for name, _, _ in cells}}
+    profiles = list(dict.fromkeys((name, profile) for name, profile, _ in cells))
+    found = []
+    for key in sorted(cells, key=lambda key: (profiles.index(key[:2]), key[2])):
+        folder = folders[key[0]]
+        if folder is not None:
+            mark = folder / f"compiled-{hashlib.sha256(repr(key).encode()).hexdigest()[:12]}"
+            if not mark.is_file():
+                found.append(Part(key, tuple(cells[key].values()), mark))
     return found
 
 
-def _compile(slots: Sequence[dict[str, object]]) -> float:
-    """Make first steps to fill the cache; return the CPU time [s]."""
-    started = time.process_time()
+def _folder(name: str) -> Path | None:
+    engine = find(name).engine
+    return engine.kernels() if isinstance(engine, Engine) else None
+
+
+def compile_one(slots: Sequence[Slot]) -> bool:
+    """Make the first steps of the first cell that can make them; whether there is one.
+
+    What goes wrong is reported by the cells themselves.
+    """
     for slot in slots:
-        with contextlib.suppress(Exception):  # the cell itself reports the error
-            first_steps(slot_from_dict(slot))
-    return time.process_time() - started
+        with contextlib.suppress(Exception):
+            first_steps(slot)
+            return True
+    return False
 
 
 def first_steps(slot: Slot) -> None:
@@ -122,22 +112,3 @@ def first_steps(slot: Slot) -> None:
     if isinstance(engine, Engine):
         values = {setting.name: setting.value for setting in settings_of(engine, slot, prepared.scene)}
         run(engine, replace(prepared.scene, duration=STEPS * slot.dt), slot.dt, values, Sampling(contacts_from=0.0))
-
-
-def _seconds(mark: Path) -> float:
-    try:
-        return float(_told(mark)["cpu_seconds"])
-    except (ValueError, KeyError, TypeError):
-        return 0.0
-
-
-def _dimension(mark: Path) -> object:
-    return _told(mark).get("dimension")
-
-
-def _told(mark: Path) -> dict[str, Any]:
-    """Content of a mark; empty where it cannot be read."""
-    try:
-        return dict(json.loads(mark.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return {}

@@ -1,4 +1,8 @@
-"""The parent's side: assigns cells to workers, with time limits, and collects results."""
+"""The parent's side: assigns cells to workers, with time limits, and collects results.
+
+Kernels that cells need are compiled by the same workers first (`validation.running.warming`), outside the cells' time
+limits. One worker runs other cells meanwhile, as long as there are any.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +10,27 @@ import base64
 import json
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing.connection import wait
 from pathlib import Path
+from typing import Any
 
 from adapters import registry
 from adapters.foreign import said_by
 from adapters.isolation import Child, Lost, Mistaken
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare
+from validation.running import warming
 from validation.running.tracks import Recording, recording_from_bytes
 from validation.workers import limits
 from validation.workers.process import READY, serve
 
-#: Seconds after which a cell counts as hanging: the slowest healthy one needs seconds, plus a cold compilation.
+#: Seconds after which a cell counts as hanging: the slowest healthy one needs seconds.
 TIMEOUT = 300.0
+#: Time limit of a compilation [s]: twenty times what our slowest part took on a busy machine with 2 cores.
+COMPILING = 3600.0
 #: Time limit [s] for the start of a worker: it imports our packages, perhaps on a busy machine with a cold disk.
 START = 120.0
 #: Time-outs of one engine on one scene after which its other cells there are left out, as they would hang too.
@@ -39,14 +47,85 @@ class _Seat:
 
     child: Child | None = None
     engine: str = ""
-    slot: Slot | None = None
+    work: Slot | warming.Part | None = None
     until: float = 0.0
 
     def free(self) -> None:
         """End the worker, and everything it started."""
         if self.child is not None:
             self.child.stop()
-        self.child, self.engine, self.slot = None, "", None
+        self.child, self.engine, self.work = None, "", None
+
+
+class _Waiting:
+    """Cells that have not run, those of them that wait for kernels, and the kernels."""
+
+    def __init__(
+        self, slots: Sequence[Slot], parts: Sequence[warming.Part], leave: Callable[[Slot, str], None]
+    ) -> None:
+        self._leave = leave
+        self._timeouts: Counter[tuple[str, str]] = Counter()
+        self._repeated: set[Slot] = set()
+        self._parts = deque(parts)
+        self._held: dict[warming.Key, list[Slot]] = {part.key: [] for part in parts}
+        self._ready: dict[str, deque[Slot]] = {}
+        for slot in slots:
+            held = self._held.get(warming.key_of(slot))
+            (self._ready.setdefault(slot.engine, deque()) if held is None else held).append(slot)
+
+    def never_started(self) -> Iterator[Observation]:
+        """Cells of plugins that end or hang the process that imports them."""
+        for engine in list(self._ready):
+            found = registry.find(engine)
+            if found.fatal:
+                for slot in self._ready.pop(engine):
+                    yield _lost(slot, Outcome.CRASHED, found.reason, "")
+
+    def next(self, seat: _Seat, seats: Sequence[_Seat]) -> Slot | warming.Part | None:
+        """Take the next work of a free seat: kernels, as long as another seat is left for cells that can run.
+
+        Else a cell of its engine while there are any, then of the engine with the most cells left.
+        """
+        compiling = sum(isinstance(other.work, warming.Part) for other in seats)
+        while True:
+            self._ready = {engine: queue for engine, queue in self._ready.items() if queue}
+            if self._parts and (not self._ready or compiling < len(seats) - 1):
+                return self._parts.popleft()
+            if not self._ready:
+                return None
+            engine = seat.engine
+            if engine not in self._ready:
+                served = Counter(other.engine for other in seats)
+                engine = max(self._ready, key=lambda name: len(self._ready[name]) / (1 + served[name]))
+            slot = self.first(engine)
+            if slot is not None:
+                return slot
+
+    def first(self, engine: str) -> Slot | None:
+        """Take the first cell of an engine that should run; those before it are left out."""
+        queue = self._ready.get(engine, deque())
+        while queue:
+            slot = queue.popleft()
+            if self._timeouts[slot.engine, slot.scene] < MOST_TIMEOUTS:
+                return slot
+            self._leave(slot, f"{slot.engine} has timed out {MOST_TIMEOUTS} times on {slot.scene}")
+        return None
+
+    def timed_out(self, slot: Slot) -> None:
+        """Count a time-out."""
+        self._timeouts[slot.engine, slot.scene] += 1
+
+    def again(self, slot: Slot) -> bool:
+        """Let a cell run once more, next of its engine; False if it has."""
+        if slot in self._repeated:
+            return False
+        self._repeated.add(slot)
+        self._ready.setdefault(slot.engine, deque()).appendleft(slot)
+        return True
+
+    def compiled(self, part: warming.Part) -> None:
+        """Let the cells start that waited for these kernels; where they could not be compiled, the cells report why."""
+        self._ready.setdefault(part.key[0], deque()).extend(self._held.pop(part.key))
 
 
 def run_cells(
@@ -58,6 +137,8 @@ def run_cells(
     shown: Set[Slot] = frozenset(),
     record: Callable[[Slot, Recording], None] = lambda slot, recording: None,
     leave: Callable[[Slot, str], None] = lambda slot, reason: None,
+    parts: Sequence[warming.Part] | None = None,
+    compiled: Callable[[warming.Part], None] = lambda part: None,
 ) -> Iterator[Observation]:
     """Yield an observation per slot, in the order in which they finish.
 
@@ -78,6 +159,10 @@ def run_cells(
         Slots whose motion is recorded, and a function called with each recording before its observation is yielded.
     leave
         Called with the reason for every slot that is left out after three time-outs of its engine on its scene.
+    parts
+        Kernels to compile, in this order; None: those that the slots need and that are missing.
+    compiled
+        Called with each part when it is done, before a cell that needs it starts.
 
     Raises
     ------
@@ -88,63 +173,71 @@ def run_cells(
     Unwritten
         If a requested trajectory cannot be written.
     """
-    if not slots:
+    parts = warming.missing(slots) if parts is None else parts
+    if not slots and not parts:
         return
-    jobs = limits.workers(jobs, len(slots))
+    jobs = limits.workers(jobs, len(slots) + len(parts))
     memory = limits.memory(jobs) if memory is None else memory
-    texts = posed.texts_of(slot.scene for slot in slots)
-    waiting: dict[str, deque[Slot]] = {}
-    for wanted in slots:
-        waiting.setdefault(wanted.engine, deque()).append(wanted)
-    timeouts: Counter[tuple[str, str]] = Counter()
-    repeated: set[Slot] = set()
+    waiting = _Waiting(slots, parts, leave)
     seats = [_Seat() for _ in range(jobs)]
     try:
-        yield from _never_started(waiting)
+        yield from waiting.never_started()
 
         failure: Exception | None = None  # no new cell is started; raised after the running ones have ended
 
-        def ask(seat: _Seat, choose: Callable[[], Slot | None]) -> None:
+        def ask(seat: _Seat, choose: Callable[[], Slot | warming.Part | None]) -> None:
             nonlocal failure
             try:
-                slot = choose()
-                if slot is not None:
-                    _ask(seat, slot, texts, timeout, keep(slot), slot in shown)
+                work = choose()
+                if work is None:
+                    return
+                if isinstance(work, warming.Part):
+                    _engage(seat, work.key[0], memory)
+                    _send(seat, work, {"compile": [slot.as_dict() for slot in work.slots]}, work.slots, COMPILING)
+                else:
+                    _engage(seat, work.engine, memory)
+                    _send(seat, work, _job(work, keep(work), work in shown), [work], timeout)
             except Exception as error:  # no worker can be started, or the caller cannot store results
                 failure = failure or error
 
         while True:
             for seat in seats:
-                if seat.slot is None and failure is None:
-                    ask(seat, partial(_next, seat, seats, waiting, timeouts, leave, memory))
-            busy = [seat for seat in seats if seat.slot is not None]
+                if seat.work is None and failure is None:
+                    ask(seat, partial(waiting.next, seat, seats))
+                    if seat.work is None:
+                        seat.free()
+            busy = [seat for seat in seats if seat.work is not None]
             if not busy:
                 if failure is not None:
                     raise failure
                 return
             for seat in _ready(busy):
-                slot = seat.slot
-                assert slot is not None
+                work = seat.work
+                assert work is not None
+                if isinstance(work, warming.Part):
+                    if _compiled(seat):
+                        work.keep()
+                    compiled(work)
+                    waiting.compiled(work)
+                    continue
                 try:
-                    observation, recording = _collect(seat, slot, timeout)
+                    observation, recording = _collect(seat, work, timeout)
                 except Unwritten as error:
                     failure = failure or error
                     continue
                 except Mistaken as mistaken:
-                    if slot not in repeated:
-                        repeated.add(slot)
-                        waiting.setdefault(slot.engine, deque()).appendleft(slot)
+                    if waiting.again(work):
                         continue
-                    observation, recording = _lost(slot, Outcome.CRASHED, str(mistaken), ""), None
+                    observation, recording = _lost(work, Outcome.CRASHED, str(mistaken), ""), None
                 if observation.outcome is Outcome.TIMED_OUT:
-                    timeouts[slot.engine, slot.scene] += 1
+                    waiting.timed_out(work)
                 # Before the result is used, so that a worker does not wait while it is stored. No worker is started
                 # meanwhile, which takes seconds.
                 if seat.child is not None and failure is None:
-                    ask(seat, partial(_first, waiting.get(seat.engine, deque()), timeouts, leave))
+                    ask(seat, partial(waiting.first, seat.engine))
                 if recording is not None:
                     try:
-                        record(slot, recording)
+                        record(work, recording)
                     except Exception as error:  # as if it had not run: it runs again when the run is resumed
                         failure = failure or error
                         continue
@@ -154,53 +247,11 @@ def run_cells(
             seat.free()
 
 
-def _never_started(waiting: dict[str, deque[Slot]]) -> Iterator[Observation]:
-    """Cells of plugins that end or hang the process that imports them."""
-    for engine in list(waiting):
-        found = registry.find(engine)
-        if found.fatal:
-            for slot in waiting.pop(engine):
-                yield _lost(slot, Outcome.CRASHED, found.reason, "")
-
-
-def _next(
-    seat: _Seat,
-    seats: Sequence[_Seat],
-    waiting: dict[str, deque[Slot]],
-    timeouts: Counter[tuple[str, str]],
-    leave: Callable[[Slot, str], None],
-    memory: int,
-) -> Slot | None:
-    """Next cell of a free seat: of its engine while there are any, else of the one with the most cells left.
-
-    The seat has a worker for it then.
-    """
-    slot = None
-    while slot is None:
-        for engine in [engine for engine, queue in waiting.items() if not queue]:
-            del waiting[engine]
-        if not waiting:
-            seat.free()
-            return None
-        engine = seat.engine
-        if engine not in waiting:
-            served = Counter(other.engine for other in seats)
-            engine = max(waiting, key=lambda name: len(waiting[name]) / (1 + served[name]))
-        slot = _first(waiting[engine], timeouts, leave)
+def _engage(seat: _Seat, engine: str, memory: int) -> None:
+    """Give a seat a worker for an engine, if it has none."""
     if seat.engine != engine or seat.child is None:
         seat.free()
         seat.child, seat.engine = _started(memory), engine
-    return slot
-
-
-def _first(queue: deque[Slot], timeouts: Counter[tuple[str, str]], leave: Callable[[Slot, str], None]) -> Slot | None:
-    """Take the first cell that should run; those before it are left out."""
-    while queue:
-        slot = queue.popleft()
-        if timeouts[slot.engine, slot.scene] < MOST_TIMEOUTS:
-            return slot
-        leave(slot, f"{slot.engine} has timed out {MOST_TIMEOUTS} times on {slot.scene}")
-    return None
 
 
 def _started(memory: int) -> Child:
@@ -223,19 +274,25 @@ def _started(memory: int) -> Child:
         raise limits.LimitError(f"worker: cannot start: {lost}" + (f": {said}" if said else "")) from None
 
 
-def _ask(seat: _Seat, slot: Slot, texts: dict[str, str], timeout: float, keep: Path | None, record: bool) -> None:
-    job = {
+def _job(slot: Slot, keep: Path | None, record: bool) -> dict[str, Any]:
+    return {
         "slot": slot.as_dict(),
-        "scenes": {name: text for name, text in texts.items() if name == slot.scene},
-        "stated": posed.handed([slot.scene]),
         "keep": str(keep) if keep else None,
         "record": record,
         "installed": registry.find(slot.engine).engine is not None,
     }
+
+
+def _send(
+    seat: _Seat, work: Slot | warming.Part, job: Mapping[str, Any], slots: Sequence[Slot], timeout: float
+) -> None:
+    """Send a job with the scene files of its slots."""
+    scenes = [slot.scene for slot in slots]
+    told = {**job, "scenes": posed.texts_of(scenes), "stated": posed.handed(scenes)}
     assert seat.child is not None
     seat.child.written = b""
-    seat.child.send(json.dumps(job).encode())
-    seat.slot, seat.until = slot, time.monotonic() + timeout
+    seat.child.send(json.dumps(told).encode())
+    seat.work, seat.until = work, time.monotonic() + timeout
 
 
 def _ready(busy: Sequence[_Seat]) -> list[_Seat]:
@@ -256,7 +313,7 @@ def _ready(busy: Sequence[_Seat]) -> list[_Seat]:
 def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Recording | None]:
     child = seat.child
     assert child is not None
-    seat.slot = None
+    seat.work = None
     try:
         if not child.has_answer() and not child.ended():
             child.stop()
@@ -290,6 +347,17 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
     if not observation.cell:
         observation = _lost(slot, observation.outcome, observation.reason, "")
     return replace(observation, log=log), recording
+
+
+def _compiled(seat: _Seat) -> bool:
+    """Whether a seat has compiled its kernels; its worker is renewed if it ended or hangs."""
+    assert seat.child is not None
+    seat.work = None
+    try:
+        return bool(json.loads(seat.child.receive(0.0))["compiled"])
+    except Exception:
+        seat.free()
+        return False
 
 
 def _lost(slot: Slot, outcome: Outcome, reason: str, log: str) -> Observation:

@@ -22,7 +22,7 @@ READY = b"ready"
 
 
 def serve(connection: Connection) -> None:
-    """Run cells until the other end closes."""
+    """Run cells, and compile kernels, until the other end closes."""
     from validation.running.execution import perform  # noqa: F401  (loaded before the first cell's clock starts)
 
     registry.load_engines_here()
@@ -33,8 +33,25 @@ def serve(connection: Connection) -> None:
             job = json.loads(connection.recv_bytes())
         except EOFError:
             return
-        answer, before = _answer(job, before)
+        if "compile" in job:
+            answer = _compiled(job)
+        else:
+            answer, before = _answer(job, before)
         connection.send_bytes(json.dumps(answer).encode())
+
+
+def _compiled(job: Mapping[str, Any]) -> dict[str, Any]:
+    """Compile the kernels that the cells of a job call; whether that worked."""
+    from validation.running.warming import compile_one
+
+    _learn(job)
+    return {"compiled": compile_one([slot_from_dict(data) for data in job["compile"]])}
+
+
+def _learn(job: Mapping[str, Any]) -> None:
+    """Scene files that the parent has read."""
+    posed.remember(job["scenes"])
+    posed.hand_over(job["stated"])
 
 
 def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[str, Any], state.State | None]:
@@ -44,8 +61,7 @@ def _answer(job: Mapping[str, Any], before: state.State | None) -> tuple[dict[st
     """
     slot, recording, changed, unwritten = slot_from_dict(job["slot"]), None, "", None
     try:
-        posed.remember(job["scenes"])
-        posed.hand_over(job["stated"])
+        _learn(job)
         found = registry.find(slot.engine)
         before = state.taken() if before is None else state.still(before)
         try:
