@@ -160,6 +160,7 @@ class Child:
         wait([process.sentinel], 0.5 if self._closed() else 0.0)
         ended = _has_ended(process)
         if not ended:
+            assert process.pid is not None
             process.terminate()  # its guardian ends all its processes, and then itself
             _kill(process.pid, signal.SIGCONT)  # the child may have stopped it
             process.join(GRACE)

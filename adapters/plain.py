@@ -11,6 +11,11 @@ import unicodedata
 from collections.abc import Mapping
 from typing import Any
 
+
+class Notice(UserWarning):
+    """What a user must know while a command goes on; one line, which commands print."""
+
+
 #: Longest reason [characters]: three lines of a wide terminal.
 REASON = 500
 #: Longest name or version [characters] for a column.

@@ -7,7 +7,7 @@ import json
 import math
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from enum import Enum
 from fractions import Fraction
 from typing import Any
@@ -36,6 +36,9 @@ MOST_STEPS, MOST_SAMPLES = 10**7, 5 * 10**7
 #: Longest step [s]: the probes of an adapter resolve nothing coarser. At 0.15 s they cannot measure friction, at 0.25 s
 #: their boxes turn over between two samples; a property check would measure the step, not the engine.
 LONGEST_DT = 0.1
+#: What is stored of each setting and property check.
+SETTING = {field.name for field in fields(Setting)}
+RECEIPT = {"quantity", "asked", "declared", "measured", "band", "holds", "because"}
 
 
 class Outcome(Enum):
@@ -264,6 +267,13 @@ def observation_from_dict(data: Mapping[str, Any]) -> Observation:
         values[name] = dict(plain(data[name]))
     for name, most in (("cell", NAME), ("engine_version", NAME), ("reason", REASON), ("state_hash", NAME)):
         values[name] = one_line(data[name], most)
+    for name, kind in (("scene_version", int), ("steps", int), ("wall_time_s", float)):
+        values[name] = kind(data[name])
+    for name, keys in (("settings", SETTING), ("receipts", RECEIPT)):
+        if not all(isinstance(item, dict) and keys <= item.keys() for item in values[name]):
+            raise ValueError(f"{name}: each is a table of {', '.join(sorted(keys))}")
+    if not math.isfinite(values["wall_time_s"]):
+        raise ValueError("wall_time_s: is not a finite number")
     values["log"] = lines(str(data["log"]), LOG_LINES)
     values.pop("out_of_plane", None)  # of runs before it was a metric: one number of mixed units
     return Observation(**values)

@@ -6,6 +6,8 @@ import contextlib
 import inspect
 import os
 import sys
+import warnings
+from functools import partial
 from typing import Any, NoReturn
 
 import click
@@ -13,7 +15,7 @@ import click
 from adapters.engine import EngineError
 from adapters.isolation import IsolationError
 from adapters.model import ReaderMissing
-from adapters.plain import one_line
+from adapters.plain import Notice, one_line
 from adapters.scene import SceneError
 from reports.command import statuses
 from reports.command.files import FOLDER
@@ -53,7 +55,10 @@ class _Group(click.Group):
         _open_streams()
         try:
             try:
-                return super().main(*args, **kwargs)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("always", Notice)
+                    warnings.showwarning = partial(_print_warning, set())
+                    return super().main(*args, **kwargs)
             finally:
                 sys.stdout.flush()  # a full disk must raise here, not at the end of the interpreter
         except ReaderMissing as error:
@@ -105,6 +110,18 @@ def _open_streams() -> None:
             if null == descriptor:
                 os.set_inheritable(null, True)
             setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
+
+
+def _print_warning(told: set[str], message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """Print a notice once, in one line, and other warnings as Python does."""
+    is_ours = issubclass(category, Notice)
+    text = (
+        f"crosscheck: {one_line(message, 2000)}" if is_ours else warnings.formatwarning(message, category, *where[:2])
+    )
+    if text not in told:
+        told.add(text)
+        with contextlib.suppress(OSError):
+            click.echo(text, err=True)
 
 
 def _leave(line: str, status: int) -> NoReturn:

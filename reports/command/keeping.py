@@ -46,7 +46,7 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
 @main.command("prune", epilog="Example: crosscheck prune --keep 50 --dry-run")
 @click.option("--keep", type=click.IntRange(1), help="Keep this many of the runs with the same title, the newest.")
 @click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Delete runs older than this.")
-@click.option("--unfinished", is_flag=True, help="Delete interrupted runs.")
+@click.option("--unfinished", is_flag=True, help="Delete interrupted runs, and damaged ones.")
 @click.option("--recordings", is_flag=True, help="Delete replays, except of the newest run of each title.")
 @click.option("--dry-run", is_flag=True, help="Only print what would be deleted.")
 @AS_JSON
@@ -63,7 +63,10 @@ def prune_(
         raise SceneError("prune: needs --keep, --older-than, --unfinished or --recordings")
     store = Store(out, create=False, write=not dry_run)
     try:
-        going = doomed(store.runs(), rules) if dry_run else prune(store, rules)
+        if dry_run:
+            going = [*doomed(store.runs(), rules), *(store.damaged().values() if unfinished else ())]
+        else:
+            going = prune(store, rules)
     finally:
         store.close()
     if as_json:

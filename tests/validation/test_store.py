@@ -98,15 +98,13 @@ def test_a_store_that_is_closed_says_that_it_cannot_write(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a b", "x" * 200 + "\n", "20260101-000000\n", "", "20260101-000000; DROP"])
-def test_an_id_that_is_none_is_said_to_eighty_letters_and_in_one_line(name):
-    row = [name, "2026-01-01T00:00:00", "abc", "{}", "title", "[]", 1]
-    with pytest.raises(ValueError) as error:
-        store_module._run_of(row)
-    said = str(error.value)
-    assert said.endswith(" is not the id of a run") and "\n" not in said and len(said) <= 82 + 23
-    assert name[:3].strip() in said
-    sound = store_module._run_of(["20260101-000000", "d\nate", "abc\x07", '{"cpu": "x"}', "ti\ntle", '["a"]', 1])
-    assert sound == store_module.Run("20260101-000000", "d", sound.commit, {"cpu": "x"}, "ti", ("a",), True)
-    assert "\x07" not in sound.commit
-    row = ["20260101-000000", "", "", "{}", "", "[]", 0]
-    assert store_module._run_of(row).finished is False
+def test_an_id_that_is_none(name):
+    row = [name, "2026-01-01T00:00:00+00:00", "abc", "{}", "title", "[]", 1]
+    with pytest.raises(ValueError, match=r"^run '.{0,80}' is damaged \(id\)$") as error:
+        store_module.run_of(row)
+    assert name[:3].strip() in str(error.value)
+    row = ["20260101-000000", row[1], "abc\x07", '{"cpu": "x\\u0007"}', "ti\ntle", '["a"]', 1]
+    sound = store_module.run_of(row)
+    machine = {"cpu": r"x\u{7}"}
+    assert sound == store_module.Run("20260101-000000", row[1], r"abc\u{7}", machine, "ti", ("a",), True)
+    assert store_module.run_of([*row[:-1], 0]).finished is False

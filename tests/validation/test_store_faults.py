@@ -6,18 +6,25 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+import threading
+from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from adapters.plain import Notice, is_visible
 from validation import posed
+from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot
 from validation.judging.rows import rows_of
 from validation.posed import pinned, resolve
 from validation.records import store
+from validation.records.keeping import Rules, merge, prune
 from validation.records.store import FILE, MissingError, Store, StoreError
 from validation.running.plan import Request, slots
+from validation.running.tracks import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOTS = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", 1 / 240) for v in (1.0, 2.0, 3.0)]
@@ -46,6 +53,22 @@ def filled(folder):
     return run
 
 
+def crowded(folder):
+    """Two finished runs with rows in every table, the second with the cell of a scene file."""
+    run = filled(folder)
+    made, empty = Store(folder), np.zeros((0, 2))
+    apart, _ = made.start("another", [*SLOTS, *written(folder / "drop.json")])
+    made.add(apart, observed(SLOTS[0])), made.finish(apart)
+    t, none = np.linspace(0.0, 1.0, 3), np.zeros(0, np.int64)
+    recording = Recording(t, np.zeros((3, 2, 3)), none, np.zeros((0, 2), np.int64), empty, empty, None, "completed")
+    for slot in SLOTS:
+        made.add_recording(run, slot, recording)
+    made.add_timings(run, [Timing("work", slot, "c", "1", 1, "a/b", 0, 0, 0, False, 9, 1.0, 1.0, "h", None)
+                           for slot in SLOTS])  # fmt: skip
+    made.set_protocol(run, {"seed": 1})
+    made.close()
+
+
 def sql(folder, statement, *values):
     with sqlite3.connect(folder / FILE) as database:
         database.execute(statement, values)
@@ -60,36 +83,119 @@ def read_all(folder):
         opened.close()
 
 
+def everything(folder):
+    """All that can be read of a store, in words."""
+    opened = Store(folder, create=False)
+    found = []
+    for run in opened.runs():
+        found += [repr(each) for each in opened.observations(run)]
+        found += [f"recording {run.id} {slot}" for slot, _ in opened.recordings(run)]
+        found += [repr(each) for each in (*opened.timings(run), *opened.scenes(run), opened.protocol(run))]
+    opened.close()
+    return found
+
+
 @pytest.mark.parametrize(
     ("statement", "values"),
     [
         ("UPDATE observations SET body = ?", ("{",)),
         ("UPDATE observations SET body = ?", ("[]",)),
-        ("UPDATE observations SET body = ?", ("null",)),
+        ("UPDATE observations SET body = ?", ("[" * 100_000,)),
         ("UPDATE observations SET body = json_set(body, '$.field_of_the_future', 1)", ()),
         ("UPDATE observations SET body = json_remove(body, '$.metrics')", ()),
         ("UPDATE observations SET body = json_set(body, '$.outcome', 'splendid')", ()),
         ("UPDATE observations SET body = json_set(body, '$.slot.dt', 'soon')", ()),
         ("UPDATE observations SET body = json_set(body, '$.metrics', 7)", ()),
+        ("UPDATE observations SET body = json_set(body, '$.steps', 'many')", ()),
+        ("UPDATE observations SET body = json_set(body, '$.settings', json('[1]'))", ()),
         ("UPDATE observations SET body = ?", (b"\x00\x01",)),
+        ("UPDATE observations SET body = CAST(? AS TEXT)", (b'{"slot": "\xff"',)),
+        ("UPDATE recordings SET body = substr(body, 1, 100)", ()),
+        ("UPDATE recordings SET body = 'text'", ()),
+        ("UPDATE recordings SET request = 'null'", ()),
+        ("UPDATE timings SET body = '{}'", ()),
+        ("UPDATE protocols SET body = '['", ()),
+        ("UPDATE scenes SET body = 'another'", ()),
         ("UPDATE runs SET plan = ?", ("{",)),
+        ("UPDATE runs SET plan = ?", ("[1]",)),
+        ("UPDATE runs SET machine = ?", ("[1",)),
         ("UPDATE runs SET machine = ?", ("[1]",)),
-        ("UPDATE runs SET id = ?", ("../../etc/x",)),
+        ("UPDATE runs SET date = ?", ("yesterday",)),
+        ("UPDATE runs SET title = ?", (b"\x00",)),
+        ("UPDATE runs SET id = ?", ("../../x",)),
         ("UPDATE runs SET id = ?", ("a\nb",)),
         ("UPDATE runs SET id = ?", ("",)),
-        ("DROP TABLE observations", ()),
-        ("DROP TABLE runs", ()),
-        ("INSERT INTO scenes SELECT id, 'drop.json@00000000', '{}' FROM runs", ()),
-        ("ALTER TABLE runs RENAME COLUMN title TO name", ()),
     ],
 )
-def test_a_store_that_was_tampered_with_is_one_line(tmp_path, statement, values):
+def test_a_damaged_row(tmp_path, statement, values):
+    """One line names its run and table, and the other rows are read."""
+    crowded(tmp_path)
+    whole = everything(tmp_path)
+    sql(tmp_path, f"{statement} WHERE rowid = (SELECT min(rowid) FROM {statement.split()[1]})", *values)
+    with pytest.warns(Notice) as said:
+        left = everything(tmp_path)
+    assert all(is_visible(str(each.message)) and len(str(each.message)) < 1000 for each in said)
+    assert left and Counter(left) < Counter([*whole, "None"]) and left != whole
+    assert "damaged" in str(said[0].message)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["DROP TABLE observations", "DROP TABLE runs", "ALTER TABLE runs RENAME COLUMN title TO name"],
+)
+def test_a_damaged_table(tmp_path, statement):
     filled(tmp_path)
-    sql(tmp_path, statement, *values)
+    sql(tmp_path, statement)
     with pytest.raises(StoreError) as caught:
         read_all(tmp_path)
-    assert "\n" not in str(caught.value) and len(str(caught.value)) < 1000
-    assert not isinstance(caught.value, MissingError)
+    assert is_visible(str(caught.value)) and not isinstance(caught.value, MissingError)
+
+
+def test_a_damaged_run(tmp_path):
+    """It cannot be asked for, does not hinder the next one, is not merged, and can be deleted."""
+    crowded(tmp_path / "a")
+    sql(tmp_path / "a", "UPDATE runs SET machine = '[1', finished = 0 WHERE rowid = 1")
+    opened = Store(tmp_path / "a")
+    (first,) = opened._db.execute("SELECT id FROM runs WHERE rowid = 1").fetchone()
+    with pytest.raises(StoreError, match=rf"run '{first}' is damaged \(machine\)"):
+        opened.run(first)
+    latest = opened.run()
+    with pytest.warns(Notice, match="is damaged"):
+        again, done = opened.start("test", SLOTS)
+    assert latest.id != first and again.id not in (first, latest.id) and done == set()
+    ours = Store(tmp_path / "b")
+    with pytest.raises(StoreError, match=rf"^merge: cannot read .*: run '{first}' is damaged"):
+        merge(ours, tmp_path / "a")
+    assert ours.runs() == []
+    gone = prune(opened, Rules(unfinished=True))
+    assert first in [run.id for run in gone] and opened.damaged() == {}
+    assert not opened._db.execute("SELECT 1 FROM observations WHERE run = ?", (first,)).fetchone()
+    assert latest.id in [run.id for run in opened.runs()]
+
+
+@pytest.mark.parametrize("name", ["a?b", "a#b", "a%20b"])
+def test_a_folder_with_the_name_of_an_address(tmp_path, name):
+    """It is merged, and no other file is opened or made."""
+    crowded(tmp_path / name)
+    ours = Store(tmp_path / "ours")
+    assert merge(ours, tmp_path / name).runs == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "ours"])
+
+
+def test_a_lock_that_lasts(tmp_path, monkeypatch):
+    """Who writes says that it waits, and writes when it is gone."""
+    run = filled(tmp_path)
+    made = Store(tmp_path)
+    other = sqlite3.connect(tmp_path / FILE, isolation_level=None, check_same_thread=False)
+    other.execute("BEGIN IMMEDIATE")
+    monkeypatch.setattr(store, "PATIENCE", 0.2)
+    made._db.execute("PRAGMA busy_timeout = 100")
+    timer = threading.Timer(1.0, other.execute, ["COMMIT"])
+    timer.start()
+    with pytest.warns(Notice, match="locked by another process; waiting") as said:
+        made.add(run, observed(SLOTS[0], reason="later"))
+    assert len(said) == 1 and "later" in [each.reason for each in made.observations(run)]
+    timer.join(), other.close()
 
 
 def test_a_file_cut_short_is_one_line(tmp_path):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from adapters.plain import plain
 from validation.cells import Slot, slot_from_dict
 
 #: Purpose of a timing: a point of a work-precision plot; cost of the binding (empty scene, one free body); cost over
@@ -72,5 +73,5 @@ class Timing:
 
 
 def timing_from_dict(data: Mapping[str, Any]) -> Timing:
-    """Inverse of `Timing.as_dict`."""
-    return Timing(**{**data, "slot": slot_from_dict(data["slot"])})
+    """Inverse of `Timing.as_dict`; texts are cleaned."""
+    return Timing(**{**plain(data), "slot": slot_from_dict(data["slot"])})

@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from adapters.plain import one_line
-from validation.records.store import Run, Store, StoreError
+from validation.records.store import Run, Store, StoreError, opened_to_read, run_of
 
 #: Tables whose rows belong to a run, and their keys.
 TABLES = {
@@ -44,7 +44,7 @@ def merge(store: Store, other: Path) -> Merged:
     Raises
     ------
     StoreError
-        If the other store cannot be read, or is the same.
+        If the other store cannot be read, has a damaged run, or is the same.
     """
     theirs = Store(other, create=False)  # checks version and damage
     path = theirs.path.resolve()
@@ -52,12 +52,10 @@ def merge(store: Store, other: Path) -> Merged:
     if path == store.path.resolve():
         raise StoreError(f"merge: {path} is the same store")
     with store.writing() as db:
-        db.execute("CREATE TEMP TABLE IF NOT EXISTS ids (theirs TEXT PRIMARY KEY, ours TEXT)")
-        db.execute("DELETE FROM ids")
-        source = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+        source = opened_to_read(path)
         try:
             return _merged(db, source)
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, ValueError) as error:
             raise StoreError(f"merge: cannot read {path}: {one_line(error)}") from None
         finally:
             source.close()
@@ -68,6 +66,7 @@ def _merged(db: sqlite3.Connection, source: sqlite3.Connection) -> Merged:
     for run in source.execute(
         "SELECT id, date, commit_hash, machine, title, plan, plan_hash, finished FROM runs ORDER BY rowid"
     ).fetchall():
+        run_of((*run[:6], run[7]))  # a damaged one is refused
         name, added = _own_id(db, run)
         new, known = new + added, known + (not added)
         db.execute("UPDATE runs SET finished = max(finished, ?) WHERE id = ?", (run[-1], name))
@@ -118,7 +117,7 @@ class Rules:
     days
         Delete runs older than this.
     unfinished
-        Delete interrupted runs.
+        Delete interrupted runs, and damaged ones.
     recordings
         Delete replay data of all runs except the newest of each title, not the runs.
     """
@@ -149,6 +148,7 @@ def doomed(runs: Iterable[Run], rules: Rules, now: datetime | None = None) -> li
 
 def prune(store: Store, rules: Rules, now: datetime | None = None) -> list[Run]:
     """Delete by the rules and free the disk space; returns the deleted runs."""
+    damaged = store.damaged() if rules.unfinished else {}
     runs = store.runs()
     going = doomed(runs, rules, now)
     newest = {run.title: run.id for run in runs if run.finished}
@@ -157,8 +157,12 @@ def prune(store: Store, rules: Rules, now: datetime | None = None) -> list[Run]:
             for table in TABLES:
                 db.execute(f"DELETE FROM {table} WHERE run = ?", (run.id,))
             db.execute("DELETE FROM runs WHERE id = ?", (run.id,))
+        for number in damaged:
+            for table in TABLES:
+                db.execute(f"DELETE FROM {table} WHERE run = (SELECT id FROM runs WHERE rowid = ?)", (number,))
+            db.execute("DELETE FROM runs WHERE rowid = ?", (number,))
         if rules.recordings:
             kept = ", ".join("?" * len(newest))
             db.execute(f"DELETE FROM recordings WHERE run NOT IN ({kept})", tuple(newest.values()))
     store.compact()
-    return going
+    return [*going, *damaged.values()]

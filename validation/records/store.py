@@ -1,4 +1,7 @@
-"""The result store: runs and their observations in one SQLite file; each cell is stored when it finishes."""
+"""The result store: runs and their observations in one SQLite file; each cell is stored when it finishes.
+
+Rows are read one by one: what is damaged is named in one line (`adapters.plain.Notice`) and left out.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -15,8 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote
 
-from adapters.plain import one_line
-from adapters.scene import SceneError
+from adapters.plain import NAME, Notice, one_line, plain
 from validation import posed
 from validation.bench.timing import Timing, timing_from_dict
 from validation.cells import Observation, Slot, observation_from_dict, slot_from_dict
@@ -26,7 +29,7 @@ from validation.running.tracks import Recording, recording_from_bytes
 FILE = "results.sqlite"
 #: Version of the tables, kept as ``user_version``; 0 is a store from before versions, which had no scenes.
 VERSION = 1
-#: Longest wait of a process for another one that writes [s].
+#: Wait for another process that writes [s]; whoever writes says then that it waits, and goes on waiting.
 PATIENCE = 30.0
 #: Title of runs with moved starts, for the scatter of another run; never the latest run.
 SCATTER_TITLE = "scatter of "
@@ -105,9 +108,9 @@ class Store:
         with self._guarded("use"):
             if write:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._db = _patiently(lambda: _opened(self.path))
+                self._db = _patiently(self.path, lambda: _opened(self.path))
             else:
-                self._db = _opened_to_read(self.path)
+                self._db = opened_to_read(self.path)
             version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version > VERSION:
             self._db.close()
@@ -115,7 +118,7 @@ class Store:
                              f"to {VERSION}")  # fmt: skip
         if write and version < VERSION:
             with self._guarded("use"):
-                _patiently(self._make_tables)
+                self._make_tables()
 
     def _make_tables(self) -> None:
         with self._transaction():
@@ -135,7 +138,7 @@ class Store:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """Write all or nothing; the write lock is taken before reading, so that two processes do not both write."""
-        self._db.execute("BEGIN IMMEDIATE")
+        _patiently(self.path, lambda: self._db.execute("BEGIN IMMEDIATE"))
         try:
             yield
             self._db.execute("COMMIT")
@@ -149,6 +152,21 @@ class Store:
         """The tables, in one transaction: for work on many runs (`validation.records.keeping`)."""
         with self._guarded("write"), self._transaction():
             yield self._db
+
+    def _made(self, what: str, rows: Iterable[Sequence[Any]], make: Callable[..., _T]) -> list[_T]:
+        """What ``make`` makes of each row; damaged rows are left out, and named in one line."""
+        found, wrong = [], []
+        for row in rows:
+            try:
+                found.append(make(*row))
+            except Exception as error:  # a damaged row may raise anything
+                wrong.append(one_line(f"{type(error).__name__}: {error}", NAME))
+        if wrong:
+            self._tell(f"{what}: damaged and left out: {len(wrong)} of {len(found) + len(wrong)}, {wrong[0]}")
+        return found
+
+    def _tell(self, line: str) -> None:
+        warnings.warn(Notice(f"out: {self.path}: {line}"), stacklevel=2)
 
     def compact(self) -> None:
         """Free the disk space of deleted data."""
@@ -176,10 +194,10 @@ class Store:
         plan_hash = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:16]
         made = json.dumps(machine()), title, json.dumps(plan), plan_hash
         here = commit()
-        query = "SELECT id FROM runs WHERE plan_hash = ? AND finished = 0 ORDER BY rowid DESC LIMIT 1"
         with self._guarded("write"), self._transaction():
-            row = None if fresh else self._db.execute(query, (plan_hash,)).fetchone()
-            if row is None:
+            open_ones = [] if fresh else self._runs("plan_hash = ? AND finished = 0", plan_hash)
+            row = (open_ones[-1].id,) if open_ones else ()
+            if not row:
                 now = datetime.now(UTC)
                 row = (self._free_id(now.strftime("%Y%m%d-%H%M%S")),)
                 date = now.isoformat(timespec="seconds")
@@ -203,7 +221,7 @@ class Store:
 
     def _write(self, statement: str, values: Sequence[Any]) -> None:
         with self._guarded("write"):
-            self._db.execute(statement, values)
+            _patiently(self.path, lambda: self._db.execute(statement, values))
 
     def finish(self, run: Run) -> None:
         """Mark the run as complete; the same plan then starts a new one."""
@@ -220,26 +238,48 @@ class Store:
         ------
         MissingError
             If there is no such run.
+        StoreError
+            If it is damaged.
         """
-        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC LIMIT 1"
+        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC"
         apart = (f"{SCATTER_TITLE}%", f"{RELEASE_TITLE}%")
         where, args = ("id = ?", (run_id,)) if run_id != "latest" else (last, apart)
         with self._guarded("read"):
-            row = self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where}", args).fetchone()
-            if row is None:
-                known = self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20").fetchall()
-                said = one_line(", ".join(str(r[0]) for r in known) or "none")
-                raise MissingError(f"run: there is no run {run_id!r} in {self.path}; it has {said}")
-            return _run_of(row)
+            for row in self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where}", args):
+                try:
+                    return run_of(row)
+                except ValueError as error:
+                    if run_id != "latest":
+                        raise StoreError(f"run: {self.path}: {error}") from None
+                    self._tell(f"{error}; it is left out")
+            known = self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20").fetchall()
+            said = one_line(", ".join(str(r[0]) for r in known) or "none")
+            raise MissingError(f"run: there is no run {run_id!r} in {self.path}; it has {said}")
 
     def _runs(self, where: str, *values: str) -> list[Run]:
         with self._guarded("read"):
-            query = f"SELECT {_COLUMNS} FROM runs WHERE {where} ORDER BY rowid"
-            return [_run_of(row) for row in self._db.execute(query, values).fetchall()]
+            found = []
+            for row in self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where} ORDER BY rowid", values):
+                try:
+                    found.append(run_of(row))
+                except ValueError as error:
+                    self._tell(f"{error}; it is left out, and crosscheck prune --unfinished deletes it")
+            return found
+
+    def damaged(self) -> dict[int, Run]:
+        """Runs that cannot be read, by row: their ids made plain, and the reason as title."""
+        with self._guarded("read"):
+            found = {}
+            for number, *row in self._db.execute(f"SELECT rowid, {_COLUMNS} FROM runs ORDER BY rowid"):
+                try:
+                    run_of(row)
+                except ValueError as error:
+                    found[number] = Run(one_line(row[0], NAME), "", "", {}, str(error), (), False)
+            return found
 
     def timed_runs(self) -> list[Run]:
         """Runs with a protocol, which have timings; oldest first."""
-        return self._runs("id IN (SELECT run FROM protocols)")
+        return [run for run in self._runs("id IN (SELECT run FROM protocols)") if self.protocol(run) is not None]
 
     def release_runs(self, engine: str, version: str = "") -> list[Run]:
         """Runs on other releases of an engine (or on one of them), oldest first."""
@@ -248,12 +288,12 @@ class Store:
 
     def observations(self, run: Run) -> list[Observation]:
         """Observations of a run, in the order of its plan; its scene files need not exist any more."""
-        self._remember_scenes(run)
+        self.scenes(run)
         with self._guarded("read"):
             rows = self._db.execute("SELECT slot, body FROM observations WHERE run = ?", (run.id,)).fetchall()
             order = {key: position for position, key in enumerate(run.plan)}
             rows.sort(key=lambda row: order.get(row[0], len(order)))
-            return [observation_from_dict(json.loads(body)) for _, body in rows]
+            return self._made(f"results of run {run.id}", rows, _observation)
 
     def missing(self, run: Run) -> int:
         """Number of planned cells of a run without observation: it was interrupted, or rows were deleted."""
@@ -266,13 +306,8 @@ class Store:
         with self._guarded("read"):
             if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'scenes'").fetchone():
                 return {}  # a store of version 0
-            return dict(self._db.execute("SELECT name, body FROM scenes WHERE run = ?", (run.id,)).fetchall())
-
-    def _remember_scenes(self, run: Run) -> None:
-        try:
-            posed.remember(self.scenes(run))
-        except SceneError as error:
-            raise StoreError(f"out: cannot read {self.path}: {one_line(error)}") from None
+            rows = self._db.execute("SELECT name, body FROM scenes WHERE run = ?", (run.id,)).fetchall()
+            return dict(self._made(f"scene files of run {run.id}", rows, _scene))
 
     def add_timings(self, run: Run, timings: Sequence[Timing]) -> None:
         """Store raw timings, in one transaction."""
@@ -292,17 +327,18 @@ class Store:
         """Raw timings of a run, in order."""
         with self._guarded("read"):
             rows = self._db.execute("SELECT body FROM timings WHERE run = ? ORDER BY rowid", (run.id,)).fetchall()
-            return [timing_from_dict(json.loads(body)) for (body,) in rows]
+            return self._made(f"times of run {run.id}", rows, lambda body: timing_from_dict(json.loads(body)))
 
     def set_protocol(self, run: Run, protocol: dict[str, Any]) -> None:
         """Store how a benchmark was made: seed, limits, clock, and what was left out and why."""
         self._write("INSERT OR REPLACE INTO protocols VALUES (?, ?)", (run.id, json.dumps(protocol)))
 
     def protocol(self, run: Run) -> dict[str, Any] | None:
-        """Protocol of a benchmark; None for a run without timings."""
+        """Protocol of a benchmark; None for a run without timings, or if it is damaged."""
         with self._guarded("read"):
-            row = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchone()
-            return None if row is None else dict(json.loads(row[0]))
+            rows = self._db.execute("SELECT body FROM protocols WHERE run = ?", (run.id,)).fetchall()
+            found = self._made(f"protocol of run {run.id}", rows, lambda body: dict(plain(json.loads(body))))
+            return found[0] if found else None
 
     def add_recording(self, run: Run, slot: Slot, recording: Recording) -> None:
         """Store the replay of a cell."""
@@ -311,21 +347,66 @@ class Store:
 
     def recordings(self, run: Run) -> list[tuple[Slot, Recording]]:
         """Recordings of a run, in the order of its plan."""
-        self._remember_scenes(run)
+        self.scenes(run)
         with self._guarded("read"):
             found = "SELECT slot, request, body FROM recordings WHERE run = ?"
             rows = self._db.execute(found, (run.id,)).fetchall()
             order = {key: position for position, key in enumerate(run.plan)}
             rows.sort(key=lambda row: order.get(row[0], len(order)))
-            return [(slot_from_dict(json.loads(slot)), recording_from_bytes(body)) for _, slot, body in rows]
+            return self._made(f"recordings of run {run.id}", rows, _recorded)
 
 
-def _run_of(row: Sequence[Any]) -> Run:
+def run_of(row: Sequence[Any]) -> Run:
+    """The run of a row of the table, in the order of the columns of `Run`.
+
+    Raises
+    ------
+    ValueError
+        Naming the run and the damaged columns, in one line.
+    """
     name, date, made_at, here, title, plan, finished = row
-    if not _ID.fullmatch(str(name)):
-        raise ValueError(f"{one_line(str(name), 80)!r} is not the id of a run")
-    texts = (one_line(date), one_line(made_at), dict(json.loads(here)), one_line(title))
-    return Run(name, *texts, tuple(json.loads(plan)), bool(finished))
+    there, slots = _parsed(here), _parsed(plan)
+    is_right = {
+        "id": isinstance(name, str) and _ID.fullmatch(name),
+        "date": isinstance(date, str) and _is_date(date),
+        "machine": isinstance(there, dict),
+        "title": isinstance(title, str),
+        "plan": isinstance(slots, list) and all(isinstance(key, str) for key in slots),
+    }
+    if wrong := [column for column, right in is_right.items() if not right]:
+        raise ValueError(f"run {one_line(name, NAME)!r} is damaged ({', '.join(wrong)})")
+    return Run(name, one_line(date), one_line(made_at), plain(there), one_line(title), tuple(slots), bool(finished))
+
+
+def _parsed(text: Any) -> Any:
+    """Data of JSON; None if it is none."""
+    try:
+        return json.loads(text)
+    except (ValueError, TypeError, RecursionError):
+        return None
+
+
+def _is_date(text: str) -> bool:
+    try:
+        return datetime.fromisoformat(text).tzinfo is not None
+    except ValueError:
+        return False
+
+
+def _observation(slot: str, body: str) -> Observation:
+    found = observation_from_dict(json.loads(body))
+    if posed.is_file(found.slot.scene):
+        posed.resolve(found.slot.scene)  # its scene may be damaged
+    return found
+
+
+def _scene(name: str, text: str) -> tuple[str, str]:
+    posed.remember({name: text})
+    return name, text
+
+
+def _recorded(_: str, slot: str, body: bytes) -> tuple[Slot, Recording]:
+    return slot_from_dict(json.loads(slot)), recording_from_bytes(body)
 
 
 def _opened(path: Path) -> sqlite3.Connection:
@@ -334,14 +415,21 @@ def _opened(path: Path) -> sqlite3.Connection:
     # WAL with NORMAL survives the end of the process, which a run must survive.
     connection.execute("PRAGMA synchronous=NORMAL")
     connection.execute("PRAGMA temp_store=MEMORY")  # a full temporary folder does not matter here
+    connection.text_factory = _as_text
     return connection
 
 
-def _opened_to_read(path: Path) -> sqlite3.Connection:
+def _as_text(data: bytes) -> str:
+    """Text of a column; bytes that are none must not hide the other rows."""
+    return data.decode(errors="replace")
+
+
+def opened_to_read(path: Path) -> sqlite3.Connection:
     """Open without writing; where the log's index cannot be created, as an immutable file."""
     address = f"file:{quote(str(path.resolve()))}?mode=ro"
     for suffix in ("", "&immutable=1"):
         connection = sqlite3.connect(address + suffix, uri=True, timeout=PATIENCE, isolation_level=None)
+        connection.text_factory = _as_text
         try:
             connection.execute("PRAGMA temp_store=MEMORY")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()
@@ -353,13 +441,19 @@ def _opened_to_read(path: Path) -> sqlite3.Connection:
     raise AssertionError("unreachable")
 
 
-def _patiently(action: Callable[[], _T]) -> _T:
-    """Repeat a call that fails as another process opens the file: a change of journal mode does not wait."""
-    ends = time.monotonic() + PATIENCE
+def _patiently(path: Path, action: Callable[[], _T]) -> _T:
+    """Repeat a call until no other process has locked the file.
+
+    A change of journal mode does not wait at all, and everything else for `PATIENCE`.
+    """
+    begun, told = time.monotonic(), False
     while True:
         try:
             return action()
         except sqlite3.OperationalError as error:
-            if "locked" not in str(error) or time.monotonic() > ends:
+            if "locked" not in str(error):
                 raise
-            time.sleep(0.05)
+        if not told and time.monotonic() - begun >= PATIENCE:
+            warnings.warn(Notice(f"out: {path} is locked by another process; waiting for it"), stacklevel=2)
+            told = True
+        time.sleep(0.05)
