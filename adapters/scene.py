@@ -31,7 +31,7 @@ from typing import Any, Literal
 
 from adapters.drives import Harmonic, check_drive
 from adapters.materials import Materials, Pair, single
-from adapters.plain import NAME, is_visible, one_line
+from adapters.plain import NAME, REASON, is_visible, one_line
 from adapters.shapes import (
     SHAPE_NAMES,
     SHAPES,
@@ -287,6 +287,8 @@ def _complete(body: Body, dimension: int) -> Body:
 
 
 def _validate_scene(scene: Scene) -> None:
+    if not isinstance(scene.name, str) or not is_visible(scene.name) or len(scene.name) > REASON:
+        raise SceneError(f"name: {one_line(scene.name, NAME)!r} cannot be the name of a scene")
     check_positive("duration", scene.duration)
     check_finite("gravity", scene.gravity)
     check_length("gravity", scene.gravity, scene.dimension)
@@ -343,7 +345,7 @@ def _validate_body(body: Body, dimension: int) -> None:
 
 
 def _validate_pair(pair: Pair, names: Mapping[str, int], most: float) -> None:
-    label = f"pair {pair.a}-{pair.b}"
+    label = one_line(f"pair {pair.a}-{pair.b}", 2 * NAME + 6)
     for side in (pair.a, pair.b):
         if side != "*" and side not in names:
             raise SceneError(f"{label}: there is no body called {side!r}")

@@ -10,11 +10,16 @@ from __future__ import annotations
 
 import hashlib
 import math
+import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
+from pickletools import genops
 from types import MappingProxyType
 from typing import Any
 
@@ -23,6 +28,7 @@ import numpy as np
 from adapters.drives import as_moving
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
+from adapters.plain import Notice
 from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
 from adapters.reference.profiles import KINDS, PROFILES, SOURCE
@@ -113,6 +119,7 @@ class ReferenceEngine(Engine):
         EngineError
             For a model or a setting that the solver refuses, or an unknown setting.
         """
+        _heal_once()
         try:
             return ReferenceSimulation(scene, solver_model(scene), _checked(settings, dt))
         except (ValueError, TypeError) as error:
@@ -182,15 +189,56 @@ class ReferenceEngine(Engine):
         return {"friction": told, "friction_impulse": told}
 
     def kernels(self) -> Path | None:
-        """Folder of the solver's kernels; None without compilation, or without a writable folder."""
+        """Folder of the solver's kernels; None without compilation, or without a writable folder.
+
+        Damaged files, as after a power cut, are thrown away.
+        """
         from reference_solver import compilation
 
-        return None if compilation.config.DISABLE_JIT else compilation.cache_folder()
+        folder = None if compilation.config.DISABLE_JIT else compilation.cache_folder()
+        if folder is not None:
+            _heal(folder)
+        return folder
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: the solver's settings."""
         changed = ", ".join(f"{name}={settings[name]!r}" for name in names)
         return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
+
+
+@cache
+def _heal_once() -> None:
+    """Look at the kernels before the first world of this process."""
+    from reference_solver import compilation
+
+    if compilation.CACHE_FOLDER is not None and not compilation.config.DISABLE_JIT:
+        _heal(compilation.CACHE_FOLDER)
+
+
+def _heal(folder: Path) -> None:
+    """Delete damaged files of kernels, and the marks in ``folder`` that say that all are compiled.
+
+    numba renames files that are complete, so none is damaged because it is being written.
+    """
+    with suppress(OSError):
+        damaged = [path for path in folder.rglob("*.nb[ic]") if not _is_pickled(path.read_bytes())]
+        for path in damaged + [path for path in folder.iterdir() if damaged and path.is_file()]:
+            path.unlink(missing_ok=True)
+        if damaged:
+            count = "1 damaged file" if len(damaged) == 1 else f"{len(damaged)} damaged files"
+            warnings.warn(Notice(f"kernels: {count} thrown away; what is missing is compiled again"), stacklevel=2)
+
+
+def _is_pickled(data: bytes) -> bool:
+    """Whether a file consists of complete pickles; none is loaded."""
+    stream = BytesIO(data)
+    try:
+        while stream.tell() < len(data):
+            for _ in genops(stream):
+                pass
+    except Exception:  # what is no pickle may raise anything
+        return False
+    return len(data) > 0
 
 
 def _checked(settings: Mapping[str, Any], dt: float) -> Any:

@@ -12,7 +12,8 @@ from generated_scenes import mutated
 from adapters.plain import is_visible
 from adapters.scene import SceneError
 from reports import exports
-from validation.cells import LONGEST_DT
+from validation.cells import LONGEST_DT, Observation, Outcome
+from validation.files.scene_files import json_schema
 from validation.files.scene_text import MOST_BODIES, MOST_BYTES
 from validation.judging.rows import rows_of
 from validation.posed import pinned, resolve
@@ -144,6 +145,60 @@ def test_pipes_folders_and_devices_are_no_scene_files(tmp_path):
     for name in ("pipe", "folder", "zero", "loop"):
         with pytest.raises(SceneError, match="cannot read"):
             pinned(str(tmp_path / f"{name}.json"))
+
+
+#: A file with a value in every field that takes text.
+WORDY = BASE | {
+    "growth": "2", "impact_law": "N-SIM", "constants": {"k": "1 + 1"}, "pairs": [{"a": "ball", "b": "floor"}],
+    "checks": [{"quantity": "floor/ball.fy", "value": "k", "tolerance": "k", "over": "mean", "because": "a reason"}],
+    "bodies": [body | {"motion": body.get("motion", "free")} for body in BASE["bodies"]],
+}  # fmt: skip
+SPOILT = "\x1b[2J\x00\u202egnp.exe\n]]>"
+
+
+def texts(schema, root):
+    """Places of all texts of a schema; a number stands for any entry of a list, ``*`` for a name of a table."""
+    schema = root["$defs"][schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
+    if schema.get("type") == "string":
+        yield ()
+    for name, each in schema.get("properties", {}).items():
+        yield from ((name, *rest) for rest in texts(each, root))
+    for each in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
+        yield from texts(each, root)
+    if isinstance(schema.get("items"), dict):
+        yield from ((0, *rest) for rest in texts(schema["items"], root))
+    if isinstance(schema.get("additionalProperties"), dict):
+        yield from (("*",), *(("k", *rest) for rest in texts(schema["additionalProperties"], root)))
+
+
+def spoilt(data, place, word):
+    """The data with another text at that place."""
+    first, *rest = place
+    if first == "*":
+        return {word: "1"}
+    changed = data.copy()
+    changed[first] = spoilt(data[first], rest, word) if rest else word
+    return changed
+
+
+@pytest.mark.parametrize("place", dict.fromkeys(texts(json_schema(), json_schema())), ids=str)
+def test_control_characters_in_a_text_of_a_scene_file(tmp_path, place):
+    """The file is refused in a line that can be read, or its text is made plain before it is shown anywhere."""
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(spoilt(WORDY, place, SPOILT)))
+    try:
+        (slot,) = slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0]))
+    except SceneError as error:
+        assert is_visible(str(error))
+        return
+    canonical = resolve(slot.scene)
+    checks = canonical.checks(canonical.scene(2), slot.dt)
+    metrics = {check.metric: (1e9, "") for check in checks}
+    rows = [row.as_dict() for row in rows_of("r", [Observation(slot, "c", 1, "1", Outcome.OK, metrics=metrics)])]
+    ElementTree.fromstring(exports.as_junit(rows))
+    written = exports.as_csv(rows) + exports.as_markdown(rows) + canonical.name + "".join(canonical.notes)
+    assert all(is_visible(line) for line in written.splitlines())
+    assert all(is_visible(row["because"]) for row in rows)
 
 
 def many(count):

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator
 
 from adapters.materials import Materials
 from adapters.plain import one_line
@@ -37,6 +37,8 @@ class SceneErrors(SceneError):
 #: A number of a file: neither ``true`` nor digits in quotes, which would be mistakes.
 Number = Annotated[float, Strict()]
 Whole = Annotated[int, Strict()]
+#: Text that is shown: one line without control characters.
+Text = Annotated[str, AfterValidator(lambda text: one_line(" ".join(text.split())))]
 
 
 class _Strict(BaseModel):
@@ -180,7 +182,7 @@ class CheckModel(_Strict):
     tolerance: Annotated[Number, Field(gt=0.0)] | str
     at: Number | None = Field(default=None, ge=0.0)
     over: Literal["mean", "least", "greatest", "spread"] | None = None
-    because: str = "stated in the scene file"
+    because: Text = "stated in the scene file"
 
 
 class SceneModel(_Strict):

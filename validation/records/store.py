@@ -29,7 +29,7 @@ from validation.running.tracks import Recording, recording_from_bytes
 FILE = "results.sqlite"
 #: Version of the tables, kept as ``user_version``; 0 is a store from before versions, which had no scenes.
 VERSION = 1
-#: Wait for another process that writes [s]; whoever writes says then that it waits, and goes on waiting.
+#: Wait for another process that writes [s]; after that a writer prints one line, and goes on waiting.
 PATIENCE = 30.0
 #: Title of runs with moved starts, for the scatter of another run; never the latest run.
 SCATTER_TITLE = "scatter of "
@@ -154,7 +154,7 @@ class Store:
             yield self._db
 
     def _made(self, what: str, rows: Iterable[Sequence[Any]], make: Callable[..., _T]) -> list[_T]:
-        """What ``make`` makes of each row; damaged rows are left out, and named in one line."""
+        """Results of ``make``, one a row; damaged rows are left out, and named in one line."""
         found, wrong = [], []
         for row in rows:
             try:
