@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -318,7 +319,23 @@ class Engine(ABC):
 
     @abstractmethod
     def version(self) -> str:
-        """Version of the engine that is installed."""
+        """Version of the engine that is installed.
+
+        Raises
+        ------
+        ImportError
+            If it cannot be imported.
+        """
+
+    def listed(self) -> str:
+        """Version by the metadata of the engine's package: nothing is imported, which takes seconds for some engines.
+
+        Raises
+        ------
+        ImportError
+            If the package is not installed.
+        """
+        return version(self.facts.package)
 
     @abstractmethod
     def refuses(self, scene: Scene, profile: str) -> str | None:

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import shlex
+from functools import cache
 from importlib.metadata import PackageNotFoundError, requires
 
 #: Distribution whose metadata lists the packages of each extra.
 PROJECT = "contact-crosscheck"
+
+
+@cache
+def required() -> tuple[str, ...]:
+    """Requirements of this project with those of its extras, from its metadata; read once a process.
+
+    Raises
+    ------
+    PackageNotFoundError
+        If nothing has installed it.
+    """
+    return tuple(requires(PROJECT) or ())
 
 
 def packages(extra: str) -> list[str]:
@@ -17,7 +30,7 @@ def packages(extra: str) -> list[str]:
     try:
         from packaging.requirements import Requirement
 
-        told = [Requirement(line) for line in requires(PROJECT) or ()]
+        told = [Requirement(line) for line in required() if extra in line]
     except (PackageNotFoundError, ModuleNotFoundError):
         return []
     return sorted(

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
-from xml.sax.saxutils import escape, quoteattr
 
 from adapters.plain import NAME, one_line
 from adapters.scene import SceneError
@@ -108,6 +107,8 @@ def named(root: Element, tags: Collection[str]) -> None:
 
 def text_of(root: Element) -> str:
     """The model as text; each element begins on its original line, so that a parser's errors name the right one."""
+    from xml.sax.saxutils import escape, quoteattr  # its import loads http and ssl
+
     line, pieces = 1, []
 
     def write(element: Element) -> None:

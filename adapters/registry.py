@@ -172,13 +172,27 @@ def brought_by(entry: EntryPoint) -> str:
     return one_line(entry.dist.name, NAME) if entry.dist is not None else ""
 
 
-def loaded(entry: EntryPoint, distribution: str = "") -> Found:
+def listed(name: str) -> Found:
+    """Look for an engine as `find` does, of ours without importing the engine itself: by the metadata of its package.
+
+    Raises
+    ------
+    EngineError
+        If no such engine is registered.
+    """
+    entry = _entries().get(name)
+    return find(name) if entry is None or not is_ours(entry) else loaded(entry, imported=False)
+
+
+def loaded(entry: EntryPoint, distribution: str = "", imported: bool = True) -> Found:
     """Load an engine in this process; for a broken one the result has the reason.
 
     Parameters
     ----------
     distribution
         The package that registers it, for the reason why it cannot be loaded.
+    imported
+        Whether the engine itself is imported, or only looked up in the metadata of its package.
     """
     engine: Engine | None = None
     facts: EngineFacts | None = None
@@ -194,7 +208,7 @@ def loaded(entry: EntryPoint, distribution: str = "") -> Found:
         for profile in dict(engine.profiles):
             if not isinstance(profile, str) or not is_visible(profile) or not 0 < len(profile) <= NAME:
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
-        return Found(name, engine, one_line(engine.version(), NAME), "", facts)
+        return Found(name, engine, one_line(engine.version() if imported else engine.listed(), NAME), "", facts)
     except ImportError as error:
         reason = f"{one_line(error)}; {_remedy(entry, facts, distribution)}"
         trace = "" if is_ours(entry) else trace_of(error)

@@ -16,10 +16,10 @@ import jinja2
 import pandas as pd
 
 from adapters import registry
-from reports.cures import recorded_fixes, recorded_paste, recorded_text, setting_text
+from reports.cures import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.tables import unset_text
-from reports.wording import first_of, markdown, number, word_of
+from reports.wording import first_of, markdown, number, setting_text, word_of
 from validation.catalogue import CATALOGUE
 
 PUBLISHED = Path(__file__).parents[1] / "reports" / "published" / "report.html"
@@ -113,7 +113,7 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "scenes/index", {"groups": groups}
     engines = [name for name in registry.names() if registry.find(name).engine is not None]
     for name in engines:
-        told = describe(name)
+        told = describe(name, measure=True)
         yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
     yield (
         "engines/index",

@@ -12,7 +12,7 @@ from adapters import registry
 from adapters.engine_folder import belongs_of
 from adapters.scene import SceneError
 from adapters.settings import text_of
-from reports.wording import number, params_text
+from reports.wording import number, params_text, setting_text
 from validation.cells import Observation, Slot, format_dt
 from validation.cells import settings_of as settings_in
 from validation.posed import is_file, resolve
@@ -435,12 +435,3 @@ def _unpasted(row: Mapping[str, Any], profile: Sequence[str]) -> str:
     engine = row["engine"]
     words = ["crosscheck", "export", row["scene"], *_case(row), "--engine", engine, *profile, "--to", "python"]
     return f"nothing to paste: {engine} is set by calls; {shlex.join(words)} writes them"
-
-
-def setting_text(value: Any) -> str:
-    """A setting's value as text."""
-    if isinstance(value, bool) or value is None:
-        return str(value)
-    if isinstance(value, list | tuple):
-        return " ".join(setting_text(item) for item in value)
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -7,10 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
-from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+from typing import TYPE_CHECKING, Any
 
 from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
@@ -18,6 +15,10 @@ from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, is_alarming, rows_of
 from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Run, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from junitparser import TestCase
 
 Plain = Mapping[str, Any]
 
@@ -118,6 +119,8 @@ def as_markdown(rows: Sequence[Plain]) -> str:
 
 def as_junit(rows: Sequence[Plain]) -> str:
     """JUnit XML: a suite per engine and profile; failures are only those with exit status 1."""
+    from junitparser import JUnitXml, TestCase, TestSuite
+
     cases: dict[str, list[TestCase]] = {}
     for row in rows:
         name = f"{row['engine']}/{row['profile']}"
@@ -138,6 +141,8 @@ def as_junit(rows: Sequence[Plain]) -> str:
 
 
 def _mark_case(case: TestCase, row: Plain) -> None:
+    from junitparser import Error, Failure, Skipped
+
     mark = mark_of(row)
     if mark in ("crashed", "timed_out"):
         failed = Error(finding_line(row))

@@ -55,11 +55,11 @@ def _cell(variation: Variation) -> str:
     return params if variation.iterations == (None,) else f"{params} at {counts} iterations"
 
 
-def engines() -> list[dict[str, Any]]:
-    """All registered engines, installed or not."""
+def engines(imported: bool = False) -> list[dict[str, Any]]:
+    """All registered engines, installed or not; by the metadata of their packages unless each is imported."""
     out: list[dict[str, Any]] = []
     for name in registry.names():
-        found = registry.find(name)
+        found = registry.find(name) if imported else registry.listed(name)
         profiles = list(found.engine.profiles) if found.engine else []
         status = "installed" if found.engine else "not installed"
         out.append(
@@ -87,16 +87,18 @@ def _stated(canonical: CanonicalScene, scene: Scene) -> list[Check]:
     return [*canonical.checks(scene, QUICK_DT), *plane_of(canonical, scene, QUICK_DT)]
 
 
-def describe(name: str) -> dict[str, Any]:
+def describe(name: str, measure: bool = False) -> dict[str, Any]:
     """Everything about one scene or engine.
+
+    ``measure`` runs the experiments that measure what an engine does when nothing is set: seconds of CPU time.
 
     Raises
     ------
     SceneError
         If nothing has that name.
     """
-    if name in registry.names():
-        return _describe_engine(name)
+    if registry.entry(name) is not None:
+        return _describe_engine(name, measure)
     try:
         return _describe_scene(name)
     except SceneError:
@@ -123,20 +125,23 @@ def _describe_scene(name: str) -> dict[str, Any]:
     }
 
 
-def _describe_engine(name: str) -> dict[str, Any]:
-    found = registry.find(name)
+def _describe_engine(name: str, measure: bool) -> dict[str, Any]:
+    found = registry.listed(name)
     out: dict[str, Any] = {"kind": "engine", "name": name, "version": found.version}
-    out |= {"unset": [_unset(row, _why_unmeasured(name)) for row in unset_of(name)]}
+    why_not = _why_unmeasured(name) if measure else f"crosscheck describe {name} --measure does so"
+    out |= {"unset": [_unset(row, why_not) for row in unset_of(name)]}
+    try:
+        settable = found.engine.settable() if found.engine else {}
+    except ImportError:  # some ask the engine, which is listed and cannot be imported
+        found = registry.find(name)
     if found.engine is None:
         return {**out, "status": "not installed", "reason": found.reason}
-    facts = found.engine.facts
-    profiles: dict[str, Any] = {}
-    for profile in found.engine.profiles:
-        per_scene = {}
-        for canonical in CATALOGUE.values():
-            wanted = needs(canonical.scene(canonical.dimensions[-1]))
-            per_scene[canonical.name] = [asdict(s) for s in found.engine.settings(profile, wanted, QUICK_DT)]
-        profiles[profile] = per_scene
+    engine, facts = found.engine, found.engine.facts
+    wanted = {scene.name: needs(scene.scene(scene.dimensions[-1])) for scene in CATALOGUE.values()}
+    profiles = {
+        profile: {name: [asdict(s) for s in engine.settings(profile, own, QUICK_DT)] for name, own in wanted.items()}
+        for profile in engine.profiles
+    }
     return {
         **out,
         "status": "installed",
@@ -149,7 +154,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "quirks": [asdict(quirk) for quirk in facts.quirks],
         "measured": [asdict(fact) | {"standing": fact.standing} for fact in facts_of(name)],
         "known_bad_versions": dict(facts.known_bad_versions),
-        "settable": [{"name": each, "must_be": kind(object())} for each, kind in found.engine.settable().items()],
+        "settable": [{"name": each, "must_be": kind(object())} for each, kind in settable.items()],
         "profiles": profiles,
     }
 
@@ -191,7 +196,7 @@ def doctor() -> dict[str, Any]:
         if path.parent.parent != home:
             problems.append(f"the package {name!r} on this path is not ours: {path.parent}")
     problems += broken() + engine_folder.problems()
-    found = engines()
+    found = engines(imported=True)
     traces: dict[str, list[str]] = {}
     for engine in found:
         trace = registry.find(engine["name"]).trace

@@ -7,9 +7,8 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
@@ -22,7 +21,10 @@ from validation.judging.verdicts import judge_physics
 from validation.posed import primary_of
 from validation.records.store import Run, Store
 
-Tables = dict[str, pd.DataFrame]
+if TYPE_CHECKING:
+    import pandas as pd
+
+Tables = dict[str, "pd.DataFrame"]
 #: Levels that fit into a terminal.
 SHOWN_LEVELS = (1e-1, 1e-2, 1e-3, 1e-5)
 
@@ -72,6 +74,8 @@ def write_all(folder: Path, run: Run, protocol: Mapping[str, Any], tables: Table
 
 def raw_of(store: Store, run: Run) -> pd.DataFrame:
     """Raw timings, one row each."""
+    import pandas as pd
+
     return pd.json_normalize([timing.as_dict() for timing in store.timings(run)])
 
 
@@ -154,6 +158,8 @@ def _table(title: str) -> Table:
 
 
 def _level_cell(row: Mapping[Any, Any], ranked: bool) -> Text:
+    import pandas as pd
+
     if not math.isfinite(row["cost"]):
         return Text("-")
     iterations = "" if row["iterations"] is None or pd.isna(row["iterations"]) else f" x{row['iterations']:.0f}"

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
+
 from rich.table import Table
 from rich.text import Text
 
 from reports.tables import grid
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def counted(found: pd.DataFrame) -> Table:

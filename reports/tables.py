@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -13,10 +13,11 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from reports.cures import setting_text
-from reports.wording import FEW, first_of, number, quantity, roles_line, word_of
+from reports.wording import FEW, first_of, number, quantity, roles_line, setting_text, word_of
 from validation.cells import format_dt
-from validation.questions.detection import BlindSpot
+
+if TYPE_CHECKING:
+    from validation.questions.detection import BlindSpot
 
 Plain = Mapping[str, Any]
 #: Note below facts measured without an adapter.

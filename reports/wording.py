@@ -199,3 +199,12 @@ def plural(count: int, noun: str) -> str:
     if count == 1:
         return f"1 {noun}"
     return f"{count} {noun.removesuffix('y')}ies" if noun.endswith("ly") else f"{count} {noun}s"
+
+
+def setting_text(value: Any) -> str:
+    """A setting's value as text."""
+    if isinstance(value, bool) or value is None:
+        return str(value)
+    if isinstance(value, list | tuple):
+        return " ".join(setting_text(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

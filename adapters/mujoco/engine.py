@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from importlib.metadata import version
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
@@ -116,6 +117,13 @@ class MujocoEngine(Engine):
         import mujoco
 
         return str(mujoco.__version__)
+
+    def listed(self) -> str:
+        """See `Engine.listed`; of `mujoco` where there is no `mujoco-core`."""
+        try:
+            return super().listed()
+        except ImportError:
+            return version("mujoco")
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """Refuse impossible and too small inertias, which MuJoCo does not compile."""

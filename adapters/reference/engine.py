@@ -91,6 +91,10 @@ class ReferenceEngine(Engine):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
         return f"{_package_version()}+{digest.hexdigest()[:8]}"
 
+    def listed(self) -> str:
+        """See `Engine.listed`; its sources are no import."""
+        return self.version()
+
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """The result of the solver's own validation.
 

@@ -1,50 +1,9 @@
 """The command: ``crosscheck``. Tables and progress go to stderr, machine output to stdout.
 
-One module per group of subcommands; importing it registers them.
+One module per group of subcommands; importing it registers them. `reports.command.group` imports it when one of them is
+called.
 """
 
-from reports.command import (
-    accepting,
-    asking,
-    benching,
-    certifying,
-    comparing,
-    curing,
-    driving,
-    exporting,
-    guessing,
-    inspecting,
-    keeping,
-    releasing,
-    reporting,
-    running,
-    schema,
-    showing,
-    sweeping,
-    tuning,
-    weighing,
-)
 from reports.command.group import main
 
-__all__ = [
-    "accepting",
-    "asking",
-    "benching",
-    "certifying",
-    "comparing",
-    "curing",
-    "driving",
-    "exporting",
-    "guessing",
-    "inspecting",
-    "keeping",
-    "main",
-    "releasing",
-    "reporting",
-    "running",
-    "schema",
-    "showing",
-    "sweeping",
-    "tuning",
-    "weighing",
-]
+__all__ = ["main"]

@@ -8,8 +8,6 @@ from typing import Any
 
 import click
 
-from adapters.scene import SceneError
-
 
 class _File(click.ParamType):
     """Name of a file to write; a name that ends in a slash is a folder and refused."""
@@ -19,7 +17,7 @@ class _File(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if str(value).endswith(("/", os.sep)):
             field = param.name if param else "file"
-            raise SceneError(f"{field}: {value} is a folder, not a file")
+            raise _wrong(f"{field}: {value} is a folder, not a file")
         return Path(value)
 
 
@@ -31,7 +29,7 @@ class _Folder(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if not str(value):
             field = param.opts[0].strip("-") if param else "folder"
-            raise SceneError(f"{field}: is empty; `.` is the folder that you are in")
+            raise _wrong(f"{field}: is empty; `.` is the folder that you are in")
         return Path(value)
 
 
@@ -47,12 +45,12 @@ def writable(path: Path, field: str) -> Path:
         With the name ``field``, if it is a folder, if its folder is missing, or if it is not writable.
     """
     if path.is_dir():
-        raise SceneError(f"{field}: {path} is a folder, not a file")
+        raise _wrong(f"{field}: {path} is a folder, not a file")
     folder = nearest(path.parent)
     if field != "output" and folder != path.parent:
-        raise SceneError(f"{field}: there is no folder {path.parent}")
+        raise _wrong(f"{field}: there is no folder {path.parent}")
     if not os.access(path if path.exists() else folder, os.W_OK):
-        raise SceneError(f"{field}: {path} may not be written")
+        raise _wrong(f"{field}: {path} may not be written")
     return path
 
 
@@ -65,13 +63,20 @@ def folder(path: Path, field: str = "out") -> Path:
         With the name ``field``, if there is a file of that name, or no folder can be made.
     """
     if path.exists() and not path.is_dir():
-        raise SceneError(f"{field}: {path} is a file, not a folder")
+        raise _wrong(f"{field}: {path} is a file, not a folder")
     there = nearest(path)
     if not there.is_dir() or not os.access(there, os.W_OK):
-        raise SceneError(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
+        raise _wrong(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
     return path
 
 
 def nearest(path: Path) -> Path:
     """The first of ``path`` and its parents that exists."""
     return next((p for p in (path, *path.absolute().parents) if p.exists()), path)
+
+
+def _wrong(text: str) -> Exception:
+    """The error of a wrong call; its module is imported where there is one, since all commands import this one."""
+    from adapters.scene import SceneError
+
+    return SceneError(text)

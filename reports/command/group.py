@@ -3,72 +3,103 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import os
 import sys
 import warnings
 from functools import partial
+from importlib import import_module
 from typing import Any, NoReturn
 
 import click
 
-from adapters.engine import EngineError
-from adapters.isolation import IsolationError
-from adapters.model import ReaderMissing
-from adapters.plain import Notice, one_line
-from adapters.scene import SceneError
 from reports.command import statuses
 from reports.command.files import FOLDER
-from validation.findings import FindingsError
-from validation.records.store import MissingError, StoreError
-from validation.workers import LimitError
-
-#: Errors of a wrong call; each is printed as one line, with exit status 2.
-WRONG_CALL = (SceneError, EngineError, MissingError, FindingsError)
-#: Errors of a machine that has too little memory or no further process.
-TOO_LITTLE = (LimitError, IsolationError)
 
 OUT = click.option(
     "--out", default="crosscheck-out", show_default=True, type=FOLDER, metavar="PATH", help="Folder for results."
 )
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on stdout.")
 
-
-#: Commands in the order of work.
+#: Commands in the order of work, each with its module in `reports.command` and the first line of its help: what the
+#: list of commands needs, so that it imports none of them. A test compares these lines with the commands.
 SECTIONS = {
-    "Start here": ("run", "ask", "show", "explain", "report"),
-    "Look closer": (
-        "findings", "describe", "list", "compare", "bench", "frontier", "residuals", "nulls", "field"
-    ),
-    "Your own scene, model or engine": ("sweep", "cure", "export", "new-adapter", "check-adapter"),
-    "Since which release": ("releases", "bisect", "dashboard"),
-    "Maintain results, lists and settings": ("accept", "tune", "bundle", "merge", "prune", "doctor"),
-    "The reference solver": ("certify", "profile"),
-    "Seldom needed": ("compile", "run-cell", "schema"),
-}  # fmt: skip
+    "Start here": {
+        "run": ("running", "Run scenes on engines and judge every check."),
+        "ask": ("asking", "Find a scene and a fix from a symptom in your words."),
+        "show": ("showing", "Show the verdicts of a run again."),
+        "explain": ("showing", "Explain one check: values, truth, tolerance, cause and fix."),
+        "report": ("reporting", "Write the report of a run as one HTML page."),
+    },
+    "Look closer": {
+        "findings": ("showing", "List the checks of a run that fail, by cause."),
+        "describe": ("inspecting", "Describe a scene or an engine."),
+        "list": ("inspecting", "List scenes, suites, engines, checks or runs."),
+        "compare": ("comparing", "Show what changed between two runs."),
+        "bench": ("benching", "Measure error against time, over steps and iterations."),
+        "frontier": ("driving", "Find breaking points: how far a scene goes until it fails."),
+        "residuals": ("weighing", "Check reported contact forces against the laws of contact."),
+        "nulls": ("guessing", "Score trivial answers that need no engine."),
+        "field": ("asking", "Run known reports (public questions and bugs) again."),
+    },
+    "Your own scene, model or engine": {
+        "sweep": ("sweeping", "Run scenes over grids of parameters, into one table."),
+        "cure": ("curing", "Search stock settings that fix a scene, and their cost."),
+        "export": ("exporting", "Write a case as a script of its engine, or results as tables."),
+        "new-adapter": ("inspecting", "Write a package for an engine of your own."),
+        "check-adapter": ("inspecting", "Test an adapter for conformance."),
+    },
+    "Since which release": {
+        "releases": ("releasing", "Run scenes on releases of an engine."),
+        "bisect": ("releasing", "Find the release that changed a check."),
+        "dashboard": ("reporting", "Write one HTML page about all runs and releases."),
+    },
+    "Maintain results, lists and settings": {
+        "accept": ("accepting", "Add failing checks of a run to the list of known failures."),
+        "tune": ("tuning", "Search better stock settings for a profile."),
+        "bundle": ("reporting", "Write a run as one archive."),
+        "merge": ("keeping", "Add the runs of other folders to this one."),
+        "prune": ("keeping", "Delete old runs."),
+        "doctor": ("inspecting", "Check the installation."),
+    },
+    "The reference solver": {
+        "certify": ("certifying", "Test the reference solver against its stated accuracy."),
+        "profile": ("benching", "Show how long each stage of a solver step takes."),
+    },
+    "Seldom needed": {
+        "compile": ("running", "Compile the solver's kernels."),
+        "run-cell": ("running", "Run cases given as JSON, for a scheduler."),
+        "schema": ("schema", "Print the JSON Schema of scene files."),
+    },
+}
+_MODULES = {name: module for section in SECTIONS.values() for name, (module, _) in section.items()}
 
 
 class _Group(click.Group):
-    """Prints errors as one line; the exit status says what kind of error it was (`reports.command.statuses`)."""
+    """Imports the module of a command when the command is called, and prints errors as one line.
+
+    The exit status says what kind of error it was (`reports.command.statuses`).
+    """
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands in the order of work."""
+        return [*_MODULES]
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """The command called ``name``; importing its module registers it."""
+        if name in _MODULES:
+            import_module(f"reports.command.{_MODULES[name]}")
+        return super().get_command(ctx, name)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         _open_streams()
         try:
             try:
                 with warnings.catch_warnings():
-                    warnings.simplefilter("always", Notice)
+                    warnings.simplefilter("always", UserWarning)  # `adapters.plain.Notice` is one
                     warnings.showwarning = partial(_print_warning, set())
                     return super().main(*args, **kwargs)
             finally:
                 sys.stdout.flush()  # a full disk must raise here, not at the end of the interpreter
-        except ReaderMissing as error:
-            _leave(str(error), statuses.INCOMPLETE)
-        except WRONG_CALL as error:
-            _leave(str(error), statuses.WRONG_CALL)
-        except TOO_LITTLE as error:
-            _leave(str(error), statuses.INCOMPLETE)
-        except StoreError as error:
-            _leave(str(error), statuses.RESULTS)
         except ModuleNotFoundError as error:
             _leave(f"{error.name or error}: is not installed here; crosscheck doctor says what is", statuses.INCOMPLETE)
         except BrokenPipeError:
@@ -77,14 +108,18 @@ class _Group(click.Group):
         except OSError as error:
             _silence_stdout()
             _leave(f"{error.filename or 'the output'}: {error.strerror or error}", statuses.RESULTS)
+        except Exception as error:
+            status = _status_of(error)
+            if status is None:
+                raise
+            _leave(str(error), status)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write all commands by `SECTIONS`, each with the whole first line of its help."""
-        width = max(map(len, self.commands))
-        for section, names in SECTIONS.items():
-            with formatter.section(section):
-                lines = [(name.ljust(width), inspect.getdoc(self.commands[name].callback)) for name in names]
-                formatter.write_dl([(name, (told or "").partition("\n")[0]) for name, told in lines])
+        width = max(map(len, _MODULES))
+        for title, section in SECTIONS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(width), line) for name, (_, line) in section.items()])
         formatter.write_paragraph()
         formatter.write_text("crosscheck COMMAND --help has options and an example.")
 
@@ -96,6 +131,23 @@ class _Group(click.Group):
         except BrokenPipeError:  # click would end with 1, which is a verdict
             _silence_stdout()  # the reader of our output has closed it early
             ctx.exit(statuses.RESULTS)
+
+
+def _status_of(error: Exception) -> int | None:
+    """Exit status of an error that is printed as one line; None of another. Imports what raised it, not more."""
+    from adapters.engine import EngineError
+    from adapters.isolation import IsolationError
+    from adapters.model import ReaderMissing
+    from adapters.scene import SceneError
+    from validation.findings import FindingsError
+    from validation.records.store import MissingError, StoreError
+    from validation.workers import LimitError
+
+    if isinstance(error, ReaderMissing | LimitError | IsolationError):
+        return statuses.INCOMPLETE
+    if isinstance(error, SceneError | EngineError | MissingError | FindingsError):
+        return statuses.WRONG_CALL
+    return statuses.RESULTS if isinstance(error, StoreError) else None
 
 
 def _open_streams() -> None:
@@ -114,6 +166,8 @@ def _open_streams() -> None:
 
 def _print_warning(told: set[str], message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
     """Print a notice once, in one line, and other warnings as Python does."""
+    from adapters.plain import Notice, one_line
+
     is_ours = issubclass(category, Notice)
     text = (
         f"crosscheck: {one_line(message, 2000)}" if is_ours else warnings.formatwarning(message, category, *where[:2])
@@ -125,6 +179,8 @@ def _print_warning(told: set[str], message: Warning | str, category: type[Warnin
 
 
 def _leave(line: str, status: int) -> NoReturn:
+    from adapters.plain import one_line
+
     with contextlib.suppress(OSError):  # if stderr is closed too, the status is enough
         click.echo(f"crosscheck: {one_line(line, 2000)}", err=True)
     sys.exit(status)

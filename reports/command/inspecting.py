@@ -19,8 +19,6 @@ from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
 from reports.wording import profiles_called
-from validation.questions.detection import Detected, detection, lines, only_by_receipts
-from validation.records.store import Store
 
 
 @main.command("list", epilog="Example: crosscheck list scenes")
@@ -43,10 +41,11 @@ def list_(
     that the reference solver cannot run go to the first tuned engine that can.
     """
     data: list[Any]
-    found = Detected([], [])
     if reasons and what != "checks":
         raise SceneError("reasons: belongs to checks, not to " + what)
     if sensitivity:
+        from validation.questions import detection
+
         if what != "checks":
             raise SceneError("sensitivity: belongs to checks, not to " + what)
         named, engine = engine is not None, engine or registry.solver()
@@ -55,9 +54,11 @@ def list_(
             raise EngineError(f"profile: {engine} has no exact profile; name one with --profile")
         best = [(name, registry.profile_of(name, "tuned")) for name in registry.usual() if not named and name != engine]
         others = [(registry.load(name), tuned) for name, tuned in best if tuned and registry.find(name).engine]
-        found = detection(registry.load(engine), profile, 2, others=others)
-        data = list(lines(found.seen))
+        found = detection.detection(registry.load(engine), profile, 2, others=others)
+        data = list(detection.lines(found.seen))
     elif what == "runs":
+        from validation.records.store import Store
+
         store = Store(out, create=False)
         names = ("id", "date", "commit", "title", "finished")
         data = [{name: getattr(run, name) for name in names} for run in store.runs()]
@@ -71,21 +72,22 @@ def list_(
     if as_json:
         click.echo(json.dumps(data, indent=1))
     elif sensitivity:
-        tables.sensitivity(data, only_by_receipts(found.seen), found.blind, terminal())
+        tables.sensitivity(data, detection.only_by_receipts(found.seen), found.blind, terminal())
     else:
         tables.listed(what, data, terminal(), reasons)
 
 
 @main.command(epilog="Example: crosscheck describe bounce")
 @click.argument("name", shell_complete=names_of_either)
+@click.option("--measure", is_flag=True, help="Of an engine, also measure what it does when nothing is set [seconds].")
 @AS_JSON
-def describe(name: str, as_json: bool) -> None:
+def describe(name: str, measure: bool, as_json: bool) -> None:
     """Describe a scene or an engine.
 
     For a scene: figure, law, parameters, checks with the reasons of their tolerances. For an engine: profiles, settings
-    with reasons, quirks.
+    with reasons, quirks, and what it does when nothing is set: as it is documented, and as it is measured on request.
     """
-    data = listing.describe(name)
+    data = listing.describe(name, measure)
     if as_json:
         click.echo(json.dumps(data, indent=1, default=str))
     else:

@@ -119,13 +119,14 @@ def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
 def request_from(options: dict[str, Any]) -> Request:
     """Turn the options of `selection` into a request; raises for a wrong call before anything runs."""
     suite = _suite(options)
+    scenes = scene_names_of(options["scenes"], options.get("drop", False))  # before an engine is imported
     registry.check_required()
     for name in options["engine"]:
         registry.find(name)
     dimensions = list(options["dim"])
     engines = list(options["engine"]) or registry.usual()
     request = Request(
-        scenes=scene_names_of(options["scenes"], options.get("drop", False)),
+        scenes=scenes,
         engines=engines,
         profiles=profiles_called(options["profile"], engines),
         dimensions=dimensions,

@@ -11,12 +11,12 @@ from adapters import registry
 from adapters.conformance.faults import FAULTS
 from adapters.engine import EngineFacts
 from adapters.engine_folder import laws_of
-from reports.cures import Change, setting_text
+from reports.cures import Change
 from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
 from reports.page.source import Source
 from reports.page.verdicts import slug
-from reports.wording import number
+from reports.wording import number, setting_text
 from validation.cells import Observation, slot_from_dict
 from validation.findings import Unsupported
 from validation.findings.files import findings_of

@@ -124,7 +124,7 @@ def test_what_an_engine_of_ours_lacks_is_the_packages_of_its_extra_and_no_trace_
         'odd<2,>=1.5; (python_version > "3") and extra == "odd"',
         'gone; os_name == "no" and extra == "odd"',
     ]
-    monkeypatch.setattr(extras, "requires", lambda project: listed)
+    monkeypatch.setattr(extras, "required", lambda: listed)
     found = loaded(monkeypatch, Lacking, module="adapters.odd")
     assert found.reason == "no libodd.so; pip install 'odd<2,>=1.5'"
     assert found.facts is Lacking.facts and found.trace == ""

@@ -11,16 +11,16 @@ ROOT = Path(__file__).parents[2]
 def test_an_extra_is_named_by_the_packages_that_this_system_takes(monkeypatch):
     listed = ["click>=8", 'b>=1; extra == "two"', 'a<2,>=1; (python_version > "3") and extra == "two"',
               'c; os_name == "none" and extra == "two"', 'd; extra == "one"', 'e; python_version > "3"']  # fmt: skip
-    monkeypatch.setattr(extras, "requires", lambda project: listed)
+    monkeypatch.setattr(extras, "required", lambda: listed)
     assert extras.packages("two") == ["a<2,>=1", "b>=1"]
     assert extras.install("two") == "pip install 'a<2,>=1' 'b>=1'"
 
 
 def test_without_metadata_the_hint_is_the_way_of_a_checkout(monkeypatch):
-    def missing(project):
-        raise PackageNotFoundError(project)
+    def missing():
+        raise PackageNotFoundError(extras.PROJECT)
 
-    monkeypatch.setattr(extras, "requires", missing)
+    monkeypatch.setattr(extras, "required", missing)
     assert extras.packages("shapes") == [] and extras.install("shapes") == "pip install -e '.[shapes]'"
 
 

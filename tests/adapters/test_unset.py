@@ -139,18 +139,22 @@ def test_an_engine_that_is_not_here_shows_what_is_documented_and_that_nothing_wa
     missing = next((name for name in OURS if name not in HERE), None)
     if missing is None:
         pytest.skip("all engines are installed")
-    done = CliRunner().invoke(main, ["describe", missing, "--json"])
+    done = CliRunner().invoke(main, ["describe", missing, "--measure", "--json"])
     told = json.loads(done.output)
     assert told["status"] == "not installed" and told["unset"]
     for row in told["unset"]:
         assert row["measured"] is None and row["reason"] == f"{missing} is not installed here"
-    text = CliRunner().invoke(main, ["describe", missing]).output
+    text = CliRunner().invoke(main, ["describe", missing, "--measure"]).output
     assert "When nothing is set" in text and f"not measured: {missing} is not installed here" in text
 
 
 @pytest.mark.parametrize("engine", [name for name in HERE if registry.load(name).kernels() is None])
 def test_describe_measures_when_it_is_asked_and_lists_what_can_be_set(engine):
-    told = json.loads(CliRunner().invoke(main, ["describe", engine, "--json"]).output)
+    unmeasured = json.loads(CliRunner().invoke(main, ["describe", engine, "--json"]).output)["unset"]
+    assert {(row["measured"], row["reason"]) for row in unmeasured} == {
+        (None, f"crosscheck describe {engine} --measure does so")
+    }
+    told = json.loads(CliRunner().invoke(main, ["describe", engine, "--measure", "--json"]).output)
     assert {row["what"]: row["agrees"] for row in told["unset"]}
     assert all(row["agrees"] is not False for row in told["unset"])
     if engine != "newton":

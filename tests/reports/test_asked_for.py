@@ -2,6 +2,7 @@
 
 import io
 import json
+from importlib.metadata import EntryPoint
 from types import SimpleNamespace
 
 import pandas as pd
@@ -74,8 +75,8 @@ def test_an_engine_that_is_not_installed_is_described_by_why(monkeypatch, as_jso
     from reports import listing
 
     found = SimpleNamespace(version="", engine=None, reason="no module named toy; pip install toy")
-    monkeypatch.setattr(listing.registry, "names", lambda: ["toy"])
-    monkeypatch.setattr(listing.registry, "find", lambda name: found)
+    monkeypatch.setattr(listing.registry, "entry", lambda name: EntryPoint("toy", "toy:Engine", listing.registry.GROUP))
+    monkeypatch.setattr(listing.registry, "listed", lambda name: found)
     done = CliRunner().invoke(main, ["describe", "toy", *["--json"] * as_json])
     assert done.exit_code == 0, done.output
     if as_json:

@@ -254,7 +254,7 @@ def test_a_doctor_says_whose_packages_these_are_and_which_releases_are_bad(monke
     }
     told = [{"name": "toy", "version": "1.0", "reason": ""}, {"name": "broken", "version": "", "reason": "ImportError"},
             {"name": "apart", "version": "", "reason": "not installed"}]  # fmt: skip
-    monkeypatch.setattr(listing, "engines", lambda: told)
+    monkeypatch.setattr(listing, "engines", lambda imported: told)
     absent = SimpleNamespace(engine=None, trace="")
     monkeypatch.setattr(listing.registry, "find", lambda name: engines.get(name, absent))
     monkeypatch.setattr(listing.registry, "usual", lambda: ["toy", "broken"])

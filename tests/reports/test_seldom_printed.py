@@ -27,7 +27,7 @@ from validation.findings import Family, Finding
 from validation.judging.acceptance import Change as Proposed
 from validation.judging.comparison import Change, Kind
 from validation.judging.comparison import Family as Moved
-from validation.questions import invariance
+from validation.questions import detection, invariance
 from validation.questions.detection import BlindSpot, Detected
 from validation.records.store import Run
 from validation.releases import history
@@ -81,7 +81,7 @@ def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
 
 
 def test_sensitivity_is_asked_of_checks_alone(monkeypatch):
-    monkeypatch.setattr(inspecting, "detection", lambda *asked, **named: Detected([], BLIND))
+    monkeypatch.setattr(detection, "detection", lambda *asked, **named: Detected([], BLIND))
     assert "incline/angle" in call("list", "checks", "--sensitivity").stdout
     assert json.loads(call("list", "checks", "--sensitivity", "--json").stdout) == []
     assert "belongs to checks, not to scenes" in call("list", "scenes", "--sensitivity", status=2).stderr

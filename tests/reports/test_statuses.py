@@ -50,11 +50,12 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
 
 
 @pytest.mark.parametrize(
-    "command", [name for name, each in main.commands.items() if "jobs" in {p.name for p in each.params}]
+    "command",
+    [name for name in main.list_commands(None) if "jobs" in {p.name for p in main.get_command(None, name).params}],
 )
 def test_more_workers_than_any_machine_has_cores_are_a_wrong_call(command):
     """A number that was meant for another option started processes until the machine had none left."""
-    (jobs,) = (each for each in main.commands[command].params if each.name == "jobs")
+    (jobs,) = (each for each in main.get_command(None, command).params if each.name == "jobs")
     assert jobs.type.max == selection.MOST_JOBS <= 4096
     asked = {"bisect": ["chipmunk", "7.0.0..7.3.1"], "cure": ["chipmunk", "stack"], "tune": ["chipmunk"],
              "releases": ["chipmunk", "7.3.1"], "sweep": ["impact", "--grid", "e=0:1:3"]}  # fmt: skip

@@ -117,7 +117,7 @@ def test_settings_and_habits_of_a_plugin_are_shown_as_they_are(monkeypatch):
         pytest.skip(f"chipmunk: {data['reason']}")
     data["profiles"] = {said: {"impact": [{"name": said, "value": said, "because": said, "source": said}]}}
     data["quirks"] = [{"what": said, "what_we_do": said, "source": said}]
-    monkeypatch.setattr(listing, "describe", lambda name: data)
+    monkeypatch.setattr(listing, "describe", lambda name, measure: data)
     result = call("describe", "chipmunk")
     assert result.exit_code == 0, result.output
     assert flat(result.stdout).count(said) >= 6
@@ -135,7 +135,7 @@ def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch)
                for n in range(4)]
         for k, name in enumerate(scenes)
     }}  # fmt: skip
-    monkeypatch.setattr(listing, "describe", lambda name: data)
+    monkeypatch.setattr(listing, "describe", lambda name, measure: data)
     said = call("describe", "chipmunk").stdout
     assert sum(because in line for line in said.splitlines()) == 8
     assert flat(said).count("(1) all but (2)") == 1 and said.count("scene_number_40") == 1

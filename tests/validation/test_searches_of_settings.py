@@ -268,7 +268,7 @@ def test_cost_is_the_least_of_the_laps_that_count_over_their_steps(monkeypatch):
     laps = [(0.36, ""), (0.24, ""), (0.12, "void: it hung"), (0.0, ""), (0.48, ""), (0.6, ""), (0.3, "")]
     FakeLane.table = {("stack", k): lap for k, lap in enumerate(laps, 1)}
     FakeLane.table |= {("impact", k): (0.1, "died") for k in range(1, 8)}
-    monkeypatch.setattr(cures, "Lane", FakeLane)
+    monkeypatch.setattr("validation.bench.lane.Lane", FakeLane)
     slots = [Slot("stack", (("n", 3.0),), 2, "toy", "tuned", DT), Slot("impact", (), 2, "toy", "tuned", DT)]
     monkeypatch.setattr(cures, "prepare", lambda slot: SimpleNamespace(
         scene=SimpleNamespace(bodies="abcd" if slot.scene == "stack" else "ab",

@@ -9,15 +9,16 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from validation.bench.reading import POINT, identity, table_of
 from validation.bench.statistics import Spread, spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
 from validation.records.store import Run, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def ratios(store: Store, run: Run) -> pd.DataFrame:

@@ -11,15 +11,17 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from validation.bench.statistics import DRIFT, drift, power_law, spread
 from validation.bench.timing import Timing
 from validation.cells import Slot
 from validation.records.store import RELEASE_TITLE, Run, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Columns that identify a series: an engine with a profile on a scene.
 SERIES = ["scene", "dimension", "engine", "profile"]
@@ -41,6 +43,8 @@ def timings_summary(store: Store, run: Run) -> pd.DataFrame:
     ``cost_minimum``, ``cost_low``, ``cost_high`` [s/s], ``per_step`` [s]; ``error``, ``state_hash``, ``states``
     (number of different end states: 1 for a deterministic engine), ``void``.
     """
+    import pandas as pd
+
     groups: dict[tuple[Any, ...], list[Timing]] = defaultdict(list)
     for timing in store.timings(run):
         groups[timing.purpose, timing.slot, timing.sampled].append(timing)
@@ -82,6 +86,8 @@ def _summary(timings: Sequence[Timing]) -> dict[str, Any]:
 
 def table_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Rows as a table; a missing iteration count stays None, because NaN of pandas equals nothing."""
+    import pandas as pd
+
     table = pd.DataFrame(rows)
     if "iterations" in table:
         table["iterations"] = pd.Series([row["iterations"] for row in rows], dtype=object)
@@ -141,6 +147,8 @@ def scaling_fits(table: pd.DataFrame) -> pd.DataFrame:
     One row per purpose, scene, dimension, engine and profile: ``exponent``, ``standard_error``, ``factor`` [s],
     ``points``, ``smallest``, ``largest`` (of x), ``reason`` if there are too few points.
     """
+    import pandas as pd
+
     rows = []
     for names, group in grouped(table, ["purpose", *SERIES]):
         used = group[(group["void"] == "") & (group["x"] >= SMALLEST_FITTED[names[0]])].sort_values("x")

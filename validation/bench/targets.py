@@ -21,9 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from adapters import registry
 from adapters.engine import Role
@@ -36,6 +34,9 @@ from validation.bench.timing import Timing
 from validation.bench.units import Unit, runs, scene_of
 from validation.bench.work import time_at_equal_error
 from validation.cells import Slot, parse_dt
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TABLE = Path(__file__).with_name("targets.toml")
 #: Nine rounds for cheap units; three where a round of one engine takes seconds.
@@ -389,6 +390,8 @@ def lead(points: pd.DataFrame, twice: tuple[float, float]) -> Row:
 
     It counts the levels that another engine reaches. The number that only ours reaches is separate.
     """
+    import pandas as pd
+
     levels = time_at_equal_error(points)
     levels = levels[levels["rank"].notna()]
     ours = levels["engine"] == registry.solver()

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from adapters.registry import is_ranked
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
@@ -20,6 +19,9 @@ from validation.cells import Observation, Outcome, Slot
 from validation.files.distance import CertifiedRuns, certified_runs, posed
 from validation.posed import is_file, primary_of, resolve
 from validation.records.store import Run, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Errors at which costs are compared.
 ERROR_LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -199,6 +201,8 @@ def _no_point(group: pd.DataFrame) -> str:
 
 def _has_rank(table: pd.DataFrame) -> pd.Series:
     """Which rows have a ranked profile."""
+    import pandas as pd
+
     known = [is_ranked(engine, profile) for engine, profile in zip(table["engine"], table["profile"], strict=True)]
     return pd.Series(known, index=table.index, dtype=bool)
 

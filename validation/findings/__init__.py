@@ -20,9 +20,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from packaging.specifiers import SpecifierSet
-from packaging.version import InvalidVersion
-
 from adapters import registry
 from adapters.experiment import Experiment
 from validation.cells import Slot, format_dt
@@ -68,6 +65,9 @@ class Family:
 
     def holds_for(self, version: str) -> bool:
         """Whether it was found in this release of the engine."""
+        from packaging.specifiers import SpecifierSet
+        from packaging.version import InvalidVersion
+
         try:
             return SpecifierSet(self.releases).contains(version, prereleases=True)
         except InvalidVersion:

@@ -6,9 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from adapters.engine import EngineError
 from adapters.scene import Scene
@@ -31,6 +29,9 @@ from validation.judging.verdicts import (
 )
 from validation.metrics import NEWER, UNTOLD
 from validation.posed import is_file, is_model, resolve
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Standings and outcomes that make the command exit 1.
 ALARMING_STANDINGS = ("new", "drifted")
@@ -368,6 +369,8 @@ def _study_row(run: str, result: StudyResult) -> Row:
 
 def frame(rows: Sequence[Row]) -> pd.DataFrame:
     """Rows as a DataFrame, one column per field, parameters as ``param.<name>`` columns as well."""
+    import pandas as pd
+
     plain = [row.as_dict() for row in rows]
     table = pd.DataFrame(plain, columns=list(Row.__dataclass_fields__))
     params = pd.json_normalize([row["params"] for row in plain]).add_prefix("param.")

@@ -15,10 +15,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 
 from adapters.scene import SceneError
 from validation.canonical import CanonicalScene
@@ -26,6 +25,9 @@ from validation.cells import Slot
 from validation.judging.rows import Row
 from validation.posed import pinned, resolve
 from validation.running.plan import Request, slots
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Most cells of a sweep: the plan takes half a gigabyte of memory, the rows some ten.
 MOST_CELLS = 200_000
@@ -175,6 +177,8 @@ def _scenes(request: Request) -> list[CanonicalScene]:
 
 def table(rows: Sequence[Row]) -> pd.DataFrame:
     """One line per cell: parameters, outcome, the value of every metric, and whether all judged ones pass."""
+    import pandas as pd
+
     lines: dict[str, dict[str, object]] = {}
     for row in rows:
         if len(row.cells) > 1:  # a study of several cells has no line

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import requires
 
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -16,6 +15,7 @@ from packaging.version import InvalidVersion, Version
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.extras import required
 from adapters.plain import one_line
 from adapters.releases import Distribution, Releases
 
@@ -82,7 +82,7 @@ def known_releases(engine: str) -> Releases:
 
 def _range(package: str) -> str:
     """Versions of a package in this project's extras, as a specifier; "" if none names it."""
-    asked = [Requirement(text) for text in requires("contact-crosscheck") or ()]
+    asked = [Requirement(text) for text in required()]
     name = canonicalize_name(package)
     return next((str(each.specifier) for each in asked if canonicalize_name(each.name) == name), "")
 

@@ -33,8 +33,6 @@ import numpy as np
 from adapters.engine_folder import CURES, belongs_of, candidates_of, inside
 from adapters.registry import find, is_ranked, load, profile_of
 from adapters.stepping import step_count
-from validation.bench.lane import Lane
-from validation.bench.units import Unit
 from validation.canonical import Params
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot, prepare, settings_of
@@ -428,6 +426,9 @@ def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
 
 def clocked(slots: Sequence[Slot]) -> tuple[float | None, ...]:
     """CPU time per step of each slot [s]: the least of `ROUNDS`, alternating in one process of the benchmark."""
+    from validation.bench.lane import Lane
+    from validation.bench.units import Unit
+
     units = []
     for slot in slots:
         scene = prepare(slot).scene

@@ -1,0 +1,78 @@
+"""Commands start at once: none imports what it does not need, and what takes long is done once a process."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from adapters import registry
+
+#: Libraries that take a tenth of a second or more to import, and the engines with their packages.
+LARGE = {"pandas", "pyarrow", "scipy", "numba", "altair", "distributed", "matplotlib", "jinja2"}
+ENGINES = {
+    "pymunk",
+    "pybullet",
+    "mujoco",
+    "Box2D",
+    "pyb2d3",
+    "rapier3d",
+    "dartpy",
+    "pydrake",
+    "sapien",
+    "newton",
+    "warp",
+}
+#: Runs commands one after the other in one process; after each it writes which modules there are.
+CALLS = """
+import contextlib, io, json, sys
+from contact_crosscheck import main
+
+for words in json.loads(sys.argv[1]):
+    sys.argv = ["crosscheck", *words]
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+        main()
+    print(json.dumps([*sys.modules]))
+"""
+
+
+def imported(*calls):
+    """Modules that there are after each of these commands."""
+    command = [sys.executable, "-c", CALLS, json.dumps([call.split() for call in calls])]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return dict(zip(calls, (set(json.loads(line)) for line in done.stdout.splitlines()), strict=True))
+
+
+def test_help_and_a_command_that_there_is_not_import_no_command_and_no_numpy():
+    for found in imported("--help", "rnu", "--version").values():
+        assert {name for name in found if name.startswith("reports.command.")} == {
+            f"reports.command.{name}" for name in ("group", "files", "statuses")
+        }
+        assert not found & {"numpy", "adapters", "validation", "rich"}
+
+
+def test_commands_that_run_nothing_import_no_engine_and_no_large_library():
+    calls = ["list scenes", "describe bounce", "run --no-such-option", "describe bonce", "list engines", "list suites",
+             "ask my ball does not bounce", "ask mujoco grip slips", "describe bullet",
+             "run bonce --engine mujoco",
+             "show --no-such-option", "bench --no-such-option", "report --no-such-option"]  # fmt: skip
+    found = imported(*calls)
+    assert {call: sorted(modules & (LARGE | ENGINES)) for call, modules in found.items()} == {
+        call: [] for call in calls
+    }
+    folders = {f"adapters.{name}" for name in registry.names()}
+    assert not folders & found["describe bounce"]
+    # What an engine is, and what it can be set to, does not need what it does by design.
+    ends = (".laws", ".predictions", ".unset", ".experiments")
+    assert [name for name in found["list engines"] if name.startswith(tuple(folders)) and name.endswith(ends)] == []
+
+
+def test_an_engine_that_is_described_is_the_only_one_that_is_imported():
+    pytest.importorskip("mujoco")
+    assert imported("describe mujoco")["describe mujoco"] & (LARGE | ENGINES) == {"mujoco"}
+
+
+def test_the_plugin_of_pytest_imports_nothing_without_its_option():
+    code = "import sys; before = set(sys.modules); import contact_crosscheck; print(*set(sys.modules) - before)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"numpy", "click", "adapters", "reports", "validation"} & set(done.stdout.split())
