@@ -37,7 +37,16 @@ from typing import Any
 
 import numpy as np
 
-from reference_solver.certificate.audit import Finding, audit, ends_of_series, grazes, shared_loads, without_order
+from reference_solver.certificate.audit import (
+    Answers,
+    Finding,
+    answers,
+    audit,
+    ends_of_series,
+    grazes,
+    shared_loads,
+    without_order,
+)
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
 from reference_solver.geometry import reach, rotation
@@ -95,8 +104,12 @@ class Certificate:
     horizon
         First time at which ``growth`` reaches `GROWTH` [s]; infinite if it does not.
     determined
-        Time until which the laws know one motion only [s]: none of how loads are shared shows in it. Infinite if at no
-        time of the run, be it beyond the horizon, two motions that obey them are visibly apart.
+        Time until which the laws know one motion only [s]: none of how loads are shared shows in it, and no solve has
+        another answer. Infinite if at no time of the run, be it beyond the horizon, two motions that obey them are
+        visibly apart.
+    unique
+        From when two motions obey the laws, or uniqueness was not searched; empty if all solves were searched for
+        another answer and have none.
     disturbed
         (s,) way that the disturbance moves a body, over its speed [s].
     dt
@@ -119,6 +132,7 @@ class Certificate:
     growth: Array = field(repr=False)
     horizon: float
     determined: float
+    unique: str
     disturbed: Array = field(repr=False)
     dt: float
     gap: float
@@ -173,10 +187,18 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     record = run.record(steps, stride, pieces=True)
     growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
     beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
+    beyond = f"beyond {horizon:.3g} s {beyond}: only laws hold there"
     unordered, several = _without_order(model, record, settings.dt)
     if unordered < horizon:
         horizon = unordered
-        beyond = f"round-off decides whether bodies {several} are struck together or one after the other"
+        beyond = (
+            f"beyond {horizon:.3g} s round-off decides whether bodies {several} are struck together or one after the "
+            "other: only laws hold there"
+        )
+    found_answers = answers(model, record, settings.dt)
+    unique, two = _unique(found_answers), _sample_after(record.t, found_answers.begin, settings.dt)
+    if two <= horizon:
+        horizon, beyond = two, unique
     apart, shared = shared_loads(model, record, settings.dt, horizon)
     place = np.abs(record.pose[np.isfinite(record.pose)]).max(initial=0.0)
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
@@ -196,12 +218,13 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     # A difference of two motions that obey the laws grows as that disturbance does.
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart + grazed)
     until = _determined(model, record.t, apart, shared.limit)
-    made = (error, growth, horizon, until, moved / size, settings.dt, gap, grazed, light, record.pose)
+    until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
+    made = (error, growth, horizon, until, unique, moved / size, settings.dt, gap, grazed, light, record.pose)
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
     reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons
     if horizon < record.t[-1]:
-        reasons.append(f"beyond {horizon:.3g} s {beyond}: only laws hold there")
+        reasons.append(beyond)
     return replace(found, holds=holds, reasons=tuple(reasons))
 
 
@@ -226,13 +249,27 @@ def _without_order(model: Model, record: Record, dt: float) -> tuple[float, str]
     """First sample after impacts that round-off decides (E21) [s], and the numbers of their bodies."""
     pieces, found = record.pieces, without_order(model, record, dt)
     assert pieces is not None
-    after = np.flatnonzero(record.t > pieces.begin[found].min(initial=np.inf))
-    if not len(after):
+    if not len(found):
         return float("inf"), ""
     first = found[np.argmin(pieces.begin[found])]
     of_piece = slice(*pieces.first_contact[first : first + 2])
     bodies = sorted({*pieces.body_a[of_piece].tolist(), *pieces.body_b[of_piece].tolist()})
-    return float(record.t[after[0]]), ", ".join(map(str, bodies))
+    return _sample_after(record.t, float(pieces.begin[first]), dt), ", ".join(map(str, bodies))
+
+
+def _sample_after(t: Array, time: float, dt: float) -> float:
+    """Return the first of the times ``t`` (s,) after ``time`` [s], by more than round-off of a step; or infinity."""
+    after = np.flatnonzero(t > time + 1e-9 * dt)
+    return float(t[after[0]]) if len(after) else float("inf")
+
+
+def _unique(found: Answers) -> str:
+    """What is said of other answers; nothing where each solve was searched and has none."""
+    if found.begin < np.inf:
+        return f"two motions obey the laws from {found.begin:.4g} s: {found.told}"
+    if found.unsearched < np.inf:
+        return f"uniqueness not searched from {found.unsearched:.4g} s: {found.contacts} contacts in one solve"
+    return ""
 
 
 def away(model: Model, far: float) -> Change:

@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reference_solver.certificate.audit import answers as other_answers
 from reference_solver.certificate.audit import chains, contact, energy, motion, sharing, space, touching
+from reference_solver.certificate.audit.answers import Answers
 from reference_solver.certificate.audit.run import Run
 from reference_solver.model import Model
 from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
@@ -155,6 +157,16 @@ def without_order(model: Model, record: Record, dt: float) -> np.ndarray:
     Raises ValueError if the record has no pieces.
     """
     return chains.without_order(_run_of(model, record, dt))
+
+
+def answers(model: Model, record: Record, dt: float) -> Answers:
+    """Return when a recorded run first has another answer, and when the search for one ended (`answers`).
+
+    Raises ValueError if the record has no pieces.
+    """
+    run = _run_of(model, record, dt)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return other_answers.answers(run)
 
 
 def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.ndarray) -> np.ndarray:

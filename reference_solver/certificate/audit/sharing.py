@@ -8,8 +8,7 @@ impact: impulses) that the laws admit then are a convex set. They keep closed co
 sticking contacts sticking; normal forces push; friction is ``mu p_n`` against a slip, and within its cone where a
 contact sticks. The extremes of the velocities over that set tell by how much two motions can differ.
 
-One other set of modes is considered: that bodies at rest stay at rest. Contacts that press against each other can hold
-a wedged body; without such forces it starts to move.
+Other modes are for `answers`.
 """
 
 from __future__ import annotations
@@ -57,7 +56,6 @@ class _Contacts(NamedTuple):
     held: NDArray[np.bool_]  # (c,) closed throughout its piece
     rubs: NDArray[np.bool_]  # (c,) held, slips, and has friction
     sticks: NDArray[np.bool_]  # (c,) held, does not slip, and has friction
-    starts: NDArray[np.bool_]  # (c,) of bodies at rest, one of which moves at the end of a force phase
     mu: Array  # (c,)
     given: Array  # (c, d) impulse: along the normal, along the tangents [N s]
     row: Indices  # (c, 2) rows of body A and body B; -1 where it is not free
@@ -73,14 +71,9 @@ def shared_loads(run: Run) -> Spread:
     contacts = _contacts(run)
     for k in np.unique(owner[contacts.rubs]):
         own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
-        for cluster in _clusters(own[contacts.held[own]], contacts.row):
+        for cluster in clusters(own[contacts.held[own]], contacts.row):
             if len(cluster) > 1 and contacts.rubs[cluster].any():
                 _share(run, contacts, cluster, found)
-    for k in np.unique(owner[contacts.starts]):
-        own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
-        for cluster in _clusters(own, contacts.row):
-            if len(cluster) > 1 and contacts.starts[cluster].all() and contacts.mu[cluster].any():
-                _stand(run, contacts, cluster, found)
     return found
 
 
@@ -147,37 +140,27 @@ def _contacts(run: Run) -> _Contacts:
     size = np.linalg.norm(slip, axis=1)
     still = size <= SLIP_NOISE * speed
     against = np.where(still, 0.0, mu / np.where(still, 1.0, size))
-    tangents = _tangents(n)
+    tangents = tangents_of(n)
     along = np.concatenate([n[:, None], (n - against[:, None] * slip)[:, None], tangents], axis=1)
     given = np.column_stack([pressed.clip(min=0.0), (pieces.impulse[:, None] * tangents).sum(axis=2)])
     push = np.zeros((*row.shape, along.shape[1], pieces.twist_before.shape[1]))
     for side, sign in ((0, -1.0), (1, 1.0)):
         for j in range(along.shape[1]):
-            push[:, side, j] = _pushed(run, row[:, side], pieces.point, sign * along[:, j])
-    known = np.isfinite(push).all(axis=(1, 2, 3))
-    held &= known
-    began = asked & ~impact & known & (np.linalg.norm(before, axis=1) <= SLIP_NOISE * speed)
-    began &= ((row < 0) | _at_rest(run, pieces.twist_before)[row]).all(axis=1)
-    # A body that carries many times its own weight gets a speed from the round-off of that load.
-    load = np.zeros(len(pieces.body))
-    for side in row.T:
-        np.add.at(load, side[side >= 0], np.linalg.norm(pieces.impulse[side >= 0], axis=1))
-    unseen = SLIP_NOISE * (run.pull * run.dt + load / run.mass[pieces.body])
-    moved = np.zeros(len(pieces), bool)
-    np.logical_or.at(moved, owner, ((row >= 0) & (_fastest(run, pieces.twist_after) > unseen)[row]).any(axis=1))
+            push[:, side, j] = pushed(run, row[:, side], pieces.point, sign * along[:, j])
+    held &= np.isfinite(push).all(axis=(1, 2, 3))
     slips = held & ~still & (mu > 0.0)
-    return _Contacts(held, slips, held & still & (mu > 0.0), began & moved[owner], mu, given, row, push)
+    return _Contacts(held, slips, held & still & (mu > 0.0), mu, given, row, push)
 
 
-def _pushed(run: Run, row: Indices, point: Array, impulse: Array) -> Array:
+def pushed(run: Run, row: Indices, point: Array, impulse: Array) -> Array:
     """Changes of the twists (c, 3 | 6) of the bodies of rows by impulses (c, d) at points, times the root of M."""
     body = run.pieces.body[row]
     moment = cross(point - run.pieces.pose_before[row, : run.d], impulse)
-    found = np.column_stack([impulse / np.sqrt(run.mass[body])[:, None], _by_root_of_inertia(run, row, moment)])
+    found = np.column_stack([impulse / np.sqrt(run.mass[body])[:, None], by_root_of_inertia(run, row, moment)])
     return np.where((row >= 0)[:, None], found, 0.0)
 
 
-def _by_root_of_inertia(run: Run, row: Indices, moment: Array) -> Array:
+def by_root_of_inertia(run: Run, row: Indices, moment: Array) -> Array:
     """Moments (s, 1 | 3) over the root of the inertia tensor of the bodies of rows (s,)."""
     factor = 1.0 / np.sqrt(run.moments[run.pieces.body[row]])
     return moment * factor if run.d == 2 else scaled_along(rotation(run.pieces.pose_before[row]), factor, moment)
@@ -195,7 +178,8 @@ def _next_approach(run: Run, approach: Array, leaves: Array) -> Array:
     return found
 
 
-def _tangents(n: Array) -> Array:
+def tangents_of(n: Array) -> Array:
+    """Unit vectors (c, d - 1, d) that are square to normals (c, d) and to each other."""
     if n.shape[1] == 2:
         return np.stack([-n[:, 1], n[:, 0]], axis=1)[:, None]
     first = np.cross(n, np.eye(3)[np.abs(n).argmin(axis=1)])
@@ -203,7 +187,7 @@ def _tangents(n: Array) -> Array:
     return np.stack([first, np.cross(n, first)], axis=1)
 
 
-def _clusters(own: Indices, row: Indices) -> list[Indices]:
+def clusters(own: Indices, row: Indices) -> list[Indices]:
     """Contacts of one piece in groups that share no free body."""
     groups: list[tuple[set[int], list[int]]] = []
     for c, rows in zip(own.tolist(), row[own].tolist(), strict=True):
@@ -249,40 +233,12 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
         motion = directions[:, k].reshape(len(rows), -1)
         reach = run.reach[run.pieces.body[rows]]
         gain = np.linalg.norm(motion[:, :d], axis=1) / np.sqrt(run.mass[run.pieces.body[rows]])
-        gain += reach * np.linalg.norm(_by_root_of_inertia(run, rows, motion[:, d:]), axis=1)
+        gain += reach * np.linalg.norm(by_root_of_inertia(run, rows, motion[:, d:]), axis=1)
         taking = own[np.unique(of[np.abs(turn[k] @ ways) * size > REDUNDANT])]
         if spread > 0.0:
             for row in rows[gain > 0.0].tolist():
                 found.contacts[row] = np.union1d(found.contacts.get(row, taking), taking)
             found.gain[rows[gain > 0.0]] += spread * gain[gain > 0.0]
-
-
-def _stand(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
-    """Enter an infinite speed for bodies that leave rest in a piece although the contacts of a cluster can hold them.
-
-    They can hold them if some sum of forces at the edges of their cones, with factors of at least 0, balances the
-    loads. The laws then do not say whether and when the bodies start to move.
-    """
-    d, pieces = run.d, run.pieces
-    rows = np.unique(contacts.row[own])
-    rows = rows[rows >= 0]
-    where = np.searchsorted(rows, contacts.row[own])
-    edges = np.zeros((len(own), len(SIDES_OF[d]), len(rows), contacts.push.shape[3]))
-    for side in range(2):
-        at = np.flatnonzero(contacts.row[own, side] >= 0)
-        normal, tangents = contacts.push[own[at], side, 0], contacts.push[own[at], side, 2:]
-        friction = contacts.mu[own[at], None, None] * np.einsum("sj,cjk->csk", SIDES_OF[d], tangents)
-        edges[at, :, where[at, side]] += normal[:, None] + friction
-    loads = run.force[pieces.body[rows]] / np.sqrt(run.mass[pieces.body[rows]])[:, None]
-    loads = np.column_stack([loads, _by_root_of_inertia(run, rows, run.torque[pieces.body[rows]])])
-    parts = np.vstack([edges.reshape(-1, loads.size), loads.reshape(1, -1)])
-    parts /= np.maximum(np.linalg.norm(parts, axis=1), np.finfo(float).tiny)[:, None]
-    _, strength, ways = np.linalg.svd(parts.T)
-    nothing = ways[np.count_nonzero(strength > REDUNDANT * strength[0]) :].T
-    if nothing.size and farthest(nothing[-1], nothing, np.zeros(len(nothing))) > 0.0:
-        for row in rows.tolist():
-            found.contacts[row] = np.union1d(found.contacts.get(row, own), own)
-        found.gain[rows] = np.inf
 
 
 def _limits(mu: Array, stuck: Indices, d: int) -> Array:
