@@ -4,6 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3; do $$p -c '' 2>/dev/null && echo 
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+USED := $(VENV)/.installed-to-run
 OUT ?= crosscheck-out
 SUITE ?= quick
 CONSTRAINTS ?= -c constraints.txt
@@ -14,16 +15,19 @@ EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
 
 setup: $(STAMP)
 
-# An editable install goes stale when entry points or pins change, so both files re-install.
-$(STAMP): pyproject.toml constraints.txt
+# `make run` installs what it uses, all else needs everything; neither removes what the other has installed. An editable
+# install goes stale when entry points or pins change, so both files re-install.
+$(USED): EXTRAS_OF := chipmunk,bullet,mujoco,report,shapes
+$(STAMP): EXTRAS_OF := all,dev
+$(USED) $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no working python3.11 or python3 on PATH"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[all,dev]" $(CONSTRAINTS)
-	@touch $@
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$(EXTRAS_OF)]" $(CONSTRAINTS)
+	@touch $@ $(USED)
 
 # The verdicts decide the exit status; benchmark and report are made in any case. The answer is printed once, by `run`;
 # the path of the report comes last.
-run: $(STAMP)
+run: $(USED)
 	@status=0; begun=$$(date +%s); \
 	$(BIN)/crosscheck run --$(SUITE) --out $(OUT) || status=$$?; \
 	test $$status -le 1 || exit $$status; \

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,17 @@ echo "called: $*" >> "$CALLED"
 case "$1" in report) echo "path on stdout";; *) echo "output of $1";; esac
 case "$1" in run) exit ${RUN:-0};; bench) exit ${BENCH:-0};; report) exit ${REPORT:-0};; esac
 """
+#: Stands in for Python: installs nothing.
+NOTHING = "#!/bin/sh\n"
+
+
+def make(*words, **environment):
+    """Run make here; flags of a make around it would be those of this one."""
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    return subprocess.run(
+        ["make", "--no-print-directory", *words], cwd=ROOT, env=own | environment, capture_output=True, text=True,
+        timeout=60,
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -23,21 +35,16 @@ def make_run(tmp_path):
     """Runs it with a stand-in, whose calls end with the statuses that are given; its end, its lines, the calls."""
     folder = tmp_path / "venv"
     (folder / "bin").mkdir(parents=True)
-    command = folder / "bin" / "crosscheck"
-    command.write_text(STAND_IN)
-    command.chmod(0o755)
-    (folder / ".installed").touch()  # newer than what it is made of: nothing is installed
+    for name, text in (("crosscheck", STAND_IN), ("python", NOTHING)):
+        (folder / "bin" / name).write_text(text)
+        (folder / "bin" / name).chmod(0o755)
+    (folder / ".installed-to-run").touch()  # newer than what it is made of: nothing is installed
 
     def run(*words, **statuses):
         called = tmp_path / "called"
         called.unlink(missing_ok=True)
         given = {name.upper(): str(status) for name, status in statuses.items()}
-        # Flags of a make around it would be those of this one.
-        environment = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
-        done = subprocess.run(
-            ["make", "--no-print-directory", "run", f"VENV={folder}", f"OUT={tmp_path / 'out'}", *words],
-            cwd=ROOT, env=environment | given | {"CALLED": str(called)}, capture_output=True, text=True, timeout=60,
-        )  # fmt: skip
+        done = make("run", f"VENV={folder}", f"OUT={tmp_path / 'out'}", *words, **given, CALLED=str(called))
         calls = [line.split()[1:] for line in called.read_text().splitlines()]
         return done.returncode, done.stdout.splitlines(), calls
 
@@ -75,3 +82,49 @@ def test_a_run_that_is_no_verdict_has_nothing_to_be_timed_or_reported(make_run, 
 def test_a_stage_that_fails_fails_it(make_run, stage):
     status, _, calls = make_run(**{stage: 1})
     assert status != 0 and calls[-1][0] == stage
+
+
+#: What `make run` installs, and what all other targets install.
+USED, ALL = "chipmunk,bullet,mujoco,report,shapes", "all,dev"
+
+
+@pytest.mark.parametrize(
+    ("stamps", "target", "installed"),
+    [
+        ((), "run", [USED]),
+        ((), "test", [ALL]),
+        ((".installed-to-run",), "run", []),
+        ((".installed-to-run",), "test", [ALL]),
+        ((".installed", ".installed-to-run"), "run", []),
+        ((".installed", ".installed-to-run"), "test", []),
+    ],
+)
+def test_a_target_installs_what_it_uses_and_is_not_there_yet(tmp_path, stamps, target, installed):
+    for stamp in stamps:
+        (tmp_path / stamp).touch()
+
+    def asked(*words):
+        done = make("-n", target, f"VENV={tmp_path}", *words)
+        return re.findall(r"pip install .*-e \"\.\[(.*)\]\"", done.stdout)
+
+    assert asked() == installed
+    assert asked("-W", "pyproject.toml") == asked("-W", "constraints.txt") == [USED if target == "run" else ALL]
+
+
+def test_a_full_installation_serves_a_run_as_well(tmp_path):
+    """As in CI, which sets up once: pip is a stand-in that does nothing."""
+    (tmp_path / "bin").mkdir()
+    python = tmp_path / "bin" / "python"
+    python.write_text(NOTHING)
+    python.chmod(0o755)
+    assert make("setup", f"VENV={tmp_path}").returncode == 0
+    for target in ("run", "setup", "lint", "extras"):
+        assert f"[{USED}]" not in (done := make("-n", target, f"VENV={tmp_path}")).stdout
+        assert f"[{ALL}]" not in done.stdout and done.returncode == 0
+
+
+def test_what_a_run_installs_is_a_part_of_all():
+    """So that a full installation serves a run as well."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    (whole,) = extras["all"]
+    assert set(USED.split(",")) < set(re.fullmatch(r"contact-crosscheck\[(.*)\]", whole)[1].split(","))
