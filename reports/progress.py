@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -44,6 +44,7 @@ def run_plan(
     finish: bool = True,
     cluster: str = "",
     known: Sequence[Observation] = (),
+    heard: Callable[[Run, Observation], None] = lambda run, observation: None,
 ) -> Run:
     """Run the cases of this plan that the store lacks; the observations are in the store afterwards.
 
@@ -56,6 +57,8 @@ def run_plan(
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
         console.print(f"resuming run {run.id}: {len(done)} of {plural(len(slots), 'case')} done")
+        for observation in store.observations(run):
+            heard(run, observation)
     left: dict[str, int] = {}
 
     def leave(slot: Slot, reason: str) -> None:
@@ -83,6 +86,7 @@ def run_plan(
                                   parts=parts, compiled=compiled)  # fmt: skip
             for observation in cells:
                 store.add(run, observation)
+                heard(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
         except KeyboardInterrupt:
             console.print("interrupted: finished cases are kept; the same command resumes")

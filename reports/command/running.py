@@ -25,10 +25,11 @@ from reports.spread import spread_lines
 from reports.stages import compiling
 from reports.summary import show
 from reports.terminal import terminal
+from reports.verdicts import Verdicts
 from reports.wording import plural
 from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
-from validation.judging.rows import Row, rows_of
+from validation.judging.rows import Row
 from validation.posed import is_file, pinned, resolve
 from validation.questions.nulls import null_rows, with_skill
 from validation.questions.spread import spreads
@@ -105,9 +106,11 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     keep = out / "trajectories" if options["keep_trajectories"] else None
     title = f"{request.suite}: {asked(request, options)}"
     limits = options["jobs"], options["timeout"]
-    done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"])
-    observations = store.observations(done)
-    rows = rows_of(done.id, observations, chosen)
+    verdicts = Verdicts(chosen, console)
+    done = run_plan(
+        store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"], heard=verdicts.add
+    )
+    rows, observations = verdicts.rows(done), store.observations(done)
     if done.finished:
         brief.keep(out, done.id, observations, rows)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []

@@ -37,14 +37,15 @@ def ran(monkeypatch):
     """Calls of what runs a plan, and what it leaves: a finished run, and rows as `ran.rows` has them."""
     found = SimpleNamespace(calls=[], rows=[], finished=True, kept=[], apart=[], absent=[])
 
-    def run_plan(store, title, chosen, console, jobs, timeout, keep=None, fresh=False, cluster=""):
+    def run_plan(store, title, chosen, console, jobs, timeout, keep=None, fresh=False, cluster="", heard=None):
         found.calls.append((title, len(chosen), jobs, timeout, keep and keep.name, fresh, cluster))
         return SimpleNamespace(id="a-run", finished=found.finished)
 
     for module in (running, sweeping):
         monkeypatch.setattr(module, "run_plan", run_plan)
-        monkeypatch.setattr(module, "rows_of", lambda run, seen, chosen: found.rows)
         monkeypatch.setattr(module, "missing", lambda named, engines: found.absent)
+    monkeypatch.setattr(sweeping, "rows_of", lambda run, seen, chosen: found.rows)
+    monkeypatch.setattr(running.Verdicts, "rows", lambda verdicts, run: found.rows)
     monkeypatch.setattr(running.Store, "observations", lambda store, run: ["seen"])
     monkeypatch.setattr(running.Store, "recordings", lambda store, run: ["recorded"])
     monkeypatch.setattr(running.brief, "keep", lambda *given: found.kept.append(given[1:]))

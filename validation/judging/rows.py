@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from adapters.engine import EngineError
 from adapters.scene import Scene
 from validation.canonical import Check
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
 from validation.files.invariants import LAWS
 from validation.files.stated import STATED, instant_of
@@ -130,6 +131,22 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
     ready = foretold([_asked(o, check) for o, _, checks in judged for check in checks if _is_asked(o, check)])
     rows = [_row(run, o, scene, check, ready) for o, scene, checks in judged for check in checks]
     return with_floors(rows, observations) + [_study_row(run, result) for result in results(observations)]
+
+
+def in_order(rows: Iterable[Row], plan: Sequence[Slot]) -> list[Row]:
+    """Rows of parts of a plan in the order of `rows_of` for all of it: cells, missing cells, studies."""
+    cells, groups = {slot: k for k, slot in enumerate(plan)}, dict[Slot, int]()
+    for k, slot in enumerate(plan):
+        groups.setdefault(slot.with_params({}), k)
+    studies = [(name, study.name) for name, canonical in CATALOGUE.items() for study in canonical.studies]
+
+    def place(row: Row) -> tuple[int, int, int]:
+        slot = slot_from_dict(row.slot)
+        if (row.scene, row.metric) in studies:
+            return 2, studies.index((row.scene, row.metric)), groups[slot]
+        return row.outcome == Outcome.MISSING.value, 0, cells[slot]
+
+    return sorted(rows, key=place)
 
 
 def with_floors(rows: Iterable[Row], observations: Iterable[Observation]) -> list[Row]:

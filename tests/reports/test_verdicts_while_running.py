@@ -1,0 +1,96 @@
+"""Scenes are judged and shown as their cases end, with the same rows as a run that is judged as a whole."""
+
+import io
+import random
+
+import kept_run
+import pytest
+from rich.console import Console
+
+from reports.verdicts import Verdicts
+from validation.judging.rows import rows_of
+from validation.records.store import Store
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A run of many scenes on four engines, and its results in the order of the plan."""
+    folder = tmp_path_factory.mktemp("kept")
+    kept_run.fill(folder)
+    store = Store(folder, create=False)
+    run = max(store.runs(), key=lambda run: len(run.plan))
+    yield run, store.observations(run)
+    store.close()
+
+
+def shown(run, observations, plan, width=80, terminal=False):
+    """Lines after each result, and all rows."""
+    text = io.StringIO()
+    console = Console(file=text, width=width, force_terminal=terminal, markup=False, emoji=False)
+    verdicts, counts = Verdicts(plan, console), []
+    for observation in observations:
+        verdicts.add(run, observation)
+        counts.append(len(text.getvalue().splitlines()))
+    return counts, text.getvalue().splitlines(), verdicts.rows(run)
+
+
+def test_rows_in_the_order_of_the_plan_whatever_ends_first(kept):
+    run, observations = kept
+    plan = [observation.slot for observation in observations]
+    whole = rows_of(run.id, observations, plan)
+    assert {"incline/threshold"} <= {row.check for row in whole}  # a study of several cells
+    mixed = random.Random(1).sample(observations, len(observations))
+    assert shown(run, mixed, plan)[2] == whole
+    some = mixed[::2]
+    kept_order = [observation for observation in observations if observation in some]
+    assert shown(run, some, plan)[2] == rows_of(run.id, kept_order, plan)
+
+
+def test_a_line_as_soon_as_a_scene_on_an_engine_has_ended(kept):
+    run, observations = kept
+    own = [o for o in observations if o.slot.engine == "mujoco" and o.slot.scene in ("impact", "bounce")]
+    plan = [observation.slot for observation in own]
+    counts, lines, _ = shown(run, own, plan)
+    ends = [max(k for k, slot in enumerate(plan) if slot.scene == scene) for scene in ("impact", "bounce")]
+    assert counts == [0 if k < min(ends) else 2 if k < max(ends) else 3 for k in range(len(plan))]
+    assert lines[0].split() == ["engine", "scene", "checks", "by", "profile"]
+    (line,) = (line for line in lines if "impact" in line)
+    assert line.split()[:3] == ["mujoco", "impact", "default"] and "/" in line and ", tuned " in line
+    assert all(len(line) <= 80 for line in lines)
+
+
+def test_a_wide_terminal_has_profiles_below_each_other(kept):
+    run, observations = kept
+    plan = [observation.slot for observation in observations]
+    _, lines, _ = shown(run, observations, plan, width=120)
+    own = [line for line in lines if line.startswith("mujoco") and "," not in line]
+    assert len(own) > 5 and len({line.index("tuned") for line in own}) == 1 and " of " in "".join(own)
+
+
+def test_no_control_characters_without_a_terminal_and_colours_with_one(kept):
+    run, observations = kept
+    plan = [observation.slot for observation in observations]
+    _, lines, _ = shown(run, observations, plan)
+    assert not any(ord(letter) < 32 or ord(letter) == 127 for line in lines for letter in line)
+    assert any("\x1b[" in line for line in shown(run, observations, plan, terminal=True)[1])
+
+
+def test_no_lines_for_a_single_scene_nor_where_an_engine_cannot_run_one(kept):
+    run, observations = kept
+    own = [o for o in observations if o.slot.scene == "bounce"]
+    assert own and shown(run, own, [o.slot for o in own])[1] == []
+    refused = [o for o in observations if o.outcome.value == "unsupported"]
+    _, lines, rows = shown(run, refused, [o.slot for o in refused])
+    assert rows and len({o.slot.scene for o in refused}) > 1 and len(lines) <= 1
+
+
+def test_missing_cases_are_shown_with_the_rows(kept):
+    run, observations = kept
+    own = [o for o in observations if o.slot.engine == "chipmunk" and o.slot.scene in ("impact", "bounce")]
+    text = io.StringIO()
+    verdicts = Verdicts([o.slot for o in own], Console(file=text, width=120))
+    for observation in own[1:]:
+        verdicts.add(run, observation)
+    assert "impact" not in text.getvalue()
+    verdicts.rows(run)
+    assert "missing" in text.getvalue()
