@@ -32,6 +32,7 @@ from adapters.probes import (
     slide_load,
     slide_speed,
 )
+from adapters.stages import stage
 from adapters.stepping import posed_for, run
 
 #: What the probes measure. ``restitution`` and ``friction`` are the pair's effective coefficients, the latter from
@@ -83,6 +84,7 @@ class Receipt:
     because: str
 
 
+@stage("property checks", whole=True)
 def receipts(
     engine: Engine,
     profile: str,

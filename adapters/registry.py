@@ -12,6 +12,7 @@ from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
 from adapters.extras import install, packages
 from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
 from adapters.plain import NAME, is_visible, one_line
+from adapters.stages import stage
 
 GROUP = "contact_crosscheck.engines"
 #: Environment variable with the engines that must be installed, separated by commas: in continuous integration a
@@ -184,6 +185,7 @@ def listed(name: str) -> Found:
     return find(name) if entry is None or not is_ours(entry) else loaded(entry, imported=False)
 
 
+@stage("loading engines")
 def loaded(entry: EntryPoint, distribution: str = "", imported: bool = True) -> Found:
     """Load an engine in this process; for a broken one the result has the reason.
 

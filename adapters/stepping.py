@@ -23,8 +23,11 @@ from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_
 from adapters.near import start_overlap
 from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import reach
+from adapters.stages import stage
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
+#: What a reader of `adapters.stages` calls the parts of a run.
+BUILDING, STEPPING, READING = "building worlds", "steps of the engine", "reading states back"
 #: A body faster than this many times the largest speed that the scene explains counts as exploded. Ten times would
 #: still be a wrong result worth measuring; a thousand times is not.
 EXPLOSION_FACTOR = 1e3
@@ -64,6 +67,7 @@ class _Seen:
         self.reach = np.array([reach(body.shape) for body in scene.bodies])
         self.outside, self.unturned = 0.0, False
 
+    @stage(READING)
     def look(self, simulation: Simulation) -> None:
         """Store copies of the current state, as a simulation may return its own arrays."""
         if len(self.poses) == AT_ONCE:
@@ -71,6 +75,7 @@ class _Seen:
         self.poses.append(np.array(simulation.pose()))
         self.twists.append(np.array(simulation.twist()))
 
+    @stage(READING)
     def take(self, found: Recorded) -> bool:
         """Store states that were recorded at once; False, and nothing is stored, if one of them may be invalid.
 
@@ -103,6 +108,7 @@ class _Seen:
             return ""
         return f"a body moves at {fastest:.3g} m/s, which nothing in the scene explains"
 
+    @stage(READING)
     def states(self) -> tuple[Array, Array, float | None]:
         """Poses and twists of all instants, and the distance of an embedded 2-D scene from its plane [m]."""
         self._read_all()
@@ -193,7 +199,8 @@ def run(
     started = time.perf_counter()
     # A diverged run is reported at the instant of divergence, so it is repeated sample by sample.
     for in_one_call in (IN_ONE_CALL, 0):
-        simulation = engine.build(posed, dt, settings)
+        with stage(BUILDING):
+            simulation = engine.build(posed, dt, settings)
         try:
             found = _record(simulation, scene, posed, dt, sampling, started, in_one_call)
         finally:
@@ -213,6 +220,7 @@ def advances(simulation: Simulation, steps: int, stride: int = 1) -> Iterator[in
         yield done
 
 
+@stage(STEPPING)
 def _record(
     simulation: Simulation, scene: Scene, posed: Scene, dt: float, sampling: Sampling, started: float, in_one_call: int
 ) -> Trajectory | None:
@@ -242,7 +250,8 @@ def _record(
         seen.look(simulation)
         steps_at.append(done)
         if _has_contacts(sampling, dt, done):
-            told = _kept(simulation.contacts())
+            with stage(READING):
+                told = _kept(simulation.contacts())
             collected.append((range(len(steps_at) - 1, len(steps_at)), [len(told.a)], told))
         reason = seen.divergence()
         if reason:
@@ -301,6 +310,7 @@ def _kept(contacts: Contacts) -> Contacts:
     return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
 
 
+@stage(READING)
 def _join(collected: list[tuple[range, Sequence[int], Contacts]], dimension: int, flat: bool) -> ContactRecord:
     """Contacts of all samples: sample indices, counts and contacts, part by part."""
     offset = np.cumsum([0] + [count for _, counts, _ in collected for count in counts])

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import validation
+from adapters.stages import stage
 from validation.canonical import Primary
 from validation.cells import Observation, Slot
 from validation.judging.rows import ALARMING_OUTCOMES, Row, rows_of
@@ -144,6 +145,7 @@ def judging_code() -> str:
     return digest.hexdigest()[:16]
 
 
+@stage("writing files")
 def keep(folder: Path, run: str, observations: Iterable[Observation], rows: Iterable[Row]) -> None:
     """Store the summary of a judged run for dashboards."""
     kept = Kept(folder)

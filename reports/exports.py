@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adapters.stages import stage
 from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
@@ -156,6 +157,7 @@ def _mark_case(case: TestCase, row: Plain) -> None:
         case.system_out = finding_line(row)
 
 
+@stage("writing files")
 def write_all(folder: Path, rows: Sequence[Plain], nulls: Sequence[Plain] = ()) -> dict[str, Path]:
     """Write rows.jsonl, rows.csv, summary.md and, if there are any, the rows of nulls as nulls.csv into ``folder``."""
     texts = {"rows.jsonl": as_jsonl(rows), "rows.csv": as_csv(rows), "summary.md": as_markdown(rows)}

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from adapters.stages import stage
 from reports import overview
 from reports.answers import Costs, answers, choices
 from reports.findings import REFUSED, alarms, families, refusals
@@ -42,6 +43,7 @@ MOST_ALARMS = 6
 HEAD = 2
 
 
+@stage("printing")
 def show(
     rows: Sequence[Plain],
     console: Console,

@@ -23,6 +23,7 @@ from adapters.own_settings import suffix_of
 from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
+from adapters.stages import stage
 from validation.bounds import planar
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.identity import adapter_hash, scene_code
@@ -315,6 +316,7 @@ class Prepared:
     cell: Cell
 
 
+@stage("preparing cases")
 def prepare(slot: Slot) -> Prepared:
     """Make the slot's scene and the identity of its cell, without loading the engine's own library.
 

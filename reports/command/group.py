@@ -87,7 +87,10 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command called ``name``; importing its module registers it."""
         if name in _MODULES:
-            import_module(f"reports.command.{_MODULES[name]}")
+            from adapters.stages import START, stage
+
+            with stage(START):
+                import_module(f"reports.command.{_MODULES[name]}")
         return super().get_command(ctx, name)
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
@@ -197,7 +200,28 @@ def _silence_stdout() -> None:
     os.close(null)
 
 
+def _timed(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Measure the stages of the command that follows, and print their times when it ends, however it does."""
+    if value and not ctx.resilient_parsing:
+        from adapters import stages
+
+        stages.begin()
+        ctx.call_on_close(_print_timings)
+
+
+def _print_timings() -> None:
+    from adapters import stages
+    from reports.stages import timings
+    from reports.terminal import terminal
+
+    with contextlib.suppress(OSError):
+        timings(terminal(stderr=True))
+    stages.end()
+
+
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--timings", is_flag=True, is_eager=True, expose_value=False, callback=_timed,
+              help="Print on stderr where the time of the command went.")  # fmt: skip
 @click.version_option(package_name="contact-crosscheck", prog_name="crosscheck")
 def main() -> None:
     """Run the same contact scenes on physics engines, and say how wrong each one is, at what cost."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 
+from adapters import stages
 from adapters.engine import EngineError
 from adapters.extras import install
 from reports.command.files import FILE, writable
@@ -119,6 +120,7 @@ def bundle(run: str, output: Path | None, as_json: bool, out: Path) -> None:
 def extra(command: str, name: str = "report") -> Iterator[None]:
     """Turn a missing library of an extra into an error that says how to install it."""
     try:
-        yield
+        with stages.stage(stages.START):
+            yield
     except ImportError as error:
         raise EngineError(f"{command}: {error.name} is missing; {install(name)}") from None

@@ -1,12 +1,16 @@
 """What a long command says of its stages: how long each took, and what it waits for."""
 
 import io
+import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from rich.console import Console
 
+from adapters import stages as measured
 from reports import stages
+from reports.command import main
 from validation.running.warming import Part
 
 
@@ -66,3 +70,46 @@ def test_compilation_is_announced_with_its_time_and_each_part_when_it_is_done(co
 def test_where_nothing_is_left_to_compile_nothing_is_said(console):
     stages.compiling([], console)
     assert said(console) == ""
+
+
+#: Stages of a process of cases that every case has.
+OF_A_CASE = ("preparing cases", "building worlds", "steps of the engine", "reading states back", "property checks",
+             "measuring", "sending answers")  # fmt: skip
+
+
+def sections(text):
+    """Stages by section of the table, each with its numbers."""
+    found, title = {}, ""
+    for line in text.partition("where the time went")[2].splitlines()[2:]:
+        name, *numbers = re.split(r"\s{2,}", line.strip())
+        if line.startswith("  "):
+            found[title][name] = [float(number) for number in numbers]
+        else:
+            title = name
+            found[title] = {"all": [float(number) for number in numbers]}
+    return found
+
+
+def test_timings_tell_the_stages_of_a_command_and_of_its_cases(tmp_path, monkeypatch):
+    monkeypatch.setattr(stages, "LEAST", 0.0)
+    call = ["run", "impact", "--engine", "chipmunk", "--dim", "2", "--jobs", "1", "--out", str(tmp_path)]
+    done = CliRunner().invoke(main, ["--timings", *call])
+    assert done.exit_code == 0, done.output
+    own, cases, _ = (found := sections(done.stderr)).values()
+    assert [*found] == ["this process", "processes of cases, together", "other processes, and starts of these"]
+    assert {"judging", "storing results", "starting processes", "waiting for processes", "printing"} <= set(own)
+    assert set(OF_A_CASE) <= set(cases)
+    count = cases["measuring"][0]
+    assert count > 1 and cases["property checks"][0] == cases["sending answers"][0] + 1 == count
+    for section in (own, cases):  # up to two digits
+        shown = [sum(numbers[k] for name, numbers in section.items() if name != "all") for k in (-2, -1)]
+        assert shown == pytest.approx(section["all"], abs=0.1)
+    # Nothing of it is left for the next command.
+    assert "where the time went" not in CliRunner().invoke(main, ["list", "suites"]).stderr
+    assert not measured.is_on()
+
+
+def test_timings_are_told_of_a_command_that_fails():
+    done = CliRunner().invoke(main, ["--timings", "describe", "bonce"])
+    assert done.exit_code == 2 and "did you mean 'bounce'" in done.stderr
+    assert "start and imports" in done.stderr

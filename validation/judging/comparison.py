@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
+from adapters.stages import stage
 from validation.cells import slot_from_dict
 from validation.metrics import NEWER
 
@@ -71,6 +72,7 @@ def _identity(row: Plain) -> tuple[str, str]:
     return json.dumps(row["slot"], sort_keys=True), row["metric"]
 
 
+@stage("comparing runs")
 def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
     """All changes of rows from ``before`` to ``after``, most serious first."""
     a, b = ({_identity(row): row for row in rows if row.get("reason") != NEWER} for rows in (before, after))

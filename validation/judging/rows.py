@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from adapters.engine import EngineError
 from adapters.scene import Scene
+from adapters.stages import stage
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
@@ -118,6 +119,7 @@ def is_listed(engine: str, scene: str) -> bool:
     return not is_model(scene) and _findings(engine)[0] is not None
 
 
+@stage("judging")
 def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] = ()) -> list[Row]:
     """Judge all checks of all observations, and their studies.
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from adapters.engine import Array
 from adapters.scene import Scene
+from adapters.stages import stage
 from adapters.stepping import step_count
 from adapters.trajectory import Measured, Trajectory
 from validation.canonical import CanonicalScene, Check
@@ -209,6 +210,7 @@ def skill_of(row: Mapping[str, Any]) -> tuple[float | None, str]:
     return skill(row["value"] - row["truth"], nulls_of(*asked))
 
 
+@stage("trivial answers")
 def with_skill(rows: Sequence[Row]) -> list[Row]:
     """The rows with skill, and the trivial answer that it refers to."""
     if len(_cells(rows)) > MOST_CELLS:
@@ -220,6 +222,7 @@ def with_skill(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
+@stage("trivial answers")
 def null_rows(rows: Sequence[Row]) -> list[Row]:
     """One row for each trivial answer and check in ``rows``, once for all engines and iterations."""
     if len(_cells(rows)) > MOST_CELLS:

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 from urllib.parse import quote
 
 from adapters.plain import NAME, Notice, one_line, plain
+from adapters.stages import stage
 from validation import posed
 from validation.bench.timing import Timing, timing_from_dict
 from validation.cells import Observation, Slot, observation_from_dict, slot_from_dict
@@ -179,6 +180,7 @@ class Store:
         """Close the file."""
         self._db.close()
 
+    @stage("storing results")
     def start(self, title: str, slots: Sequence[Slot], fresh: bool = False, apart: str = "") -> tuple[Run, set[str]]:
         """Resume the unfinished run of the same plan and code, or start a new one.
 
@@ -212,6 +214,7 @@ class Store:
         taken = {row[0] for row in self._db.execute("SELECT id FROM runs")}
         return next(i for i in (stem, *(f"{stem}-{k}" for k in range(2, len(taken) + 3))) if i not in taken)
 
+    @stage("storing results")
     def add(self, run: Run, observation: Observation) -> None:
         """Store an observation; it is on disk when this returns."""
         slot = observation.slot
@@ -223,6 +226,7 @@ class Store:
         with self._guarded("write"):
             _patiently(self.path, lambda: self._db.execute(statement, values))
 
+    @stage("storing results")
     def finish(self, run: Run) -> None:
         """Mark the run as complete; the same plan then starts a new one."""
         self._write("UPDATE runs SET finished = 1 WHERE id = ?", (run.id,))
@@ -286,6 +290,7 @@ class Store:
         name = f"{RELEASE_TITLE}{engine}=={version}" + (":" if version else "")
         return self._runs("substr(title, 1, length(?)) = ?", name, name)
 
+    @stage("reading results")
     def observations(self, run: Run) -> list[Observation]:
         """Observations of a run, in the order of its plan; its scene files need not exist any more."""
         self.scenes(run)
@@ -323,6 +328,7 @@ class Store:
         """Delete the timings of an interrupted run: rounds of two processes must not be mixed."""
         self._write("DELETE FROM timings WHERE run = ?", (run.id,))
 
+    @stage("reading results")
     def timings(self, run: Run) -> list[Timing]:
         """Raw timings of a run, in order."""
         with self._guarded("read"):
@@ -340,11 +346,13 @@ class Store:
             found = self._made(f"protocol of run {run.id}", rows, lambda body: dict(plain(json.loads(body))))
             return found[0] if found else None
 
+    @stage("storing results")
     def add_recording(self, run: Run, slot: Slot, recording: Recording) -> None:
         """Store the replay of a cell."""
         row = (run.id, slot.key(), json.dumps(slot.as_dict()), recording.to_bytes())
         self._write("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", row)
 
+    @stage("reading results")
     def recordings(self, run: Run) -> list[tuple[Slot, Recording]]:
         """Recordings of a run, in the order of its plan."""
         self.scenes(run)

@@ -9,6 +9,7 @@ from math import gcd
 from typing import Any
 
 from adapters.engine import Engine
+from adapters.stages import stage
 from adapters.stepping import run, step_count
 from adapters.trajectory import Sampling, Trajectory
 from validation.cells import Prepared, Slot
@@ -18,6 +19,7 @@ from validation.cells import Prepared, Slot
 BLOCK, FINER = 13, 2.618
 
 
+@stage("certificate", whole=True)
 def fully_certified(
     engine: Engine, prepared: Prepared, slot: Slot, settings: Mapping[str, Any], trajectory: Trajectory
 ) -> Trajectory:

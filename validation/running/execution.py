@@ -19,6 +19,7 @@ from adapters.plain import one_line, plain
 from adapters.receipts import Receipt, receipts
 from adapters.registry import find
 from adapters.scene import SceneError
+from adapters.stages import stage
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
@@ -110,6 +111,7 @@ def _observe(
         return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
 
 
+@stage("measuring")
 def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], trajectory: Trajectory) -> Observation:
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)

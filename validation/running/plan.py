@@ -21,6 +21,7 @@ from adapters.own_settings import kinds_of, near, own
 from adapters.plain import NAME, one_line
 from adapters.registry import facts, find, is_ranked
 from adapters.scene import Scene
+from adapters.stages import stage
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size, settings_of
@@ -62,6 +63,7 @@ class Request:
     sets: Sequence[tuple[str, Any]] = ()
 
 
+@stage("choosing cases")
 def slots(request: Request) -> list[Slot]:
     """All slots of a request, in display order.
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from adapters.engine import Array
 from adapters.needs import needs
 from adapters.scene import Scene
+from adapters.stages import stage
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.canonical import CanonicalScene
 from validation.cells import Slot
@@ -61,6 +62,7 @@ class Recording:
     departure: float | None
     finish: str
 
+    @stage("recording the motion")
     def to_bytes(self) -> bytes:
         """Compressed numpy archive with 16-bit poses, points and impulses."""
         arrays: dict[str, NDArray[np.generic]] = {"t": self.t, "frame": self.frame, "pair": self.pair}
@@ -118,6 +120,7 @@ def _distance(slot: Slot) -> tuple[bool, float, bool, int]:
     return other, abs(math.log(slot.dt / QUICK_DT)), not own, -(slot.iterations or 0)
 
 
+@stage("recording the motion")
 def record(canonical: CanonicalScene, scene: Scene, trajectory: Trajectory) -> Recording:
     """Reduce a trajectory to its recording."""
     t = trajectory.t

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from adapters.engine import Engine
 from adapters.registry import find
+from adapters.stages import stage
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.cells import Slot, prepare, settings_of
@@ -88,6 +89,7 @@ def _folder(name: str) -> Path | None:
     return engine.kernels() if isinstance(engine, Engine) else None
 
 
+@stage("compiling kernels", whole=True)
 def compile_one(slots: Sequence[Slot]) -> bool:
     """Make the first steps of the first cell that can make them; whether there is one.
 

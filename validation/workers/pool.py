@@ -17,9 +17,10 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
-from adapters import registry
+from adapters import registry, stages
 from adapters.foreign import said_by
 from adapters.isolation import Child, Lost, Mistaken
+from adapters.stages import stage
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare
 from validation.running import warming
@@ -43,10 +44,14 @@ class Unwritten(OSError):
 
 @dataclass
 class _Seat:
-    """A slot of the pool for one worker; the worker changes with the engine."""
+    """A slot of the pool for one worker; the worker changes with the engine.
+
+    ``started``: when it was, by the monotonic clock [s], if it is to measure its stages.
+    """
 
     child: Child | None = None
     engine: str = ""
+    started: float | None = None
     work: Slot | warming.Part | None = None
     until: float = 0.0
 
@@ -251,9 +256,11 @@ def _engage(seat: _Seat, engine: str, memory: int) -> None:
     """Give a seat a worker for an engine, if it has none."""
     if seat.engine != engine or seat.child is None:
         seat.free()
+        seat.started = time.monotonic() if stages.is_on() else None
         seat.child, seat.engine = _started(memory), engine
 
 
+@stage("starting processes")
 def _started(memory: int) -> Child:
     """Start a worker; a failure to start is not an engine's fault.
 
@@ -288,13 +295,14 @@ def _send(
 ) -> None:
     """Send a job with the scene files of its slots."""
     scenes = [slot.scene for slot in slots]
-    told = {**job, "scenes": posed.texts_of(scenes), "stated": posed.handed(scenes)}
+    told = {**job, "scenes": posed.texts_of(scenes), "stated": posed.handed(scenes), "started": seat.started}
     assert seat.child is not None
     seat.child.written = b""
     seat.child.send(json.dumps(told).encode())
     seat.work, seat.until = work, time.monotonic() + timeout
 
 
+@stage("waiting for processes")
 def _ready(busy: Sequence[_Seat]) -> list[_Seat]:
     """Seats whose worker has answered, ended, or run out of time; waits until there is one."""
     while True:
@@ -310,6 +318,7 @@ def _ready(busy: Sequence[_Seat]) -> list[_Seat]:
                 return [seat]
 
 
+@stage("reading answers")
 def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Recording | None]:
     child = seat.child
     assert child is not None
@@ -322,6 +331,7 @@ def _collect(seat: _Seat, slot: Slot, timeout: float) -> tuple[Observation, Reco
         answer = json.loads(child.receive(5.0))  # it has arrived, or the child has ended
         if answer["unwritten"]:
             raise Unwritten(*answer["unwritten"])
+        stages.add(answer["stages"])
         observation = observation_from_dict(answer["observation"])
         if observation.slot != slot:
             raise Mistaken("its process answered for another case")
@@ -354,7 +364,9 @@ def _compiled(seat: _Seat) -> bool:
     assert seat.child is not None
     seat.work = None
     try:
-        return bool(json.loads(seat.child.receive(0.0))["compiled"])
+        answer = json.loads(seat.child.receive(0.0))
+        stages.add(answer["stages"])
+        return bool(answer["compiled"])
     except Exception:
         seat.free()
         return False

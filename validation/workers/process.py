@@ -6,14 +6,16 @@ import base64
 import contextlib
 import json
 import sys
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from adapters import registry
+from adapters import registry, stages
 from adapters.foreign import said_by
+from adapters.stages import stage
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.workers import state
@@ -28,16 +30,22 @@ def serve(connection: Connection) -> None:
     registry.load_engines_here()
     connection.send_bytes(READY)
     before: state.State | None = None
+    ready = time.monotonic()
     while True:
         try:
-            job = json.loads(connection.recv_bytes())
+            with stage("waiting for work"):
+                job = json.loads(connection.recv_bytes())
         except EOFError:
             return
+        if job["started"] is not None and not stages.is_on():
+            stages.begin(ready - job["started"])
         if "compile" in job:
             answer = _compiled(job)
         else:
             answer, before = _answer(job, before)
-        connection.send_bytes(json.dumps(answer).encode())
+        answer["stages"] = stages.taken()
+        with stage("sending answers"):
+            connection.send_bytes(json.dumps(answer).encode())
 
 
 def _compiled(job: Mapping[str, Any]) -> dict[str, Any]:

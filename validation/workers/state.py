@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from adapters.stages import stage
+
 #: Modules whose functions and classes are watched besides ours: those used to measure and judge.
 WATCHED = ("builtins", "math", "random", "time", "json", "os", "sys", "copy", "dataclasses", "numpy", "numpy.linalg")
 OURS = ("adapters", "validation")
@@ -26,6 +28,8 @@ OURS = ("adapters", "validation")
 #: the 1024 of a Linux process.
 SPARE_FILES = 64
 OPEN_FILES = "open files"
+#: What a reader of `adapters.stages` calls a look at the process.
+COMPARING = "looking at what cases share"
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class State:
     modules: int
 
 
+@stage(COMPARING)
 def taken() -> State:
     """Take a snapshot of this process."""
     facts = {name: look() for name, look in _FACTS.items()}  # first of all: a snapshot may import modules
@@ -49,6 +54,7 @@ def taken() -> State:
     return State(facts, names, sizes, modules)
 
 
+@stage(COMPARING)
 def still(before: State) -> State:
     """Snapshot to compare with the next cell, after one that changed nothing: the same, as a new one costs 3 ms.
 
@@ -66,6 +72,7 @@ def still(before: State) -> State:
     return replace(now, facts={**now.facts, OPEN_FILES: before.facts[OPEN_FILES]})
 
 
+@stage(COMPARING)
 def changed(before: State) -> str:
     """Differences from ``before``, in a few words; empty if there are none."""
     found = [name for name, look in _FACTS.items() if not _same(name, before.facts[name], look())]
