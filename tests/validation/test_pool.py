@@ -42,7 +42,7 @@ class Worker:
         if "compile" in self.job:
             raise Lost("no part is compiled here")
         slot = slot_from_dict(self.asked[-1])
-        answer = {"changed": "", "unwritten": None, "outcome": Outcome.OK} | self.told.get(slot, {})
+        answer = {"changed": "", "unwritten": None, "stages": [], "outcome": Outcome.OK} | self.told.get(slot, {})
         observation = Observation(slot, "", 1, "1", answer.pop("outcome")).as_dict()
         return json.dumps({"observation": observation, "recording": None} | answer).encode()
 
@@ -176,7 +176,7 @@ class Compiler(Worker):
             return super().receive(timeout)
         if self.job["compile"][0]["profile"] == self.fails or self.left >= 0:
             raise Lost("the process was killed by SIGKILL")
-        return b'{"compiled": true}'
+        return b'{"compiled": true, "stages": []}'
 
 
 @pytest.fixture
