@@ -189,7 +189,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
     beyond = f"beyond {horizon:.3g} s {beyond}: only laws hold there"
     unordered, several = _without_order(model, record, settings.dt)
-    if unordered < horizon:
+    if unordered <= horizon and unordered < np.inf:
         horizon = unordered
         beyond = (
             f"beyond {horizon:.3g} s round-off decides whether bodies {several} are struck together or one after the "
@@ -197,7 +197,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         )
     found_answers = answers(model, record, settings.dt)
     unique, two = _unique(found_answers), _sample_after(record.t, found_answers.begin, settings.dt)
-    if two <= horizon:
+    if two <= horizon and two < np.inf:
         horizon, beyond = two, unique
     apart, shared = shared_loads(model, record, settings.dt, horizon)
     place = np.abs(record.pose[np.isfinite(record.pose)]).max(initial=0.0)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_solver.certificate.audit import answers as other_answers
-from reference_solver.certificate.audit import chains, contact, energy, motion, sharing, space, touching
+from reference_solver.certificate.audit import chains, contact, energy, motion, order, sharing, space, touching
 from reference_solver.certificate.audit.answers import Answers
 from reference_solver.certificate.audit.run import Run
 from reference_solver.model import Model
@@ -152,11 +152,13 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
 
 
 def without_order(model: Model, record: Record, dt: float) -> np.ndarray:
-    """Return the pieces (k,) of a recorded run at which the motion hangs on round-off (`chains.without_order`).
+    """Return the pieces (k,) of a recorded run at which the motion hangs on round-off (`chains`, `order`).
 
     Raises ValueError if the record has no pieces.
     """
-    return chains.without_order(_run_of(model, record, dt))
+    run = _run_of(model, record, dt)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return np.union1d(chains.without_order(run), order.decided_by_gaps(run))
 
 
 def answers(model: Model, record: Record, dt: float) -> Answers:

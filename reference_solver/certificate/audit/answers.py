@@ -43,8 +43,8 @@ SIGN, TWO, ALIKE = 1e-10, 1e-6, 1e-8
 LEFT_OVER = 2e-14
 #: Condition of a mode's equations beyond which its contacts are redundant, and only a sum of forces is known.
 REDUNDANT = 1e9
-#: Share of a slip by which it differs between two answers, and cosine of the angle.
-ANOTHER_WAY, ALONG = 0.1, 0.99
+#: Share of that difference up to which a velocity is none.
+SAME = 0.1
 #: Steps of Newton's method, which converges in a few, or not at all; and what makes its equations solvable where
 #: contacts are redundant, as a share of them: a thousand times their round-off.
 STEPS, DAMPING = 12, 1e-13
@@ -99,7 +99,7 @@ def answers(run: Run) -> Answers:
         begin = float(run.pieces.begin[run.contact_owner[own[0]]])
         key = _key(problem) if problem else b""
         if problem and key not in known and spent + _cost(problem) <= BUDGET:
-            known[key], spent = _all(problem), spent + _cost(problem)
+            known[key], spent = all_answers(problem), spent + _cost(problem)
         if not problem or key not in known:
             if begin < found.unsearched:
                 found = found._replace(unsearched=begin, contacts=len(own))
@@ -128,7 +128,7 @@ def _problems(run: Run) -> Iterator[tuple[Indices, Problem | None]]:
                 continue
             pairs = [pieces.body_a[cluster], pieces.body_b[cluster], *np.round(pieces.normal[cluster] / TWO).T]
             face = np.unique(np.column_stack(pairs), axis=0, return_inverse=True)[1].ravel()
-            modes = _modes((mu[cluster] > 0.0) & ~at.slip[cluster].any(axis=1), face, run.d)
+            modes = modes_of((mu[cluster] > 0.0) & ~at.slip[cluster].any(axis=1), face, run.d)
             if not len(modes):
                 yield cluster, None
             elif (problem := _problem(run, at, cluster, mu, modes)) is not None:
@@ -157,7 +157,7 @@ def _instants(run: Run) -> _Instants:
     # What restitution wants; where a rebound is held that is nothing (E22).
     wanted = run.model.restitution[a, b] * np.maximum(-u[:, 0], 0.0)
     held = (run.meeting_velocity(after=True) * n).sum(axis=1) < 0.5 * wanted
-    free = u + np.column_stack([np.where(held, 0.0, wanted), np.zeros((len(u), d - 1))])
+    free = u - np.column_stack([np.where(held, 0.0, wanted), np.zeros((len(u), d - 1))])
     lasting = asked & ~impact
     wander = accelerations(run, lasting)
     free[lasting, 0] = wander[lasting, 0]
@@ -222,7 +222,7 @@ def _is_single(matrix: Array, mu: Array) -> bool:
     return bool(share < (1.0 - SIGN) * least / most)
 
 
-def _modes(chooses: NDArray[np.bool_], face: Indices, d: int) -> Indices:
+def modes_of(chooses: NDArray[np.bool_], face: Indices, d: int) -> Indices:
     """Modes (m, c) of contacts, each for itself or all of a ``face`` (c,) alike; none of too many.
 
     Contacts that slide, or have no friction, do not choose among directions.
@@ -260,7 +260,7 @@ def _cost(problem: Problem) -> float:
     return float(len(problem.modes) * steps * ((len(problem.free) + chosen) / 10.0) ** 3)
 
 
-def _all(problem: Problem) -> list[Array]:
+def all_answers(problem: Problem) -> list[Array]:
     """Velocities (c, d) of all answers that are found, of those alike one."""
     d, chooses, modes = problem.free.shape[1], _chooses(problem), problem.modes
     closed, sticks = modes > OPEN, (modes == CLOSED) & chooses
@@ -411,26 +411,14 @@ def _two(velocities: list[Array], problem: Problem) -> tuple[int, Array, Array] 
     for k, one in enumerate(velocities):
         for other in velocities[:k]:
             size = TWO * max(1.0, float(np.abs(one).max()), float(np.abs(other).max()))
-            opens = [x[:, 0] > size for x in (one, other)]
-            shut = [x[:, 0] <= 0.1 * size for x in (one, other)]
-            parts = (opens[0] & shut[1]) | (opens[1] & shut[0])
-            slips = np.linalg.norm(one[:, 1:], axis=1), np.linalg.norm(other[:, 1:], axis=1)
-            apart = np.linalg.norm(one[:, 1:] - other[:, 1:], axis=1) > np.maximum(
-                size, ANOTHER_WAY * np.maximum(*slips)
-            )
-            slip = (
-                chooses
-                & ~opens[0]
-                & ~opens[1]
-                & apart
-                & (
-                    (np.minimum(*slips) <= 0.1 * size)
-                    | ((one[:, 1:] * other[:, 1:]).sum(axis=1) < slips[0] * slips[1] * ALONG)
-                )
-            )
-            differs = np.flatnonzero(parts | slip)
-            if len(differs):
-                return int(differs[0]), one, other
+            opens = np.column_stack([x[:, 0] > size for x in (one, other)])
+            shut = np.column_stack([x[:, 0] <= SAME * size for x in (one, other)])
+            slips = np.column_stack([np.linalg.norm(x[:, 1:], axis=1) for x in (one, other)])
+            slip = (slips.max(axis=1) > size) & (slips.min(axis=1) <= SAME * size)
+            slip |= (slips.min(axis=1) > size) & ((one[:, 1:] * other[:, 1:]).sum(axis=1) < 0.0)
+            differs = (opens & shut[:, ::-1]).any(axis=1) | (slip & chooses & ~opens.any(axis=1))
+            if differs.any():
+                return int(differs.argmax()), one, other
     return None
 
 

@@ -43,7 +43,7 @@ def ladder(seed, kind):
         free = rows @ twist
         if (free[::2] >= 0.0).any():
             return None
-        sliding, free[::2] = None, (1.0 - e) * free[::2]
+        sliding, free[::2] = None, (1.0 + e) * free[::2]
     else:
         load = rng.uniform(-1.0, 1.0, 3) * (30.0, 30.0, 10.0)
         free = rows @ (inverse * load)
