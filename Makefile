@@ -31,11 +31,15 @@ run: $(USED)
 	@status=0; begun=$$(date +%s); \
 	$(BIN)/crosscheck run --$(SUITE) --out $(OUT) || status=$$?; \
 	test $$status -le 1 || exit $$status; \
-	echo "verdicts after $$(( $$(date +%s) - begun )) s; now the benchmark and the report"; \
+	judged=$$(date +%s); \
+	echo "verdicts after $$(( judged - begun )) s; now the benchmark and the report"; \
 	$(BIN)/crosscheck bench --quick --brief --out $(OUT) || exit 2; \
+	timed=$$(date +%s); \
 	echo "report:"; \
 	$(BIN)/crosscheck report --out $(OUT) || exit 2; \
-	echo "done after $$(( $$(date +%s) - begun )) s"; \
+	ended=$$(date +%s); \
+	echo "done after $$(( ended - begun )) s: verdicts $$(( judged - begun )) s, benchmark $$(( timed - judged )) s," \
+		"report $$(( ended - timed )) s"; \
 	exit $$status
 
 # `setup` has installed the engines and Pinocchio: if one is not there, its tests fail instead of being skipped. PyBullet
