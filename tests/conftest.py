@@ -35,6 +35,7 @@ settings.load_profile("all" if ALL else "few")
 def pytest_configure(config):
     """Without its engines whole files are skipped: where they are required, that is a failure and not a skip."""
     config.addinivalue_line("markers", "long: takes seconds of CPU or more; `make test-all` runs it")
+    config.addinivalue_line("markers", "optional(engine): needs an engine that `[all]` has not, or is skipped")
     config.addinivalue_line("markers", "few(n): `make test` runs n cases of a parametrized test, `make test-all` all")
     try:
         registry.check_required()
@@ -62,6 +63,14 @@ def pytest_collection_modifyitems(config, items):
     out = {item for item in out if not named & {item.nodeid, item.nodeid.partition("[")[0]}}
     config.hook.pytest_deselected(items=[item for item in items if item in out])
     items[:] = [item for item in items if item not in out]
+
+
+def pytest_runtest_setup(item):
+    """Skip a test of an optional engine that is not installed."""
+    for mark in item.iter_markers("optional"):
+        found = registry.find(*mark.args)
+        if found.engine is None:
+            pytest.skip(found.reason)
 
 
 @pytest.fixture

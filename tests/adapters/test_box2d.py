@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("Box2D", reason="Box2D is optional: pip install -e '.[box2d]'")
-
 from driven import driven
 
 from adapters.box2d import Box2DEngine
@@ -21,6 +18,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.single_precision import Method, rounded_law
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("box2d")
 ENGINE = Box2DEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "tuned")

@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("pyb2d3", reason="Box2D 3.1 is optional: pip install -e '.[box2d3]'")
-
 from driven import driven
 
 from adapters.box2d3 import Box2D3Engine
@@ -21,6 +18,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("box2d3")
 ENGINE = Box2D3Engine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "tuned")

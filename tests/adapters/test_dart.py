@@ -4,9 +4,6 @@ import math
 from dataclasses import replace
 
 import pytest
-
-pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
-
 from driven import driven
 
 from adapters.conformance import items
@@ -21,6 +18,7 @@ from adapters.engine import EngineError
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("dart")
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")

@@ -4,9 +4,6 @@ import math
 from dataclasses import replace
 
 import pytest
-
-pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
-
 from driven import driven
 
 from adapters.conformance import items
@@ -22,6 +19,7 @@ from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("drake")
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")

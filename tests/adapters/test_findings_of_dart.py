@@ -4,9 +4,6 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-
-pytest.importorskip("dartpy", reason="DART is optional: pip install -e '.[dart]'")
-
 from driven import measured_of
 
 from adapters.dart import DartEngine
@@ -21,6 +18,7 @@ from validation.bounds import planar
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, prepare, settings_of
 
+pytestmark = pytest.mark.optional("dart")
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
 measured = partial(measured_of, ENGINE)

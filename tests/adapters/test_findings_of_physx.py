@@ -5,9 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-
-pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
-
 from driven import driven, measured_of
 
 from adapters.physx import PhysxEngine
@@ -17,6 +14,7 @@ from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("physx")
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
 settings, _ = driven(ENGINE, "default")

@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("newton", reason="Newton is optional: pip install -e '.[newton]'")
-
 from driven import driven
 
 from adapters.conformance import items
@@ -27,6 +24,7 @@ from validation.catalogue import CATALOGUE
 from validation.scenes import card_tent
 from validation.truths import leaning
 
+pytestmark = pytest.mark.optional("newton")
 ENGINE = NewtonEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")

@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("sapien", reason="PhysX is optional: pip install -e '.[physx]'")
-
 from driven import driven
 
 from adapters.conformance import items
@@ -23,6 +20,7 @@ from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
 from validation.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.optional("physx")
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")

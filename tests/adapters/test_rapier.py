@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("rapier3d", reason="Rapier is optional: pip install -e '.[rapier]'")
-
 from driven import driven
 
 from adapters.conformance import items
@@ -17,6 +14,7 @@ from adapters.rapier import RapierEngine
 from adapters.receipts import receipts
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 
+pytestmark = pytest.mark.optional("rapier")
 ENGINE = RapierEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")

@@ -6,8 +6,6 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-pytest.importorskip("rapier3d", reason="Rapier is optional: pip install -e '.[rapier]'")
-
 from adapters.lift import lift
 from adapters.needs import needs
 from adapters.rapier import RapierEngine
@@ -15,6 +13,7 @@ from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 from validation.scenes import domino
 
+pytestmark = pytest.mark.optional("rapier")
 ENGINE = RapierEngine()
 DT = 1.0 / 240.0
 UP, AHEAD = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])

@@ -472,7 +472,8 @@ def test_the_box_slides_through_its_window_no_faster_than_a_friction_of_one_asks
     assert speed - 2.0 * friction * down * 0.5 > 0.0
 
 
-STOCK = (("bullet", "default"), ("bullet", "tuned"), ("mujoco", "default"), ("mujoco", "tuned"), ("dart", "default"))
+STOCK = (("bullet", "default"), ("bullet", "tuned"), ("mujoco", "default"), ("mujoco", "tuned"),
+         pytest.param("dart", "default", marks=pytest.mark.optional("dart")))  # fmt: skip
 
 
 @pytest.mark.parametrize(("engine", "profile"), STOCK)
@@ -488,10 +489,10 @@ def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, prof
     assert [slip.quantity for slip in receipts(found.engine, profile, asked, dt) if not slip.holds] == []
 
 
+@pytest.mark.optional("dart")
 @pytest.mark.parametrize("friction", [5.0, 10.0, 100.0])
 @pytest.mark.parametrize("asked", [REST, IMPACT], ids=["rest", "impact"])
 def test_cones_that_are_not_solved_to_their_end_break_no_measurement(asked, friction):
-    pytest.importorskip("dartpy")
     asked = replace(asked, dimension=3, friction=friction)
     assert all(slip.holds for slip in receipts(find("dart").engine, "fbf", asked, DT))
 

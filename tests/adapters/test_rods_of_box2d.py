@@ -10,21 +10,21 @@ SINGLES = 1e-5
 PLACES = 1e-4
 
 
+@pytest.mark.optional("box2d")
 @pytest.mark.parametrize("delay", [0.0507, 0.0525, 0.0539])
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}])
 def test_box2d_strikes_a_rod_half_way_into_the_overlap_that_a_step_finds(params, delay):
-    pytest.importorskip("Box2D", reason="Box2D is optional: pip install -e '.[box2d]'")
     params = params | {"delay": delay}
     found, depth = struck("box2d", "tuned", params)
     assert np.abs(found - textbook(params, 0.5 * depth)).max() < SINGLES
     assert np.abs(found - textbook(params)).max() > 5.0 * SINGLES
 
 
+@pytest.mark.optional("box2d3")
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("params", [{"e": 0.8}, {"e": 0.5, "mu": 0.1}])
 def test_a_rebound_of_box2d3_comes_last_and_without_friction(profile, params):
     """One that is faster turns the rod and lifts it, and leaves it as fast along the floor, unlike the textbook's."""
-    pytest.importorskip("pyb2d3", reason="Box2D 3.1 is optional: pip install -e '.[box2d3]'")
     x, _, square, p = end_of(params)
     slower = params | {"e": 0.1}
     found, _ = struck("box2d3", profile, params)

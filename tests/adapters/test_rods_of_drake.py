@@ -9,8 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
-
 from adapters.drake import DrakeEngine
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION
 from adapters.needs import needs
@@ -20,6 +18,7 @@ from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
 from validation.files.mass_properties import moments as uniform_inertia
 
+pytestmark = pytest.mark.optional("drake")
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
 RODS = (Capsule(0.3, 0.2), Cylinder(0.3, 0.2))

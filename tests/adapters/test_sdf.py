@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-pytest.importorskip("pydrake", reason="Drake is optional: pip install -e '.[drake]'")
-
 from adapters import registry
 from adapters.drake.engine import DrakeEngine
 from adapters.drake.sdf import read
@@ -22,6 +20,7 @@ from adapters.stepping import run
 from adapters.trajectory import Sampling
 from reports.command import main
 
+pytestmark = pytest.mark.optional("drake")
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "tests" / "models"
 READ = sorted(p for p in MODELS.iterdir() if p.suffix in (".sdf", ".world") and not p.name.startswith("refused"))

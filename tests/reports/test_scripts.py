@@ -49,6 +49,8 @@ APART = [
     ("newton", "impact", {}, 2, "default"), ("newton", "oblique", {}, 3, "default"),
     ("newton", "impact", {}, 3, "tuned"),
 ]  # fmt: skip
+USUAL = ("chipmunk", "bullet", "mujoco", "reference")
+OPTIONAL = {engine for engine, *_ in APART}
 LOADED = """
 name = "loaded"
 dimension = {d}
@@ -85,6 +87,14 @@ SPATIAL = {"d": 3, "gravity": [0.0, 0.0, -9.81], "half": [0.5, 0.4, 0.3],
            "pose": [0.0, 0.0, 0.7, 0.9887710779360422, 0.0, 0.14943813247359922, 0.0], "force": [1.0, 0.2, 0.5],
            "torque": [0.3, 0.1, 0.2], "away": [1.3, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0],
            "twist": [-0.5, 0.0, 0.0, 0.0, 0.0, 0.2]}  # fmt: skip
+
+
+def cases(listed):
+    """Cases of a test of engines; those of `OPTIONAL` are marked."""
+    return [
+        pytest.param(name, *rest, marks=[pytest.mark.optional(name)] if name in OPTIONAL else [])
+        for name, *rest in listed
+    ]
 
 
 def installed(engine):
@@ -149,19 +159,19 @@ def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
 
-@pytest.mark.parametrize(("engine", "scene", "params", "dimension", "profile"), APART)
+@pytest.mark.parametrize(("engine", "scene", "params", "dimension", "profile"), cases(APART))
 def test_so_does_one_for_an_engine_that_is_set_apart(engine, scene, params, dimension, profile, tmp_path):
     installed(engine)
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
 
-@pytest.mark.parametrize(("engine", "changes"), [
+@pytest.mark.parametrize(("engine", "changes"), cases([
     ("rapier", {"friction_model": "coulomb", "recycling": False, "clustering": False}),
     ("dart", {"detector": "bullet"}), ("box2d", {"early_restitution": True, "units_per_metre": 4.0}),
     ("box2d3", {"continuous": False, "units_per_metre": 4.0}), ("drake", {"boxes": "point", "dissipation": 10.0}),
     ("physx", {"friction_every_iteration": False, "persistent_manifolds": False}),
     ("newton", {"weighted": False, "rebound_iterations": 3}),
-])  # fmt: skip
+]))  # fmt: skip
 def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
     found = installed(engine)
     slot = slot_of(engine, "oblique", {"e": 0.0 if engine == "drake" else 0.5}, "default", 2)
@@ -215,7 +225,7 @@ def another(value):
     return not value if isinstance(value, bool) else value + 1 if isinstance(value, int) else 0.5 * value or 1.0
 
 
-@pytest.mark.parametrize("engine", sorted({engine for engine, *_ in APART}))
+@pytest.mark.parametrize("engine", cases((name,) for name in sorted(OPTIONAL)))
 def test_no_setting_is_left_out(engine):
     """A profile's own number may be the engine's default, so that a script ends in the same bits without it."""
     found = installed(engine)
@@ -232,9 +242,9 @@ def test_no_setting_is_left_out(engine):
         assert len(set(texts.values())) == len(settings) + 1 - (engine == "dart"), (profile, texts)
 
 
+@pytest.mark.optional("drake")
 @pytest.mark.parametrize("name", ["rollers", "soft_surfaces"])
 def test_so_does_one_of_a_model_with_its_own_surfaces(name, tmp_path):
-    installed("drake")
     assert_same_bits(slot_of("drake", pinned(str(MODELS / f"{name}.sdf")), {}, "model", 3), tmp_path)
 
 
@@ -250,9 +260,7 @@ def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, t
     assert_same_bits(slot_of("mujoco", scene, params, "matched", 3), tmp_path)
 
 
-@pytest.mark.parametrize("engine", [
-    "chipmunk", "bullet", "mujoco", "reference", "rapier", "dart", "box2d", "box2d3", "drake", "physx", "newton",
-])  # fmt: skip
+@pytest.mark.parametrize("engine", cases((name,) for name in (*USUAL, *sorted(OPTIONAL))))
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
 def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
     found = installed(engine)
@@ -299,11 +307,11 @@ friction = 0.5
 COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 
 
-@pytest.mark.parametrize(("engine", "runs", "shaken"), [
+@pytest.mark.parametrize(("engine", "runs", "shaken"), cases([
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
     ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
     ("reference", True, False), ("physx", None, True), ("newton", True, True), ("newton", False, True),
-])  # fmt: skip
+]))  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
     found = installed(engine)
@@ -346,11 +354,11 @@ CYLINDER = {"d": 3, "gravity": [1.0, 0.0, -9.81], "first": [0.0, 0.0, 0.31, 1, 0
 HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]'}
 
 
-@pytest.mark.parametrize(("engine", "values"), [
+@pytest.mark.parametrize(("engine", "values"), cases([
     ("chipmunk", IN_THE_PLANE), ("reference", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
     ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL), ("physx", IN_THE_PLANE), ("physx", HULL),
     ("newton", IN_THE_PLANE), ("newton", HULL),
-])  # fmt: skip
+]))  # fmt: skip
 def test_so_does_one_of_other_shapes(engine, values, tmp_path):
     found = installed(engine)
     path = tmp_path / "shapes.toml"
@@ -481,7 +489,7 @@ def test_a_wrong_call_is_one_line(words, said, tmp_path, monkeypatch):
 def test_every_format_of_ours_is_tried_here():
     ours = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
     forms = {(name, form) for name in ours for form in registry.adapter(name).exports}
-    tried = {"chipmunk", "bullet", "mujoco", "reference", *(engine for engine, *_ in APART)}
+    tried = {*USUAL, *OPTIONAL}
     assert forms == {(name, "python") for name in tried} | {("mujoco", "mjcf")}
 
 
