@@ -387,8 +387,10 @@ def test_a_real_engine_is_cured_by_what_its_sheet_says():
     assert isinstance(refuses, Unsearched) and not refuses.asked
 
 
-def test_what_passes_and_what_cannot_be_asked_are_told_apart():
+def test_what_passes_and_what_cannot_be_asked_are_told_apart(monkeypatch):
     pytest.importorskip("pymunk")
+    monkeypatch.setattr(cures, "candidates_of", lambda engine: {"start_overlap": (0.0,)})
+    monkeypatch.setattr(cures, "clocked", lambda slots: (None, None))
     told = CliRunner().invoke(main, ["cure", "chipmunk", "incline", "slide"])
     assert told.exit_code == 0, told.output
     lines = told.stdout.splitlines()

@@ -203,7 +203,7 @@ BROKEN_LAWS = [
 ]
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("code", "said"), BROKEN_LAWS)
 def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_without_them(site, tmp_path, code, said):
     (site / "laws.py").write_text(code)
@@ -217,7 +217,7 @@ def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_wit
     assert ",fail,new," in row and "its laws cannot be loaded" in row and said in row, done.output
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("answer", "said"),
     [("1 / 0", "ZeroDivisionError"), ("(float('nan'), 1.0)", "predicts nan"), ("(1.0, -1.0)", "predicts 1 +- -1"),

@@ -284,18 +284,18 @@ print(run.id)
 """
 
 
-def test_six_simultaneous_starts_are_six_runs(tmp_path):
+def test_simultaneous_starts_are_runs_of_their_own(tmp_path):
     command = [sys.executable, "-c", START, str(tmp_path)]
     starts = [subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-              for _ in range(6)]  # fmt: skip
+              for _ in range(3)]  # fmt: skip
     for start in starts:  # all are loaded and wait
         start.stdin.write("go\n")
     for start in starts:
         start.stdin.flush()
     ids = [start.communicate(timeout=120)[0].strip() for start in starts]
-    assert [start.returncode for start in starts] == [0] * 6
-    assert len(set(ids)) == 6
-    assert len(Store(tmp_path, create=False).runs()) == 6
+    assert [start.returncode for start in starts] == [0] * 3
+    assert len(set(ids)) == 3
+    assert len(Store(tmp_path, create=False).runs()) == 3
 
 
 def test_whoever_reads_what_it_will_write_by_has_the_lock_to_write_already(tmp_path, monkeypatch):

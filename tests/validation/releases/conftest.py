@@ -1,5 +1,6 @@
 """Tiny releases of an engine as local wheels, an environment cache of their own, and pip that knows nothing else."""
 
+import os
 import shutil
 import sys
 import zipfile
@@ -39,28 +40,39 @@ def write_wheel(folder, name, version, files, requires=()):
 
 
 @pytest.fixture(scope="session")
-def wheels(tmp_path_factory):
-    """Folder with all releases of `toyphysics`, and the numpy that is installed here."""
-    folder = tmp_path_factory.mktemp("wheels")
-    for version, changes in CHANGES.items():
-        source = ENGINE.replace("VERSION", version)
-        for old, new in changes:
-            assert old in source
-            source = source.replace(old, new)
-        write_wheel(folder, "toyphysics", version, {"toyphysics.py": source})
+def released(tmp_path_factory):
+    """`released(version, files)`: a folder with all releases of `toyphysics`, and one of numpy."""
+
+    def made(numpy, files):
+        folder = tmp_path_factory.mktemp("wheels")
+        for version, changes in CHANGES.items():
+            source = ENGINE.replace("VERSION", version)
+            for old, new in changes:
+                assert old in source
+                source = source.replace(old, new)
+            write_wheel(folder, "toyphysics", version, {"toyphysics.py": source})
+        write_wheel(folder, "numpy", numpy, files)
+        return folder
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def wheels(released):
+    """All releases of `toyphysics`, and the numpy that is installed here."""
     numpy = distribution("numpy")
     kept = [
         f for f in numpy.files if "dist-info" not in str(f) and "tests" not in f.parts and not str(f).startswith("..")
     ]
     files = {str(f): f.locate().read_bytes() for f in kept if "__pycache__" not in f.parts}
-    write_wheel(folder, "numpy", numpy.version, files)
-    return folder
+    return released(numpy.version, files)
 
 
 @pytest.fixture(scope="session")
 def shared_cache(tmp_path_factory):
-    """Cache folder that tests share which only use environments."""
-    return tmp_path_factory.mktemp("cache")
+    """Cache folder that tests share which only use environments; those of all workers of pytest-xdist."""
+    own = tmp_path_factory.getbasetemp()
+    return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "environments"
 
 
 @pytest.fixture

@@ -50,6 +50,7 @@ def job(toy, tmp_path):
     return run
 
 
+@pytest.mark.long
 def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
     home = job('float("inf")', 0)
     out = home / "crosscheck-out"

@@ -18,6 +18,12 @@ def toy_release(version="1.0.0", distribution="toyphysics"):
     return Release("toy", version, distribution, ("numpy",))
 
 
+@pytest.fixture(scope="session")
+def wheels(released):
+    """Nothing is computed in these environments: their numpy is a name."""
+    return released("1.0", {"numpy.py": ""})
+
+
 def test_an_environment_holds_the_release_and_numpy_and_a_receipt_says_so(own_cache):
     made = environments.build(toy_release())
     assert set(made.receipt["packages"]) == {"toyphysics", "numpy"}

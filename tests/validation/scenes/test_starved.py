@@ -142,7 +142,7 @@ def test_a_row_gave_way_or_held():
     assert starved.fate(scene, {"displacement": (None, "no"), "penetration": (0.0, "")}) == "NaN"
 
 
-@pytest.mark.few(12)
+@pytest.mark.few(6)
 @pytest.mark.parametrize("rate", [60, 120, 240, 480, 960])
 @pytest.mark.parametrize("n", [*range(1, 11), 15, 20, 30])
 def test_our_solver_is_certified_for_a_row_that_only_its_last_ball_is_pressed_in(n, rate):
