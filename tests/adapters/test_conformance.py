@@ -1,5 +1,7 @@
 """The checker of adapters: healthy ones pass, and what is wrong with another one is a finding, never an exception."""
 
+import os
+
 import pytest
 
 from adapters import registry
@@ -19,6 +21,13 @@ def few_worlds(monkeypatch):
     """Memory is looked at over a tenth of the worlds, in tests of other checks: it takes the longest of all."""
     monkeypatch.setattr(worlds, "WARM", 20)
     monkeypatch.setattr(worlds, "BUILDS", 100)
+
+
+@pytest.fixture
+def worlds_in_time(request):
+    """Memory is looked at over all worlds where all tests run."""
+    if not os.environ.get("CROSSCHECK_ALL"):
+        request.getfixturevalue("few_worlds")
 
 
 def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
@@ -79,12 +88,14 @@ def test_expected_failures_are_told_and_an_unexpected_pass_is_a_failure(toy_clas
     assert told["receipt mass"].status == "unexpected pass"
 
 
+@pytest.mark.usefixtures("worlds_in_time")
 def test_the_healthy_toy_conforms_and_every_check_is_told(toy):
     findings = check_adapter(toy())
     assert [str(finding) for finding in findings if not finding.holds] == []
     assert [finding.check for finding in findings] == [*CHECKS, *(f"receipt {q}" for q in QUANTITIES)]
 
 
+@pytest.mark.usefixtures("few_worlds")
 def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_class):
     class Discs(toy_class):
         def refuses(self, scene, profile):
@@ -104,6 +115,7 @@ def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_cla
 
 
 @pytest.mark.few(4)
+@pytest.mark.usefixtures("worlds_in_time")
 @pytest.mark.parametrize("name", registry.names())
 def test_our_adapters_conform(name):
     found = registry.find(name)

@@ -63,7 +63,7 @@ def test_what_is_written_conforms_runs_and_is_short(tmp_path):
     tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", "tests"]
     ran = subprocess.run(tests, cwd=folder, env=environment, capture_output=True, text=True)
     assert ran.returncode == 0 and " passed" in ran.stdout, ran.stdout
-    asked = ["run", "bounce", "--engine", "my_discs", "--dim", "2", "--quick", "--jobs", "1"]
+    asked = ["run", "impact", "--engine", "my_discs", "--dim", "2", "--quick", "--jobs", "1"]
     command = [sys.executable, "-m", "reports.command", *asked]
     ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert ran.returncode == 0 and "my_discs 0.1" in ran.stdout and "Every check passes" in ran.stdout, ran.stderr

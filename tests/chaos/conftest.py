@@ -33,6 +33,12 @@ def soak():
     return bool(os.environ.get("CROSSCHECK_SOAK"))
 
 
+@pytest.fixture(scope="session")
+def every(soak):
+    """Whether all kinds are met, as in `make test-all`, or some of each."""
+    return soak or bool(os.environ.get("CROSSCHECK_ALL"))
+
+
 @pytest.fixture
 def dice(request):
     """Random numbers of this test; the seed is printed, and CROSSCHECK_SEED sets it."""
