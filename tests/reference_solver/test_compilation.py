@@ -100,7 +100,7 @@ def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
     assert run(code, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1") == "True"
 
 
-@pytest.mark.parametrize("module", ["adapters", "validation", "reports"])
-def test_the_solver_imports_nothing_of_the_rest(module):
-    code = f"import sys, reference_solver.planar; print(any(name.split('.')[0] == {module!r} for name in sys.modules))"
-    assert run(code, NUMBA_DISABLE_JIT="1") == "False"
+def test_the_solver_imports_nothing_of_the_rest():
+    rest = {"adapters", "validation", "reports"}
+    code = f"import sys, reference_solver.planar; print({rest} & {{name.split('.')[0] for name in sys.modules}})"
+    assert run(code, NUMBA_DISABLE_JIT="1") == "set()"

@@ -77,6 +77,7 @@ def test_nothing_passes_a_thin_wall_and_the_rebound_is_exact(space, shape, speed
     assert simulation.pose[1, 0] == pytest.approx(expected, rel=1e-12, abs=1e-14)
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 10, 20])
 def test_each_interface_of_a_column_carries_the_weight_above_it_for_5_seconds(space, reference, n, friction):

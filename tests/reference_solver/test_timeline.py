@@ -20,7 +20,8 @@ def column(dimension):
     return space.simulation(space.column([1.0, 1.0]), Settings.classical(1 / 240), GRAVITY, 0.0, 0.5)
 
 
-@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("dimension", [2, 3])
 def test_the_timed_steps_reach_the_same_bits(dimension):
     timed, plain = column(dimension), column(dimension)
     stages = timeline(timed, 30, warm_up=10)

@@ -8,6 +8,7 @@ from telling import check
 OWN = [name for name in LAWS if name.startswith(tuple(f"laws/{engine}-" for engine in APART))]
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("name", OWN)
 def test_what_a_law_of_another_engine_predicts_is_as_it_was_kept(name):
     check(name, LAWS[name], share=1e-7, nothing=1e-10)

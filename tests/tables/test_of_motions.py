@@ -54,7 +54,7 @@ def values(canonical: CanonicalScene, scene: Scene, found: Trajectory) -> dict[s
     return {name: value if value is None or math.isfinite(value) else None for name, (value, _) in told.items()}
 
 
-@pytest.mark.few(12)
+@pytest.mark.few(8)
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_what_would_be_seen_if_it_were_large_is_not_passed_over_where_it_is_no_number(name):

@@ -62,7 +62,7 @@ def slips_by_search(k, q, mu, directions=200_001):
 
 def test_the_answer_is_one_that_a_search_of_the_circle_finds():
     random, slipped = np.random.default_rng(5), 0
-    for _ in range(150):
+    for _ in range(60):
         k, q, mu = problem(random, 100.0)
         p = solved(k, q, mu)
         stick = -np.linalg.solve(k, q)
@@ -73,7 +73,7 @@ def test_the_answer_is_one_that_a_search_of_the_circle_finds():
         # condition 100 and a root that may be nearly double: half the digits of an angle, fewer of the impulse
         assert min(np.abs(p - other).max() for other in candidates) <= 1e-7 * np.abs(p).max()
         slipped += 1
-    assert slipped >= 50
+    assert slipped >= 20
 
 
 def test_roots_that_stand_close_together_are_told_apart():

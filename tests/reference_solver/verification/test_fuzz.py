@@ -141,6 +141,7 @@ class TestAttack:
         """Of the run that is restarted: 5.6e-15 m, where both bounds together were a hundredth less."""
         assert attack(20221, 2).defects == ()
 
+    @pytest.mark.few(5)
     @pytest.mark.parametrize(("dimension", "seed"), ONCE_REFUSED)
     def test_short_pieces_obey_cone_sign_and_complementarity(self, dimension, seed):
         drawn = scene(seed, dimension)

@@ -25,8 +25,8 @@ def long(*call):
     return pytest.param(call, marks=pytest.mark.long)
 
 
-#: Piles of half a minute of CPU or more each.
-LONG = ("50 spheres", "8 spatial boxes", "50 discs and boxes", "50 boxes")
+#: Piles of many seconds of CPU each.
+LONG = ("50 spheres", "8 spatial boxes", "50 discs", "50 discs and boxes", "50 boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),
