@@ -8,12 +8,15 @@ HERE = Path(__file__).parent
 OPTIONS = ("-q", "-p", "no:randomly", "-p", "no:cacheprovider", "-p", "no:xdist")
 
 
-def planted(pytester, line, before=""):
-    """Run a test that does ``line`` and swallows what that raises, and one after it that does nothing."""
+def planted(pytester, lines, before=""):
+    """Run a test for each line, which does it and swallows what that raises, and one after them that does nothing."""
     pytester.makeconftest((HERE / "conftest.py").read_text(encoding="utf-8"))
     folder = pytester.mkdir("reports")
     (folder / "conftest.py").write_text((HERE / "reports" / "conftest.py").read_text(encoding="utf-8"))
-    (folder / "test_planted.py").write_text(f"""
+    tests = [
+        f"def test_{k}():\n    with contextlib.suppress(Exception):\n        {line}\n" for k, line in enumerate(lines)
+    ]
+    head = f"""
 import contextlib
 import pytest
 import click
@@ -30,56 +33,42 @@ def told(text):
     click.echo(text)
 
 {before}
-def test_one():
-    with contextlib.suppress(Exception):
-        {line}
-
-def test_two():
-    pass
-""")
+"""
+    (folder / "test_planted.py").write_text(head + "\n".join([*tests, "def test_last():\n    pass\n"]))
     # A process of its own: in this one what watches the tests around may be at work already, and would tell it twice.
     return pytester.runpytest_subprocess(*OPTIONS, "reports")
 
 
-@pytest.mark.few(3)
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("raise SceneError('first\\nsecond')", "SceneError does not say one line*test_planted.py:20"),
-        ("raise SceneError(' ')", "SceneError does not say one line"),
-        ("raise SceneError()", "SceneError does not say one line"),
-        ("raise SceneError('a', 'b')", "SceneError does not say one line"),
-        ("raise EngineError(7)", "EngineError does not say one line"),
-        ("Table('a', 'b', 'c').add_row('1', '2')", "a row of 2 cells in a table of 3 columns"),
-        ("Table('a').add_row('1', '2')", "a row of 2 cells in a table of 1 columns"),
-        ("Table('a', 'b').add_row('1', None)", "a row with nothing in a cell"),
-        ("Console(quiet=True).print(None)", "nothing is printed"),
-        ("CliRunner().invoke(told, ['--json', '[\\n  1\\n]'])", "is laid out otherwise"),
-        ("CliRunner().invoke(told, ['--json', '[{\"a\": 1}]'])", "is laid out otherwise"),
-    ],
-)
-def test_what_is_swallowed_is_told(pytester, line, told):
-    result = planted(pytester, line)
-    result.assert_outcomes(passed=2, errors=1)
-    result.stdout.fnmatch_lines([f"*{told}*", "ERROR *test_planted.py::test_one*"])
+SWALLOWED = {
+    "raise SceneError('first\\nsecond')": "SceneError does not say one line*test_planted.py:20",
+    "raise SceneError(' ')": "SceneError does not say one line",
+    "raise SceneError()": "SceneError does not say one line",
+    "raise SceneError('a', 'b')": "SceneError does not say one line",
+    "raise EngineError(7)": "EngineError does not say one line",
+    "Table('a', 'b', 'c').add_row('1', '2')": "a row of 2 cells in a table of 3 columns",
+    "Table('a').add_row('1', '2')": "a row of 2 cells in a table of 1 columns",
+    "Table('a', 'b').add_row('1', None)": "a row with nothing in a cell",
+    "Console(quiet=True).print(None)": "nothing is printed",
+    "CliRunner().invoke(told, ['--json', '[\\n  1\\n]'])": "is laid out otherwise",
+    "CliRunner().invoke(told, ['--json', '[{\"a\": 1}]'])": "is laid out otherwise",
+}
+FINE = [
+    "raise SceneError('one line')",
+    "raise EngineError('first\\nsecond')",
+    "CliRunner().invoke(told, ['--json', '[\\n 1\\n]'])",
+    "CliRunner().invoke(told, ['--json', '{\"a\": [1]}'])",
+    "CliRunner().invoke(told, ['--json', 'not JSON'])",
+    "Table('a', 'b').add_row('1', '2')",
+    "Table('a', 'b').add_row('1')",
+    "Console(quiet=True).print('')",
+]
 
 
-@pytest.mark.few(2)
-@pytest.mark.parametrize(
-    "line",
-    [
-        "raise SceneError('one line')",
-        "raise EngineError('first\\nsecond')",
-        "CliRunner().invoke(told, ['--json', '[\\n 1\\n]'])",
-        "CliRunner().invoke(told, ['--json', '{\"a\": [1]}'])",
-        "CliRunner().invoke(told, ['--json', 'not JSON'])",
-        "Table('a', 'b').add_row('1', '2')",
-        "Table('a', 'b').add_row('1')",
-        "Console(quiet=True).print('')",
-    ],
-)
-def test_what_is_as_it_should_be_is_not(pytester, line):
-    planted(pytester, line).assert_outcomes(passed=2)
+def test_what_is_swallowed_is_told_by_its_test_and_what_is_as_it_should_be_is_not(pytester):
+    result = planted(pytester, [*SWALLOWED, *FINE])
+    result.assert_outcomes(passed=len(SWALLOWED) + len(FINE) + 1, errors=len(SWALLOWED))
+    result.stdout.fnmatch_lines([f"*{told}*" for told in SWALLOWED.values()])
+    result.stdout.fnmatch_lines([f"ERROR *test_planted.py::test_{k}*" for k in range(len(SWALLOWED))])
 
 
 def test_what_is_set_up_or_ends_around_tests_is_told_as_well(pytester):
@@ -91,11 +80,12 @@ def shared():
     yield
     SceneError("")
 """
-    result = planted(pytester, "pass", shared)
+    result = planted(pytester, ["pass"], shared)
     result.assert_outcomes(passed=2, errors=2)
-    result.stdout.fnmatch_lines(["ERROR *::test_one*", "ERROR *::test_two*"])
+    result.stdout.fnmatch_lines(["ERROR *::test_0*", "ERROR *::test_last*"])
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("every", "asked", "passed"),
     [

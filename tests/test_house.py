@@ -28,8 +28,14 @@ SOLVER = registry.solver()
 COMMON = {*sys.stdlib_module_names, "numpy", "packaging", "scipy", *LINE}
 
 
+@cache
+def parsed(path):
+    """Syntax tree of a file, which many of these tests look at."""
+    return ast.parse(path.read_text())
+
+
 def imported(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -74,7 +80,7 @@ def test_only_the_command_that_prints_them_imports_the_solver_s_tests():
 
 def named(path):
     """Modules that a file imports, by their whole names; of ``from a import b`` both a and a.b."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -221,7 +227,7 @@ def scenes_named(path, names):
     text = path.read_text()
     if path.suffix != ".py":
         return {word for word in re.findall(r"""["'`](\w+)["'`]""", text) if word in names}
-    found = {node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)}
+    found = {node.value for node in ast.walk(parsed(path)) if isinstance(node, ast.Constant)}
     return {value for value in found if isinstance(value, str) and value in names}
 
 
@@ -251,7 +257,7 @@ def searched_group(name):
 
 
 def whole_imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.ImportFrom):
             yield node.module
 
@@ -271,7 +277,7 @@ def test_no_utils_and_no_packages_among_the_tests():
 def solver_functions():
     """Every function of the solver with the file it stands in."""
     for path in sorted((ROOT / "reference_solver").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
                 yield path.relative_to(ROOT / "reference_solver"), node
 
@@ -383,7 +389,7 @@ def test_what_is_measured_is_not_compared_by_a_max_that_passes_over_no_numbers()
     """Python's max(0.0, nan) is 0.0, which passes: `validation.metrics.largest` is NaN, which has no value."""
     found = []
     for path in sorted((ROOT / "validation").rglob("*.py")):
-        for function in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)):
+        for function in (node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef)):
             given = [ast.unparse(each.annotation) for each in function.args.args if each.annotation]
             if any("Trajectory" in each or "Measured" in each for each in given):
                 named = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
@@ -427,7 +433,7 @@ def all_tests():
 
 def _all_tests():
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 yield f"{path.relative_to(ROOT)}::{node.name}", node
 

@@ -77,6 +77,7 @@ def drawn(chart):
 # ---- one case --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "profile", "scene", "dimension", "params"),
     [
@@ -451,6 +452,7 @@ print(repr(cc.run("impact", engine="evil", profile="raise")))
     assert out.count("begun") == 1 and "building failed" in out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["mujoco"])
 def test_a_script_without_a_guard_reads_a_model(tmp_path, engine, name):
     code = f"""

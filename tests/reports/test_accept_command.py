@@ -263,6 +263,7 @@ def weak(tmp_path, monkeypatch):
         sys.modules.pop(f"weak_{fault}", None)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("fault", "cell"), [("impulse", ["impact", "--param", "v=6"]),
                                              ("friction", ["incline", "--param", "ratio=1.1"])])  # fmt: skip
 def test_a_fault_of_two_per_cent_fails_the_run_and_nothing_of_it_can_be_listed(weak, findings, tmp_path, fault, cell):

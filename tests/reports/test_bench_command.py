@@ -14,7 +14,9 @@ from validation import workers
 from validation.bench import reading
 from validation.bench.lane import QUICK
 from validation.bench.sweep import answered
+from validation.cells import Slot
 from validation.records.store import Store
+from validation.running.execution import execute
 
 ONE = ["bench", "impact", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--dt", "1/60", "--dt", "1/240"]
 
@@ -171,23 +173,11 @@ def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_pat
 )
 def test_an_answer_of_another_cell_machine_or_kind_of_run_is_not_taken(tmp_path, statement, left):
     pytest.importorskip("pymunk")
-    words = [
-        "run",
-        "impact",
-        "--param",
-        "e=.5",
-        "--engine",
-        "chipmunk",
-        "--profile",
-        "tuned",
-        "--dim",
-        "2",
-        "--dt",
-        ".01",
-    ]
-    assert call(*words, "--out", tmp_path).exit_code == 0
+    slots = [Slot("impact", (("e", 0.5),), 2, "chipmunk", "tuned", 0.01)]
     store = Store(tmp_path)
-    slots = [o.slot for o in store.observations(store.run())]
+    made, _ = store.start("quick: impact", slots)
+    store.add(made, execute(slots[0]))
+    store.finish(made)
     run, found = answered(store, slots)
     assert run == store.run().id and [o.slot for o in found] == slots and len(slots) == 1
     with store.writing() as db:

@@ -66,6 +66,7 @@ def between(own):
     return {*ends, math.sqrt(abs(own.easy * own.hard)) or own.hard / 3.0} if not own.whole else {*ends}
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("scene", "own"), axes(), ids=lambda x: x if isinstance(x, str) else x.name)
 def test_the_command_of_an_end_of_a_bracket_asks_for_its_cell(scene, own):
     found = brackets([scene], ENGINES, (), (), quick=True)

@@ -63,6 +63,7 @@ BLAMED_IN_VAIN = {
 }  # fmt: skip
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("engine", "reason"), BLAMED_IN_VAIN)
 def test_a_reason_is_proven_on_its_engine(engine, reason):
     package, blamed, cells = BLAMED_IN_VAIN[engine, reason]

@@ -310,8 +310,8 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
 @pytest.mark.parametrize(("engine", "runs", "shaken"), cases([
     ("chipmunk", True, True), ("bullet", True, False), ("bullet", False, True), ("mujoco", True, True),
     ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
-    ("reference", True, False), ("physx", None, True), ("newton", True, True), ("newton", False, True),
-]))  # fmt: skip
+    ("physx", None, True), ("newton", True, True), ("newton", False, True),
+]) + [pytest.param("reference", True, False, marks=pytest.mark.long)])  # fmt: skip
 def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
     found = installed(engine)
@@ -355,10 +355,10 @@ HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1,
 
 
 @pytest.mark.parametrize(("engine", "values"), cases([
-    ("chipmunk", IN_THE_PLANE), ("reference", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
+    ("chipmunk", IN_THE_PLANE), ("mujoco", IN_THE_PLANE), ("bullet", CYLINDER),
     ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL), ("physx", IN_THE_PLANE), ("physx", HULL),
     ("newton", IN_THE_PLANE), ("newton", HULL),
-]))  # fmt: skip
+]) + [pytest.param("reference", IN_THE_PLANE, marks=pytest.mark.long)])  # fmt: skip
 def test_so_does_one_of_other_shapes(engine, values, tmp_path):
     found = installed(engine)
     path = tmp_path / "shapes.toml"

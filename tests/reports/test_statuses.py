@@ -150,6 +150,7 @@ def test_a_full_stdout_is_said_in_one_line(arguments):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no broken pipes on Windows")
+@pytest.mark.few(1)
 @pytest.mark.parametrize("arguments", [["list", "scenes"], ["describe", "bounce", "--json"]])
 def test_a_reader_that_goes_away_is_no_verdict(arguments):
     """``crosscheck show --all | head``: status 1 would say that something is alarming."""
@@ -162,7 +163,7 @@ def test_a_reader_that_goes_away_is_no_verdict(arguments):
     assert done.stderr == ""
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(2)
 @pytest.mark.skipif(sys.platform == "win32", reason="closes streams by >&-, which is a word of POSIX shells alone")
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize(
@@ -216,7 +217,7 @@ sys.meta_path.insert(0, Hidden())
 """
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [

@@ -393,6 +393,7 @@ def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_e
     assert again["id"] == plain["id"] and again["value"] == plain["value"]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("e", [1.0, 0.7])
 def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
     """MuJoCo's `matched` rebounds by a loop around the solver, which no settings have: pasted without it, they do not.
