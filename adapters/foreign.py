@@ -36,7 +36,7 @@ from adapters.engine import (
 )
 from adapters.isolation import Child, IsolationError, Lost
 from adapters.needs import Needs
-from adapters.plain import NAME, lines, one_line, plain
+from adapters.plain import NAME, kind_of, lines, one_line, plain
 from adapters.scene import Scene
 
 #: Time limit of an import [s]: the largest engines with Python bindings take about ten on a cold disk.
@@ -202,10 +202,10 @@ def checked_settings(given: Any) -> list[Setting]:
         Naming the value of the wrong type.
     """
     if not isinstance(given, list | tuple):
-        raise EngineError(f"settings: a {type(given).__name__} was given, a list is needed")
+        raise EngineError(f"settings: {kind_of(given)} was given, a list is needed")
     for setting in given:
         if not isinstance(setting, Setting) or not isinstance(setting.name, str):
-            raise EngineError(f"settings: a {type(setting).__name__} was given, a Setting with a name is needed")
+            raise EngineError(f"settings: {kind_of(setting)} was given, a Setting with a name is needed")
         if isinstance(setting.value, float) and not math.isfinite(setting.value):
             raise EngineError(f"settings: {one_line(setting.name, NAME)} is {setting.value}, not a finite number")
     return list(given)
@@ -220,7 +220,7 @@ def checked_refusal(given: Any) -> str | None:
         If it is neither.
     """
     if given is not None and not isinstance(given, str):
-        raise EngineError(f"refuses: a {type(given).__name__} was given, a sentence or None is needed")
+        raise EngineError(f"refuses: {kind_of(given)} was given, a sentence or None is needed")
     return one_line(given) if given is not None else None
 
 
@@ -233,7 +233,7 @@ def checked_facts(facts: Any) -> EngineFacts:
         Naming the fact that is wrong.
     """
     if not isinstance(facts, EngineFacts):
-        raise EngineError(f"facts: a {type(facts).__name__} was given, EngineFacts are needed")
+        raise EngineError(f"facts: {kind_of(facts)} was given, EngineFacts are needed")
     try:
         return facts_from(plain_facts(facts))
     except (KeyError, TypeError, ValueError, AttributeError) as error:

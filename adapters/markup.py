@@ -59,7 +59,7 @@ def parsed(text: str, tag: str, otherwise: str) -> Element:
     SceneError
         If it is not XML, has entities, or is nested too deep or too long; with the line.
     """
-    parser, count = expat.ParserCreate(), 0
+    parser, count = expat.ParserCreate("utf-8"), 0  # whatever the text says of its bytes, which are ours
     stack: list[Element] = []
     roots: list[Element] = []
 

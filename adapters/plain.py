@@ -47,6 +47,12 @@ def lines(text: str, count: int, most: int = REASON) -> str:
     return "\n".join(_cut(_visible(line), most) for line in text.splitlines()[-count:])
 
 
+def kind_of(value: Any) -> str:
+    """``an int``, ``a list``, ``None``: what was given, for an error."""
+    name = one_line(type(value).__name__, NAME)
+    return "None" if value is None else f"{'an' if name[:1].lower() in tuple('aeiou') else 'a'} {name}"
+
+
 def is_visible(text: str) -> bool:
     """Whether ``text`` has no characters that `one_line` would escape."""
     return not any(unicodedata.category(c) in _STEERING for c in text)
@@ -104,7 +110,7 @@ def _as_text(value: Any, most: int) -> str:
     try:
         return (value if isinstance(value, str) else str(value))[:most]
     except BaseException:
-        return f"a {type(value).__name__} without a text"
+        return f"{kind_of(value)} without a text"
 
 
 def _visible(text: str) -> str:

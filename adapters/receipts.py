@@ -18,6 +18,7 @@ from typing import Any
 
 from adapters.engine import Declared, Engine, EngineError, Setting
 from adapters.needs import Needs
+from adapters.plain import kind_of
 from adapters.probes import (
     GRAVITY,
     HALF_EXTENTS,
@@ -116,6 +117,8 @@ def receipts(
     )
     names = tuple(name for name in PROBES if _applies(name, needs))
     declared = engine.declares(profile, needs, dt) if own is None else {}
+    if not isinstance(declared, Mapping):
+        raise EngineError(f"declares: {kind_of(declared)} was given, a table is needed")
     for quantity in declared:
         if quantity not in QUANTITIES:
             raise EngineError(f"declares: {engine.name}/{profile} declares {quantity!r}, no probe measures it")

@@ -31,7 +31,7 @@ from typing import Any, Literal
 
 from adapters.drives import Harmonic, check_drive
 from adapters.materials import Materials, Pair, single
-from adapters.plain import NAME, REASON, is_visible, one_line
+from adapters.plain import NAME, REASON, is_visible, kind_of, one_line
 from adapters.shapes import (
     SHAPE_NAMES,
     SHAPES,
@@ -310,7 +310,7 @@ def _validate_scene(scene: Scene) -> None:
 def _validate_body(body: Body, dimension: int) -> None:
     planar = dimension == 2
     if not isinstance(body.shape, SHAPES_OF[dimension]):
-        raise SceneError(f"{body.name}.shape: a {type(body.shape).__name__} cannot be used in {dimension}-D")
+        raise SceneError(f"{body.name}.shape: {kind_of(body.shape)} cannot be used in {dimension}-D")
     body.shape.validate(body.name)
     if isinstance(body.shape, Box):
         check_length(f"{body.name}.shape.half_extents", body.shape.half_extents, dimension)

@@ -21,6 +21,7 @@ from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
 from adapters.near import start_overlap
+from adapters.plain import kind_of
 from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import reach
 from adapters.stages import stage
@@ -64,16 +65,17 @@ class _Seen:
         self.poses: list[Array] = []
         self.twists: list[Array] = []
         self.read: list[tuple[Array, Array]] = []
+        self.shapes = [(len(scene.bodies), size) for size in ((7, 6) if flat or self.dimension == 3 else (3, 3))]
         self.reach = np.array([reach(body.shape) for body in scene.bodies])
         self.outside, self.unturned = 0.0, False
 
     @stage(READING)
     def look(self, simulation: Simulation) -> None:
-        """Store copies of the current state, as a simulation may return its own arrays."""
+        """Store copies of the current state."""
         if len(self.poses) == AT_ONCE:
             self._read_all()
-        self.poses.append(np.array(simulation.pose()))
-        self.twists.append(np.array(simulation.twist()))
+        self.poses.append(_copied("pose", simulation.pose(), self.shapes[0]))
+        self.twists.append(_copied("twist", simulation.twist(), self.shapes[1]))
 
     @stage(READING)
     def take(self, found: Recorded) -> bool:
@@ -136,6 +138,21 @@ class _Seen:
             pose[:, self.standing] = self.places
             twist[:, self.standing] = 0.0
         return pose, twist
+
+
+def _copied(name: str, given: Any, shape: tuple[int, int]) -> Array:
+    """Copy of a state, as a simulation may return its own arrays.
+
+    Raises
+    ------
+    EngineError
+        If it has another shape, or no numbers.
+    """
+    found = np.array(given)
+    if found.shape != shape or found.dtype.kind not in "fiu":
+        said = f"an array of shape {found.shape}" if found.dtype.kind in "fiu" and found.ndim else kind_of(given)
+        raise EngineError(f"{name}: the engine gave {said}, numbers of shape {shape} are needed")
+    return found
 
 
 def posed_for(engine: Engine, scene: Scene) -> Scene:
@@ -201,6 +218,8 @@ def run(
     for in_one_call in (IN_ONE_CALL, 0):
         with stage(BUILDING):
             simulation = engine.build(posed, dt, settings)
+        if not hasattr(simulation, "advance"):
+            raise EngineError(f"build: the engine gave {kind_of(simulation)}, a Simulation is needed")
         try:
             found = _record(simulation, scene, posed, dt, sampling, started, in_one_call)
         finally:
@@ -306,7 +325,15 @@ def _pull(body: Body) -> float:
 
 
 def _kept(contacts: Contacts) -> Contacts:
-    """Copies, as a simulation may return its own arrays."""
+    """Copies, as a simulation may return its own arrays.
+
+    Raises
+    ------
+    EngineError
+        If they are no contacts.
+    """
+    if not isinstance(contacts, Contacts):
+        raise EngineError(f"contacts: the engine gave {kind_of(contacts)}, Contacts are needed")
     return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
 
 

@@ -20,7 +20,7 @@ from adapters import registry
 from adapters import scene as scene_module
 from adapters.engine import Engine, EngineError
 from adapters.own_settings import own
-from adapters.plain import NAME, one_line
+from adapters.plain import NAME, kind_of, one_line
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory, load_trajectory
 from contact_crosscheck.apart import apart
@@ -292,7 +292,7 @@ def engine_named(engine: AnyEngine) -> str:
             raise EngineError(f"engine: {engine} is not installed: {found.reason}")
         return engine
     if not isinstance(engine, Engine | type):
-        raise EngineError(f"engine: a {type(engine).__name__} was given; name an engine, or give one of your own")
+        raise EngineError(f"engine: {kind_of(engine)} was given; name an engine, or give one of your own")
     name = registry.introduce(engine)
     warnings.warn(UNPROTECTED.format(name), stacklevel=3)
     return name
@@ -348,7 +348,7 @@ def settings_from(settings: Mapping[str, Any] | None) -> tuple[tuple[str, Any], 
         If they are no table.
     """
     if settings is not None and not isinstance(settings, Mapping):
-        raise EngineError(f"settings: a {type(settings).__name__} was given; give values by name, {{'name': value}}")
+        raise EngineError(f"settings: {kind_of(settings)} was given; give values by name, {{'name': value}}")
     return tuple(sorted((str(name), value) for name, value in (settings or {}).items()))
 
 

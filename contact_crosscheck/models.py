@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from adapters.plain import kind_of
 from adapters.scene import SceneError
 from contact_crosscheck.apart import apart
 from validation.catalogue import matching
@@ -138,7 +139,7 @@ def scene_named(scene: str | os.PathLike[str] | Scene) -> str:
     if isinstance(scene, Scene):
         return scene.name
     if not isinstance(scene, str | os.PathLike):
-        raise SceneError(f"scene: a {type(scene).__name__} was given; name a scene or a file, or give a Scene")
+        raise SceneError(f"scene: {kind_of(scene)} was given; name a scene or a file, or give a Scene")
     name = os.fspath(scene)
     if is_known(name):
         return Scene.from_file(name).name if is_file(name) else name

@@ -317,7 +317,7 @@ def bench(
             raise SceneError("bench: no case fits these engines, profiles and dimension")
         console = terminal(stderr=True)
         with _store(out) as store:
-            run = run_plan(store, f"bench: {name}", slots, console, jobs, timeout, finish=False)
+            run = run_plan(store, f"bench: {name}", slots, console, jobs, timeout, finish=False, recorded=False)
             observations = store.observations(run)
             if not any(each.outcome is Outcome.OK for each in observations):
                 raise SceneError(f"bench: no case has a result: {observations[0].reason}")

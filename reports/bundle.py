@@ -26,7 +26,7 @@ from typing import Any
 from reports import exports, speed
 from reports.page import load_source, render
 from reports.page.source import Source
-from reports.wording import cell
+from reports.writing import csv_of
 from validation.records.store import Run, Store
 
 README = """contact-crosscheck, run {run}
@@ -82,7 +82,7 @@ def _texts(source: Source, folder: Path) -> dict[str, str]:
     }
     if source.bench is not None:
         store = Store(folder, create=False)
-        texts["timings.csv"] = speed.raw_of(store, source.bench.run).map(cell).to_csv(index=False)
+        texts["timings.csv"] = csv_of(speed.raw_of(store, source.bench.run))
         store.close()
     return texts | {"report.html": render(source), "CITATION.cff": citation(source.run)} | _scene_files(source)
 

@@ -199,7 +199,7 @@ def _of_one_side(changes: Sequence[Change]) -> list[str]:
 def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> str:
     """Both sides, the headline, and a table of at most ``most`` families of changes."""
     out = ["**contact-crosscheck compare**: " + headline(changes), ""]
-    out += [f"* {line}" for line in header(a, b)]
+    out += [f"* {markdown(line)}" for line in header(a, b)]
     found = families(changes)
     if found:
         out += [
@@ -224,7 +224,8 @@ def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> 
     if len(found) > most:
         left = plural(len(found) - most, "more family")
         out.append(f"\n... and {left}; `crosscheck compare --json` lists every change")
-    out += [f"\n{line}" for line in [roles_line((change.engine, change.profile) for change in changes)] if line]
+    roles = roles_line((change.engine, change.profile) for change in changes)
+    out += [f"\n{markdown(roles)}"] if roles else []
     return "\n".join(out) + "\n"
 
 

@@ -13,6 +13,7 @@ from adapters.stages import stage
 from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
+from reports.writing import write
 from validation.judging.rows import Row, frame, is_alarming, rows_of
 from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Run, Store
@@ -164,5 +165,5 @@ def write_all(folder: Path, rows: Sequence[Plain], nulls: Sequence[Plain] = ()) 
     if nulls:
         texts["nulls.csv"] = as_csv(nulls)
     for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write(folder / name, text)
     return {name: folder / name for name in texts}

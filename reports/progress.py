@@ -42,16 +42,18 @@ def run_plan(
     keep: Path | None = None,
     fresh: bool = False,
     finish: bool = True,
+    recorded: bool = True,
     cluster: str = "",
     known: Sequence[Observation] = (),
     heard: Callable[[Run, Observation], None] = lambda run, observation: None,
 ) -> Run:
     """Run the cases of this plan that the store lacks; the observations are in the store afterwards.
 
-    ``finish`` marks the run as complete; a bench does so itself, after its timings. A run with missing cases, as of
-    those left after time-outs, is not complete: it prints that, and the same command resumes it. ``cluster`` is the
-    address of a Dask cluster to run on; its motions are not recorded, and OUT/cluster.jsonl lists which worker ran each
-    case. ``known`` are results of another run for cases of this plan, which are stored instead of being run again.
+    ``finish`` marks the run as complete; others do so themselves, after their timings or files. A run with missing
+    cases, as of those left after time-outs, is not complete: it prints that, and the same command resumes it. Motions
+    are recorded for replays if ``recorded``. ``cluster`` is the address of a Dask cluster to run on; its motions are
+    not recorded, and OUT/cluster.jsonl lists which worker ran each case. ``known`` are results of another run for cases
+    of this plan, which are stored instead of being run again.
     """
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
@@ -70,7 +72,7 @@ def run_plan(
     compiled = compiling(parts, console, any(key_of(slot) not in waiting for slot in todo))
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
-    shown = representatives(slots) if finish else set()
+    shown = representatives(slots) if recorded else set()
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
         stage(console, plural(len(todo), "case")),

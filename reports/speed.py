@@ -14,7 +14,8 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters import registry
-from reports.wording import cell, number, plural
+from reports.wording import number, plural
+from reports.writing import csv_of, write
 from validation.bench import agreement, reading, work
 from validation.cells import Observation, Outcome, checks_of, format_dt
 from validation.judging.verdicts import judge_physics
@@ -65,10 +66,10 @@ def write_all(folder: Path, run: Run, protocol: Mapping[str, Any], tables: Table
     """Write bench.json, one CSV per table, and the raw timings into ``folder/bench``."""
     target = folder / "bench"
     target.mkdir(parents=True, exist_ok=True)
-    (target / "bench.json").write_text(as_json(run, protocol, tables) + "\n", encoding="utf-8")
+    write(target / "bench.json", as_json(run, protocol, tables) + "\n")
     for name, table in {**tables, "raw_timings": raw}.items():
         flat = table.drop(columns=["slot"], errors="ignore")
-        flat.map(cell).to_csv(target / f"{name}.csv", index=False)
+        write(target / f"{name}.csv", csv_of(flat))
     return sorted(target.iterdir())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -177,11 +178,14 @@ def _is_number(text: str) -> bool:
     return True
 
 
+#: What has a meaning in Markdown: HTML, table cells, code, emphasis, links and images, names of people, addresses.
+_LIVE = re.compile(r"[&<>|\\`*~\[]|(?<!\w)_|_(?!\w)|(?<!\w)@|@(?=[\w-]+\.)|(?<=:)/(?=/)|(?<=\bwww)\.")
+_HARMLESS = {"&": "&amp;", "<": "&lt;", ">": "&gt;", "@": "@&#8203;"}
+
+
 def markdown(text: str) -> str:
-    """Text escaped for Markdown: without HTML and ends of table cells."""
-    for raw, escaped in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("|", "\\|")):
-        text = text.replace(raw, escaped)
-    return text
+    """Text escaped for Markdown, so that it is shown as it is."""
+    return _LIVE.sub(lambda found: _HARMLESS.get(found[0], f"\\{found[0]}"), text)
 
 
 def params_text(params: Mapping[str, float]) -> str:

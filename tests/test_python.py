@@ -151,10 +151,10 @@ def test_settings_of_a_user_s_own_name_the_profile(engine):
 WRONG = [
     (SceneError, "scene: there is no scene called 'bonce', did you mean 'bounce'?", {"scene": "bonce"}),
     (SceneError, "scene: 'bounc*' means bounce; name one", {"scene": "bounc*"}),
-    (SceneError, "scene: a int was given", {"scene": 3}),
+    (SceneError, "scene: an int was given", {"scene": 3}),
     (SceneError, "scene: cannot read nowhere.toml", {"scene": "nowhere.toml"}),
     (EngineError, "engine: there is no engine called 'chipmonk', did you mean 'chipmunk'?", {"engine": "chipmonk"}),
-    (EngineError, "engine: a int was given", {"engine": 3}),
+    (EngineError, "engine: an int was given", {"engine": 3}),
     (EngineError, "engine: cannot be made: TypeError: int is not", {"engine": int}),
     (EngineError, "profile: chipmunk has no profile 'tund', only", {"profile": "tund"}),
     (EngineError, "profile: chipmunk has no profile '3', only", {"profile": 3}),
@@ -171,7 +171,7 @@ WRONG = [
     (SceneError, "bounce.dimension: 4 is not one of", {"dimension": 4}),
     (SceneError, "dimension: '3' must be 2 or 3", {"dimension": "3"}),
     (SceneError, "iterations: 0 must be a whole number", {"iterations": 0}),
-    (EngineError, "settings: a int was given", {"settings": 3}),
+    (EngineError, "settings: an int was given", {"settings": 3}),
     (EngineError, "set: chipmunk has no setting 'nope'", {"settings": {"nope": 3}}),
 ]
 

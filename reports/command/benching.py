@@ -114,7 +114,7 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
         console.print(f"reusing {len(known)} of {plural(len(cells), 'result')} of run {source}")
     run = run_plan(
         store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False,
-        known=known,
+        recorded=False, known=known,
     )  # fmt: skip
     if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
         store.close()

@@ -65,6 +65,8 @@ def folder(path: Path, field: str = "out") -> Path:
     if path.exists() and not path.is_dir():
         raise _wrong(f"{field}: {path} is a file, not a folder")
     there = nearest(path)
+    if there == path and not os.access(path, os.W_OK):
+        raise _wrong(f"{field}: {path} may not be written; name a folder that may")
     if not there.is_dir() or not os.access(there, os.W_OK):
         raise _wrong(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
     return path

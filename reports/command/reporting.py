@@ -19,6 +19,7 @@ from reports.command.showing import which
 from reports.stages import say, stage
 from reports.terminal import terminal
 from reports.wording import missing_text
+from reports.writing import write
 from validation.records.store import MissingError, Store
 
 
@@ -40,7 +41,7 @@ def report(run: str, output: Path | None, show: bool, as_json: bool, out: Path) 
     with stage(terminal(stderr=True), "report"):
         source = load_source(out, run)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(render(source), encoding="utf-8")
+        write(path, render(source))
     if not as_json:
         store = Store(out, create=False)
         click.echo(which(store, source.run, run).line("report", out), err=True)
@@ -80,7 +81,7 @@ def dashboard(output: Path | None, show: bool, as_json: bool, out: Path) -> None
             raise MissingError(f"out: {out} has no finished run of a scene to show")
         shown = sum(len(panel.points) > 1 for panel in found)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(render(found, f"{shown} series{made}", reports), encoding="utf-8")
+        write(path, render(found, f"{shown} series{made}", reports))
     moved = sum(len(events(panel)) for panel in found)
     result = {"path": str(path), "panels": len(found), "moved": moved}
     click.echo(json.dumps(result) if as_json else str(path))

@@ -27,6 +27,7 @@ from reports.summary import show
 from reports.terminal import terminal
 from reports.verdicts import Verdicts
 from reports.wording import plural
+from reports.writing import write
 from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.judging.rows import Row
@@ -107,33 +108,34 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     title = f"{request.suite}: {asked(request, options)}"
     limits = options["jobs"], options["timeout"]
     verdicts = Verdicts(chosen, console)
-    done = run_plan(
-        store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"], heard=verdicts.add
-    )
-    rows, observations = verdicts.rows(done), store.observations(done)
-    if done.finished:
+    done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"],
+                    heard=verdicts.add, finish=False)  # fmt: skip
+    rows, observations, complete = verdicts.rows(done), store.observations(done), not store.missing(done)
+    if complete:
         brief.keep(out, done.id, observations, rows)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
-    store.close()
     # The answer goes to stdout, for a pipe or a file, unless --json prints there.
     answer = console if as_json else terminal()
     _show(rows, out, as_json, answer, options)
+    if complete:
+        store.finish(done)  # after its files: the same command would write them again
+    store.close()
     for line in spread_lines(apart):
         answer.print(line, markup=False, highlight=False, soft_wrap=True)
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     alarm = any(row.failing if options["strict"] else row.alarming for row in rows)
-    sys.exit(statuses.verdict(alarm, done.finished and not absent))
+    sys.exit(statuses.verdict(alarm, complete and not absent))
 
 
 def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
     plain = [row.as_dict() for row in with_skill(rows)]
     written = exports.write_all(out, plain, [row.as_dict() for row in null_rows(rows)])
     if options["junit"]:
-        options["junit"].write_text(exports.as_junit(plain), encoding="utf-8")
+        write(options["junit"], exports.as_junit(plain))
     if options["markdown"]:
-        options["markdown"].write_text(exports.as_markdown(plain), encoding="utf-8")
+        write(options["markdown"], exports.as_markdown(plain))
     if as_json:
         click.echo(exports.as_json(plain))
     show(plain, console, files=written.values(), out=out)

@@ -19,6 +19,7 @@ from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import print_roles, terminal
 from reports.wording import at, plural
+from reports.writing import csv_of, write
 from validation.judging.rows import rows_of
 from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
 from validation.records.store import Store
@@ -72,13 +73,16 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     store = Store(out)
     title = f"sweep: {' '.join(request.scenes)}"
     limits = options["jobs"], options["timeout"]
-    done = run_plan(store, title, chosen, console, *limits, fresh=options["fresh"], cluster=options["cluster"])
-    rows = rows_of(done.id, store.observations(done), chosen)
-    store.close()
+    done = run_plan(store, title, chosen, console, *limits, fresh=options["fresh"], cluster=options["cluster"],
+                    finish=False)  # fmt: skip
+    rows, complete = rows_of(done.id, store.observations(done), chosen), not store.missing(done)
     found = table(rows)
-    found.to_csv(files["csv"], index=False)
+    write(files["csv"], csv_of(found))
     if options["parquet"]:
         found.to_parquet(files["parquet"], index=False)
+    if complete:
+        store.finish(done)  # after its files: the same command would write them again
+    store.close()
     if as_json:
         click.echo(json.dumps(json.loads(found.to_json(orient="records", double_precision=15)), indent=1))
     console.print(counted(found))
@@ -92,7 +96,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     broken = any(row.outcome in ("invalid", "crashed", "timed_out", "missing") for row in rows)
-    sys.exit(statuses.verdict(broken, done.finished and not absent))
+    sys.exit(statuses.verdict(broken, complete and not absent))
 
 
 def _study(options: dict[str, Any]) -> Study:

@@ -57,11 +57,11 @@ def test_what_are_no_facts_settings_or_refusals_is_told_by_its_type():
     for asked, given, said in (
         (foreign.checked_facts, {"name": "toy"}, "facts: a dict was given, EngineFacts are needed"),
         (foreign.checked_settings, "slop", "settings: a str was given, a list is needed"),
-        (foreign.checked_settings, [Setting("a", 1, "", ""), 3], f"settings: a int was {needed}"),
+        (foreign.checked_settings, [Setting("a", 1, "", ""), 3], f"settings: an int was {needed}"),
         (foreign.checked_settings, [Setting(7, 1, "", "")], f"settings: a Setting was {needed}"),
         (foreign.checked_settings, (Setting("slop\n", float("nan"), "", ""),),
          "settings: slop is nan, not a finite number"),
-        (foreign.checked_refusal, 3, "refuses: a int was given, a sentence or None is needed"),
+        (foreign.checked_refusal, 3, "refuses: an int was given, a sentence or None is needed"),
     ):  # fmt: skip
         with pytest.raises(EngineError) as error:
             asked(given)

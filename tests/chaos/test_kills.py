@@ -8,8 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
-from reports import exports
+from reports import exports, progress
+from reports.command import main
 from validation.records.store import Store
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="kills processes and reads /proc")
@@ -74,6 +76,26 @@ def test_kills_at_random_moments_lose_nothing_that_finished_and_change_no_bit(di
     store.close()
     assert runs[-1].finished
     assert bits(tmp_path) == expected
+
+
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_a_kill_before_the_files_of_a_finished_run(tmp_path, monkeypatch, command):
+    """The same command writes them, and runs no case again."""
+    words = [command, "impact", "--dim", "2", "--engine", "chipmunk", "--profile", "tuned", "--out", str(tmp_path)]
+    words += ["--param", "v=2"] if command == "run" else ["--grid", "v=1:2:2"]
+    module, name = (exports, "write_all") if command == "run" else (sys.modules["reports.command.sweeping"], "csv_of")
+
+    def killed(*given):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, name, killed)
+        assert CliRunner().invoke(main, words).exit_code == 130
+    monkeypatch.setattr(progress, "run_cells", lambda todo, *rest, **more: iter([]) if not todo else killed())
+    again = CliRunner().invoke(main, words)
+    assert again.exit_code == 0, again.output
+    (run,) = Store(tmp_path, create=False).runs()
+    assert run.finished and (tmp_path / ("rows.jsonl" if command == "run" else "sweep.csv")).stat().st_size > 0
 
 
 def test_what_an_engine_started_does_not_outlive_a_run_that_is_killed(faulty, tmp_path):

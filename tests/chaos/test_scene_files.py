@@ -136,6 +136,19 @@ def test_toml_that_is_none_is_refused_in_one_line(tmp_path, text):
     assert is_visible(str(caught.value)) and len(str(caught.value)) < 2000
 
 
+@pytest.mark.parametrize("part", ["a", "'a'", '"b\\""', " a "])
+def test_a_key_of_many_parts(tmp_path, part):
+    """A parser takes time by the square of their number: they are counted before."""
+    path = tmp_path / "scene.toml"
+    for text in (".".join([part] * 16_000) + " = 1", "x = { " + ".".join([part] * 9) + " = 1 }"):
+        path.write_text(text)
+        with pytest.raises(SceneError, match="a key has more than 8 parts"):
+            resolve(pinned(str(path)))
+    path.write_text(".".join([part] * 8) + " = 1")
+    with pytest.raises(SceneError, match="Extra inputs"):
+        resolve(pinned(str(path)))
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 def test_pipes_folders_and_devices_are_no_scene_files(tmp_path):
     os.mkfifo(tmp_path / "pipe.json")

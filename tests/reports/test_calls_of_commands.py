@@ -37,9 +37,12 @@ def ran(monkeypatch):
     """Calls of what runs a plan, and what it leaves: a finished run, and rows as `ran.rows` has them."""
     found = SimpleNamespace(calls=[], rows=[], finished=True, kept=[], apart=[], absent=[])
 
-    def run_plan(store, title, chosen, console, jobs, timeout, keep=None, fresh=False, cluster="", heard=None):
+    def run_plan(
+        store, title, chosen, console, jobs, timeout, keep=None, fresh=False, cluster="", heard=None, finish=True
+    ):
+        assert not finish  # not before its files are written
         found.calls.append((title, len(chosen), jobs, timeout, keep and keep.name, fresh, cluster))
-        return SimpleNamespace(id="a-run", finished=found.finished)
+        return SimpleNamespace(id="a-run")
 
     for module in (running, sweeping):
         monkeypatch.setattr(module, "run_plan", run_plan)
@@ -47,6 +50,8 @@ def ran(monkeypatch):
     monkeypatch.setattr(sweeping, "rows_of", lambda run, seen, chosen: found.rows)
     monkeypatch.setattr(running.Verdicts, "rows", lambda verdicts, run: found.rows)
     monkeypatch.setattr(running.Store, "observations", lambda store, run: ["seen"])
+    monkeypatch.setattr(running.Store, "missing", lambda store, run: 0 if found.finished else 1)
+    monkeypatch.setattr(running.Store, "finish", lambda store, run: None)
     monkeypatch.setattr(running.Store, "recordings", lambda store, run: ["recorded"])
     monkeypatch.setattr(running.brief, "keep", lambda *given: found.kept.append(given[1:]))
     monkeypatch.setattr(running, "spreads", lambda *given: found.apart.append(given) or [])

@@ -94,7 +94,7 @@ def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
     value, flip = Kind.ERROR.value, "newly failing"
     assert text == "\n".join([
         f"**contact-crosscheck compare**: {headline([FLIP, MILDER, odd])}", "",
-        *[f"* {line}" for line in header(A, B)], "",
+        *[f"* {line.replace('>', '&gt;')}" for line in header(A, B)], "",
         "| change | | checks | where | metric | before | after | size |",
         "|---|---|---|---|---|---|---|---|",
         f"| {flip} | worse | 2 | bullet/tuned stack 2-D n=5 | `drift` | pass 1e-6 m | FAIL 3e-3 m | "

@@ -175,7 +175,8 @@ def test_what_may_not_be_written_is_said(tmp_path, monkeypatch):
     assert refused(files.folder, tmp_path / "new") == (
         f"out: {tmp_path / 'new'} cannot be made, {tmp_path} is not a folder that may be written"
     )
-    assert asked == [(tmp_path, os.W_OK)]
+    assert asked.pop() == (tmp_path, os.W_OK)
+    assert refused(files.folder, tmp_path) == f"out: {tmp_path} may not be written; name a folder that may"
 
 
 # ---- tables to take away -------------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@ import json
 import shlex
 
 import pytest
+from markdown_it import MarkdownIt
+from markdown_it.common.utils import escapeHtml
 
 from adapters import registry
 from reports.wording import (
@@ -71,6 +73,24 @@ def test_a_plain_number_keeps_the_digits_it_was_asked_for():
 )
 def test_markdown_shows_text_as_it_is(raw, shown):
     assert markdown(raw) == shown
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["![pixel](http://evil.example/x.png)", "[here](http://evil.example)", "[a]: http://evil.example", "**bold**",
+     "~~gone~~", "`code`", "_so_", "http://evil.example", "www.evil.example", "me@evil.example", "<b>", "\\[a](b)",
+     "final[ball.y] of drop.toml@3f2a9c1d"],
+)  # fmt: skip
+def test_markdown_of_a_name(text):
+    """It is shown as text: without an image, a link, or emphasis."""
+    shown = MarkdownIt().enable("strikethrough").render(f"* {markdown(text)}")
+    assert not any(begin in markdown(text) for begin in ("://", "www.", "me@evil"))
+    assert shown.replace("\u200b", "") == f"<ul>\n<li>{escapeHtml(text)}</li>\n</ul>\n"
+
+
+def test_markdown_of_a_person_s_name():
+    """A mark without width parts it from the @, so that nobody is told."""
+    assert markdown("@everyone and (@team/x)") == "@&#8203;everyone and (@&#8203;team/x)"
 
 
 @pytest.mark.parametrize("begin", ["=", "+", "-", "@", "\t", "\r"])

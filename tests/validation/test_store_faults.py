@@ -106,6 +106,7 @@ def everything(folder):
         ("UPDATE observations SET body = json_set(body, '$.outcome', 'splendid')", ()),
         ("UPDATE observations SET body = json_set(body, '$.slot.dt', 'soon')", ()),
         ("UPDATE observations SET body = json_set(body, '$.metrics', 7)", ()),
+        ("UPDATE observations SET body = json_set(body, '$.slot.engine', 'bullet')", ()),
         ("UPDATE observations SET body = json_set(body, '$.steps', 'many')", ()),
         ("UPDATE observations SET body = json_set(body, '$.settings', json('[1]'))", ()),
         ("UPDATE observations SET body = ?", (b"\x00\x01",)),

@@ -7,6 +7,7 @@ of thousands of digits.
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,10 @@ MOST_BYTES = 2**21
 MOST_BODIES = 10_000
 #: Wrong fields that are named; the rest are counted.
 MOST_ERRORS = 10
+#: Most parts of a TOML key: the format has three, and a parser takes time by the square of their number.
+MOST_PARTS = 8
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS}}}")
 
 
 def read_text(path: Path) -> str:
@@ -61,6 +66,8 @@ def parsed(text: str, path: Path) -> Any:
         One line, if it is not valid TOML or JSON, or has more bodies than can be run.
     """
     kind, shown = path.suffix[1:].upper(), one_line(path)
+    if kind == "TOML" and _LONG_KEY.search(text):
+        raise SceneError(f"scene: {shown} is not valid TOML: a key has more than {MOST_PARTS} parts")
     try:
         data = tomllib.loads(text) if kind == "TOML" else json.loads(text)
     except RecursionError:

@@ -403,6 +403,8 @@ def _is_date(text: str) -> bool:
 
 def _observation(slot: str, body: str) -> Observation:
     found = observation_from_dict(json.loads(body))
+    if found.slot.key() != slot:
+        raise ValueError("it is the result of another case")
     if posed.is_file(found.slot.scene):
         posed.resolve(found.slot.scene)  # its scene may be damaged
     return found

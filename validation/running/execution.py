@@ -15,7 +15,7 @@ from adapters.engine import Engine, EngineError
 from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
 from adapters.own_settings import own
-from adapters.plain import one_line, plain
+from adapters.plain import kind_of, one_line, plain
 from adapters.receipts import Receipt, receipts
 from adapters.registry import find
 from adapters.scene import SceneError
@@ -153,7 +153,7 @@ def _plain(slip: Receipt) -> dict[str, Any]:
 
 def _table(name: str, given: Any) -> dict[str, Any]:
     if not isinstance(given, Mapping):
-        raise EngineError(f"{name}: a {type(given).__name__} was given, a table is needed")
+        raise EngineError(f"{name}: {kind_of(given)} was given, a table is needed")
     return dict(plain(given))
 
 

@@ -1,0 +1,32 @@
+"""Files are written whole or not at all; text of a table starts no formula."""
+
+import os
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from reports.writing import csv_of, write
+
+
+def test_a_file_that_cannot_be_written_whole(tmp_path):
+    path = tmp_path / "rows.csv"
+    write(path, "old")
+    with pytest.raises(UnicodeEncodeError):
+        write(path, "new \ud800")
+    assert path.read_text() == "old" and os.listdir(tmp_path) == ["rows.csv"]
+    write(path, "new")
+    assert path.read_text() == "new"
+
+
+def test_a_link_and_a_device(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write(tmp_path / "link", "text")
+    assert (tmp_path / "link").is_symlink() and (tmp_path / "file").read_text() == "text"
+    write(Path(os.devnull), "text")
+    assert not Path(os.devnull).is_file()
+
+
+def test_a_formula_in_a_table():
+    table = pd.DataFrame({"name": ["=cmd()", "-1", "plain"], "@x": [1.0, -2.5, 3.0]})
+    assert csv_of(table) == "name,'@x\n'=cmd(),1.0\n-1,-2.5\nplain,3.0\n"
