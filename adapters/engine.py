@@ -296,6 +296,8 @@ class Engine(ABC):
     facts: EngineFacts
     #: Profile name -> rule that gives the settings for a scene's needs and the step.
     profiles: Mapping[str, ProfileRule]
+    #: Most bodies of a scene that the engine is meant for; a plan with a larger one says so. None: no such limit.
+    most_bodies: int | None = None
     #: Other releases that the adapter supports; None: only the installed package.
     releases: Releases | None = None
     #: Further settings that a user may change, by name, with a check of each (`adapters.settings`).

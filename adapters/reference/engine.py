@@ -73,6 +73,8 @@ class ReferenceEngine(Engine):
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
+    #: 160 discs that settle take 79 ms a step, as long as a whole run of most scenes.
+    most_bodies = 100
 
     def version(self) -> str:
         """Package version and eight hex digits over the solver's sources.

@@ -45,7 +45,7 @@ CRASHES = {
     "print_much": "after a line of 100 MB",
     "print_binary": "after binary output",
     "close_files": "the process",
-    "pose_shape": "pose: the engine gave an array of shape (2, 2), numbers of shape (2, 3) are needed",
+    "pose_shape": "pose: the engine gave an array of shape (1, 2), numbers of shape (1, 3) are needed",
     "pose_text": "pose: the engine gave a list, numbers",
     "twist_none": "twist: the engine gave None",
     "contacts_number": "contacts: the engine gave an int",

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -83,7 +84,7 @@ def test_a_kill_before_the_files_of_a_finished_run(tmp_path, monkeypatch, comman
     """The same command writes them, and runs no case again."""
     words = [command, "impact", "--dim", "2", "--engine", "chipmunk", "--profile", "tuned", "--out", str(tmp_path)]
     words += ["--param", "v=2"] if command == "run" else ["--grid", "v=1:2:2"]
-    module, name = (exports, "write_all") if command == "run" else (sys.modules["reports.command.sweeping"], "csv_of")
+    module, name = (exports, "write_all") if command == "run" else (import_module("reports.command.sweeping"), "csv_of")
 
     def killed(*given):
         raise KeyboardInterrupt

@@ -19,10 +19,10 @@ DAMAGE = (
 )
 
 
-@pytest.fixture(scope="module")
-def damaged(page_folder, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("damaged")
-    shutil.copytree(page_folder, folder, dirs_exist_ok=True)
+@pytest.fixture
+def damaged(page_folder, tmp_path):
+    folder = tmp_path / "damaged"
+    shutil.copytree(page_folder, folder)
     with sqlite3.connect(folder / FILE) as database:
         for statement in DAMAGE:
             database.execute(statement)

@@ -1,6 +1,7 @@
 """Which slots a run has: profiles are chosen by what they are, not by how they are called."""
 
 import ast
+import warnings
 from dataclasses import replace
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from adapters import registry
 from adapters.engine import NOT_KNOWN
 from adapters.foreign import Found
+from adapters.plain import Notice
 from adapters.scene import SceneError
 from validation import identity
 from validation.catalogue import CATALOGUE
@@ -166,3 +168,15 @@ def test_the_quick_suite_asks_a_profile_without_a_rank_what_stands_for_a_scene()
     assert len(quick["tuned"]) > 1 and named == {"matched": quick["tuned"]}
     assert standard["matched"] == standard["tuned"]
     assert asked(params={"mu": 0.25})["matched"] == {((("mu", 0.25),), None)}
+
+
+def test_a_scene_that_is_larger_than_an_engine_is_meant_for():
+    """It is told before anything runs, and for this engine alone."""
+    request = Request(["stack"], ["reference", "chipmunk"], params={"n": 100.0}, dimensions=[2])
+    with pytest.warns(Notice) as said:
+        assert slots(request)
+    told = "reference is meant for 100 bodies: a case of stack with 101 may take minutes"
+    assert {str(each.message) for each in said} == {told}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert slots(replace(request, params={"n": 99.0}))

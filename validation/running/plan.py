@@ -11,6 +11,7 @@ full
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 from adapters.engine import NOT_KNOWN, Engine, EngineError
 from adapters.needs import needs
 from adapters.own_settings import kinds_of, near, own
-from adapters.plain import NAME, one_line
+from adapters.plain import NAME, Notice, one_line
 from adapters.registry import facts, find, is_ranked
 from adapters.scene import Scene
 from adapters.stages import stage
@@ -114,6 +115,7 @@ def _engine_slots(
             for dt in (brought.dt,) if brought and not request.dts else _steps(request, engine, profile):
                 base = Slot(argument, params, dimension, name, profile, dt)
                 check_size(scene, dt)
+                _say_if_large(engine, canonical, scene)
                 sets = _own(request, engine, base, scene)
                 if argument not in CATALOGUE:
                     canonical.checks(scene, dt)  # a scene that cannot be judged is refused before any run
@@ -122,6 +124,14 @@ def _engine_slots(
                         continue
                     for ulp in (*request.ulps, *_moves(request, canonical, variation, dt, iterations)):
                         yield replace(base, iterations=iterations, ulp=ulp).with_own(sets)
+
+
+def _say_if_large(engine: Engine | None, canonical: CanonicalScene, scene: Scene) -> None:
+    """Tell of a scene with more bodies than the engine is meant for: it runs, and may take minutes."""
+    most = engine.most_bodies if engine is not None else None
+    if engine is not None and most is not None and len(scene.bodies) > most:
+        said = f"{engine.name} is meant for {most} bodies: a case of {canonical.name} with {len(scene.bodies)}"
+        warnings.warn(Notice(f"{said} may take minutes"), stacklevel=2)
 
 
 def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> tuple[tuple[str, Any], ...]:
