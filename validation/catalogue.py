@@ -53,6 +53,11 @@ def _loaded(name: str) -> CanonicalScene | SceneError:
     return found
 
 
+def _names() -> list[str]:
+    """Names of all scenes in their order, with those of other packages that cannot be loaded."""
+    return [*OURS, *_entries()]
+
+
 def module_of(name: str) -> str:
     """Module that a scene comes from."""
     return f"validation.scenes.{name}" if name in OURS else _entries()[name].module
@@ -82,8 +87,7 @@ class _Catalogue(Mapping[str, CanonicalScene]):
         return found
 
     def __iter__(self) -> Iterator[str]:
-        yield from OURS
-        yield from (name for name in _entries() if isinstance(_loaded(name), CanonicalScene))
+        return (name for name in _names() if name in OURS or isinstance(_loaded(name), CanonicalScene))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -100,7 +104,8 @@ def matching(pattern: str) -> list[CanonicalScene]:
     SceneError
         If there is none ("did you mean"), or it cannot be loaded.
     """
-    found = [scene for name, scene in CATALOGUE.items() if fnmatch.fnmatchcase(name, pattern)]
+    names = fnmatch.filter(_names(), pattern)  # only these are loaded
+    found = [scene for name in names if isinstance(scene := _loaded(name), CanonicalScene)]
     if found:
         return found
     if pattern in _entries() and isinstance(reason := _loaded(pattern), SceneError):

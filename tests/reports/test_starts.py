@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from adapters import registry
+from validation.scenes import OURS
 
 #: Libraries that take a tenth of a second or more to import, and the engines with their packages.
 LARGE = {"pandas", "pyarrow", "scipy", "numba", "altair", "distributed", "matplotlib", "jinja2"}
@@ -52,7 +53,7 @@ def test_help_and_a_command_that_there_is_not_import_no_command_and_no_numpy():
 
 
 def test_commands_that_run_nothing_import_no_engine_and_no_large_library():
-    calls = ["list scenes", "describe bounce", "run --no-such-option", "describe bonce", "list engines", "list suites",
+    calls = ["describe bounce", "describe bonce", "list scenes", "run --no-such-option", "list engines", "list suites",
              "ask my ball does not bounce", "ask mujoco grip slips", "describe bullet",
              "run bonce --engine mujoco",
              "show --no-such-option", "bench --no-such-option", "report --no-such-option"]  # fmt: skip
@@ -62,9 +63,17 @@ def test_commands_that_run_nothing_import_no_engine_and_no_large_library():
     }
     folders = {f"adapters.{name}" for name in registry.names()}
     assert not folders & found["describe bounce"]
+    assert {f"validation.scenes.{name}" for name in OURS} & found["describe bounce"] == {"validation.scenes.bounce"}
     # What an engine is, and what it can be set to, does not need what it does by design.
     ends = (".laws", ".predictions", ".unset", ".experiments")
     assert [name for name in found["list engines"] if name.startswith(tuple(folders)) and name.endswith(ends)] == []
+
+
+def test_a_run_imports_its_engine_and_its_scenes_alone():
+    pytest.importorskip("pymunk")
+    (found,) = imported("run bounce --engine chipmunk --dry-run").values()
+    assert found & (LARGE | ENGINES) == {"pymunk"}
+    assert {f"validation.scenes.{name}" for name in OURS} & found == {"validation.scenes.bounce"}
 
 
 def test_an_engine_that_is_described_is_the_only_one_that_is_imported():

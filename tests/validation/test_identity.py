@@ -1,9 +1,13 @@
 """What is kept of the machine that made a run."""
 
+import ast
 import os
 import platform
+from collections import Counter
+from types import SimpleNamespace
 
 from validation import identity
+from validation.cells import Slot, prepare
 
 
 def test_a_machine_is_told_by_what_a_time_means_and_what_may_move_a_last_bit(monkeypatch):
@@ -32,3 +36,19 @@ def test_a_cpu_has_the_name_that_the_system_gives_it_or_that_of_its_kind(monkeyp
     place.unlink()
     monkeypatch.setattr(identity.platform, "processor", lambda: "x86")
     assert identity._cpu_name() == "x86"
+
+
+def test_sources_are_hashed_once_a_process_and_each_text_is_read_for_imports_once(monkeypatch):
+    hashed, read, hash_files = [], Counter(), identity._hash_files
+    monkeypatch.setattr(identity, "_hash_files", lambda files: hashed.append(files) or hash_files(files))
+    parse = {"parse": lambda text: read.update([text]) or ast.parse(text)}
+    monkeypatch.setattr(identity, "ast", SimpleNamespace(**vars(ast) | parse))
+    for each in (identity.adapter_hash, identity.scene_code, identity._named):
+        each.cache_clear()
+    profiles = {"reference": "classical", "chipmunk": "default"}
+    asked = [(scene, engine) for scene in ("impact", "bounce", "stack") for engine in profiles]
+    for _ in range(2):
+        identity.code_hash(asked)
+        for scene, engine in asked:
+            prepare(Slot(scene, (), 2, engine, profiles[engine], 1 / 240)).cell.key()
+    assert len(hashed) == 5 and len(read) > 20 and set(read.values()) == {1}
