@@ -129,11 +129,16 @@ class Contacts:
             none, nowhere = np.zeros(0, np.int64), np.zeros((0, dimension))
             return cls(none, none.copy(), nowhere, nowhere.copy(), nowhere.copy(), np.zeros(0))
         first, second, points, normals, impulses, gaps = zip(*rows, strict=True)
-        i, j = np.array(first, np.int64), np.array(second, np.int64)
-        sign = np.where(i < j, 1.0, -1.0)[:, None]
-        a, b, gap = np.minimum(i, j), np.maximum(i, j), np.array(gaps, float)
         point, normal, impulse = (_vectors(told, dimension) for told in (points, normals, impulses))
-        return cls(a, b, point, sign * normal, sign * impulse, gap)
+        return cls.turned(np.array(first, np.int64), np.array(second, np.int64), point, normal, impulse, np.array(gaps))
+
+    @classmethod
+    def turned(
+        cls, i: NDArray[np.int64], j: NDArray[np.int64], point: Array, normal: Array, impulse: Array, gap: Array
+    ) -> Contacts:
+        """Turn pairs so that a < b; normals point from ``i`` to ``j``, impulses are on ``j``."""
+        sign = np.where(i < j, 1.0, -1.0)[:, None]
+        return cls(np.minimum(i, j), np.maximum(i, j), point, sign * normal, sign * impulse, np.asarray(gap, float))
 
     @classmethod
     def by_pair(cls, rows: Iterable[Row], dimension: int) -> Contacts:
@@ -186,8 +191,8 @@ class Simulation(ABC):
     def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
         """Make ``samples`` times ``stride`` steps, a state after each ``stride``; None, without a step: not supported.
 
-        For engines that can do so without a call a step. The result must equal that of `advance` and the readers, bit
-        for bit.
+        For engines whose states are read faster many at once (`adapters.copied` does that for most). The result must
+        equal that of `advance` and the readers, bit for bit.
         """
         return None
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.bullet import clipped
 from adapters.bullet.profiles import checked
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
+from adapters.copied import Copied
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.engine import Array, Contacts, EngineError
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
 
 #: Waiting places of bodies while their inertia takes effect [m]: far from each other and from every scene.
@@ -38,7 +40,7 @@ def pybullet_here() -> ModuleType:
     return pybullet
 
 
-class BulletSimulation(Simulation):
+class BulletSimulation(Copied):
     """One world in its own DIRECT client."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
@@ -216,35 +218,55 @@ class BulletSimulation(Simulation):
 
     # -- reading --
 
-    def pose(self) -> Array:
-        """Poses (n, 7); that of a half-space without the shift to its box."""
-        ask, client = self._p.getBasePositionAndOrientation, self._client
-        told = np.array([(*place, *turn) for place, turn in (ask(i, physicsClientId=client) for i in self._ids)])
-        pose = told[:, [0, 1, 2, 6, 3, 4, 5]]  # w last in Bullet
-        pose[:, :3] -= self._offset
-        pose[self._faces, 3:] = self._normals
+    # Copies are lists of numbers or arrays: millions of tuples that stay are work for the garbage collector.
+
+    def copy_pose(self) -> list[float]:
+        """Position of each body, and its orientation with w last."""
+        ask, client, told = self._p.getBasePositionAndOrientation, self._client, []
+        for identifier in self._ids:
+            place, turn = ask(identifier, client)
+            told += place
+            told += turn
+        return told
+
+    def poses_of(self, copies: Sequence[list[float]]) -> Array:
+        """Poses; that of a half-space without the shift to its box."""
+        pose = np.array(copies).reshape(len(copies), -1, 7)[:, :, [0, 1, 2, 6, 3, 4, 5]]
+        pose[..., :3] -= self._offset
+        pose[:, self._faces, 3:] = self._normals
         return pose
 
-    def twist(self) -> Array:
-        """Twists (n, 6) of the centres of mass in world axes."""
-        ask, client = self._p.getBaseVelocity, self._client
-        return np.array([(*v, *w) for v, w in (ask(i, physicsClientId=client) for i in self._ids)])
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        ask, client, told = self._p.getBaseVelocity, self._client, []
+        for identifier in self._ids:
+            velocity, spin = ask(identifier, client)
+            told += velocity
+            told += spin
+        return told
 
-    def contacts(self) -> Contacts:
-        """Contact points with normal and friction impulses; gaps are those at the start of the last step."""
+    def twists_of(self, copies: Sequence[list[float]]) -> Array:
+        """Twists of the centres of mass in world axes."""
+        return np.array(copies).reshape(len(copies), -1, 6)
+
+    def copy_contacts(self) -> Array:
+        """A row for each contact point: the values of `getContactPoints` from number 5 on, and its two bodies."""
         told = self._p.getContactPoints(physicsClientId=self._client)
-        if not told:
-            return Contacts.from_rows([], 3)
-        points = list(zip(*told, strict=True))
-        a, b = ([self._index[body] for body in points[column]] for column in (1, 2))
-        on_a, on_b, normal, along, across = (np.array(points[column]) for column in (5, 6, 7, 11, 13))
-        gap, *forces = (np.array(points[column])[:, None] for column in (8, 9, 10, 12))
+        rows = [x[5] + x[6] + x[7] + x[8:11] + x[11] + x[12:13] + x[13] + x[1:3] for x in told]
+        return np.array(rows, float).reshape(-1, 21)
+
+    def contacts_of(self, copies: Sequence[Array]) -> tuple[NDArray[np.int64], Contacts]:
+        """Contact points with normal and friction impulses; gaps are those at the start of the last step."""
+        counts = np.array([len(rows) for rows in copies], np.int64)
+        told = np.concatenate(copies)
+        on_a, on_b, normal, along, across = (told[:, k : k + 3] for k in (0, 3, 6, 12, 16))
+        gap, *forces = (told[:, [k]] for k in (9, 10, 11, 15))
         # Bullet's impulses act on A, along the normal that points from B to A. The sum starts from zero, so a sum of
         # negative zeros is zero.
         pushed = 0.0 + forces[0] * normal + forces[1] * along + forces[2] * across
         impulse = np.where(gap <= self._solved_gap, -self._dt * pushed, 0.0)
-        rows = zip(a, b, 0.5 * (on_a + on_b), -normal, impulse, gap[:, 0], strict=True)
-        return Contacts.from_rows(list(rows), 3)
+        bodies = (np.array([self._index[body] for body in told[:, k].astype(int).tolist()], np.int64) for k in (19, 20))
+        return counts, Contacts.turned(*bodies, 0.5 * (on_a + on_b), -normal, impulse, gap[:, 0])
 
     def _dynamics(self, index: int) -> dict[str, Any]:
         info = self._p.getDynamicsInfo(self._ids[index], -1, physicsClientId=self._client)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adapters.releases import Difference, Distribution, Releases
@@ -20,16 +21,50 @@ RELEASES = Releases(
 )  # fmt: skip
 
 
-def point_impulses(arbiter: Any, count: int) -> list[tuple[float, float]]:
-    """Impulses [N s] on the second body at each of ``count`` points, world axes.
+#: A point of an arbiter: its bodies a and b by index, normal from a to b, place on a and on b, impulse on b, distance.
+Point = tuple[int, int, float, float, float, float, float, float, float, float, float]
 
-    ``J = n jn + t jt`` with t the normal turned by +90 degrees (cpArbiter.c, cpArbiterTotalImpulse); the accumulated
-    values are not public, pymunk's own pickling reads them the same way.
+
+def shape_key(shape: Any) -> Any:
+    """Key of a shape, equal to that of the same shape in an arbiter."""
+    return shape._shape
+
+
+def points_of(
+    arbiter: Any, body: int, index: Mapping[Any, int], free: Sequence[bool], places: Sequence[tuple[float, float]]
+) -> list[Point]:
+    """Points of an arbiter of ``body``; none if they are those of another free body before it.
+
+    Fields are read as by pymunk's own pickling, since its public reading takes as long as ten steps. The place on a
+    body is its position plus ``r`` (cpArbiter.c, cpArbiterGetContactPointSet), the impulse ``n jn + t jt`` with t the
+    normal turned by +90 degrees (cpArbiterTotalImpulse).
     """
+    raw = arbiter._arbiter
     try:
-        accumulated = [(each.jnAcc, each.jtAcc) for each in arbiter._arbiter.contacts[0:count]]
-    except AttributeError:  # opaque before 6.5
-        x, y = arbiter.total_impulse
-        return [(-x / count, -y / count)] * count
-    nx, ny = arbiter.contact_point_set.normal
-    return [(nx * jn - ny * jt, ny * jn + nx * jt) for jn, jt in accumulated]
+        a, b, normal, contacts = index[raw.a], index[raw.b], raw.n, raw.contacts[0 : raw.count]
+    except AttributeError:
+        return _public_points(arbiter, body, index, free)
+    other = b if a == body else a
+    if other < body and free[other]:
+        return []
+    (ax, ay), (bx, by), nx, ny = places[a], places[b], normal.x, normal.y
+    points = []
+    for contact in contacts:
+        on_a, on_b, jn, jt = contact.r1, contact.r2, contact.jnAcc, contact.jtAcc
+        px, py, qx, qy = ax + on_a.x, ay + on_a.y, bx + on_b.x, by + on_b.y
+        gap = (qx - px) * nx + (qy - py) * ny
+        points.append((a, b, nx, ny, px, py, qx, qy, nx * jn - ny * jt, ny * jn + nx * jt, gap))
+    return points
+
+
+def _public_points(arbiter: Any, body: int, index: Mapping[Any, int], free: Sequence[bool]) -> list[Point]:
+    """As `points_of`, before 6.5, whose arbiters are opaque."""
+    other = index[shape_key(arbiter.shapes[1])]
+    if other < body and free[other]:
+        return []
+    told = arbiter.contact_point_set
+    (x, y), count = arbiter.total_impulse, len(told.points)
+    return [
+        (body, other, *told.normal, *each.point_a, *each.point_b, -x / count, -y / count, each.distance)
+        for each in told.points
+    ]

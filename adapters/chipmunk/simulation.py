@@ -6,23 +6,26 @@ same instant, and free fall lags the parabola by g t dt / 2. Line numbers are th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import chain
 from operator import mul
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.chipmunk.profiles import UNSET
-from adapters.chipmunk.releases import point_impulses
+from adapters.chipmunk.releases import Point, points_of, shape_key
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
+from adapters.copied import Copied
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.engine import Array, Contacts, EngineError
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Scene
 
 
-class ChipmunkSimulation(Simulation):
+class ChipmunkSimulation(Copied):
     """One ``pymunk.Space``; bodies in the scene's order."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
@@ -53,7 +56,8 @@ class ChipmunkSimulation(Simulation):
             self._overlap_start(settings["start_overlap"])
         for body, shape in zip(self.bodies, self.shapes, strict=True):
             self.space.add(body, shape)
-        self.index = {id(shape): i for i, shape in enumerate(self.shapes)}
+        self.index = {shape_key(shape): i for i, shape in enumerate(self.shapes)}
+        self.free = [body.motion == "free" for body in scene.bodies]
         self.loaded = [
             (self.bodies[i], body.force, body.torque[0]) for i, body in enumerate(scene.bodies) if body.is_loaded
         ]
@@ -97,34 +101,58 @@ class ChipmunkSimulation(Simulation):
             self.made += 1
             step(dt)
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`."""
-        return np.array([(*body.position, body.angle) for body in self.bodies], float)
+    # Copies of states are lists of numbers: thousands of tuples that stay are work for the garbage collector.
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        return np.array([(*body.velocity, body.angular_velocity) for body in self.bodies], float)
+    def copy_pose(self) -> list[float]:
+        """Position and angle of each body."""
+        told: list[float] = []
+        for body in self.bodies:
+            told += (*body.position, body.angle)
+        return told
 
-    def contacts(self) -> Contacts:
-        """Up to two points per pair, sorted by pair; impulses per point."""
-        rows: list[Row] = []
+    def poses_of(self, copies: Sequence[list[float]]) -> Array:
+        """See `Copied.poses_of`."""
+        return np.array(copies, float).reshape(len(copies), -1, 3)
+
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        told: list[float] = []
+        for body in self.bodies:
+            told += (*body.velocity, body.angular_velocity)
+        return told
+
+    def twists_of(self, copies: Sequence[list[float]]) -> Array:
+        """See `Copied.twists_of`."""
+        return np.array(copies, float).reshape(len(copies), -1, 3)
+
+    def copy_contacts(self) -> list[Point]:
+        """Up to two points per pair."""
+        points: list[Point] = []
         failures: list[Exception] = []
+        places = [body.position for body in self.bodies]
+
+        def collect(arbiter: Any, i: int) -> None:
+            try:  # pymunk prints and drops exceptions of a callback
+                points.extend(points_of(arbiter, i, self.index, self.free, places))
+            except Exception as error:
+                failures.append(error)
+
         for i, body in enumerate(self.bodies):
-            if self.scene.bodies[i].motion != "free":
-                continue
-
-            def collect(arbiter: Any, i: int = i) -> None:
-                try:  # pymunk prints and drops exceptions of a callback
-                    j = self.index[id(arbiter.shapes[1])]
-                    if i < j or self.scene.bodies[j].motion != "free":
-                        rows.extend(_contact_rows(arbiter, i, j))
-                except Exception as error:
-                    failures.append(error)
-
-            body.each_arbiter(collect)
+            if self.free[i]:
+                body.each_arbiter(collect, i)
         if failures:
             raise EngineError(f"contacts: {type(failures[0]).__name__}: {failures[0]}")
-        return Contacts.by_pair(rows, 2)
+        return points
+
+    def contacts_of(self, copies: Sequence[list[Point]]) -> tuple[NDArray[np.int64], Contacts]:
+        """Contacts sorted by pair; impulses per point."""
+        counts = np.array([len(points) for points in copies], np.int64)
+        told = np.array(list(chain.from_iterable(copies))).reshape(-1, 11)
+        i, j = told[:, :2].astype(np.int64).T
+        order = np.lexsort((np.maximum(i, j), np.minimum(i, j), np.repeat(np.arange(len(copies)), counts)))
+        told = told[order]
+        normal, on_a, on_b, impulse = (told[:, k : k + 2] for k in (2, 4, 6, 8))
+        return counts, Contacts.turned(i[order], j[order], 0.5 * (on_a + on_b), normal, impulse, told[:, 10])
 
     def readback(self) -> dict[str, Any]:
         """Values of the space, its bodies and shapes."""
@@ -154,13 +182,3 @@ def _size(shape: Any) -> list[float]:
     if hasattr(shape, "get_vertices"):
         return [float(x) for x in np.max(np.abs(shape.get_vertices()), axis=0)]
     return [float(shape.radius)]
-
-
-def _contact_rows(arbiter: Any, i: int, j: int) -> list[tuple[int, int, Any, Any, Any, float]]:
-    """Rows of one arbiter seen from body ``i``, each with the impulse on the second body at its point."""
-    points = arbiter.contact_point_set
-    (nx, ny), rows = points.normal, []
-    for point, impulse in zip(points.points, point_impulses(arbiter, len(points.points)), strict=True):
-        middle = (0.5 * (point.point_a.x + point.point_b.x), 0.5 * (point.point_a.y + point.point_b.y))
-        rows.append((i, j, middle, (nx, ny), impulse, point.distance))
-    return rows

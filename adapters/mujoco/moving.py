@@ -98,7 +98,10 @@ class Moved:
         for i, row in self.faces.items():
             self._data.mocap_pos[row] += self._dt * np.array(self._given[i][0])
 
-    def state(self, poses: Any, twists: Any) -> None:
-        """Write the places of the faces and their motion of the last step (before any step, the first)."""
-        for i, row in self.faces.items():
-            poses[i, :3], twists[i, :3] = self._data.mocap_pos[row], self._given[i][0]
+    def places(self) -> list[Any]:
+        """Places of the faces."""
+        return [self._data.mocap_pos[row] for row in self.faces.values()]
+
+    def velocities(self) -> list[Any]:
+        """Velocities of the faces in the last step (before any step, of the first)."""
+        return [self._given[i][0] for i in self.faces]

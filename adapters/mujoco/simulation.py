@@ -11,9 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from adapters.copied import Copied
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError, Simulation, Worlds
+from adapters.engine import Array, Contacts, EngineError, Worlds
 from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
@@ -21,7 +23,7 @@ from adapters.mujoco.spec import Spec, has_joint, rotation, start
 from adapters.scene import Scene
 
 
-class MujocoSimulation(Simulation):
+class MujocoSimulation(Copied):
     """One MuJoCo model and its data."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
@@ -38,10 +40,11 @@ class MujocoSimulation(Simulation):
         self._moved = Moved(scene, dt, self._model, self._data) if moved(scene) else None
         self._matched = Matched(mujoco, scene, settings, self._model, self._data) if "rounds" in settings else None
         self._made = 0
+        self._faces = list(self._moved.faces) if self._moved else []
         self._poses = np.array([body.pose for body in scene.bodies], dtype=float)
-        self._twists = np.zeros((len(scene.bodies), 6))
         names = [self._model.geom(g).name for g in range(self._model.ngeom)]
         self._body_of_geom = np.array([int(name.removeprefix("geom")) for name in names], np.int64)
+        self._full = _memory_warnings(mujoco, self._data)
         self._set_start()
 
     def _set_start(self) -> None:
@@ -67,12 +70,11 @@ class MujocoSimulation(Simulation):
         else:
             self._mujoco.mj_step(self._model, self._data, nstep=steps)
         check_state(self._mujoco, self._data)
-        self._check_memory(self._data)
+        self._check_memory()
 
-    def _check_memory(self, data: Any) -> None:
-        kinds = self._mujoco.mjtWarning
-        for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
-            if data.warning[kind].number:
+    def _check_memory(self) -> None:
+        for warning in self._full:
+            if warning.number:
                 raise EngineError("memory: MuJoCo's arena is too small, so contacts were dropped")
 
     def _drive(self) -> None:
@@ -94,43 +96,81 @@ class MujocoSimulation(Simulation):
             mj.mj_step(model, data)
         self._made += 1
 
-    def pose(self) -> Array:
+    def copy_pose(self) -> Array:
+        """Positions of moving bodies, then places of moved faces."""
+        return np.concatenate([self._data.qpos, *self._moved.places()]) if self._moved else self._data.qpos.copy()
+
+    def poses_of(self, copies: Sequence[Array]) -> Array:
         """Poses at the end of the last step."""
-        if self._moving:
-            self._poses[self._moving] = self._data.qpos.reshape(-1, 7)
-        if self._moved:
-            self._moved.state(self._poses, self._twists)
-        return self._poses.copy()
+        samples, own = len(copies), 7 * len(self._moving)
+        told = np.array(copies)
+        found = np.tile(self._poses, (samples, 1, 1))
+        found[:, self._moving] = told[:, :own].reshape(samples, -1, 7)
+        found[:, self._faces, :3] = told[:, own:].reshape(samples, -1, 3)
+        return found
 
-    def twist(self) -> Array:
-        """Twists at the end of the last step."""
-        if self._moving:
-            velocity = self._data.qvel.reshape(-1, 6)
-            turns = rotation(self._data.qpos.reshape(-1, 7)[:, 3:])
-            self._twists[self._moving, :3] = velocity[:, :3]
-            self._twists[self._moving, 3:] = np.einsum("nij,nj->ni", turns, velocity[:, 3:])
-        if self._moved:
-            self._moved.state(self._poses, self._twists)
-        return self._twists.copy()
+    def copy_twist(self) -> Array:
+        """Positions and velocities of moving bodies, then velocities of moved faces."""
+        parts = [self._data.qpos, self._data.qvel]
+        return np.concatenate(parts + self._moved.velocities() if self._moved else parts)
 
-    def contacts(self) -> Contacts:
+    def twists_of(self, copies: Sequence[Array]) -> Array:
+        """Twists at the end of the last step; MuJoCo keeps angular velocity in body axes."""
+        samples, n = len(copies), len(self._moving)
+        told = np.array(copies)
+        velocity = told[:, 7 * n : 13 * n].reshape(samples, -1, 6)
+        turns = rotation(told[:, : 7 * n].reshape(-1, 7)[:, 3:]).reshape(samples, -1, 3, 3)
+        # Not by `einsum`, whose last digit depends on the number of states.
+        x, y, z = (turns[..., axis] * velocity[..., [3 + axis]] for axis in range(3))
+        found = np.zeros((samples, len(self._poses), 6))
+        found[:, self._moving] = np.concatenate([velocity[..., :3], x + y + z], axis=2)
+        found[:, self._faces, :3] = told[:, 13 * n :].reshape(samples, -1, 3)
+        return found
+
+    def copy_contacts(self) -> tuple[Array, ...]:
+        """Fields of contacts in the order of `contacts_of`, and the forces of all constraints."""
+        contact, count = self._data.contact, self._data.ncon
+        if not count:
+            return ()
+        fields = (contact.geom, contact.pos, contact.frame, contact.dist, contact.dim, contact.friction)
+        return (*(field.copy() for field in fields), contact.efc_address.copy(), self._data.efc_force.copy())
+
+    def contacts_of(self, copies: Sequence[tuple[Array, ...]]) -> tuple[NDArray[np.int64], Contacts]:
         """Contacts and gaps at the start of the last step, impulses of that step.
 
         RK4 solves contacts four times a step and stores the last, so impulses are not available (NaN).
         """
-        contact, count = self._data.contact, self._data.ncon
-        if not count:
-            return Contacts.from_rows([], 3)
-        force = np.zeros((count, 6))
-        for k in range(count):
-            self._mujoco.mj_contactForce(self._model, self._data, k, force[k])
-        frame = contact.frame.reshape(count, 3, 3)
-        one_solve = self._settings["integrator"] != "RK4"
-        impulse = self._dt * (force[:, None, :3] @ frame)[:, 0] if one_solve else np.full((count, 3), np.nan)
-        first, second = self._body_of_geom[contact.geom].T
-        turned = np.where(first < second, 1.0, -1.0)[:, None]
-        pair = np.minimum(first, second), np.maximum(first, second)
-        return Contacts(*pair, contact.pos.copy(), turned * frame[:, 0], turned * impulse, contact.dist.copy())
+        counts = np.array([len(copy[0]) if copy else 0 for copy in copies], np.int64)
+        found = [copy for copy in copies if copy]
+        if not found:
+            return counts, Contacts.from_rows([], 3)
+        geom, point, frame, gap, dim, friction, address, force = map(np.concatenate, zip(*found, strict=True))
+        sizes = [len(copy[-1]) for copy in found]
+        begin = np.repeat(np.cumsum(sizes) - sizes, counts[counts > 0])
+        frame = frame.reshape(-1, 3, 3)
+        if self._settings["integrator"] == "RK4":
+            impulse = np.full(point.shape, np.nan)
+        else:
+            pushed = self._forces(force, np.where(address < 0, -1, begin + address), dim, friction)
+            impulse = self._dt * (pushed[:, None] @ frame)[:, 0]
+        first, second = self._body_of_geom[geom.astype(int)].T
+        return counts, Contacts.turned(first, second, point, frame[:, 0], impulse, gap)
+
+    def _forces(self, force: Array, row: NDArray[np.int64], dim: NDArray[np.int64], friction: Array) -> Array:
+        """Forces of contacts along the axes of their frames, (k, 3), as ``mj_contactForce``.
+
+        ``row``: the first of a contact's rows in ``force``; -1 where the contact has none. A pyramid has four rows, its
+        normal plus and minus each tangent times its friction.
+        """
+        rough, pyramid = dim > 1, self._model.opt.cone == self._mujoco.mjtCone.mjCONE_PYRAMIDAL
+        inside = np.append(force, np.zeros(4))  # a contact without friction has one row
+        rows = np.where((row >= 0)[:, None], inside[row[:, None] + np.arange(4)], 0.0)
+        if pyramid:
+            normal = rows[:, 0] + rows[:, 1] + rows[:, 2] + rows[:, 3]
+            along = (rows[:, [0, 2]] - rows[:, [1, 3]]) * friction[:, :2]
+        else:
+            normal, along = rows[:, 0], rows[:, 1:3]
+        return np.column_stack([np.where(rough, normal, rows[:, 0]), np.where(rough[:, None], along, 0.0)])
 
     def _residual(self) -> Array:
         """``M a`` less loads and contacts of the last solve, (nv,) [N, N m]."""
@@ -191,6 +231,12 @@ class MujocoSimulation(Simulation):
         return found | (self._matched.told() if self._matched else {})
 
 
+def _memory_warnings(mujoco: Any, data: Any) -> list[Any]:
+    """Counters of dropped contacts; they are MuJoCo's own, so they stay up to date."""
+    kinds = mujoco.mjtWarning
+    return [data.warning[kind] for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL)]
+
+
 @final
 class MujocoWorlds(Worlds, MujocoSimulation):
     """Many models by ``mujoco.rollout``, which begins each call without warm start; the state of the first is read."""
@@ -203,6 +249,7 @@ class MujocoWorlds(Worlds, MujocoSimulation):
         self._rollout = rollout.Rollout(nthread=threads)
         self._models = [self._model, *(Spec(scene, dt, settings).compile() for scene in scenes[1:])]
         self._workers = [mj.MjData(self._model) for _ in range(threads)]
+        self._full = [warning for data in self._workers for warning in _memory_warnings(mj, data)]
         self._kind = mj.mjtState.mjSTATE_FULLPHYSICS
         state = np.empty(mj.mj_stateSize(self._model, self._kind))
         mj.mj_getState(self._model, self._data, state, self._kind)
@@ -215,8 +262,7 @@ class MujocoWorlds(Worlds, MujocoSimulation):
         states, _ = self._rollout.rollout(self._models, self._workers, self._states, nstep=steps)
         self._states = states[:, -1].copy()
         self._mujoco.mj_setState(self._model, self._data, self._states[0], self._kind)
-        for data in self._workers:
-            self._check_memory(data)
+        self._check_memory()
 
     def close(self) -> None:
         """End the threads."""

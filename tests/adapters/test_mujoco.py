@@ -20,6 +20,7 @@ from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.moving import enter_motions
 from adapters.mujoco.pairs import contact_law, pair_solreffriction
+from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import Spec
 from adapters.needs import needs
 from adapters.receipts import _probe, receipts
@@ -644,3 +645,26 @@ def test_forces_beside_a_prescribed_body_are_told_and_momentum_bears_them_out(pr
     told = found.contacts.impulse_on(2)
     gained = mass * (np.diff(found.twist[:, 2, :3], axis=0) - DT * np.array(scene.gravity))
     assert np.abs(told - gained).max() <= 1e-2 * 9.81 * mass * DT
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+@pytest.mark.parametrize(("mu", "condim"), [(0.5, 3), (0.0, 3), (0.0, 1)])
+def test_forces_of_contacts_are_bit_for_bit_those_of_mujoco(cone: str, mu: float, condim: int) -> None:
+    """A tilted cube that lands beside one that slides, so that the number of contacts changes."""
+    import mujoco
+
+    tilted = replace(cube("tilted", 1.0, 3.0), pose=(3.0, 0.0, 0.9, 0.9, 0.3, 0.3, 0.1))
+    scene = make(FLOOR, cube("cube", 0.5, twist=(1.0, 0.5, 0.0, 0.0, 0.0, 0.0)), tilted, mu=mu, g=(0.0, 0.0, -G))
+    own = {setting.name: setting.value for setting in ENGINE.settings("default", needs(scene), DT)}
+    world = ENGINE.build(scene, DT, own | {"cone": cone, "smooth_condim": condim})
+    assert isinstance(world, MujocoSimulation)
+    copies, wanted = [], []
+    for _ in range(120):
+        world.advance(1)
+        copies.append(world.copy_contacts())
+        for k in range(world._data.ncon):
+            force = np.zeros(6)
+            mujoco.mj_contactForce(world._model, world._data, k, force)
+            wanted.append(DT * (force[:3] @ world._data.contact[k].frame.reshape(3, 3)))
+    counts, found = world.contacts_of(copies)
+    assert len(set(counts.tolist())) > 2 and np.array_equal(found.impulse, wanted) and np.any(wanted)

@@ -425,6 +425,32 @@ def test_a_spin_that_is_fast_is_no_end_of_a_run_that_is_told_at_once(monkeypatch
     assert run(Toy({2}, spoiled("_twist", (0, 2), 1e9)), scene(), 0.1, {}).finish == "completed"
 
 
+def test_an_error_beyond_the_end_of_a_run_is_not_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples are made at once, so an engine may fail in a step that it would not have made."""
+
+    def fails(flight: Flight) -> None:
+        if flight.steps == 4:
+            flight._twist[0, 1] = math.inf
+        if flight.steps == 6:
+            raise EngineError("state: none")
+
+    recording(monkeypatch)
+    found = run(Toy({2}, fails), scene(), 0.1, {})
+    assert found.finish == "diverged" and "not finite at t = 0.4 s" in found.reason
+
+
+def test_an_error_of_a_step_is_raised_by_that_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(flight: Flight) -> None:
+        if flight.steps == 6:
+            raise EngineError("state: none")
+
+    recording(monkeypatch)
+    toy = Toy({2}, fails)
+    with pytest.raises(EngineError, match="state: none"):
+        run(toy, scene(), 0.1, {})
+    assert [built.steps for built in toy.built] == [6, 6] and [built.closed for built in toy.built] == [1, 1]
+
+
 @pytest.mark.parametrize("dimensions", [{2}, {3}])
 def test_what_a_simulation_gives_may_be_its_own(monkeypatch: pytest.MonkeyPatch, dimensions: set[int]) -> None:
     """Poses, twists and contacts in arrays that the next step writes into."""

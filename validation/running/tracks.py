@@ -136,22 +136,18 @@ def _loads(
     contacts: ContactRecord | None, chosen: NDArray[np.int64], dimension: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
     """Contacts summed per pair over the steps between two frames; the point is the mean weighted by impulse."""
-    sums: dict[tuple[int, int, int], tuple[Array, Array, float]] = {}
-    if contacts is not None:
-        rows = contacts.rows
-        sample = np.repeat(contacts.step, np.diff(contacts.offset))
-        frames = np.searchsorted(chosen, sample)
-        for k in np.flatnonzero(np.isfinite(rows.impulse).all(axis=1) & (frames < len(chosen))):
-            size = float(np.linalg.norm(rows.impulse[k]))
-            if size > 0.0:
-                key = int(frames[k]), int(rows.a[k]), int(rows.b[k])
-                total, moment, weight = sums.get(key, (np.zeros(dimension), np.zeros(dimension), 0.0))
-                sums[key] = total + rows.impulse[k], moment + size * rows.point[k], weight + size
-    keys = np.array(sorted(sums), np.int64).reshape(-1, 3)
-    loads = [sums[key] for key in sorted(sums)]
-    point = np.array([moment / weight for _, moment, weight in loads]).reshape(-1, dimension)
-    impulse = np.array([total for total, _, _ in loads]).reshape(-1, dimension)
-    return keys[:, 0], keys[:, 1:], point, impulse
+    if contacts is None:
+        return np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, dimension)), np.zeros((0, dimension))
+    rows = contacts.rows
+    frames = np.searchsorted(chosen, np.repeat(contacts.step, np.diff(contacts.offset)))
+    size = np.sqrt((rows.impulse * rows.impulse).sum(axis=1))
+    acting = np.flatnonzero(np.isfinite(size) & (size > 0.0) & (frames < len(chosen)))
+    keys, place = np.unique(np.column_stack([frames, rows.a, rows.b])[acting], axis=0, return_inverse=True)
+    weight, point, impulse = np.zeros(len(keys)), np.zeros((len(keys), dimension)), np.zeros((len(keys), dimension))
+    np.add.at(weight, place, size[acting])
+    np.add.at(point, place, size[acting, None] * rows.point[acting])
+    np.add.at(impulse, place, rows.impulse[acting])
+    return keys[:, 0], keys[:, 1:], point / weight[:, None], impulse
 
 
 @dataclass(frozen=True)
