@@ -265,8 +265,8 @@ class BulletSimulation(Copied):
         # negative zeros is zero.
         pushed = 0.0 + forces[0] * normal + forces[1] * along + forces[2] * across
         impulse = np.where(gap <= self._solved_gap, -self._dt * pushed, 0.0)
-        bodies = (np.array([self._index[body] for body in told[:, k].astype(int).tolist()], np.int64) for k in (19, 20))
-        return counts, Contacts.turned(*bodies, 0.5 * (on_a + on_b), -normal, impulse, gap[:, 0])
+        a, b = (np.array([self._index[body] for body in told[:, k].astype(int).tolist()], np.int64) for k in (19, 20))
+        return counts, Contacts.turned(a, b, 0.5 * (on_a + on_b), -normal, impulse, gap[:, 0])
 
     def _dynamics(self, index: int) -> dict[str, Any]:
         info = self._p.getDynamicsInfo(self._ids[index], -1, physicsClientId=self._client)
