@@ -68,9 +68,17 @@ def plain(value: Any) -> Any:
 
 def _plain(value: Any, level: int, left: list[int]) -> Any:
     """Plain data of at most ``left[0]`` characters, which is reduced by them."""
-    if type(value) in SCALARS:  # most values; a test by abstract base classes takes ten times as long
+    kind = type(value)  # most values are of a few types; a test by abstract base classes takes ten times as long
+    if kind is str:
+        text = one_line(value)
+        left[0] -= len(text) + 1
+        return text
+    if kind is float and math.isfinite(value):
+        left[0] -= NUMBER
+        return value
+    if kind in SCALARS:
         return _counted(_scalar(value), left)
-    if isinstance(value, Mapping) and level < LEVELS:
+    if (kind is dict or isinstance(value, Mapping)) and level < LEVELS:
         table = {}
         for key, item in value.items():
             if left[0] <= 0:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from reports import brief
 from reports.wording import first_of, markdown, number, plural, reproduce, roles_line
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.judging.comparison import Change, Kind, by_seriousness, families
-from validation.judging.rows import rows_of
 from validation.records.store import RELEASE_TITLE, MissingError, Store
 from validation.releases.history import told as told_by_releases
 from validation.releases.history import versions
@@ -93,7 +93,7 @@ def _load_run(folder: Path, run_id: str) -> Side:
         source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
         tables = [ratios(store, bench) for bench in source]
         table = [{str(k): v for k, v in row.items()} for t in tables for row in t.to_dict("records")]
-        rows = [row.as_dict() for row in rows_of(run.id, store.observations(run))]
+        rows = [row.as_dict() for row in brief.judged(store, run).rows]
         return Side(rows, table, run.id, run.date, run.commit)
     finally:
         store.close()

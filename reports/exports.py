@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adapters.stages import stage
+from reports.brief import Judged, judged
 from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from reports.writing import write
-from validation.judging.rows import Row, frame, is_alarming, rows_of
-from validation.questions.nulls import null_rows, with_skill
+from validation.judging.rows import Row, frame, is_alarming
 from validation.records.store import Run, Store
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool
     StoreError
         If the folder has no results or no such run.
     """
-    chosen, rows = _read(folder, run)
-    table = frame([*with_skill(rows), *(null_rows(rows) if nulls else ())])
-    return described(table, chosen.id, chosen.commit, rows)
+    chosen, found = _read(folder, run)
+    table = frame([*found.rows, *(found.nulls if nulls else ())])
+    return described(table, chosen.id, chosen.commit, found.rows)
 
 
 def described(table: pd.DataFrame, run: str, commit: str, rows: Sequence[Row]) -> pd.DataFrame:
@@ -49,14 +49,14 @@ def described(table: pd.DataFrame, run: str, commit: str, rows: Sequence[Row]) -
 
 def load_rows(folder: str | Path = "crosscheck-out", run: str = "latest") -> list[Row]:
     """Rows of a run; see `load`."""
-    return _read(folder, run)[1]
+    return list(_read(folder, run)[1].rows)
 
 
-def _read(folder: str | Path, run: str) -> tuple[Run, list[Row]]:
+def _read(folder: str | Path, run: str) -> tuple[Run, Judged]:
     store = Store(Path(folder), create=False)
     try:
         chosen = store.run(run)
-        return chosen, rows_of(chosen.id, store.observations(chosen))
+        return chosen, judged(store, chosen)
     finally:
         store.close()
 

@@ -19,7 +19,7 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.registry import is_ranked
-from reports.answers import FIXES, Answer, answers, configured
+from reports.answers import FIXES, Answer, configured
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, Matrix, matrix_of
 from reports.wording import MARKS, plural, word_of
@@ -122,12 +122,13 @@ def shortened(answer: Answer) -> Answer:
     return replace(answer, cure=cure.partition(", by ")[0]) if re.match(FIXES, cure) else answer
 
 
-def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) -> tuple[list[Answer], int]:
-    """For each engine and group the answer about the scene with most failed rows, and the number of answers.
+def worst_answers(
+    rows: Sequence[Plain], found: Sequence[Answer], families: Mapping[str, Sequence[str]]
+) -> list[Answer]:
+    """Of the answers ``found``, for each engine and group the one about the scene with most failed rows.
 
     Only for profiles as shipped: answers of `reports.answers` about others list only worse results.
     """
-    found = answers(rows)
     family = {scene: name for name, scenes in families.items() for scene in scenes}
     shipped: dict[str, str] = {}
     for row in rows:
@@ -139,4 +140,4 @@ def worst_answers(rows: Sequence[Plain], families: Mapping[str, Sequence[str]]) 
             worst[key] = answer
     order = list(families)
     chosen = sorted(worst.values(), key=lambda a: (list(shipped).index(a.engine), order.index(family[a.scene])))
-    return [shortened(answer) for answer in chosen], len(found)
+    return [shortened(answer) for answer in chosen]

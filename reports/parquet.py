@@ -18,9 +18,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from adapters.trajectory import load_trajectory
+from reports.brief import judged
 from validation.cells import Observation
-from validation.judging.rows import frame, rows_of
-from validation.questions.nulls import with_skill
+from validation.judging.rows import Row, frame
 from validation.records.store import Run, Store
 
 #: Columns of a pose and a twist; planar ones have no z, and one angle.
@@ -33,7 +33,7 @@ def write(store: Store, runs: Sequence[Run], trajectories: Path, folder: Path) -
     """Write the files into ``folder``; return the number of lines of each."""
     folder.mkdir(parents=True, exist_ok=True)
     found = [(run, store.observations(run)) for run in runs]
-    rows = pd.concat([_rows(run, observations) for run, observations in found], ignore_index=True)
+    rows = pd.concat([_rows(judged(store, run).rows) for run in runs], ignore_index=True)
     tables = {"rows": rows, "observations": pd.DataFrame(_metrics(found))}
     for name, table in tables.items():
         table.to_parquet(folder / f"{name}.parquet", index=False)
@@ -42,8 +42,8 @@ def write(store: Store, runs: Sequence[Run], trajectories: Path, folder: Path) -
     return counts | {"trajectories": _trajectories(kept, trajectories, folder / "trajectories.parquet")}
 
 
-def _rows(run: Run, observations: Sequence[Observation]) -> pd.DataFrame:
-    table = frame(with_skill(rows_of(run.id, observations)))
+def _rows(rows: Sequence[Row]) -> pd.DataFrame:
+    table = frame(rows)
     for name in ("params", "slot", "cells", "initial_change"):
         table[name] = [json.dumps(value) for value in table[name]]
     for name in ("value", "truth", "error", "tolerance", "floor", "skill"):

@@ -32,16 +32,17 @@ SHOWN_LEVELS = (1e-1, 1e-2, 1e-3, 1e-5)
 
 def tables_of(store: Store, run: Run, observations: Sequence[Observation] | None = None) -> Tables:
     """All tables of a bench run by name; ``observations`` are its own, if already read."""
-    points, scaling = work.work_points(store, run, observations), reading.scaling(store, run)
+    timings = reading.timings_summary(store, run)
+    points, scaling = work.work_points(store, run, observations, timings), reading.scaling(timings)
     return {
         "work_points": points,
         "time_at_equal_error": work.time_at_equal_error(points),
         "error_at_equal_time": work.error_at_equal_time(points),
         "scaling": scaling,
         "scaling_fits": reading.scaling_fits(scaling),
-        "overhead": reading.overhead(store, run),
+        "overhead": reading.overhead(timings),
         "ratios": agreement.ratios(store, run),
-        "timings": reading.timings_summary(store, run),
+        "timings": timings,
     }
 
 

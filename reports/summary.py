@@ -123,8 +123,9 @@ def _show_families(
     wide = max(map(len, families))
     for name, line in overview.choices(rows, families):
         console.print(_folded(f"{name:<{wide}}  {line}", console))
-    worst, total = overview.worst_answers(rows, families)
-    count = f" ({len(worst)} of {total})" if len(worst) < total else ""
+    found = answers(rows)
+    worst = overview.worst_answers(rows, found, families)
+    count = f" ({len(worst)} of {len(found)})" if len(worst) < len(found) else ""
     _heading(f"What is wrong as shipped, and what fixes it: the worst scene of each group{count}", console)
     for answer in worst:
         console.print(_folded(answer.line, console))

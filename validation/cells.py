@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from enum import Enum
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -296,10 +297,19 @@ def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
         As `CanonicalScene.checks` does.
     """
     slot = observation.slot
-    canonical = resolve(slot.scene)
-    scene = canonical.scene(slot.dimension, dict(slot.params))
+    canonical, scene = resolve(slot.scene), scene_of(slot)
     lifted = OUT_OF_PLANE in observation.metrics
     return scene, [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]
+
+
+def scene_of(slot: Slot) -> Scene:
+    """The scene of a slot, for those who judge it: made once for all engines, profiles and steps."""
+    return _scene(slot.scene, slot.dimension, slot.params)
+
+
+@lru_cache(maxsize=1024)
+def _scene(name: str, dimension: int, params: tuple[tuple[str, float], ...]) -> Scene:
+    return resolve(name).scene(dimension, dict(params))
 
 
 def plane_of(canonical: CanonicalScene, scene: Scene, dt: float) -> list[Check]:

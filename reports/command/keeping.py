@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from adapters.scene import SceneError
+from reports.brief import Kept
 from reports.command.files import FOLDER
 from reports.command.group import AS_JSON, OUT, main
 from reports.wording import plural
@@ -67,6 +68,9 @@ def prune_(
             going = [*doomed(store.runs(), rules), *(store.damaged().values() if unfinished else ())]
         else:
             going = prune(store, rules)
+            kept = Kept(store.path.parent)
+            kept.forget(run.id for run in going)
+            kept.close()
     finally:
         store.close()
     if as_json:

@@ -30,9 +30,7 @@ from reports.wording import plural
 from reports.writing import write
 from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
-from validation.judging.rows import Row
 from validation.posed import is_file, pinned, resolve
-from validation.questions.nulls import null_rows, with_skill
 from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.plan import slots
@@ -110,13 +108,14 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     verdicts = Verdicts(chosen, console)
     done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"],
                     heard=verdicts.add, finish=False)  # fmt: skip
-    rows, observations, complete = verdicts.rows(done), store.observations(done), not store.missing(done)
+    found = brief.Judged.of(verdicts.rows(done))
+    observations, complete = store.observations(done), not store.missing(done)
     if complete:
-        brief.keep(out, done.id, observations, rows)
+        brief.keep(store, done, observations, found)
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     # The answer goes to stdout, for a pipe or a file, unless --json prints there.
     answer = console if as_json else terminal()
-    _show(rows, out, as_json, answer, options)
+    _show(found, out, as_json, answer, options)
     if complete:
         store.finish(done)  # after its files: the same command would write them again
     store.close()
@@ -125,13 +124,13 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    alarm = any(row.failing if options["strict"] else row.alarming for row in rows)
+    alarm = any(row.failing if options["strict"] else row.alarming for row in found.rows)
     sys.exit(statuses.verdict(alarm, complete and not absent))
 
 
-def _show(rows: list[Row], out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
-    plain = [row.as_dict() for row in with_skill(rows)]
-    written = exports.write_all(out, plain, [row.as_dict() for row in null_rows(rows)])
+def _show(found: brief.Judged, out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
+    plain = [row.as_dict() for row in found.rows]
+    written = exports.write_all(out, plain, [row.as_dict() for row in found.nulls])
     if options["junit"]:
         write(options["junit"], exports.as_junit(plain))
     if options["markdown"]:

@@ -18,7 +18,7 @@ from rich.text import Text
 from adapters.own_settings import given, suffix_of
 from adapters.registry import is_ranked
 from adapters.scene import SceneError
-from reports import speed
+from reports import brief
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
@@ -47,9 +47,8 @@ from reports.wording import (
     word_of,
 )
 from validation.bench import reading
-from validation.cells import Observation, Slot, checks_of
-from validation.judging.rows import is_alarming, rows_of
-from validation.judging.studies import results
+from validation.cells import Observation
+from validation.judging.rows import is_alarming
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
 from validation.questions.nulls import skill_of
@@ -113,10 +112,10 @@ def which(store: Store, chosen: Run, asked: str) -> Which:
 
 @dataclass(frozen=True)
 class Kept:
-    """Stored data of one run, read at one time."""
+    """Judged rows of one run, and its number of cases, read at one time."""
 
     run: str
-    observations: list[Observation]
+    rows: Sequence[Plain]
     planned: int
     missing: int
     which: Which
@@ -140,40 +139,17 @@ def _opened(out: Path) -> Iterator[Store]:
         store.close()
 
 
-def _kept(store: Store, run: str) -> Kept:
+def load(store: Store, run: str) -> Kept:
+    """Judged rows of a run.
+
+    Raises
+    ------
+    StoreError
+        If there is no such run.
+    """
     chosen = store.run(run)
-    shown = which(store, chosen, run)
-    return Kept(chosen.id, store.observations(chosen), len(chosen.plan), store.missing(chosen), shown)
-
-
-def load(out: Path, run: str) -> tuple[list[Plain], Kept, Costs]:
-    """Judged rows of a run, its stored data, and costs by the last bench in the same store.
-
-    Raises
-    ------
-    StoreError
-        If the folder has no results or no such run.
-    """
-    with _opened(out) as store:
-        kept, timed = _kept(store, run), reading.bench_runs(store)
-        return judged(kept.run, kept.observations), kept, speed.cheapest_passing(store, timed[-1]) if timed else {}
-
-
-def observed(out: Path, run: str) -> Kept:
-    """Stored data of a run, not judged: laws take time, and only selected rows need it.
-
-    Raises
-    ------
-    StoreError
-        As `load` does.
-    """
-    with _opened(out) as store:
-        return _kept(store, run)
-
-
-def judged(run: str, observations: Sequence[Observation]) -> list[Plain]:
-    """Judged rows of observations of a run, as plain data."""
-    return [row.as_dict() for row in rows_of(run, observations)]
+    rows = [row.as_dict() for row in brief.judged(store, chosen).rows]
+    return Kept(chosen.id, rows, len(chosen.plan), store.missing(chosen), which(store, chosen, run))
 
 
 @main.command(epilog="Example: crosscheck show --all")
@@ -187,13 +163,15 @@ def show(run: str, every: bool, as_json: bool, out: Path) -> None:
     Shows what `run` showed: the matrix, the best engines, what is wrong and what fixes it. RUN is an id that `list
     runs` prints; the latest by default. The first line says which run is shown.
     """
-    rows, kept, costs = load(out, run)
+    with _opened(out) as store:
+        kept, timed = load(store, run), reading.bench_runs(store)
+        costs = brief.costs(store, timed[-1]) if timed else {}
     if as_json:
-        click.echo(json.dumps(_as_plain(rows, costs) | kept.counted(), indent=1))
+        click.echo(json.dumps(_as_plain(kept.rows, costs) | kept.counted(), indent=1))
         return
     console = terminal()
     console.print(Text(kept.which.line("show", out), style="dim"))
-    show_summary(rows, console, costs, every=every, out=out, run=kept.which.named)
+    show_summary(kept.rows, console, costs, every=every, out=out, run=kept.which.named)
     kept.say_missing()
     report = out / "report.html"
     if report.is_file():
@@ -242,21 +220,19 @@ def findings(
     if prove:
         prove_and_show(prove, wanted["engine"], as_json)
         return
-    kept = observed(out, run)
-    identity, observations = kept.run, kept.observations
+    with _opened(out) as store:
+        kept = load(store, run)
+    rows = kept.rows
     kept.say_missing()
-    wanted["scene"] = [
-        scene_of(told, {observation.slot.scene for observation in observations}) for told in wanted["scene"]
-    ]
-    wanted["profile"] = profiles_called(wanted["profile"], {o.slot.engine for o in observations})
+    wanted["scene"] = [scene_of(told, {row["scene"] for row in rows}) for told in wanted["scene"]]
+    wanted["profile"] = profiles_called(wanted["profile"], {row["engine"] for row in rows})
     for name, asked in wanted.items():
-        there = list(dict.fromkeys(getattr(observation.slot, name) for observation in observations))
+        there = list(dict.fromkeys(row[name] for row in rows))
         if absent := [one for one in asked if one not in there]:
             close = difflib.get_close_matches(absent[0], there, n=1)
             hint = f", did you mean {close[0]!r}?" if close else f", but of {first_of(there)}"
             raise SceneError(f"--{name}: this run has no check of {absent[0]!r}{hint}")
-    # A study never joins cases of two engines, profiles or scenes, so this selection changes no row.
-    rows = judged(identity, [o for o in observations if all(getattr(o.slot, n) in w for n, w in wanted.items() if w)])
+    rows = [row for row in rows if all(row[name] in asked for name, asked in wanted.items() if asked)]
     if new:
         rows = [row for row in rows if is_alarming(row)]
     if not as_json:
@@ -344,14 +320,15 @@ def explain(row: str, run: str, named: str | None, set: tuple[str, ...], as_json
     these settings of your own. RUN is an id that `list runs` prints; the latest by default.
     """
     asked, row = row, _with_settings(row, set)
-    kept = observed(out, named or run)
-    observations = _needed(kept.observations, row)
-    rows = judged(kept.run, observations)
-    try:
-        found = find_row(rows, row)
-    except SceneError:
-        _check_own(asked, set, {observation.slot.scene for observation in kept.observations})
-        raise
+    with _opened(out) as store:
+        kept = load(store, named or run)
+        rows = kept.rows
+        try:
+            found = find_row(rows, row)
+        except SceneError:
+            _check_own(asked, set, {row["scene"] for row in rows})
+            raise
+        observations = store.observations(store.run(kept.run), found["engine"], found["scene"])
     better, paste, said, differing = _cure(rows, observations, found)
     again = reproduce(found["slot"]) + at(out)
     if as_json:
@@ -410,31 +387,9 @@ def _check_own(row: str, sets: Sequence[str], scenes: Collection[str]) -> None:
     EngineError
         For the first of them, with its name.
     """
-    named = named_by(row, scenes)
-    if sets and named.get("scene") in scenes:
+    named = named_by(row, scenes) if sets else {}
+    if named.get("scene") in scenes:
         slots(Request((named["scene"],), (named["engine"],), (named["profile"],), sets=given(sets)))
-
-
-def _needed(observations: Sequence[Observation], name: str) -> list[Observation]:
-    """Observations that have to be judged to find the row ``name``: all profiles of its engine on its scene.
-
-    Raises
-    ------
-    SceneError
-        If the id of no row, or of several, begins with ``name``.
-    """
-    if "/" in name:
-        named = named_by(name, {observation.slot.scene for observation in observations})
-        keys = [(key, named[key]) for key in ("engine", "scene") if named.get(key)]
-    else:
-        slots = [slot for found, slot in ids_of(observations) if found.startswith(name.lower())]
-        if len(slots) != 1:
-            many = f"the ids of {len(slots)} checks begin" if slots else "no id of this run begins"
-            raise SceneError(
-                f"check: {many} with {name!r}; crosscheck findings lists ids; or name it ENGINE/PROFILE/SCENE"
-            )
-        keys = [("engine", slots[0].engine), ("scene", slots[0].scene)]
-    return [one for one in observations if all(getattr(one.slot, key) == value for key, value in keys)]
 
 
 def scene_of(told: str, scenes: Collection[str]) -> str:
@@ -468,21 +423,6 @@ def named_by(name: str, scenes: Collection[str]) -> dict[str, str]:
     return found | ({"metric": rest[0][end + 1 :]} if rest[0][end + 1 :] else {})
 
 
-def ids_of(observations: Sequence[Observation]) -> Iterator[tuple[str, Slot]]:
-    """Id and slot of every row that judging the observations would give."""
-    metrics: dict[Any, list[str]] = {}
-    for observation in observations:
-        slot = observation.slot
-        key = (slot.scene, slot.dimension, slot.params, slot.dt, OUT_OF_PLANE in observation.metrics)
-        if key not in metrics:
-            metrics[key] = [check.metric for check in checks_of(observation)[1]]
-        plain = slot.as_dict()
-        for metric in () if slot.ulp else metrics[key]:
-            yield row_id({"slot": plain, "metric": metric}), slot
-    for study in results(observations):
-        yield row_id({"slot": study.slot.as_dict(), "metric": study.check.metric}), study.slot
-
-
 def find_row(rows: Sequence[Plain], name: str) -> Plain:
     """Return the row ``name``.
 
@@ -500,7 +440,11 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         if not fits:
             raise SceneError(f"check: this run has no check {name!r}; crosscheck findings lists what fails")
         return max(fits, key=severity)
-    return next(row for row in rows if row_id(row).startswith(name.lower()))
+    found = [row for row in rows if row_id(row).startswith(name.lower())]
+    if len(found) != 1:
+        many = f"the ids of {len(found)} checks begin" if found else "no id of this run begins"
+        raise SceneError(f"check: {many} with {name!r}; crosscheck findings lists ids; or name it ENGINE/PROFILE/SCENE")
+    return found[0]
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:

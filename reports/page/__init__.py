@@ -21,7 +21,7 @@ import jinja2
 import minify_html
 from markupsafe import Markup
 
-from reports.answers import Answer, answers
+from reports.answers import Answer
 from reports.matrix import leaving, newer, unranked
 from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, fixing, opening, replay, takeaway, verdicts
@@ -49,9 +49,9 @@ def render(source: Source) -> str:
         _text("page.css") + heat_style() + engine_style(list(dict(source.named))) + symbols(source.named)
     )  # ours: nothing in it comes from a run
     script = Markup("\n".join(_text(name) for name in SCRIPTS).strip())
-    wrong = answers(source.rows)
     sheet = fairness.fairness(source)
-    others = [answer for answer in wrong if answer.engine != sheet.solver]  # our own solver has its own section
+    # Our own solver has its own section.
+    others = [answer for answer in source.answers if answer.engine != sheet.solver]
     first = first_answers(source, others)
     choices = choosing.choices(source)
     shown = replay.replays(source)
@@ -71,7 +71,7 @@ def render(source: Source) -> str:
             cite=cite(source),
             sentences=conclusions.sentences(source),
             families=families(source),
-            answers=wrong,
+            answers=source.answers,
             first_wrongs=fixing.wrongs(source, first),
             more_wrongs=fixing.wrongs(source, [answer for answer in others if answer not in first]),
             findings=conclusions.findings(source),
@@ -100,7 +100,7 @@ def first_answers(source: Source, wrong: Sequence[Answer]) -> list[Answer]:
     """Answers that are not folded: all if they are few, else those about the worst scene of each engine and group."""
     if len(wrong) <= SEEN:
         return list(wrong)
-    worst, _ = worst_answers(source.rows, families_of(source.rows))
+    worst = worst_answers(source.rows, source.answers, families_of(source.rows))
     chosen = {(answer.engine, answer.profile, answer.scene) for answer in worst}
     return [answer for answer in wrong if (answer.engine, answer.profile, answer.scene) in chosen]
 

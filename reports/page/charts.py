@@ -122,6 +122,8 @@ def dodged(table: pd.DataFrame, x: str, y: str, logarithmic: bool = True) -> pd.
     place = [(50.0 * size(table[name])).round() for name in (x, y)]
     span = float(np.ptp(size(table[x]))) or 1.0
     for _, group in table.groupby(place, sort=False):
+        if len(group) == 1:
+            continue
         order = group.groupby(["engine", "profile"], sort=False).ngroup()
         shift = DODGE * span * (order - order.max() / 2.0)
         table.loc[group.index, x] = group[x] * 10.0**shift if logarithmic else group[x] + shift

@@ -231,13 +231,14 @@ def _cure(source: Source, scene: str, dimension: int, engine: str, shipped: str,
     worst, same = plain[0] if plain else max(known, key=lambda pair: ratio_of(pair[0]) or 0.0)
     if (ratio_of(same) or 0.0) >= (ratio_of(worst) or 0.0):
         return None
-    found = changes(source.observations, scene, dimension, engine, shipped, better)
+    seen = source.seen(engine, scene)
+    found = changes(seen, scene, dimension, engine, shipped, better)
     where = " ".join(f"{name}={value:g}" for name, value in worst["slot"]["params"].items())
     return Cure(
         scene, dimension, engine, shipped, better, Mark(mark_of(worst), ""), Mark(mark_of(same), ""),
         f"{worst['metric']}{' at ' + where if where else ''}", _value(worst), _value(same),
         sorted(found, key=lambda change: change.role in (ROLES[""], "")),  # decisive settings first
-        *fix(worst, source.observations, better),
+        *fix(worst, seen, better),
         how_measured(engine, scene, dimension, shipped, better),
     )  # fmt: skip
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.answers import answers as answers_of
 from reports.findings import has_answer
 from reports.page.source import Source
 from reports.page.verdicts import (
@@ -225,7 +224,7 @@ class Reasoned:
 def by_reason(source: Source, mark: str, found: Iterable[FindingFamily]) -> list[Reasoned]:
     """Findings grouped by reason, in the order of the first one of each."""
     # Only the first part of a fix: its settings are listed once, with the errors.
-    cured = {(a.engine, a.profile, a.scene): a.cure.partition("; ")[0] for a in answers_of(source.rows)}
+    cured = {(a.engine, a.profile, a.scene): a.cure.partition("; ")[0] for a in source.answers}
     groups: dict[tuple[str, str, str], list[FindingFamily]] = defaultdict(list)
     for finding in found:
         groups[finding.engine, finding.profile, without_prediction(finding.reason)].append(finding)

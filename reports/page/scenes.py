@@ -16,9 +16,15 @@ from reports.page.source import Source
 from reports.page.verdicts import SceneVerdicts, scene_verdicts, slug
 from reports.wording import number
 from validation.canonical import CanonicalScene, Primary
-from validation.cells import Observation
 from validation.posed import resolve
-from validation.questions.convergence import Convergence, Extrapolation, convergence, declared_errors, extrapolations
+from validation.questions.convergence import (
+    Convergence,
+    DeclaredErrors,
+    Extrapolation,
+    convergence,
+    declared_errors,
+    extrapolations,
+)
 from validation.running.plan import QUICK_DT
 
 
@@ -41,8 +47,8 @@ class SceneSection:
 def scene_sections(source: Source) -> list[SceneSection]:
     """Sections in the order of the run."""
     observations = [*(source.bench.observations if source.bench else ()), *source.observations]
-    orders, limits = convergence(observations), extrapolations(observations)
-    errors = _iteration_table(observations)
+    declared = declared_errors(observations)
+    orders, limits, errors = convergence(declared), extrapolations(observations), _iteration_table(declared)
     return [_section(source, scene, orders, limits, errors) for scene in source.scenes]
 
 
@@ -75,10 +81,10 @@ def _section(
     )
 
 
-def _iteration_table(observations: Sequence[Observation]) -> pd.DataFrame:
+def _iteration_table(declared: DeclaredErrors) -> pd.DataFrame:
     """Headline error at dt = 1/240 for every iteration count that was set."""
     rows = []
-    for (scene, dimension, engine, profile), errors in declared_errors(observations).items():
+    for (scene, dimension, engine, profile), errors in declared.items():
         for (dt, iterations), error in errors.items():
             if dt == QUICK_DT and iterations is not None:
                 said = f"{engine}/{profile}, {iterations} iterations: error {number(error, 2)}"

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from reports import speed
+from reports.answers import Answer, answers
+from reports.brief import judged
 from validation.bench import reading
 from validation.cells import Observation, Slot
-from validation.judging.rows import rows_of
-from validation.questions.nulls import null_rows, with_skill
 from validation.records.store import Run, Store
 from validation.running.tracks import Recording
 
@@ -64,6 +65,7 @@ class Source:
     columns: tuple[tuple[str, str], ...] = field(init=False)
     lines: tuple[tuple[str, int], ...] = field(init=False)
     _by_scene: Mapping[str, Sequence[Plain]] = field(init=False, repr=False, compare=False)
+    _seen: Mapping[tuple[str, str], Sequence[Observation]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         columns = dict.fromkeys((row["engine"], row["profile"]) for row in self.rows)
@@ -71,9 +73,18 @@ class Source:
         by_scene: dict[str, list[Plain]] = {}
         for row in self.rows:
             by_scene.setdefault(row["scene"], []).append(row)
+        seen: dict[tuple[str, str], list[Observation]] = {}
+        for observation in self.observations:
+            seen.setdefault((observation.slot.engine, observation.slot.scene), []).append(observation)
         object.__setattr__(self, "_by_scene", by_scene)
+        object.__setattr__(self, "_seen", seen)
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "lines", tuple(lines))
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """What is wrong, and what fixes it."""
+        return answers(self.rows)
 
     @property
     def named(self) -> list[tuple[str, str]]:
@@ -90,6 +101,10 @@ class Source:
     def scenes(self) -> list[str]:
         """Scenes in the order of the rows."""
         return list(dict.fromkeys(scene for scene, _ in self.lines))
+
+    def seen(self, engine: str, scene: str) -> Sequence[Observation]:
+        """Observations of an engine in a scene."""
+        return self._seen.get((engine, scene), ())
 
     def of(self, **wanted: Any) -> list[Plain]:
         """Rows whose fields have the wanted values."""
@@ -108,10 +123,9 @@ def load_source(folder: Path, run: str = "latest") -> Source:
     store = Store(folder, create=False)
     try:
         chosen = store.run(run)
-        every = store.observations(chosen)
-        judged = rows_of(chosen.id, every)
-        rows, nulls = ([row.as_dict() for row in found] for found in (with_skill(judged), null_rows(judged)))
-        observations = [observation for observation in every if observation.slot.ulp == 0]
+        found = judged(store, chosen)
+        rows, nulls = ([row.as_dict() for row in each] for each in (found.rows, found.nulls))
+        observations = [observation for observation in store.observations(chosen) if observation.slot.ulp == 0]
         benches = reading.bench_runs(store)
         bench = _bench(store, benches[-1]) if benches else None
         files = store.scenes(chosen) | (store.scenes(bench.run) if bench else {})

@@ -16,7 +16,6 @@ from reports.overview import share
 from reports.page.source import Source
 from reports.wording import MARKS, NEVER, mark_of, measured, number, params_text, reproduce
 from validation.cells import format_dt
-from validation.questions.nulls import skill_of
 
 Plain = Mapping[str, Any]
 #: Mark -> sign and word in a field of the page, so that no meaning depends on colour.
@@ -315,7 +314,7 @@ def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
         times(ratio),
         f"{sum(r['physics'] == 'pass' for r in judged)}/{len(judged)}" if judged else "",
         why_anchor(mark, row["engine"], row["profile"], row["reason"]) if mark in LISTED and row["reason"] else "",
-        times(skill_of(row)[0]) if mark != "pass" else "",
+        times(row["skill"]) if mark != "pass" else "",
         reproduce(row["slot"]),
     )
 

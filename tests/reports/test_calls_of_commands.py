@@ -53,10 +53,12 @@ def ran(monkeypatch):
     monkeypatch.setattr(running.Store, "missing", lambda store, run: 0 if found.finished else 1)
     monkeypatch.setattr(running.Store, "finish", lambda store, run: None)
     monkeypatch.setattr(running.Store, "recordings", lambda store, run: ["recorded"])
-    monkeypatch.setattr(running.brief, "keep", lambda *given: found.kept.append(given[1:]))
+    judged = staticmethod(lambda rows: SimpleNamespace(rows=rows, nulls=[]))
+    monkeypatch.setattr(running.brief.Judged, "of", judged)
+    monkeypatch.setattr(
+        running.brief, "keep", lambda store, run, seen, all: found.kept.append((run.id, seen, all.rows))
+    )
     monkeypatch.setattr(running, "spreads", lambda *given: found.apart.append(given) or [])
-    monkeypatch.setattr(running, "with_skill", lambda rows: rows)
-    monkeypatch.setattr(running, "null_rows", lambda rows: [])
     monkeypatch.setattr(
         running, "show", lambda rows, console, files, out: console.print(f"{len(rows)} rows, {len(files)}")
     )

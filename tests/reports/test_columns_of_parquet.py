@@ -13,8 +13,10 @@ import pyarrow.parquet as pq
 
 from adapters.trajectory import Trajectory
 from reports import parquet
+from reports.brief import Judged
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
+from validation.judging.rows import rows_of
 from validation.records.store import Run
 
 RUN = Run("20260102-030405", "2026-01-02T03:04:05", "abc+", {}, "quick: impact", (), True)
@@ -86,7 +88,7 @@ def test_every_sample_of_a_body_is_a_line_and_a_plane_has_no_columns_of_space(tm
 
 def test_lists_of_a_row_are_text_and_numbers_are_numbers_even_where_none_is_known():
     judged = replace(TOLD, slot=replace(FLAT, ulp=0))
-    table = parquet._rows(RUN, [judged, LOST])
+    table = parquet._rows(Judged.of(rows_of(RUN.id, [judged, LOST])).rows)
     assert len(table) and set(table["run"]) == {RUN.id}
     for name in ("params", "slot", "cells", "initial_change"):
         assert [type(json.loads(value)) for value in table[name]] == [
@@ -96,11 +98,12 @@ def test_lists_of_a_row_are_text_and_numbers_are_numbers_even_where_none_is_know
     assert json.loads(table["params"].iloc[0])["v"] == 2.0
 
 
-def test_files_are_written_into_a_folder_that_is_made_and_without_an_index(tmp_path):
+def test_files_are_written_into_a_folder_that_is_made_and_without_an_index(tmp_path, monkeypatch):
     class Kept:
         def observations(self, run):
             return {RUN.id: [TOLD, LOST], EARLIER.id: [LOST]}[run.id]
 
+    monkeypatch.setattr(parquet, "judged", lambda store, run: Judged.of(rows_of(run.id, store.observations(run))))
     motion(2, 3, 3).save(tmp_path / f"{FLAT.key()}.npz")
     folder = tmp_path / "a" / "b"
     told = parquet.write(Kept(), [RUN, EARLIER], tmp_path, folder)

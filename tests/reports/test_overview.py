@@ -7,6 +7,7 @@ import pytest
 from rich.console import Console
 
 from reports import overview
+from reports.answers import answers
 from reports.summary import show
 from validation.canonical import FAMILIES
 from validation.catalogue import CATALOGUE
@@ -138,14 +139,15 @@ def test_the_worst_answer_of_a_family_is_of_the_scene_that_fails_most_rows():
         return "known" if (engine, profile) == ("bullet", "default") and scene in ("impact", "head_on") else "pass"
 
     rows = catalogue(mark) + [row("head_on", "bullet", "default", "known")]
-    worst, total = overview.worst_answers(rows, overview.families_of(rows))
-    assert [(a.engine, a.scene) for a in worst] == [("bullet", "head_on")] and total == 2
+    found = answers(rows)
+    worst = overview.worst_answers(rows, found, overview.families_of(rows))
+    assert [(a.engine, a.scene) for a in worst] == [("bullet", "head_on")] and len(found) == 2
     assert worst[0].cure == "profiles tuned and one fix it"
 
 
 def test_what_another_profile_makes_worse_is_not_how_an_engine_is_shipped():
     rows = catalogue(lambda scene, engine, profile: "known" if (scene, profile) == ("slide", "one") else "pass")
-    assert overview.worst_answers(rows, overview.families_of(rows))[0] == []
+    assert overview.worst_answers(rows, answers(rows), overview.families_of(rows)) == []
 
 
 def test_the_nearest_come_in_the_order_of_what_they_fail():

@@ -1,15 +1,17 @@
-"""A run in brief: judged once, by those who judged it; kept as it was, and made anew where nothing can be kept."""
+"""What judging a run gave: kept beside it, and made anew where nothing can be kept or something is other code."""
 
 import sqlite3
 from dataclasses import replace
 
 import pytest
 
+from adapters.plain import Notice
 from reports import brief
-from reports.brief import Kept, Summary, keep, summarise
+from reports.brief import Judged, Kept, Summary, judged, keep, summarise
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.judging.rows import rows_of
+from validation.records.store import Store
 from validation.running.plan import QUICK_DT
 
 SLOT = Slot("impact", (("e", 0.5), ("v", 2.0)), 2, "chipmunk", "tuned", QUICK_DT)
@@ -21,24 +23,86 @@ def cell(slot=SLOT, ratio=0.75, outcome=Outcome.OK, version="7.2"):
     return Observation(slot, "c", CATALOGUE["impact"].version, version, outcome, "", metrics)
 
 
-def test_a_run_that_has_been_judged_is_not_judged_again(tmp_path, monkeypatch):
-    rows = rows_of("", [cell()])
+@pytest.fixture
+def stored(tmp_path):
+    """A store with one finished run, the run, and what it observed."""
+    store = Store(tmp_path)
+    run, _ = store.start("impact", [SLOT])
+    store.add(run, cell())
+    store.finish(run)
+    yield store, store.run(), store.observations(run)
+    store.close()
+
+
+def test_a_run_that_has_been_judged_is_not_judged_again(stored, monkeypatch):
+    store, run, seen = stored
+    rows = rows_of(run.id, seen)
     failing = sum(row.physics == "fail" for row in rows)
-
-    def judge(*given):
-        raise AssertionError("it was judged already")
-
-    monkeypatch.setattr(brief, "rows_of", judge)
-    keep(tmp_path, "run", [cell()], iter(rows))
-    kept = Kept(tmp_path)
-    found = kept.get("run")
+    monkeypatch.setattr(brief, "rows_of", lambda *given: pytest.fail("judged again"))
+    keep(store, run, seen, Judged.of(rows))
+    assert judged(store, run) == Judged.of(rows) and judged(store, run).nulls
+    kept = Kept(store.path.parent)
+    found = kept.get(run.id)
     assert found == summarise([cell()], rows) and kept.get("another") is None
-    error, fails, judged, sure = found.cells[PANEL][SLOT.key()]
-    assert fails == sure == failing > 0 and judged == sum(row.physics is not None for row in rows) > failing
+    error, fails, asked, sure = found.cells[PANEL][SLOT.key()]
+    assert fails == sure == failing > 0 and asked == sum(row.physics is not None for row in rows) > failing
     assert error == pytest.approx(0.25) and found.versions == {"chipmunk": "7.2"} and found.times == {}
     kept.close()
     none = summarise([cell()], []).cells[PANEL][SLOT.key()]
     assert none == (pytest.approx(0.25), 0, 0, 0), "no row is not the same as not judged"
+
+
+def test_a_run_is_judged_by_the_first_who_reads_it_and_again_where_code_or_results_are_others(stored, monkeypatch):
+    store, run, _ = stored
+    asked = []
+    monkeypatch.setattr(brief, "rows_of", lambda *given: asked.append(given) or rows_of(*given))
+    first = judged(store, run)
+    assert judged(store, run) == first and len(asked) == 1
+    store.add(run, cell(ratio=0.5))
+    (value,) = (row.value for row in judged(store, run).rows if row.metric == "rebound_ratio")
+    assert value == 0.5 and len(asked) == 2
+    monkeypatch.setattr(brief, "row_code", lambda: "other code")
+    assert judged(store, run) == judged(store, run) and len(asked) == 3
+    with sqlite3.connect(store.path.parent / brief.FILE) as db:
+        db.execute("UPDATE kept SET body = 'spoilt'")
+    assert judged(store, run).rows and len(asked) == 4
+
+
+def test_a_damaged_result_is_told_to_each_reader(stored):
+    store, run, _ = stored
+    with store.writing() as db:
+        db.execute("UPDATE observations SET body = '{}'")
+    for _ in range(2):
+        with pytest.warns(Notice, match="damaged and left out"):
+            assert judged(store, run).rows == []
+
+
+def test_a_run_that_goes_on_is_judged_each_time_and_a_deleted_one_is_forgotten(stored, monkeypatch):
+    store, run, _ = stored
+    asked = []
+    monkeypatch.setattr(brief, "rows_of", lambda *given: asked.append(given) or rows_of(*given))
+    going = replace(run, finished=False)
+    assert judged(store, going) == judged(store, going) and len(asked) == 2
+    judged(store, run)
+    kept = Kept(store.path.parent)
+    kept.forget([run.id])
+    kept.close()
+    assert judged(store, run) and len(asked) == 4
+
+
+def test_a_row_is_judged_by_laws_and_lists_of_known_failures_too(tmp_path, monkeypatch):
+    """An edit of any of them is other code."""
+    for name in ("validation", "adapters/toy/findings"):
+        (tmp_path / name).mkdir(parents=True)
+    files = [tmp_path / "validation" / "rows.py", tmp_path / "adapters" / "laws.py"]
+    files += [tmp_path / "adapters" / "toy" / "findings" / name for name in ("families.toml", "members.csv")]
+    for package in ("validation", "adapters"):
+        monkeypatch.setattr(getattr(brief, package), "__file__", str(tmp_path / package / "__init__.py"))
+    codes = [brief.row_code.__wrapped__()]
+    for file in files:
+        file.write_text("changed")
+        codes.append(brief.row_code.__wrapped__())
+    assert len(set(codes)) == len(codes)
 
 
 def test_a_failure_that_a_moved_start_mends_is_not_sure():
@@ -79,7 +143,7 @@ def test_a_summary_of_other_code_or_a_spoilt_one_is_none_and_a_later_one_takes_i
     assert kept.get("run") == other
     for body in ("no json", "{}", "[1]", '{"panels": ["[1]"], "versions": {}, "times": []}'):
         with sqlite3.connect(tmp_path / brief.FILE) as db:
-            db.execute("UPDATE summaries SET body = ?", (body,))
+            db.execute("UPDATE kept SET body = ?", (body,))
         assert kept.get("run") is None, body
     kept.close()
 
@@ -88,8 +152,8 @@ def test_where_nothing_can_be_kept_nothing_is_and_nothing_ends(tmp_path):
     kept = Kept(tmp_path / "nowhere")
     kept.put("run", Summary({}, {}))
     assert kept.get("run") is None
+    kept.forget(["run"])
     kept.close()
-    keep(tmp_path / "nowhere", "run", [], [])
     assert not (tmp_path / "nowhere").exists()
 
 

@@ -3,6 +3,7 @@
 import io
 import json
 import re
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -11,8 +12,10 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from adapters.scene import SceneError
+from reports import brief
 from reports.answers import answers, choices
 from reports.command import main, showing
+from reports.exports import load_rows
 from reports.findings import finding_line, grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
@@ -354,6 +357,17 @@ def test_what_is_shown_ends_with_the_path_of_the_report_where_there_is_one(two_e
         report.unlink()
 
 
+def changed(monkeypatch, change):
+    """Commands read rows that ``change`` gives from those of the run."""
+    judged = brief.judged
+
+    def other(*asked):
+        found = judged(*asked)
+        return replace(found, rows=change(found.rows))
+
+    monkeypatch.setattr(brief, "judged", other)
+
+
 def call(*arguments):
     return CliRunner(env={"COLUMNS": "100"}).invoke(main, [str(a) for a in arguments])
 
@@ -412,9 +426,9 @@ def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
 
 def test_explain_says_why_a_run_is_not_certified(two_engines, monkeypatch):
     out, _ = two_engines
-    judged, why = showing.judged, "certificate: a contact pulls"
+    why = "certificate: a contact pulls"
     ended = {"outcome": "invalid", "physics": None, "standing": None, "reason": why}
-    monkeypatch.setattr(showing, "judged", lambda *asked: [{**row, **ended} for row in judged(*asked)])
+    changed(monkeypatch, lambda rows: [replace(row, **ended) for row in rows])
     lines = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout.splitlines()
     assert [line.split(None, 1)[1].strip() for line in lines if line.startswith("reason")] == [why]
 
@@ -423,27 +437,25 @@ def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeyp
     out, _ = two_engines
     row = ("explain", "mujoco/default/bounce/apex", "--out", out)
     assert "off plane" not in call(*row).stdout
-    judged = showing.judged
 
-    def tipped(*asked):
-        rows = judged(*asked)
-        beside = [{**each, "physics": "fail", "value": 0.25} for each in rows if each["metric"] == "out_of_plane"]
+    def tipped(rows):
+        beside = [replace(each, physics="fail", value=0.25) for each in rows if each.metric == "out_of_plane"]
         assert beside
-        return [each for each in rows if each["metric"] != "out_of_plane"] + beside
+        return [each for each in rows if each.metric != "out_of_plane"] + beside
 
-    monkeypatch.setattr(showing, "judged", tipped)
+    changed(monkeypatch, tipped)
     said = "off plane the scene leaves its plane by 0.25 m; this check sees only the motion in the plane"
     assert said in " ".join(call(*row).stdout.split())
     assert "off plane" not in call("explain", "mujoco/default/bounce/out_of_plane", "--out", out).stdout
 
 
-def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(two_engines, monkeypatch):
-    """`explain` and `findings --scene` judge what they show and no more, studies and ids included."""
+def test_a_row_or_a_scene_alone_is_what_the_whole_run_says(two_engines):
     out, _ = two_engines
-    rows, kept, _ = showing.load(Path(out), "latest")
-    observations = kept.observations
+    store = Store(out, create=False)
+    rows = showing.load(store, "latest").rows
+    store.close()
     by_id = {row_id(row): row for row in rows}
-    assert {name for name, _ in showing.ids_of(observations)} == set(by_id) and len(by_id) == len(rows)
+    assert len(by_id) == len(rows)
     for engine, scene in dict.fromkeys((row["engine"], row["scene"]) for row in rows):
         alone = json.loads(
             call("findings", "--all", "--json", "--engine", engine, "--scene", scene, "--out", out).stdout
@@ -451,13 +463,22 @@ def test_what_is_judged_for_a_row_or_a_scene_alone_is_what_the_whole_run_says(tw
         there = [row for row in rows if (row["engine"], row["scene"]) == (engine, scene)]
         shown = [row for _, group in grouped(there) for row in group]
         assert alone == json.loads(json.dumps([{**row, "id": row_id(row)} for row in shown]))
-    judged, counted = showing.judged, []
-    monkeypatch.setattr(showing, "judged", lambda *asked: counted.append(len(asked[1])) or judged(*asked))
     for name, row in list(by_id.items())[:: max(1, len(by_id) // 9)]:
         told = json.loads(call("explain", name, "--json", "--out", out).stdout)
         own = json.loads(json.dumps({key: each for key, each in row.items() if key != "skill"}))  # is added there
         assert {key: told[key] for key in own} == own
-    assert 0 < max(counted) < len(observations)
+
+
+def test_a_run_is_judged_once_for_all_commands(two_engines, monkeypatch):
+    out, _ = two_engines
+    rows = json.loads(json.dumps([row.as_dict() for row in load_rows(out)]))
+    monkeypatch.setattr(brief, "rows_of", lambda *asked: pytest.fail("judged again"))
+    assert call("show", "--out", out).exit_code == 0
+    assert call("compare", "latest", "latest", "--out", out).exit_code == 0
+    shown = json.loads(call("findings", "--all", "--json", "--out", out).stdout)
+    by_id = {row_id(row): row for row in rows}
+    assert shown and all(each == {**by_id[each["id"]], "id": each["id"]} for each in shown)
+    assert call("explain", shown[0]["id"], "--out", out).exit_code == 0
 
 
 @pytest.mark.parametrize(

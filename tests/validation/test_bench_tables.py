@@ -166,7 +166,7 @@ def test_corrected_cost_leaves_out_what_an_empty_scene_costs_per_step(store):
     store.add_timings(run, [timing(empty, 240e-6, k, "overhead", 240) for k in range(3)])  # 1 us a step
     (point,) = work_points(store, run).to_dict("records")
     assert point["cost_corrected"] == pytest.approx(1e-3 - 240 * 1e-6)
-    assert overhead(store, run)["per_step"].tolist() == pytest.approx([1e-6])
+    assert overhead(timings_summary(store, run))["per_step"].tolist() == pytest.approx([1e-6])
 
 
 def test_planted_scaling_is_found_above_the_overhead(store):
@@ -177,7 +177,7 @@ def test_planted_scaling_is_found_above_the_overhead(store):
         seconds = 24 * max(1e-6, 1e-7 * n**1.3) * (0 if rows == 24 else 1)
         void = "left out" if rows == 24 else ""
         store.add_timings(run, [timing(slot, seconds, 0, "bodies", 24, bodies=n, void=void)])
-    (fit,) = scaling_fits(scaling(store, run)).to_dict("records")
+    (fit,) = scaling_fits(scaling(timings_summary(store, run))).to_dict("records")
     assert fit["exponent"] == pytest.approx(1.3, abs=1e-9) and fit["points"] == 3
     assert (fit["smallest"], fit["largest"]) == (10.0, 91.0)
 

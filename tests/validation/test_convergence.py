@@ -9,7 +9,15 @@ import pytest
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.questions import convergence as questions
-from validation.questions.convergence import Limit, convergence, extrapolations, limit_of, observed_order, richardson
+from validation.questions.convergence import (
+    Limit,
+    convergence,
+    declared_errors,
+    extrapolations,
+    limit_of,
+    observed_order,
+    richardson,
+)
 from validation.scenes.parts import PHASES
 
 DTS = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))
@@ -102,7 +110,7 @@ def test_the_error_of_a_step_is_the_supremum_over_all_phases():
         for dt in DTS[:3]
         for k in range(PHASES)
     ]
-    (found,) = convergence(cells)
+    (found,) = convergence(declared_errors(cells))
     assert found.errors == pytest.approx(DTS[:3], rel=1e-12)
     assert found.limit is Limit.TRUTH
     assert found.order.order == pytest.approx(1.0, abs=1e-9)
@@ -112,8 +120,8 @@ def test_a_step_with_a_missing_or_crashed_phase_has_no_error():
     cells = [observed(impact_slot(dt, k), {"rebound_ratio": 0.8 + dt}) for dt in DTS[:2] for k in range(PHASES)]
     crashed = replace(cells[0], outcome=Outcome.CRASHED, reason="it crashed")
     missing = cells[1:-1]
-    assert convergence([crashed, *missing]) == []
-    (whole,) = convergence(cells)
+    assert convergence(declared_errors([crashed, *missing])) == []
+    (whole,) = convergence(declared_errors(cells))
     assert whole.dts == DTS[:2]
 
 
@@ -308,7 +316,7 @@ def test_cells_beside_the_declared_ones_and_moved_ones_have_no_part_in_an_error(
     other = observed(Slot("impact", (("e", 0.25),), 2, "toy", "default", DTS[0]), {"rebound_ratio": 9.0})
     moved = [replace(cell, slot=replace(cell.slot, ulp=1)) for cell in cells]
     wrong = [replace(cell, metrics={"rebound_ratio": (9.0, "")}) for cell in moved]
-    (whole,) = convergence([*wrong, other, *cells])
+    (whole,) = convergence(declared_errors([*wrong, other, *cells]))
     assert whole.errors == pytest.approx(DTS[:2], rel=1e-9)
 
 

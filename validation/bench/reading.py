@@ -108,28 +108,26 @@ def identity(slot: Slot) -> dict[str, Any]:
     }
 
 
-def overhead(store: Store, run: Run) -> pd.DataFrame:
+def overhead(summary: pd.DataFrame) -> pd.DataFrame:
     """Cost of a step without contact: an empty scene, and one free body. It is mostly the binding's own.
 
     One row per dimension, engine, profile, scene (``empty``, ``flight``) and way of sampling. Columns as in
     `timings_summary`, with ``per_step``, ``per_step_low``, ``per_step_high`` [s].
     """
-    table = timings_summary(store, run)
-    table = table[table["purpose"] == "overhead"].copy()
+    table = summary[summary["purpose"] == "overhead"].copy()
     if len(table):
         table["per_step_low"] = table["low"] / table["steps"]
         table["per_step_high"] = table["high"] / table["steps"]
     return table.reset_index(drop=True)
 
 
-def scaling(store: Store, run: Run) -> pd.DataFrame:
+def scaling(summary: pd.DataFrame) -> pd.DataFrame:
     """Cost of a step over the number of bodies (purpose ``bodies``) and of iterations (``iterations``).
 
     Rows and columns of `timings_summary`, with ``x`` (bodies or iterations), ``per_step``, ``per_step_low``,
     ``per_step_high`` [s]. ``error`` is the largest displacement of a body at the end of the timed call, in sides.
     """
-    table = timings_summary(store, run)
-    table = table[table["purpose"].isin(["bodies", "iterations"])].copy()
+    table = summary[summary["purpose"].isin(["bodies", "iterations"])].copy()
     if len(table):
         table["x"] = np.where(table["purpose"] == "bodies", table["bodies"], table["iterations"]).astype(float)
         table["per_step_low"] = table["low"] / table["steps"]

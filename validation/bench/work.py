@@ -15,7 +15,7 @@ import numpy as np
 from adapters.registry import is_ranked
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import Observation, Outcome, Slot, scene_of
 from validation.files.distance import CertifiedRuns, certified_runs, posed
 from validation.posed import is_file, primary_of, resolve
 from validation.records.store import Run, Store
@@ -31,7 +31,12 @@ COST_LEVELS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
 Row = Mapping[Hashable, Any]
 
 
-def work_points(store: Store, run: Run, observations: Iterable[Observation] | None = None) -> pd.DataFrame:
+def work_points(
+    store: Store,
+    run: Run,
+    observations: Iterable[Observation] | None = None,
+    summary: pd.DataFrame | None = None,
+) -> pd.DataFrame:
     """Error and cost: one row per scene, dimension, engine, profile, step and iteration count.
 
     Columns: `POINT` (``iterations`` None: the profile's own), ``params``, ``slot`` (the timed case, as the command
@@ -41,7 +46,7 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
     ``cost_corrected`` (minus the cost per step of an empty scene on the same engine and profile),
     ``cost_sampled`` (with every step read, if timed); ``state_hash`` of the timed call;
     ``on_front`` (on the lower envelope of its series), ``best`` (on that over all engines).
-    ``observations`` are those of the run, if already read.
+    ``observations`` and ``summary`` (`timings_summary`) are those of the run, if already read.
     """
     groups: dict[tuple[Any, ...], list[Observation]] = defaultdict(list)
     everything = list(store.observations(run) if observations is None else observations)
@@ -50,7 +55,7 @@ def work_points(store: Store, run: Run, observations: Iterable[Observation] | No
         slot = observation.slot
         if is_file(slot.scene) or resolve(slot.scene).primary:
             groups[tuple(getattr(slot, name) for name in POINT)].append(observation)
-    summary = timings_summary(store, run)
+    summary = timings_summary(store, run) if summary is None else summary
     work = summary[summary["purpose"] == "work"] if len(summary) else summary
     costs = {(tuple(row[name] for name in POINT), row["sampled"]): row for row in work.to_dict("records")}
     empty = _empty_per_step(summary)
@@ -120,8 +125,7 @@ def _error(observation: Observation, certified: CertifiedRuns) -> tuple[float | 
         if run is None or run.reason:
             return None, run.reason if run else "no certified run to measure from: it has no result"
         metrics = {**metrics, **run.metrics}
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return primary_of(slot.scene).error(scene, slot.dt, metrics)
+    return primary_of(slot.scene).error(scene_of(slot), slot.dt, metrics)
 
 
 def _cost_columns(plain: Row | None, sampled: Row | None) -> dict[str, Any]:
@@ -155,13 +159,7 @@ def time_at_equal_error(points: pd.DataFrame, levels: Sequence[float] = ERROR_LE
     overlaps that of the cheapest, so that their order is open), ``times_cheapest``; ``reason`` if no point reaches the
     level.
     """
-    rows = []
-    for names, group in grouped(points, SERIES):
-        for level in levels:
-            reached = group[(group["error"] <= level) & group["cost"].notna()]
-            row = dict(zip(SERIES, names, strict=True)) | {"level": level}
-            rows.append(row | _chosen(reached, "cost", _why_not(group, level)))
-    return _ranked(table_of(rows), "cost", "times_cheapest")
+    return _ranked(_at_levels(points, levels, "cost", "error"), "cost", "times_cheapest")
 
 
 def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEVELS) -> pd.DataFrame:
@@ -169,34 +167,27 @@ def error_at_equal_time(points: pd.DataFrame, levels: Sequence[float] = COST_LEV
 
     Columns as in `time_at_equal_error`, with ``times_best`` (error over the best error of its scene and level).
     """
+    return _ranked(_at_levels(points, levels, "error", "cost"), "error", "times_best")
+
+
+def _at_levels(points: pd.DataFrame, levels: Sequence[float], column: str, limited: str) -> pd.DataFrame:
+    """Of each series, the point that is best in ``column`` among those with at most each level of ``limited``."""
+    columns = ("cost", "cost_low", "cost_high", "cost_corrected", "error", "dt", "iterations", "slot")
+    nothing = {**dict.fromkeys(columns[:6], math.nan), "iterations": None, "slot": None}
+    least = {"error": "smallest error in this sweep is {:.2g}", "cost": "cheapest point costs {:.2g} s/s"}[limited]
     rows = []
     for names, group in grouped(points, SERIES):
+        series, members = dict(zip(SERIES, names, strict=True)), group.to_dict("records")
+        known = [point for point in members if not math.isnan(point["cost"]) and not math.isnan(point["error"])]
+        # Of points that are equal in this column, the one that is better in the other.
+        known.sort(key=lambda point: (point[column], point[limited]))
+        reasons = [point["reason"] for point in members if point["reason"]]
+        why = least.format(min(point[limited] for point in known)) if known else next(iter(reasons), "not timed")
         for level in levels:
-            affordable = group[(group["cost"] <= level) & group["error"].notna()]
-            row = dict(zip(SERIES, names, strict=True)) | {"level": level}
-            cheapest = group.loc[group["error"].notna(), "cost"].min()
-            why = f"cheapest point costs {cheapest:.2g} s/s" if math.isfinite(cheapest) else _no_point(group)
-            rows.append(row | _chosen(affordable, "error", why))
-    return _ranked(table_of(rows), "error", "times_best")
-
-
-def _chosen(candidates: pd.DataFrame, column: str, why_not: str) -> dict[str, Any]:
-    columns = ("cost", "cost_low", "cost_high", "cost_corrected", "error", "dt", "iterations", "slot")
-    if len(candidates) == 0:
-        return {**dict.fromkeys(columns[:6], math.nan), "iterations": None, "slot": None, "reason": why_not}
-    # Of points that are equal in this column, the one that is better in the other.
-    best = candidates.sort_values([column, "cost" if column == "error" else "error"]).iloc[0]
-    return {**{name: best[name] for name in columns}, "reason": ""}
-
-
-def _why_not(group: pd.DataFrame, level: float) -> str:
-    errors = group.loc[group["cost"].notna(), "error"]
-    return f"smallest error in this sweep is {errors.min():.2g}" if errors.notna().any() else _no_point(group)
-
-
-def _no_point(group: pd.DataFrame) -> str:
-    reasons = [reason for reason in group["reason"] if reason]
-    return reasons[0] if reasons else "not timed"
+            best = next((point for point in known if point[limited] <= level), None)
+            found = {**nothing, "reason": why} if best is None else {**{n: best[n] for n in columns}, "reason": ""}
+            rows.append({**series, "level": level, **found})
+    return table_of(rows)
 
 
 def _has_rank(table: pd.DataFrame) -> pd.Series:

@@ -13,7 +13,7 @@ from adapters.engine_folder import covering, laws_of
 from adapters.isolation import end_with
 from adapters.registry import load_engines_here
 from adapters.scene import Scene
-from validation.cells import Slot
+from validation.cells import Slot, scene_of
 from validation.judging.verdicts import Prediction, predicted
 from validation.posed import resolve
 from validation.workers.limits import cores
@@ -78,7 +78,7 @@ def _said(rows: Sequence[Asked]) -> list[list[Said] | None]:
 
 
 def _said_of(slot: Slot, version: str, metric: str) -> list[Said] | None:
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    scene = scene_of(slot)
     try:
         found = predictions(slot, version, metric, scene)
     except EngineError:

@@ -13,7 +13,7 @@ from adapters.scene import Scene
 from adapters.stages import stage
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Outcome, Slot, checks_of, slot_from_dict
+from validation.cells import Observation, Outcome, Slot, checks_of, scene_of, slot_from_dict
 from validation.files.invariants import LAWS
 from validation.files.stated import STATED, instant_of
 from validation.findings import Findings, FindingsError, Known, known_of
@@ -325,7 +325,7 @@ def predictions_of(row: Row) -> list[Prediction]:
     slot = slot_from_dict(row.slot)
     if slot.switched:
         return []
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
+    scene = scene_of(slot)
     try:
         return predictions(slot, row.engine_version, row.metric, scene)
     except EngineError:  # laws of another package; their row has the error

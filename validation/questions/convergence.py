@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -174,9 +174,11 @@ def richardson(dts: Sequence[float], values: Sequence[float]) -> tuple[float, fl
 
 #: Scene, dimension, engine, profile.
 Series = tuple[str, int, str, str]
+#: Error by series, step and iterations.
+DeclaredErrors = Mapping[Series, Mapping[tuple[float, int | None], float]]
 
 
-def declared_errors(observations: Iterable[Observation]) -> dict[Series, dict[tuple[float, int | None], float]]:
+def declared_errors(observations: Iterable[Observation]) -> DeclaredErrors:
     """Declared error per series and (step, iterations; None: the profile's own), where all variations ran.
 
     A step with a cell that crashed or diverged has no error.
@@ -208,10 +210,10 @@ def _is_variation(slot: Slot) -> bool:
     return any(canonical.complete(params) == asked for params in canonical.primary.variations(slot.dt))
 
 
-def convergence(observations: Iterable[Observation]) -> list[Convergence]:
+def convergence(declared: DeclaredErrors) -> list[Convergence]:
     """Error against dt for every engine and profile, with order and verdict."""
     out = []
-    for series, errors in declared_errors(observations).items():
+    for series, errors in declared.items():
         dts = tuple(sorted((dt for dt, iterations in errors if iterations is None), reverse=True))
         own = tuple(errors[dt, None] for dt in dts)
         if dts:

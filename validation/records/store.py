@@ -104,6 +104,8 @@ class Store:
     def __init__(self, folder: Path, create: bool = True, write: bool | None = None) -> None:
         write = create if write is None else write
         self.path = folder if folder.is_file() else folder / FILE
+        #: Whether something that was read was damaged and left out.
+        self.lossy = False
         if not create and not self.path.exists():
             raise MissingError(f"out: there are no results at {self.path}; crosscheck run makes them")
         with self._guarded("use"):
@@ -163,6 +165,7 @@ class Store:
             except Exception as error:  # a damaged row may raise anything
                 wrong.append(one_line(f"{type(error).__name__}: {error}", NAME))
         if wrong:
+            self.lossy = True
             self._tell(f"{what}: damaged and left out: {len(wrong)} of {len(found) + len(wrong)}, {wrong[0]}")
         return found
 
@@ -291,14 +294,28 @@ class Store:
         return self._runs("substr(title, 1, length(?)) = ?", name, name)
 
     @stage("reading results")
-    def observations(self, run: Run) -> list[Observation]:
-        """Observations of a run, in the order of its plan; its scene files need not exist any more."""
+    def observations(self, run: Run, engine: str = "", scene: str = "") -> list[Observation]:
+        """Observations of a run, or of one engine or scene of it, in the order of its plan.
+
+        Its scene files need not exist any more.
+        """
         self.scenes(run)
+        asked = {"run": run.id, "engine": engine, "scene": scene}
+        where = " AND ".join(f"{name} = :{name}" for name, value in asked.items() if value)
         with self._guarded("read"):
-            rows = self._db.execute("SELECT slot, body FROM observations WHERE run = ?", (run.id,)).fetchall()
+            rows = self._db.execute(f"SELECT slot, body FROM observations WHERE {where}", asked).fetchall()
             order = {key: position for position, key in enumerate(run.plan)}
             rows.sort(key=lambda row: order.get(row[0], len(order)))
             return self._made(f"results of run {run.id}", rows, _observation)
+
+    def digest(self, run: Run) -> str:
+        """Hash of all results of a run, as they are stored."""
+        digest = hashlib.sha256()
+        with self._guarded("read"):
+            for table in ("observations", "timings"):
+                for (body,) in self._db.execute(f"SELECT body FROM {table} WHERE run = ? ORDER BY rowid", (run.id,)):
+                    digest.update(str(body).encode() + b"\n")
+        return digest.hexdigest()[:16]
 
     def missing(self, run: Run) -> int:
         """Number of planned cells of a run without observation: it was interrupted, or rows were deleted."""

@@ -23,7 +23,7 @@ from typing import Any
 from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
 from adapters.experiment import Cured
 from adapters.registry import find, load
-from validation.cells import Observation, Slot, prepare, settings_of
+from validation.cells import Observation, Slot, scene_of, settings_of
 from validation.running.plan import QUICK_DT
 from validation.settings.switching import observe, readings, switched
 
@@ -173,7 +173,7 @@ def smallest(
 
 def changes_of(slot: Slot, better: str) -> dict[str, Any]:
     """Settings that profile ``better`` sets differently from the slot's, with their values."""
-    engine, scene = load(slot.engine), prepare(slot).scene
+    engine, scene = load(slot.engine), scene_of(slot)
     own = {s.name: s.value for s in settings_of(engine, slot, scene)}
     other = Slot(slot.scene, slot.params, slot.dimension, slot.engine, better, slot.dt)
     wanted = {s.name: s.value for s in settings_of(engine, other, scene)}

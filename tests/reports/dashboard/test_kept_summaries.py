@@ -33,7 +33,7 @@ def test_a_file_that_is_no_database_keeps_nothing_and_stays_what_it_is(file):
 
 
 def test_a_table_that_is_gone_or_of_another_program_keeps_nothing(file):
-    for statements in (["DROP TABLE summaries"], ["DROP TABLE summaries", "CREATE TABLE summaries (other TEXT)"]):
+    for statements in (["DROP TABLE kept"], ["DROP TABLE kept", "CREATE TABLE kept (other TEXT)"]):
         kept = Kept(file.parent)
         changed(file, *statements)
         kept.put("run", summary())
@@ -46,11 +46,11 @@ def test_a_summary_that_another_program_wrote_is_made_anew(file):
     kept.put("run", summary())
     assert kept.get("run") == summary() and kept.get("other") is None
     for body in ("no JSON", "[]", "{}", "7"):
-        changed(file, f"UPDATE summaries SET body = '{body}'")
+        changed(file, f"UPDATE kept SET body = '{body}'")
         assert kept.get("run") is None
     kept.put("run", summary())
     assert kept.get("run") == summary()
-    changed(file, "UPDATE summaries SET code = 'judged by other code'")
+    changed(file, "UPDATE kept SET code = 'judged by other code'")
     assert kept.get("run") is None
     kept.close()
 
