@@ -39,7 +39,7 @@ run: $(USED)
 	$(BIN)/crosscheck report --out $(OUT) || exit 2; \
 	ended=$$(date +%s); \
 	echo "done after $$(( ended - begun )) s: verdicts $$(( judged - begun )) s, benchmark $$(( timed - judged )) s," \
-		"report $$(( ended - timed )) s"; \
+		"report $$(( ended - timed )) s; by stage: crosscheck --timings COMMAND"; \
 	exit $$status
 
 # `setup` has installed the engines and Pinocchio: if one is not there, its tests fail instead of being skipped. PyBullet

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from validation.cells import Observation, Outcome, Slot
+from validation.running import warming
 from validation.workers import process
 
 SLOT = Slot("impact", (("e", 0.5),), 2, "toy", "tuned", 1 / 240)
@@ -95,3 +96,14 @@ def test_what_an_engine_raises_to_leave_is_a_crash_of_its_cell_and_its_process_g
     assert told["observation"] == Observation(SLOT, "", 0, "", Outcome.CRASHED, process.said_by(error)).as_dict()
     assert (told["changed"], told["unwritten"], told["recording"]) == ("what was raised", None, None)
     assert answer(error, changes="open files")[0]["changed"] == "open files"
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_kernels_are_compiled_for_cells_of_scene_files_as_well(monkeypatch, works):
+    did = []
+    monkeypatch.setattr(process.posed, "remember", lambda scenes: did.append(("remember", scenes)))
+    monkeypatch.setattr(process.posed, "hand_over", lambda stated: did.append(("hand over", stated)))
+    monkeypatch.setattr(warming, "compile_one", lambda slots: did.append(slots) or works)
+    job = {"compile": [SLOT.as_dict()], "scenes": {"a": "b"}, "stated": {"c": "d"}}
+    assert process._compiled(job) == {"compiled": works}
+    assert did == [("remember", {"a": "b"}), ("hand over", {"c": "d"}), [SLOT]]
