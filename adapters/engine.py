@@ -405,7 +405,11 @@ class Engine(ABC):
         return None
 
     def kernels(self) -> Path | None:
-        """Folder of machine code that this engine compiles at its first steps; None if it compiles nothing."""
+        """Folder of machine code that this engine compiles at its first steps; None if it compiles nothing.
+
+        It is another one for other sources. What is compiled may depend on the profile and the dimension alone: the
+        first steps of one scene then serve all.
+        """
         return None
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
