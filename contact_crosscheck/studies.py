@@ -266,7 +266,7 @@ def bench(
     profiles
         Names of profiles; by default all that are ranked.
     dimension
-        2 or 3; by default all dimensions of the scene.
+        2 or 3; by default the scene's first, with ``full`` all.
     dts, iterations
         Steps [s] and iteration counts; by default the scene's own.
     full

@@ -176,11 +176,16 @@ def halves(first: float, last: float) -> tuple[float, ...]:
     return tuple(1.0 / rate for rate in rates)
 
 
+#: Steps [s] of a quick benchmark of a scene that states none, and is named.
+NAMED = (1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)
+
+
 @dataclass(frozen=True)
 class Steps:
     """Steps [s] of a benchmark of a scene, and iteration counts beside each profile's own, by suite.
 
-    A scene without quick steps runs in the full benchmark, or where it is named.
+    A scene without quick steps runs in the full benchmark, or where it is named. Cases at 1/240 s that the quick suite
+    of verdicts has are not run again: a dozen scenes with quick steps have almost all of theirs there.
     """
 
     quick: tuple[float, ...] = ()
@@ -189,8 +194,8 @@ class Steps:
     full_iterations: tuple[int, ...] = ()
 
     def dts(self, suite: Suite) -> tuple[float, ...]:
-        """Steps of a suite [s]; without quick ones three of the full ones, each a quarter of the one before."""
-        return (self.quick or self.full[1:6:2]) if suite == "quick" else self.full
+        """Steps of a suite [s]; `NAMED` where a scene has no quick ones."""
+        return (self.quick or NAMED) if suite == "quick" else self.full
 
     def counts(self, suite: Suite) -> tuple[int, ...]:
         """Iteration counts of a suite."""

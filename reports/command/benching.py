@@ -73,11 +73,11 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
     run of our own solver at the end; where there is none, a line says why.
 
     Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
-    cases are timed one at a time. --quick takes under two minutes on two cores, --full up to two hours (piles of a
-    thousand boxes). With --against, exits with 1 if fewer than 90 % of the time ratios agree. With --piles, times the
-    reference solver on piles, in its exact and in its textbook profile. With --targets, times the textbook profile
-    against other engines at 10 sweeps and at equal error, in under ten minutes on one core; a ratio below its floor is
-    shown and is no failure.
+    cases are timed one at a time. --quick takes a minute on two cores: a dozen scenes, each in its first dimension
+    unless --dim names others. --full takes up to two hours (piles of a thousand boxes). With --against, exits with 1 if
+    fewer than 90 % of the time ratios agree. With --piles, times the reference solver on piles, in its exact and in its
+    textbook profile. With --targets, times the textbook profile against other engines at 10 sweeps and at equal error,
+    in under ten minutes on one core; a ratio below its floor is shown and is no failure.
     """
     console = terminal(stderr=True)
     if piles is not None:

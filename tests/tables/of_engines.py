@@ -36,7 +36,7 @@ def settings_table(engine: Engine, profile: str) -> Sections:
     for name, canonical in CATALOGUE.items():
         for dimension in canonical.dimensions:
             own = dict[str, None]()
-            for _, _, params in islice((cell for cell in cells(canonical) if cell[1] == dimension), CELLS):
+            for _, _, params in islice((cell for cell in cells(canonical, "standard") if cell[1] == dimension), CELLS):
                 scene = canonical.scene(dimension, params)
                 if isinstance(refused := posed(engine, scene, profile), str):
                     own[f"refused: {refused}"] = None

@@ -296,8 +296,9 @@ def test_a_work_point_is_timed_with_states_read_too_at_one_step_and_the_profile_
     members = [SimpleNamespace(slot=slot, cell="its cell")]
     point = {"reason": "", "slot": slot.as_dict(), "error": 0.25}
     monkeypatch.setattr(sweep, "accuracy", lambda asked, certified: point)
-    found = list(sweep._work_units(members, {}))
+    found = list(sweep._work_units(members, {}, "full"))
     assert [unit.sampled for unit in found] == [False, True][: 1 + (dt == SAMPLED_DT and iterations is None)]
+    assert list(sweep._work_units(members, {}, "quick")) == found[:1]  # a quick one has no time for it
     assert {(unit.slot, unit.cell, unit.error, unit.purpose) for unit in found} == {(slot, "its cell", 0.25, "work")}
     monkeypatch.setattr(sweep, "accuracy", lambda asked, certified: point | {"reason": "it has no error"})
-    assert list(sweep._work_units(members, {})) == []
+    assert list(sweep._work_units(members, {}, "full")) == []

@@ -10,13 +10,13 @@ import pytest
 from adapters import registry
 from validation.bench.agreement import agreement, ratios
 from validation.bench.reading import bench_runs, overhead, scaling, scaling_fits, timings_summary
-from validation.bench.sweep import Sweep, accuracy_slots, timed_units
+from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
 from validation.bench.timing import Timing
 from validation.bench.work import COST_LEVELS, ERROR_LEVELS, error_at_equal_time, time_at_equal_error, work_points
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import primary_of, resolve
 from validation.records.store import Store
-from validation.running.plan import Request
+from validation.running.plan import QUICK_DT, Request, slots
 
 STEPS = (1 / 60, 1 / 240, 1 / 960)
 
@@ -222,9 +222,32 @@ def test_versions_that_differ_are_not_compared(store):
 
 def test_a_sweep_asks_for_all_phases_at_every_step_and_count():
     sweep = Sweep(Request(["impact"], ["reference"], profiles=["classical"], dimensions=[2]), dts=STEPS, iterations=[1])
-    slots = accuracy_slots(sweep)
-    assert len(slots) == 16 * len(STEPS) * 2
-    assert {(slot.dt, slot.iterations) for slot in slots} == set(product(STEPS, (None, 1)))
+    asked = accuracy_slots(sweep)
+    assert len(asked) == 16 * len(STEPS) * 2
+    assert {(slot.dt, slot.iterations) for slot in asked} == set(product(STEPS, (None, 1)))
+
+
+def test_a_quick_benchmark_has_a_dozen_scenes_whose_cases_the_quick_suite_has():
+    """At 1/240 s and each profile's own iterations; contact times within a step are the benchmark's alone."""
+    scenes = benched("quick")
+    asked = accuracy_slots(Sweep(Request(scenes, ["reference", "chipmunk"])))
+    own = set(asked).difference(slots(Request(scenes, ["reference", "chipmunk"])))
+    assert len(scenes) == 12 and len(own) < 0.8 * len(asked)
+    assert {slot.scene for slot in own if slot.dt == QUICK_DT and slot.iterations is None} == {"impact"}
+
+
+@pytest.mark.parametrize(("scene", "dimensions"), [("slide", (2, 3)), ("tumble", (3,))])
+def test_a_quick_benchmark_runs_one_dimension_unless_others_are_named(scene, dimensions):
+    def asked(**more):
+        return {slot.dimension for slot in accuracy_slots(Sweep(Request([scene], ["reference"], **more)))}
+
+    assert asked() == {dimensions[0]} and asked(suite="full") == set(dimensions) == asked(dimensions=dimensions)
+
+
+@pytest.mark.parametrize("suite", ["quick", "full"])
+def test_a_scene_is_benched_in_the_cases_of_its_error_even_if_these_are_its_defaults(suite):
+    assert primary_of("slide").variations(1 / 240) == [{}] and len(resolve("slide").variations(suite)) > 1
+    assert {slot.params for slot in accuracy_slots(Sweep(Request(["slide"], ["reference"], suite=suite)))} == {()}
 
 
 def test_a_fixed_parameter_replaces_the_phases():

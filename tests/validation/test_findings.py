@@ -79,19 +79,37 @@ def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
         assert SpecifierSet(family.releases)
 
 
+def slot_of(engine, key):
+    profile, scene, dimension, params, dt, iterations, _ = key
+    given = tuple((name, float(value)) for name, value in (pair.split("=") for pair in params.split()))
+    return Slot(scene, given, int(dimension), engine, profile, parse_dt(dt), int(iterations) if iterations else None)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_family_with_members_has_one_in_the_quick_suite(engine):
+    findings = files.findings_of(engine)
+    quick = {
+        (name, canonical.minimal(variation.params), dimension, count)
+        for name, canonical in CATALOGUE.items()
+        for variation in canonical.variations("quick")
+        for dimension in canonical.dimensions if variation.runs_in(dimension)
+        for count in variation.iterations
+    }  # fmt: skip
+    met = {}
+    for key in findings.members if findings else ():
+        slot, family = slot_of(engine, key), findings.family_of(key).id
+        met[family] = met.get(family, False) or (slot.scene, slot.params, slot.dimension, slot.iterations) in quick
+    assert all(met.values()), [family for family, is_met in met.items() if not is_met]
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_member_is_a_row_that_the_standard_suite_states(engine):
     findings = files.findings_of(engine)
     for key in findings.members if findings else ():
-        profile, scene, dimension, params, dt, iterations, metric = key
-        numbers = dict(pair.split("=") for pair in params.split())
-        given = tuple((name, float(value)) for name, value in numbers.items())
-        slot = Slot(
-            scene, given, int(dimension), engine, profile, parse_dt(dt), int(iterations) if iterations else None
-        )
+        slot, metric = slot_of(engine, key), key[6]
         assert is_standard(slot), key
-        canonical = CATALOGUE[scene]
-        made = canonical.scene(slot.dimension, dict(given))
+        canonical = CATALOGUE[slot.scene]
+        made = canonical.scene(slot.dimension, dict(slot.params))
         checks = [*canonical.checks(made, slot.dt), *plane_of(canonical, made, slot.dt)]
         stated = {check.metric for check in checks}
         assert metric in stated | {study.name for study in canonical.studies}, key

@@ -138,7 +138,7 @@ def test_the_quick_suite_has_a_few_cells_of_the_standard_one_with_every_check_of
 
 def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
     quick, standard = (slots(Request(["impact"], ["chipmunk"], suite=suite)) for suite in ("quick", "standard"))
-    assert set(quick) < set(standard) and len(standard) == 4 * len(quick)
+    assert set(quick) < set(standard)
     assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))
 
 

@@ -67,7 +67,7 @@ class Limits:
     renew: int = 5
 
 
-QUICK = Limits(unit_seconds=0.5, size_seconds=0.4, lane_seconds=35.0, patience=30.0)
+QUICK = Limits(unit_seconds=0.5, size_seconds=0.4, lane_seconds=25.0, patience=30.0)
 FULL = Limits()
 
 

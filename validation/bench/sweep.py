@@ -28,7 +28,7 @@ from validation.running.plan import Request, slots
 
 #: Outcomes that repeat if the same case runs again.
 REPEATS = (Outcome.OK, Outcome.DIVERGED, Outcome.UNSUPPORTED, Outcome.INVALID)
-#: Step at which the cost with every step sampled is timed too [s].
+#: Step at which a full benchmark also times the cost with every step sampled [s].
 SAMPLED_DT = 1.0 / 240.0
 
 
@@ -86,11 +86,14 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
     found: dict[Slot, None] = {}
     apart: dict[Slot, None] = {}
     for scene in sweep.request.scenes:
-        primary, before = primary_of(scene), len(found)
+        primary, canonical, before = primary_of(scene), resolve(scene), len(found)
+        dimensions = _shown(sweep.request, canonical.dimensions)
         for dt in sweep.steps(scene):
             for variation in primary.variations(dt):
-                params = {**variation, **sweep.params}
-                wanted = replace(sweep.request, scenes=[scene], dts=[dt], iterations=[], params=params)
+                params = canonical.complete({**variation, **sweep.params})  # none would be those of the suite
+                wanted = replace(
+                    sweep.request, scenes=[scene], dimensions=dimensions, dts=[dt], iterations=[], params=params
+                )
                 found.update(dict.fromkeys(slots(wanted)))
                 for count in sweep.counts(scene):
                     found.update(dict.fromkeys(slots(replace(wanted, iterations=[count]))))
@@ -98,6 +101,11 @@ def accuracy_slots(sweep: Sweep) -> list[Slot]:
             finest = min(sweep.steps(scene))
             apart.update(dict.fromkeys(certified_slot(slot, 0.5 * finest) for slot in list(found)[before:]))
     return [*(slot for slot in found if _is_benched(sweep.request, slot.engine, slot.base)), *apart]
+
+
+def _shown(request: Request, dimensions: Sequence[int]) -> Sequence[int]:
+    """The dimensions that a request names; else all, or in the quick suite the first one."""
+    return tuple(request.dimensions) or (dimensions[:1] if request.suite == "quick" else dimensions)
 
 
 def _is_benched(request: Request, engine: str, profile: str) -> bool:
@@ -129,7 +137,7 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     observations = list(measured(observations, certified))
     for observation in observations:
         groups[tuple(getattr(observation.slot, name) for name in POINT)].append(observation)
-    units = [unit for members in groups.values() for unit in _work_units(members, certified)]
+    units = [unit for members in groups.values() for unit in _work_units(members, certified, suite)]
     engines = [
         (name, profile)
         for name in request.engines
@@ -144,7 +152,7 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     scaled = [(scene, size) for scene in request.scenes if (size := resolve(scene).size)]
     if scaled:
         sizes = SCALING[suite]
-        shown = dimensions[:1] if suite == "quick" else dimensions
+        shown = _shown(request, dimensions)
         piles += size_units(engines, shown, scaled, sizes.counts, sizes.rows)
         if not any(name == "iterations" for name, _ in request.sets):
             piles += iteration_units(engines, shown, sizes.iterations, sizes.iteration_rows)
@@ -153,12 +161,12 @@ def timed_units(sweep: Sweep, observations: Sequence[Observation]) -> list[Unit]
     return units + piles
 
 
-def _work_units(members: Sequence[Observation], certified: CertifiedRuns) -> Iterator[Unit]:
+def _work_units(members: Sequence[Observation], certified: CertifiedRuns, suite: Suite) -> Iterator[Unit]:
     point = accuracy(members, certified)
     if point["reason"]:
         return
     slot = slot_from_dict(point["slot"])
     cell = next(observation.cell for observation in members if observation.slot == slot)
     yield work_unit(slot, cell, point["error"])
-    if slot.dt == SAMPLED_DT and slot.iterations is None:
+    if suite == "full" and slot.dt == SAMPLED_DT and slot.iterations is None:
         yield work_unit(slot, cell, point["error"], sampled=True)

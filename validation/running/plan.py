@@ -1,7 +1,8 @@
 """The slots of a run: the cells that each scene declares, on every engine and profile.
 
 quick
-    dt 1/240; a few cells of each scene, which cover every check, law and family of findings.
+    dt 1/240; a few cells of each scene, which cover every check, law and family of findings: the representative cell in
+    both dimensions, others in one of them where both show the same.
 standard
     dt 1/240; the cells whose known failures are listed check by check.
 full
@@ -182,7 +183,7 @@ def _is_asked(request: Request, canonical: CanonicalScene, variation: Variation,
     """Whether a suite runs this cell; the quick one runs unranked profiles in representative cells only."""
     if request.suite != "quick" or request.params or profile in request.profiles or is_ranked(engine, profile):
         return True
-    return canonical.stands_for_it(variation.params)
+    return canonical.stands_for_it(variation.params) and None in variation.iterations
 
 
 def _one_profile(name: str) -> str:

@@ -23,7 +23,7 @@ import numpy as np
 from adapters.scene import Pair, Scene, SceneError
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Variation
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, states, upward
 from validation.truths.pivoting import WORDS, Pivot, fall_checks
 
@@ -321,6 +321,7 @@ SCENE = CanonicalScene(
         error,
         "the whole scene: push, fall and blow",
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
     words=WORDS
     | {
         "highest": "comes back at {value}",

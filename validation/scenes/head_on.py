@@ -142,7 +142,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states_and_impulses,
     track=track,
-    quick=(Variation({}), Variation({"ratio": 1.0, "e": 1.0}), Variation({"ratio": 1e6, "e": 0.5})),
+    quick=(Variation({}), Variation({"ratio": 1e6, "e": 0.5}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"ratio": 1.0, "e": 1.0}), Variation({"ratio": 1e6, "e": 0.5})),
     full=tuple(Variation({"ratio": 10.0**k, "e": e}) for k in range(-6, 7) for e in (0.0, 0.5, 0.8, 1.0)),
     planted=({},),
     primary=Primary(

@@ -13,7 +13,7 @@ the light box's mass, squeezes it out or lets the heavy one sink in. It starts i
 from __future__ import annotations
 
 from adapters.scene import Pair, Scene
-from validation.canonical import CanonicalScene, Frontier, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Frontier, Parameter, Params, Primary, Steps, Track, Variation
 from validation.scenes.parts import cube, floor, mass_of, standard_gravity, upward
 from validation.truths import columns
 
@@ -68,7 +68,8 @@ SCENE = CanonicalScene(
     sampling=columns.sampling,
     track=track,
     frontiers=(Frontier("mass ratio", "", "ratio", 1.0, 1e6, 1e6, columns.fate, columns.STANDS),),
-    quick=(Variation({}), Variation({"ratio": 1e4})),
+    quick=(Variation({}), Variation({"ratio": 1e4}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"ratio": 1e4})),
     full=tuple(Variation({"ratio": 10.0**k}, (None, 1, 10, 100)) for k in range(6)),
     planted=({},),
     primary=Primary(
@@ -82,5 +83,6 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
     smooth=("penetration",),
 )

@@ -148,10 +148,10 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states_and_impulses,
     track=track,
-    # Slow, medium and fast, and both limits of restitution, which show thresholds, tunnelling and impact laws.
-    quick=tuple(
-        Variation({"e": e, "v": v})
-        for e, v in ((0.0, 6.0), (0.5, 0.1), (0.5, 1.0), (0.8, 6.0), (1.0, 6.0), (1.0, 50.0))
+    # Slow and fast, and both limits of restitution, which show thresholds, tunnelling and impact laws.
+    quick=(
+        Variation({}),
+        *(Variation({"e": e, "v": v}, dimensions=(2,)) for e, v in ((0.0, 6.0), (0.5, 0.1), (1.0, 50.0))),
     ),
     standard=tuple(
         Variation({"e": e, "v": v}) for e, v in product((0.0, 0.2, 0.5, 0.8, 0.95, 1.0), (0.1, 1.0, 6.0, 50.0))
@@ -167,7 +167,7 @@ SCENE = CanonicalScene(
         rebound_error,
         "the whole scene: approach, contact, departure",
     ),
-    steps=Steps(quick=(1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0), full_iterations=(1,)),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0), full_iterations=(1,)),
     searched=Searched(
         "impact",
         ({"e": 0.0, "v": 1.0}, {"e": 0.5, "v": 6.0}, {"e": 1.0, "v": 1.0}),

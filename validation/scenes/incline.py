@@ -184,7 +184,7 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
-    steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0), full_iterations=(1, 4, 30)),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0), full_iterations=(1, 4, 30)),
     smooth=("acceleration", "creep"),
     studies=(Study("threshold", threshold),),
     searched=Searched(

@@ -159,6 +159,11 @@ SCENE = CanonicalScene(
     track=track,
     quick=(
         Variation({}),
+        Variation({"v": 1.0, "spin": -10.0, "mu": 1.0}, dimensions=(2,)),
+        Variation({"mu": 0.1, "heading": 30.0}, dimensions=(3,)),
+    ),
+    standard=(
+        Variation({}),
         Variation({"mu": 0.1}),
         Variation({"v": 1.0, "spin": -10.0, "mu": 1.0}),
         Variation({"mu": 0.1, "heading": 30.0}, dimensions=(3,)),

@@ -307,7 +307,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states_and_impulses,
     track=track,
-    quick=(Variation({}), Variation({"offset": 0.3, "e": 1.0}), Variation({"whirl": -2.0})),
+    quick=(Variation({}), Variation({"whirl": -2.0})),
+    standard=(Variation({}), Variation({"offset": 0.3, "e": 1.0}), Variation({"whirl": -2.0})),
     full=(
         *(
             Variation({"offset": d, "e": e, "ratio": r})

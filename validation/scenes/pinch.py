@@ -20,7 +20,7 @@ from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Track, Variation
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, upward
 
 SIDE, PAD = 0.5, 2.0
@@ -135,7 +135,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=sampling,
     track=track,
-    quick=(Variation({}), Variation({"margin": 1.05}), Variation({"margin": 100.0})),
+    quick=(Variation({}), Variation({"margin": 1.05}, dimensions=(2,)), Variation({"margin": 100.0})),
+    standard=(Variation({}), Variation({"margin": 1.05}), Variation({"margin": 100.0})),
     full=tuple(Variation({"margin": m}) for m in (1.01, 1.05, 1.2, 2.0, 5.0, 20.0, 100.0)),
     planted=({}, {"margin": 1.05}),
     primary=Primary(
@@ -149,6 +150,7 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
     smooth=("creep",),
     words={
         "creep": "lets the box creep down at {value}",

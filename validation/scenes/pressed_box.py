@@ -140,7 +140,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=sampling,
     track=track,
-    quick=(Variation({}), Variation({"load": 0.0}), Variation({"load": 9.0, "shear": 4.9})),
+    quick=(Variation({}), Variation({"load": 0.0}), Variation({"load": 9.0, "shear": 4.9}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"load": 0.0}), Variation({"load": 9.0, "shear": 4.9})),
     full=tuple(Variation({"load": n, "shear": s * 0.5 * (1.0 + n)}) for n in (0.0, 1.0, 9.0) for s in (0.5, 0.98, 1.2)),
     planted=({}, {"load": 0.0}),
     primary=Primary(

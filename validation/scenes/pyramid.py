@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from adapters.scene import Body, Pair, Scene
 from adapters.trajectory import Trajectory
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Track, Variation
 from validation.scenes.parts import along, at, cube, floor, mass_of, standard_gravity, upward
 from validation.truths import columns
 
@@ -102,4 +102,5 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
 )

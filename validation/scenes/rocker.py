@@ -20,7 +20,7 @@ from adapters.engine import Array
 from adapters.scene import Body, Disc, Pair, Scene, SceneError, Sphere
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Variation
 from validation.scenes.parts import block, mass_of, pose_at, standard_gravity, states, tilted, upward
 from validation.truths.quadrature import gauss
 
@@ -229,6 +229,7 @@ SCENE = CanonicalScene(
         error,
         "the rocking board",
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
     smooth=("swing_time",),
     words={
         "swing_time": "swings from side to side in {value}",

@@ -17,7 +17,7 @@ from dataclasses import replace
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Track, Variation
 from validation.scenes.parts import ball, floor, heading, mass_of, standard_gravity, states, upward
 from validation.truths.rolling import forward, gyration, launched, on_a_late_arm, struck
 
@@ -107,7 +107,7 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     track=track,
-    quick=(Variation({}), Variation({"v": 0.0, "spin": 50.0})),
+    standard=(Variation({}), Variation({"v": 0.0, "spin": 50.0})),
     full=tuple(
         Variation({"v": v, "spin": s, "heading": h}) for v in (0.0, 1.0) for s in (1.0, 50.0) for h in (0.0, 30.0)
     ),
@@ -123,6 +123,7 @@ SCENE = CanonicalScene(
         0.1,
         0.5,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     words={
         "spin": "spins about the vertical with {value}",
         "speed": "rolls on with {value}",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from adapters.scene import Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Variation
 from validation.scenes.parts import floor, heading, mass_of, standard_gravity, upward
 from validation.truths import sliding
 
@@ -107,6 +107,7 @@ SCENE = CanonicalScene(
         0.1,
         0.25,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     smooth=("stopping_distance",),
     words=sliding.WORDS | {"normal": "carries {value} of the weight", "friction": "is braked with {value} of mu N"},
 )

@@ -123,8 +123,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=columns.sampling,
     track=track,
-    # One box, the benchmark's column and the tallest; with too few iterations, three times a usual count, and enough.
-    quick=(Variation({"n": 1}), Variation({"n": 10}, (None, 1, 30, 100)), Variation({"n": 20})),
+    # The benchmark's column, and the same with too few iterations.
+    quick=(Variation({"n": 10}), Variation({"n": 10}, (SWEEPS[0],), (2,))),
     standard=_heights(10),
     full=_heights(*HEIGHTS),
     representative={"n": 10.0},  # too few iterations for many solvers
@@ -141,8 +141,7 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
-    # Ten boxes: half a minute on two cores does not reach small steps.
-    steps=Steps((1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0), quick_iterations=(50,), full_iterations=(4, 10, 30, 100)),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0), quick_iterations=(50,), full_iterations=(4, 10, 30, 100)),
     size="n",
     smooth=("penetration",),
     words={

@@ -190,7 +190,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     track=track,
-    quick=(Variation({}), Variation({"ratio": 1000.0, "e": 1.0}), Variation({"ratio": 1.0, "e": 0.5})),
+    quick=(Variation({}), Variation({"ratio": 1.0, "e": 0.5}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"ratio": 1000.0, "e": 1.0}), Variation({"ratio": 1.0, "e": 0.5})),
     full=tuple(Variation({"ratio": r, "e": e}) for r in (1.0, 3.0, 10.0, 1e3, 1e6) for e in (0.3, 0.5, 0.9, 1.0)),
     planted=({},),
     primary=Primary(

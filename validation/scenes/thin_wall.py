@@ -145,7 +145,8 @@ SCENE = CanonicalScene(
             "came back: the ball moves away from the plate, on the side that it came from",
         ),
     ),
-    quick=(Variation({}), Variation({"v": 200.0})),
+    quick=(Variation({}), Variation({"v": 200.0}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"v": 200.0})),
     full=tuple(Variation({"v": v, "thickness": d}) for v in (5.0, 20.0, 50.0, 200.0, 1000.0) for d in (0.02, 0.2)),
     planted=({}, {"delay": LATEST}),
     primary=Primary(

@@ -172,6 +172,12 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=states,
     quick=(
+        Variation({"ratio": 0.98}, dimensions=(3,)),
+        Variation({"ratio": 0.98, "aspect": 1.0}, dimensions=(2,)),
+        Variation({"ratio": 1.1}),
+        Variation({"ratio": 1.1, "aspect": 1.0}),
+    ),
+    standard=(
         *(Variation({"ratio": ratio}) for ratio in (0.98, 1.1)),
         *(Variation({"ratio": ratio, "aspect": 1.0}) for ratio in (0.98, 1.1)),
     ),

@@ -23,7 +23,7 @@ from adapters.scene import Body, Box, Scene
 from adapters.trajectory import Trajectory
 from reference_solver.geometry import rotation
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Variation
+from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Steps, Variation
 from validation.scenes.parts import mass_of, pose_at, states
 
 #: Sides of the box [m]: three different moments.
@@ -209,7 +209,7 @@ SCENE = CanonicalScene(
             "spun on: at no time was more than half of its energy or angular momentum gained or lost",
         ),
     ),
-    quick=(Variation({}), Variation({"delta": 0.01, "spin": 6.0})),
+    standard=(Variation({}), Variation({"delta": 0.01, "spin": 6.0})),
     full=tuple(Variation({"spin": s, "delta": d}) for s in (1.0, 3.0, 10.0) for d in (0.01, 0.1, 1.0)),
     planted=({},),
     primary=Primary(
@@ -221,6 +221,7 @@ SCENE = CanonicalScene(
         error,
         "a free body that tumbles",
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     smooth=("flip_time",),
     words={
         "flip_time": "turns over after {value}",

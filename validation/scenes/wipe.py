@@ -22,7 +22,7 @@ from adapters.scene import Body, HalfSpace, Pair, Scene
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.bounds import WINDOW
-from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation
+from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Steps, Track, Variation
 from validation.scenes.parts import along, at, block, floor, mass_of, standard_gravity, upward
 
 #: Width and height of the hand [m].
@@ -131,7 +131,8 @@ SCENE = CanonicalScene(
     rule=checks,
     sampling=sampling,
     track=track,
-    quick=(Variation({}), Variation({"v": 1.0})),
+    quick=(Variation({}), Variation({"v": 1.0}, dimensions=(2,))),
+    standard=(Variation({}), Variation({"v": 1.0})),
     full=tuple(Variation({"v": v, "mu": mu}) for v in (0.01, 0.1, 1.0) for mu in (0.1, 0.5, 1.0)),
     planted=({},),
     primary=Primary(
@@ -146,6 +147,7 @@ SCENE = CanonicalScene(
         0.5,
         0.25,
     ),
+    steps=Steps((1.0 / 60.0, 1.0 / 240.0)),
     words={
         "normal": "carries {value} of the hand's weight",
         "friction": "drags the hand with {value} of mu N",
