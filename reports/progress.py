@@ -46,6 +46,7 @@ def run_plan(
     cluster: str = "",
     known: Sequence[Observation] = (),
     heard: Callable[[Run, Observation], None] = lambda run, observation: None,
+    beside: tuple[str, Sequence[Slot]] = ("", ()),
 ) -> Run:
     """Run the cases of this plan that the store lacks; the observations are in the store afterwards.
 
@@ -53,8 +54,10 @@ def run_plan(
     cases, as of those left after time-outs, is not complete: it prints that, and the same command resumes it. Motions
     are recorded for replays if ``recorded``. ``cluster`` is the address of a Dask cluster to run on; its motions are
     not recorded, and OUT/cluster.jsonl lists which worker ran each case. ``known`` are results of another run for cases
-    of this plan, which are stored instead of being run again.
+    of this plan, which are stored instead of being run again. ``beside`` are title and cases of a run that the same
+    workers begin: those that this plan lacks are stored there.
     """
+    other, more = _begun(store, *beside, fresh, slots)
     run, done = store.start(title, slots, fresh)
     todo = [slot for slot in slots if slot.key() not in done]
     if done:
@@ -66,7 +69,7 @@ def run_plan(
     def leave(slot: Slot, reason: str) -> None:
         left[reason] = left.get(reason, 0) + 1
 
-    todo = _without(known, store, run, todo)
+    todo = [*_without(known, store, run, todo), *more]
     parts = [] if cluster else missing(todo)  # machines of a cluster have kernels of their own
     waiting = {part.key for part in parts}
     compiled = compiling(parts, console, any(key_of(slot) not in waiting for slot in todo))
@@ -78,7 +81,8 @@ def run_plan(
         stage(console, plural(len(todo), "case")),
         progress_on(console) as progress,
     ):
-        task = progress.add_task("running cases", total=len(slots), completed=len(slots) - len(todo))
+        total = len(slots) + len(more)
+        task = progress.add_task("running cases", total=total, completed=total - len(todo))
         try:
             record = partial(store.add_recording, run)
             if cluster:
@@ -86,9 +90,13 @@ def run_plan(
             else:
                 cells = run_cells(todo, jobs, timeout, keep=paths.get, shown=shown, record=record, leave=leave,
                                   parts=parts, compiled=compiled)  # fmt: skip
+            apart = set(more)
             for observation in cells:
-                store.add(run, observation)
-                heard(run, observation)
+                if other is not None and observation.slot in apart:
+                    store.add(other, observation)
+                else:
+                    store.add(run, observation)
+                    heard(run, observation)
                 progress.update(task, advance=1, description=f"{observation.slot.scene} on {observation.slot.engine}")
         except KeyboardInterrupt:
             console.print("interrupted: finished cases are kept; the same command resumes")
@@ -100,6 +108,17 @@ def run_plan(
     elif finish:
         store.finish(run)
     return store.run(run.id)
+
+
+def _begun(
+    store: Store, title: str, slots: Sequence[Slot], fresh: bool, others: Sequence[Slot]
+) -> tuple[Run | None, list[Slot]]:
+    """A run of these cases, and those of them that neither it nor ``others`` have; none without cases."""
+    if not slots:
+        return None, []
+    run, done = store.start(title, slots, fresh)
+    known = {slot.key() for slot in others} | done
+    return run, [slot for slot in slots if slot.key() not in known]
 
 
 def _without(known: Sequence[Observation], store: Store, run: Run, todo: Sequence[Slot]) -> list[Slot]:

@@ -90,11 +90,8 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
         raise SceneError("ulp: moves the start of a run; it has no meaning for a benchmark")
     if options["standard"]:
         raise SceneError("standard: is a suite of judged cases; a benchmark is --quick or --full")
-    request = replace(request_from(options), ulps=(0,))
-    if not options["scenes"]:
-        request = replace(request, scenes=benched(request.suite))
-    wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
-    cells = accuracy_slots(wanted)
+    wanted, title, cells = plan_of(options)
+    request = wanted.request
     if not cells:
         raise SceneError("scenes: no case fits this selection")
     if options["dry_run"]:
@@ -108,7 +105,6 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
     store = Store(folder(out))
     earlier = _earlier(store, options["against"])
     seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
-    title = f"bench {request.suite}: {asked(request, options)}"
     source, known = ("", []) if options["fresh"] else answered(store, cells)
     if known:
         console.print(f"reusing {len(known)} of {plural(len(cells), 'result')} of run {source}")
@@ -133,6 +129,15 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(statuses.verdict(not agrees, not absent))
+
+
+def plan_of(options: dict[str, Any]) -> tuple[Sweep, str, list[Slot]]:
+    """Sweep, title and cases of a benchmark with these options."""
+    request = replace(request_from(options), ulps=(0,))
+    if not options["scenes"]:
+        request = replace(request, scenes=benched(request.suite))
+    wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
+    return wanted, f"bench {request.suite}: {asked(request, options)}", accuracy_slots(wanted)
 
 
 def _measurable(store: Store, run: Run, units: Sequence[Unit]) -> bool:

@@ -55,6 +55,7 @@ from validation.workers import TIMEOUT, run_cells
     help="Run metamorphic tests instead: the order, heading and place of bodies must not matter.",
 )
 @CLUSTER
+@click.option("--for-bench", is_flag=True, help="Also run the cases of bench --quick, which then only times them.")
 @click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
 @click.option(
     "--drop", is_flag=True, help="Leave out what a scene cannot have of a model, and print what was left out."
@@ -107,7 +108,7 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     limits = options["jobs"], options["timeout"]
     verdicts = Verdicts(chosen, console)
     done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"],
-                    heard=verdicts.add, finish=False)  # fmt: skip
+                    heard=verdicts.add, finish=False, beside=_of_bench(options))  # fmt: skip
     found = brief.Judged.of(verdicts.rows(done))
     observations, complete = store.observations(done), not store.missing(done)
     if complete:
@@ -126,6 +127,16 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     alarm = any(row.failing if options["strict"] else row.alarming for row in found.rows)
     sys.exit(statuses.verdict(alarm, complete and not absent))
+
+
+def _of_bench(options: dict[str, Any]) -> tuple[str, list[Slot]]:
+    """Title and cases of the quick benchmark of the same selection; none unless they are asked for."""
+    if not options["for_bench"]:
+        return "", []
+    from reports.command.benching import plan_of
+
+    _, title, cells = plan_of(options | {"quick": True, "standard": False, "full": False, "ulp": ()})
+    return title, cells
 
 
 def _show(found: brief.Judged, out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from reports import speed
 from reports.command import main
+from reports.command.benching import plan_of
 from validation import workers
 from validation.bench import reading
 from validation.bench.lane import QUICK
@@ -156,6 +157,24 @@ def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_pat
 
     again = store.runs()[-1]
     assert answers(benched) == answers(again) and {o.slot for o in store.observations(judged)} & answers(again).keys()
+    store.close()
+
+
+def test_a_run_for_a_benchmark_leaves_it_no_case_and_judges_none_of_its_cases(tmp_path, asked):
+    pytest.importorskip("pymunk")
+    words = ["slide", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--quick", "--out", tmp_path]
+    assert call("run", *words, "--for-bench").exit_code == 0
+    store = Store(tmp_path, create=False)
+    begun, judged = store.runs()
+    steps = {slot.dt for slot in asked}
+    assert len(asked) == len(set(asked)) and steps == {1 / 60, 1 / 240, 1 / 960}
+    assert {o.slot.dt for o in store.observations(judged)} == {1 / 240} and judged.finished and not begun.finished
+    assert store.run() == judged  # the latest is what was judged
+    options = main.get_command(None, "bench").make_context("bench", [str(word) for word in words]).params
+    _, title, cells = plan_of(options)
+    known = {o.slot for o in store.observations(begun)} | {o.slot for o in answered(store, cells)[1]}
+    assert (begun.title, begun.plan) == (title, tuple(slot.key() for slot in cells)) and known == set(cells)
+    assert {slot.dt for slot in asked if slot in set(cells)} == steps
     store.close()
 
 

@@ -37,11 +37,9 @@ def ran(monkeypatch):
     """Calls of what runs a plan, and what it leaves: a finished run, and rows as `ran.rows` has them."""
     found = SimpleNamespace(calls=[], rows=[], finished=True, kept=[], apart=[], absent=[])
 
-    def run_plan(
-        store, title, chosen, console, jobs, timeout, keep=None, fresh=False, cluster="", heard=None, finish=True
-    ):
+    def run_plan(store, title, chosen, console, jobs, timeout, keep=None, fresh=False, finish=True, **more):
         assert not finish  # not before its files are written
-        found.calls.append((title, len(chosen), jobs, timeout, keep and keep.name, fresh, cluster))
+        found.calls.append((title, len(chosen), jobs, timeout, keep and keep.name, fresh, more.get("cluster", "")))
         return SimpleNamespace(id="a-run")
 
     for module in (running, sweeping):

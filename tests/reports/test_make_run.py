@@ -55,7 +55,7 @@ def test_the_answer_is_printed_once_then_come_bench_and_report_with_its_path(mak
     status, lines, calls = make_run()
     assert status == 0 and [call[0] for call in calls] == ["run", "bench", "report"]
     assert all(call[-2] == "--out" and call[-1] == calls[0][-1] for call in calls)
-    assert "--quick" in calls[0] and "--standard" in make_run("SUITE=standard")[2][0]
+    assert {"--quick", "--for-bench"} < set(calls[0]) and "--standard" in make_run("SUITE=standard")[2][0]
     shown = [line for line in lines if line.startswith(("output of", "path"))]
     assert shown == ["output of run", "output of bench", "path on stdout"]
     assert lines[-3:-1] == ["report:", "path on stdout"]
