@@ -162,7 +162,8 @@ class Child:
         if not ended:
             assert process.pid is not None
             process.terminate()  # its guardian ends all its processes, and then itself
-            _kill(process.pid, signal.SIGCONT)  # the child may have stopped it
+            if hasattr(signal, "SIGCONT"):
+                _kill(process.pid, signal.SIGCONT)  # the child may have stopped it
             process.join(GRACE)
             for other in _descendants(process.pid):  # for a guardian that was stopped by its child
                 _kill(other)
@@ -357,7 +358,7 @@ def _descendants(pid: int | None) -> list[int]:
     return found
 
 
-def _kill(pid: int, number: int = signal.SIGKILL) -> None:
+def _kill(pid: int, number: int = getattr(signal, "SIGKILL", 9)) -> None:
     with contextlib.suppress(OSError):
         os.kill(pid, number)
 

@@ -121,6 +121,9 @@ class _Seen:
         self.poses, self.twists = [], []
 
     def _read(self, pose: Array, twist: Array) -> None:
+        if (pose.shape[1:], twist.shape[1:]) != (self.shapes[0], self.shapes[1]):
+            given = f"poses and twists of shapes {pose.shape[1:]} and {twist.shape[1:]}"
+            raise EngineError(f"record: the engine gave {given}, {self.shapes[0]} and {self.shapes[1]} are needed")
         if pose.shape[2] == 7 and (np.linalg.norm(pose[..., 3:], axis=2) < SHORTEST_TURN).any():
             self.unturned = True
         if self.flat:
@@ -271,7 +274,7 @@ def _record(
         steps_at.append(done)
         if _has_contacts(sampling, dt, done):
             with stage(READING):
-                told = _kept(simulation.contacts())
+                told = _kept(simulation.contacts(), posed)
             collected.append((range(len(steps_at) - 1, len(steps_at)), [len(told.a)], told))
         reason = seen.divergence()
         if reason:
@@ -325,17 +328,26 @@ def _pull(body: Body) -> float:
     return math.hypot(*body.force) / body.mass + reach(body.shape) * math.hypot(*body.torque) / moment
 
 
-def _kept(contacts: Contacts) -> Contacts:
+def _kept(contacts: Contacts, scene: Scene) -> Contacts:
     """Copies, as a simulation may return its own arrays.
 
     Raises
     ------
     EngineError
-        If they are no contacts.
+        If they are no contacts of bodies of the scene.
     """
     if not isinstance(contacts, Contacts):
         raise EngineError(f"contacts: the engine gave {kind_of(contacts)}, Contacts are needed")
-    return Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
+    found = Contacts(*(np.array(getattr(contacts, name)) for name in CONTACT_FIELDS))
+    count, bodies = found.a.size, len(scene.bodies)
+    for name in CONTACT_FIELDS:
+        shape = (count, scene.dimension) if name in ("point", "normal", "impulse") else (count,)
+        if getattr(found, name).shape != shape:
+            given = getattr(found, name).shape
+            raise EngineError(f"contacts.{name}: the engine gave an array of shape {given}, {shape} is needed")
+    if count and not (min(found.a.min(), found.b.min()) >= 0 and max(found.a.max(), found.b.max()) < bodies):
+        raise EngineError(f"contacts: the engine names bodies beyond the {bodies} of the scene")
+    return found
 
 
 @stage(READING)

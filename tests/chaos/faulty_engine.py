@@ -14,12 +14,13 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from adapters.chipmunk import ChipmunkEngine
-from adapters.engine import Engine, EngineFacts, Setting
+from adapters.engine import Contacts, Engine, EngineFacts, Setting
 
 
 class Mute(Exception):
@@ -290,7 +291,14 @@ class Odd:
     def twist(self):
         return None if self.fault == "twist_none" else self.inner.twist()
 
+    def record(self, samples, stride, contacts):
+        """States are read one by one, from here."""
+
     def contacts(self):
+        if self.fault == "contacts_flat":
+            return replace(self.inner.contacts(), point=np.zeros(3))
+        if self.fault == "contacts_beyond":
+            return Contacts(np.array([0]), np.array([5]), *(np.zeros((1, 2)) for _ in range(3)), np.zeros(1))
         return 7 if self.fault == "contacts_number" else self.inner.contacts()
 
     def readback(self):
@@ -309,7 +317,8 @@ class Odd:
 
 
 ODD = (
-    "pose_nan", "pose_shape", "pose_text", "pose_jumps", "twist_none", "contacts_number", "readback_list",
+    "pose_nan", "pose_shape", "pose_text", "pose_jumps", "twist_none", "contacts_number", "contacts_flat",
+    "contacts_beyond", "readback_list",
     "readback_cyclic", "readback_odd", "readback_large", "certificate_list", "long_change",
 )  # fmt: skip
 ASKED = (

@@ -49,6 +49,8 @@ CRASHES = {
     "pose_text": "pose: the engine gave a list, numbers",
     "twist_none": "twist: the engine gave None",
     "contacts_number": "contacts: the engine gave an int",
+    "contacts_flat": "contacts.point: the engine gave an array of shape (3,)",
+    "contacts_beyond": "contacts: the engine names bodies beyond the",
     "readback_list": "readback",
     "certificate_list": "certificate",
     "settings_none": "settings: None was given",
