@@ -7,7 +7,7 @@ import json
 import math
 import platform
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from fractions import Fraction
 from functools import lru_cache
@@ -217,7 +217,7 @@ class Cell:
 
     def key(self) -> str:
         """Sixteen hex digits that identify the cell."""
-        data = asdict(self) | {"slot": _said(asdict(self.slot))}
+        data = vars(self) | {"slot": _said(vars(self.slot))}
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 

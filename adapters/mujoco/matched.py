@@ -66,8 +66,8 @@ def matched_step2(mujoco, model, data, restitution, law):
     rough = contacts.dim[touching] > 1
     mu = np.where(rough, contacts.friction[touching, 0], 0.0)
     first, second = normal + rough, normal + 2 * rough
-    pairs = np.sort(contacts.geom[touching], axis=1).tolist()
-    e = np.array([restitution.get((a, b), 0.0) for a, b in pairs])
+    pairs = np.sort(contacts.geom[touching], axis=1).tolist() if restitution else []
+    e = np.array([restitution.get((a, b), 0.0) for a, b in pairs]) if restitution else 0.0
     # Compiled references have the target velocity 0 one step later: -v/dt.
     asked = data.efc_aref.copy()
     approach = asked[normal] * dt

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +92,7 @@ def _observe(
     slot, scene = blank.slot, prepared.scene
     wanted = needs(scene)
     settings = settings_of(engine, slot, scene)
-    blank = replace(blank, settings=tuple(plain(asdict(setting)) for setting in settings))
+    blank = replace(blank, settings=tuple(plain(vars(setting)) for setting in settings))
     try:
         # Declarations hold for a profile's own settings, not for experiments or a model's settings. With a user's
         # settings nothing is declared, and the measured properties are reported.
@@ -147,7 +147,7 @@ def _finite(value: float | None, reason: str) -> Measured:
 
 def _plain(slip: Receipt) -> dict[str, Any]:
     """A property check as JSON-ready data; a missing measurement is null, as JSON has no NaN."""
-    found = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in asdict(slip).items()}
+    found = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in vars(slip).items()}
     return dict(plain(found))
 
 
