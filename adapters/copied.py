@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array, Contacts, Recorded, Simulation
+from adapters.stages import READING, stage
 
 
 class Copied(Simulation):
@@ -59,11 +60,14 @@ class Copied(Simulation):
     def record(self, samples: int, stride: int, contacts: bool) -> Recorded:
         """See `Simulation.record`."""
         poses, twists, touched = [], [], []
+        reading = stage(READING)
         for _ in range(samples):
             self.advance(stride)
-            poses.append(self.copy_pose())
-            twists.append(self.copy_twist())
-            if contacts:
-                touched.append(self.copy_contacts())
-        counts, rows = self.contacts_of(touched) if contacts else (np.zeros(samples, np.int64), None)
-        return Recorded(self.poses_of(poses), self.twists_of(twists), counts, rows)
+            with reading:
+                poses.append(self.copy_pose())
+                twists.append(self.copy_twist())
+                if contacts:
+                    touched.append(self.copy_contacts())
+        with reading:
+            counts, rows = self.contacts_of(touched) if contacts else (np.zeros(samples, np.int64), None)
+            return Recorded(self.poses_of(poses), self.twists_of(twists), counts, rows)

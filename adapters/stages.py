@@ -15,6 +15,7 @@ from contextlib import ContextDecorator
 
 #: Stages of the command, and of processes that run cases.
 START, OTHER = "start and imports", "other"
+BUILDING, STEPPING, READING = "building worlds", "steps of the engine", "reading states back"
 #: Name, how often, wall time [s] and CPU time [s] of a stage.
 Sum = tuple[str, int, float, float]
 

@@ -24,11 +24,9 @@ from adapters.near import start_overlap
 from adapters.plain import kind_of
 from adapters.scene import Body, HalfSpace, Scene
 from adapters.shapes import reach
-from adapters.stages import stage
+from adapters.stages import BUILDING, READING, STEPPING, stage
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 
-#: What a reader of `adapters.stages` calls the parts of a run.
-BUILDING, STEPPING, READING = "building worlds", "steps of the engine", "reading states back"
 #: A body faster than this many times the largest speed that the scene explains counts as exploded. Ten times would
 #: still be a wrong result worth measuring; a thousand times is not.
 EXPLOSION_FACTOR = 1e3
