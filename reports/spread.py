@@ -18,7 +18,8 @@ def spread_lines(found: Sequence[Spread]) -> Iterator[str]:
     for (scene, dimension), group in groupby(sorted(found, key=posed), posed):
         members = sorted(group, key=lambda each: -each.distance)
         first = members[0]
-        sure = "" if first.certified else "; that run is not certified"
+        sure = "" if first.certified or first.several else "; that run is not certified"
+        sure += f"; {first.unique}" if first.unique else ""
         yield ""
         yield f"How far from our own solution: {scene} {dimension}-D, after {first.time:.3g} s{sure}"
         names = [f"{each.engine}/{each.profile}" for each in members]

@@ -155,8 +155,10 @@ class ReferenceEngine(Engine):
         light = found.light["converged"] and not found.light["reasons"]
         broken = {finding.name for finding in found.findings if not finding.holds}
         determined = math.isinf(found.determined)
-        if not determined and "shared" not in broken:  # beyond the horizon
-            reasons.insert(0, next(finding.meaning for finding in found.findings if finding.name == "shared"))
+        if not determined and "shared" not in broken:  # beyond the horizon, or it ends there
+            shared = next(finding for finding in found.findings if finding.name == "shared")
+            why = found.unique if found.several else shared.meaning
+            reasons = [why, *(reason for reason in reasons if reason != why)]
         if not same:
             reasons.append("the certified run does not end where the judged run does")
         return {
@@ -167,6 +169,8 @@ class ReferenceEngine(Engine):
             "growth": json_ready(found.growth[-1]),
             "horizon": json_ready(found.horizon),
             "determined": json_ready(found.determined),
+            "unique": found.unique,
+            "several": found.several,
             "findings": {finding.name: json_ready(finding.value) for finding in found.findings},
         }
 

@@ -110,6 +110,8 @@ class Certificate:
     unique
         From when two motions obey the laws, or uniqueness was not searched; empty if all solves were searched for
         another answer and have none.
+    several
+        Whether two motions obey the laws.
     disturbed
         (s,) way that the disturbance moves a body, over its speed [s].
     dt
@@ -133,6 +135,7 @@ class Certificate:
     horizon: float
     determined: float
     unique: str
+    several: bool
     disturbed: Array = field(repr=False)
     dt: float
     gap: float
@@ -219,7 +222,20 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
-    made = (error, growth, horizon, until, unique, moved / size, settings.dt, gap, grazed, light, record.pose)
+    made = (
+        error,
+        growth,
+        horizon,
+        until,
+        unique,
+        two < np.inf,
+        moved / size,
+        settings.dt,
+        gap,
+        grazed,
+        light,
+        record.pose,
+    )
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
     reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
     holds = not reasons

@@ -170,9 +170,9 @@ MOST = 0.1 * CHECK.bound
         ({}, ""),
         ({"kernel": "blocks"}, ""),
         ({"certified": True}, "light"),
-        ({"certified": True, "full": True}, "full"),
-        ({"certified": True, "full": True, "metric_errors": {"acceleration": 1e-9}}, "full"),
-        ({"certified": True, "full": True, "metric_errors": {"creep": 1.234e-9}}, "full, to 1.2e-09 m/s"),
+        ({"certified": True, "full": {}}, "full"),
+        ({"certified": True, "full": {}, "metric_errors": {"acceleration": 1e-9}}, "full"),
+        ({"certified": True, "full": {}, "metric_errors": {"creep": 1.234e-9}}, "full, to 1.2e-09 m/s"),
     ],
 )
 def test_a_row_says_which_certificate_ran_and_how_exact_its_value_is(certificate, shown):
@@ -180,7 +180,7 @@ def test_a_row_says_which_certificate_ran_and_how_exact_its_value_is(certificate
 
 
 def test_a_unit_that_is_empty_leaves_no_space_behind():
-    observation = replace(SEEN, certificate={"certified": True, "full": True, "metric_errors": {"m": 0.25}})
+    observation = replace(SEEN, certificate={"certified": True, "full": {}, "metric_errors": {"m": 0.25}})
     assert rows._certificate(observation, replace(CHECK, metric="m", unit="")) == "full, to 0.25"
 
 

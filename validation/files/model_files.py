@@ -26,6 +26,7 @@ from validation import metrics
 from validation.bounds import ROUND_OFF
 from validation.canonical import Brought, CanonicalScene, Check, Measured, Parameter
 from validation.files import stated
+from validation.files.magnitudes import check_magnitudes, impossible_inertia
 from validation.files.stated import Stated
 
 #: Longest run of a model [s]: contacts of every step are stored.
@@ -69,10 +70,12 @@ def canonical_from_text(text: str, path: Path) -> CanonicalScene:
 
 
 def _canonical(engine: str, read: Model, title: str) -> CanonicalScene:
+    check_magnitudes(read.scene)
     flat = lowered(read.scene)
     posed = {3: read.scene} | ({2: flat} if flat is not None else {})
     dimensions = tuple(sorted(posed))
     notes = [f"{one_line(line)}: left out" for line in read.dropped] + list(read.notes)
+    notes += impossible_inertia(read.scene)
     if flat is not None:
         notes.append("it lies in the plane y = 0 and also runs in 2-D")
     notes.append(

@@ -20,6 +20,7 @@ from adapters.shapes import MOST_VERTICES, check_length
 from validation.files import forces
 from validation.files.centring import centre
 from validation.files.expressions import FUNCTIONS, FormulaError, value_of
+from validation.files.magnitudes import check_magnitudes, impossible_inertia
 from validation.files.mass_properties import HOW, moments, volume
 from validation.files.quantities import QUANTITIES, parts_of
 from validation.files.scene_text import listed
@@ -241,6 +242,7 @@ def stated(model: SceneModel) -> Stated:
             data["bodies"][k] = _stand_in(body["name"], model.dimension)
     try:
         scene = scene_from_dict(data)
+        check_magnitudes(scene)
     except (SceneError, ArithmeticError) as error:
         raise SceneErrors([*wrong, _why(error, "gravity")]) from None
     numbered = [(f"checks.{k}", check) for k, check in enumerate(model.checks)]
@@ -249,7 +251,7 @@ def stated(model: SceneModel) -> Stated:
     for quantity, at, over in dict.fromkeys(quantities):
         if quantities.count((quantity, at, over)) > 1:
             wrong.append(f"checks: {quantity!r} is stated {quantities.count((quantity, at, over))} times")
-    notes += _materials(model, scene)
+    notes += [*impossible_inertia(scene), *_materials(model, scene)]
     names = dict(told(model, scene, wrong))
     made = [each for label, check in right for each in _stated(label, check, scene, names, wrong)]
     growth = _growth(model, scene, names, wrong)

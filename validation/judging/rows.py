@@ -14,6 +14,7 @@ from adapters.stages import stage
 from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, checks_of, scene_of, slot_from_dict
+from validation.files.distance import posed
 from validation.files.invariants import LAWS
 from validation.files.stated import STATED, instant_of
 from validation.findings import Findings, FindingsError, Known, known_of
@@ -44,6 +45,8 @@ OWN_MODEL = "not listed: your own model"
 OWN_SETTINGS = "not listed: with settings of your own"
 #: What laws say about rows, asked ahead of the others.
 Ready = Mapping[Asked, list[Prediction]]
+#: Scenes from files with several motions: by what was asked, when they part [s], and what is said of them.
+Several = Mapping[tuple[object, ...], tuple[float, str]]
 #: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
 TRUTH_SHARE = 0.1
 
@@ -131,7 +134,8 @@ def rows_of(run: str, observations: Iterable[Observation], plan: Iterable[Slot] 
     observations += [_missing(slot) for slot in plan if slot not in seen]
     judged = [(o, *checks_of(o)) for o in observations if not o.slot.ulp]
     ready = foretold([_asked(o, check) for o, _, checks in judged for check in checks if _is_asked(o, check)])
-    rows = [_row(run, o, scene, check, ready) for o, scene, checks in judged for check in checks]
+    several = _several(observations)
+    rows = [_row(run, o, scene, check, ready, several) for o, scene, checks in judged for check in checks]
     return with_floors(rows, observations) + [_study_row(run, result) for result in results(observations)]
 
 
@@ -185,9 +189,37 @@ def _difference(value: float | None, other: float | None) -> float | None:
     return value - other
 
 
-def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: Ready) -> Row:
+def _several(observations: Iterable[Observation]) -> Several:
+    """Scenes from files of which two motions obey the laws, with when they part [s] and what is said of them."""
+    found: dict[tuple[object, ...], tuple[float, str]] = {}
+    for observation in observations:
+        full = observation.certificate.get("full", {})
+        if is_file(observation.slot.scene) and full.get("lawful") and full.get("several"):
+            told = (float(full.get("determined") or 0.0), str(full["unique"]))
+            found[posed(observation.slot)] = min(told, found.get(posed(observation.slot), told))
+    return found
+
+
+def _is_left_open(observation: Observation, check: Check, value: float | None, several: Several) -> str:
+    """Why a value that a file states is not judged: the run may follow another motion that obeys the laws.
+
+    What it states is judged where a run agrees, and until the motions part.
+    """
+    if check.source != STATED or posed(observation.slot) not in several:
+        return ""
+    until, told = several[posed(observation.slot)]
+    at = instant_of(check.metric)
+    certificate = observation.certificate.get("full", {})
+    runs = observation.outcome is Outcome.OK or (observation.outcome is Outcome.INVALID and certificate.get("several"))
+    if not runs or (at is not None and at <= until) or judge_physics(value, check) is not Physics.FAIL:
+        return ""
+    return f"not judged: {told}"
+
+
+def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: Ready, several: Several) -> Row:
     value, why = observation.metrics.get(check.metric, (None, NEWER))
-    if _is_lawful(observation, check):
+    left_open = _is_left_open(observation, check, value, several)
+    if left_open or _is_lawful(observation, check):
         observation = replace(observation, outcome=Outcome.OK, reason="")
     doubt = _doubt(observation, check)
     if doubt:
@@ -196,7 +228,7 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
         # A value that an engine does not report is no failure of its motion; for catalogue scenes such engines are
         # listed.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
-    verdict = _verdict(observation, scene, check, value, why, ready)
+    verdict = Verdict(None, None, left_open) if left_open else _verdict(observation, scene, check, value, why, ready)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
 
@@ -291,8 +323,9 @@ def _certificate(observation: Observation, check: Check) -> str:
         return ""
     if "full" not in found:
         return "light"
-    error = found.get("metric_errors", {}).get(check.metric)
-    return "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
+    error, unique = found.get("metric_errors", {}).get(check.metric), found["full"].get("unique", "")
+    told = "full" if error is None else f"full, to {error:.2g} {check.unit}".rstrip()
+    return f"{told}; {unique}" if unique else told
 
 
 def _is_asked(observation: Observation, check: Check) -> bool:

@@ -50,8 +50,8 @@ class Verdict:
 
 
 def judge_physics(value: float | None, check: Check) -> Physics | None:
-    """PASS if |value - truth| <= bound; None where nothing was measured or there is no truth."""
-    if value is None or check.truth is None or check.bound is None:
+    """PASS if |value - truth| <= bound; None where nothing was measured, or there is no truth, or no finite bound."""
+    if value is None or check.truth is None or check.bound is None or not math.isfinite(check.bound):
         return None
     error = abs(value - check.truth)
     return Physics.PASS if math.isfinite(error) and error <= check.bound else Physics.FAIL
@@ -87,6 +87,8 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
     """
     if check.truth is None or check.bound is None:
         return Verdict(None, None)
+    if not math.isfinite(check.bound):
+        return Verdict(None, None, f"not judged: its tolerance, {check.bound}, is no number to judge with")
     if value is None:
         return _without_value(known, why)
     physics = judge_physics(value, check)

@@ -24,7 +24,10 @@ from validation.running.tracks import Recording
 
 @dataclass(frozen=True)
 class Spread:
-    """One engine and profile beside the certified run; ``distance`` [m] of ``body`` at ``time`` [s]."""
+    """One engine and profile beside the certified run; ``distance`` [m] of ``body`` at ``time`` [s].
+
+    ``unique`` says from when ``several`` motions obey the laws, or that this was not searched; it is empty if one does.
+    """
 
     scene: str
     dimension: int
@@ -34,6 +37,8 @@ class Spread:
     body: str
     distance: float
     certified: bool
+    unique: str = ""
+    several: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -51,8 +56,11 @@ def spreads(observations: Sequence[Observation], recordings: Sequence[tuple[Slot
             continue
         time = _horizon(found[partner], kept[partner])
         body, distance = _apart(slot, recording, kept[partner], time)
-        certified = bool(found[partner].certificate.get("certified"))
-        told.append(Spread(slot.scene, slot.dimension, slot.engine, slot.profile, time, body, distance, certified))
+        said = found[partner].certificate
+        certified, full = bool(said.get("certified")), said.get("full", {})
+        unique, several = str(full.get("unique", "")), bool(full.get("several"))
+        who = slot.scene, slot.dimension, slot.engine, slot.profile
+        told.append(Spread(*who, time, body, distance, certified, unique, several))
     return told
 
 
