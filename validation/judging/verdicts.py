@@ -88,7 +88,7 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
     if check.truth is None or check.bound is None:
         return Verdict(None, None)
     if not math.isfinite(check.bound):
-        return Verdict(None, None, f"not judged: its tolerance, {check.bound}, is no number to judge with")
+        return Verdict(None, None, f"not judged: its tolerance is {check.bound}")
     if value is None:
         return _without_value(known, why)
     physics = judge_physics(value, check)
