@@ -222,6 +222,12 @@ def test_one_of_two_workers_compiles_while_the_other_runs_cells_without_kernels(
     assert ("cell", [MIXED[0]]) in log[at:]
 
 
+def test_a_worker_is_renewed_after_the_last_part_that_it_compiles(compiled, run):
+    """Parts share code in one process, which leaves much memory in use."""
+    log = compiled(list(filter(needs_kernels, MIXED)), 1)
+    assert [kind for kind, _ in log] == ["compile", "cell", "cell", "compile", "cell", "cell"] and run.begun == 2
+
+
 def test_one_worker_runs_cells_without_kernels_first(compiled):
     log = compiled(MIXED, 1)
     assert [kind for kind, _ in log] == ["cell"] * 4 + ["compile"] + ["cell"] * 2 + ["compile"] + ["cell"] * 2

@@ -128,9 +128,13 @@ class _Waiting:
         self._ready.setdefault(slot.engine, deque()).appendleft(slot)
         return True
 
-    def compiled(self, part: warming.Part) -> None:
-        """Let the cells start that waited for these kernels; where they could not be compiled, the cells report why."""
+    def compiled(self, part: warming.Part) -> bool:
+        """Let the cells start that waited for these kernels; whether others are left to compile.
+
+        Where they could not be compiled, the cells report why.
+        """
         self._ready.setdefault(part.key[0], deque()).extend(self._held.pop(part.key))
+        return bool(self._parts)
 
 
 def run_cells(
@@ -223,7 +227,8 @@ def run_cells(
                     if _compiled(seat):
                         work.keep()
                     compiled(work)
-                    waiting.compiled(work)
+                    if not waiting.compiled(work):
+                        seat.free()  # compiling leaves up to .95 GB in use, a cell needs a quarter of that
                     continue
                 try:
                     observation, recording = _collect(seat, work, timeout)
