@@ -108,6 +108,7 @@ def test_what_settings_do_not_name_is_as_shipped_and_each_reaches_the_law():
 # ---- rebounds ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 1000])
 @pytest.mark.parametrize("v", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("e", [0.3, 0.8, 1.0])

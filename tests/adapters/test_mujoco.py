@@ -138,6 +138,7 @@ SCENES = {
 }
 
 
+@pytest.mark.few(20)
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
@@ -185,6 +186,7 @@ def test_another_friction_than_asked_fails_the_receipt_of_a_box_that_is_thrown_u
 # ---- rebounds -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("e", [0.0, 0.2, 0.5, 0.8, 0.95, 1.0])
 def test_tuned_rebound_is_e_to_round_off(e: float, dt: float) -> None:

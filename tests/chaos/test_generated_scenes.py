@@ -34,7 +34,7 @@ def fields_of(data):
 @pytest.mark.timeout(7200)
 def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own(dice, soak, every, tmp_path):
     engines = [name for name in registry.names() if registry.find(name).engine is not None]
-    cells, files = [], int(os.environ.get("CROSSCHECK_FILES", 500)) if soak else 25 if every else 5
+    cells, files = [], int(os.environ.get("CROSSCHECK_FILES", 500)) if soak else 25 if every else 3
     for number in range(files):
         path = tmp_path / f"scene-{number}.json"
         path.write_text(json.dumps(valid(dice, STEPS, DT)))

@@ -59,7 +59,7 @@ def undisturbed(tmp_path_factory):
 
 def test_kills_at_random_moments_lose_nothing_that_finished_and_change_no_bit(dice, soak, every, tmp_path, undisturbed):
     expected, seconds = undisturbed
-    for _ in range(60 if soak else 5 if every else 2):
+    for _ in range(60 if soak else 5 if every else 1):
         process = subprocess.Popen([*COMMAND, "--out", str(tmp_path)], cwd=ROOT, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.DEVNULL, preexec_fn=listening)  # fmt: skip
         time.sleep(dice.uniform(0.0, 0.9 * seconds))

@@ -75,6 +75,7 @@ CASES = (
 )
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
 def test_the_grid_finds_what_all_pairs_have(dimension, case):

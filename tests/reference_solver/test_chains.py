@@ -248,6 +248,7 @@ ROWS = {
 }
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", VARIATIONS)
 def test_a_light_ball_caught_between_a_wall_and_a_heavy_one_takes_all_that_moves(name, d):
@@ -257,6 +258,7 @@ def test_a_light_ball_caught_between_a_wall_and_a_heavy_one_takes_all_that_moves
     assert beyond <= 0.0
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", ROWS)
 def test_two_contacts_are_certified_and_right(name, d):
@@ -308,7 +310,7 @@ def certified_and_wrong(d, seeds):
     return short, wrong
 
 
-@pytest.mark.parametrize(("d", "seeds"), [(2, range(20)), (3, range(120, 125))])
+@pytest.mark.parametrize(("d", "seeds"), [(2, range(20)), (3, range(120, 123))])
 def test_no_row_of_balls_is_certified_and_wrong(d, seeds):
     """What is refused says why."""
     assert not certified_and_wrong(d, seeds)[1]

@@ -74,6 +74,7 @@ def outside(shape, pose, point, d):
     return max(0.0, np.linalg.norm(local) - shape.radius)
 
 
+@pytest.mark.few(30)
 @pytest.mark.parametrize("coarse", [False, True], ids=["random", "parallel"])
 @pytest.mark.parametrize("pair", range(len(PAIRS)), ids=lambda k: "-".join(type(s).__name__ for s in PAIRS[k]))
 def test_no_larger_and_no_smaller(pair, coarse):

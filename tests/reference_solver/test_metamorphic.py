@@ -55,6 +55,7 @@ def test_equal_worlds_in_canonical_order_give_equal_bits(profile, space):
     holds()
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("scene", SCENES)
 def test_disturbances_stay_small_up_to_the_horizon(scene, space):

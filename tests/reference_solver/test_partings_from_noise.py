@@ -28,6 +28,7 @@ def resting_box(dimension):
     return (world._bodies, world._rows) if dimension == 2 else (world._bodies, world._manifolds[:1])
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(
     ("struck", "e", "speed", "back_within", "leaves"),

@@ -37,7 +37,10 @@ sys.exit(status)
     "tests",
     [
         # 8 s of CPU where nothing is compiled before
-        ["test_structures.py", "verification/event_driven/test_roots.py", "direct/test_matrix.py"],
+        pytest.param(
+            ["test_structures.py", "verification/event_driven/test_roots.py", "direct/test_matrix.py"],
+            marks=pytest.mark.long,
+        ),
         pytest.param(["direct"], marks=pytest.mark.long),  # 31 s
     ],
     ids=["structures, roots, a matrix", "the direct solver"],

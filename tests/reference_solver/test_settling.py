@@ -77,6 +77,7 @@ def said_by(script, *arguments):
     return done.stdout.split()
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("overlaps", "closed", "put_back"),
     [

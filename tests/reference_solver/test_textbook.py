@@ -37,6 +37,7 @@ def bounces(height, e, t):
     return speed * (t - impact) - 0.5 * G * (t - impact) ** 2, speed - G * (t - impact)
 
 
+@pytest.mark.few(24)
 @shapes
 @pytest.mark.parametrize("dt", [0.1, 1 / 60, 1 / 240, 1 / 1000])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.5, 0.8])

@@ -56,9 +56,8 @@ def bench(path, out, *words, status=0):
     return done
 
 
-@pytest.mark.parametrize(
-    ("scene", "engine"), [(PLANE, "chipmunk"), pytest.param(SPACE, "mujoco", marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("scene", "engine"), [(PLANE, "chipmunk"), (SPACE, "mujoco")])
 def test_the_error_is_what_the_scheme_of_the_engine_leaves(tmp_path, scene, engine):
     """Semi-implicit Euler falls short of g t^2 / 2 by g dt t / 2; our own solver flies exactly."""
     pytest.importorskip({"chipmunk": "pymunk"}.get(engine, engine))

@@ -149,6 +149,7 @@ def assert_same_bits(slot, tmp_path, allowed=()):
         assert np.array_equal(found, expected)
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(("scene", "params", "profile"), CELLS)
 @pytest.mark.parametrize(("engine", "package", "dimension"), [
     ("chipmunk", "pymunk", 2), ("bullet", "pybullet", 2), ("bullet", "pybullet", 3),

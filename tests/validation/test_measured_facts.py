@@ -106,7 +106,7 @@ class TestReference:
         theta = math.atan(0.5 * ratio)
         assert found == pytest.approx(9.81 * (math.sin(theta) - 0.5 * math.cos(theta)), rel=1e-9)
 
-    @pytest.mark.parametrize("n", [1, 2, 5, pytest.param(10, marks=pytest.mark.long)])
+    @pytest.mark.parametrize("n", [1, 2, *(pytest.param(n, marks=pytest.mark.long) for n in (5, 10))])
     def test_interface_impulses(self, dimension, n):
         found = measure("stack", "reference", "reference", 1 / 240, dimension, n=float(n))
         for i in range(1, n + 1):

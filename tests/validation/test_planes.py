@@ -83,6 +83,7 @@ def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio,
     assert apart / off == pytest.approx(canonical.growth(scene), rel=0.02)
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("scene", "params", "least"),
     [

@@ -109,6 +109,7 @@ def failing(scene, trajectory):
     }
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("dt", DTS)
 @pytest.mark.parametrize("e", [0.5, 0.8, 0.95, 1.0])

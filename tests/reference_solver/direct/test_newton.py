@@ -10,6 +10,7 @@ from reference_solver.exact_contact import coulomb_solutions
 SOLVED = 1e-13
 
 
+@pytest.mark.few(30)
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("seed", range(30))
 def test_planar_problems_agree_with_enumeration(direct, seed, mu):

@@ -152,6 +152,7 @@ def is_first(t, gaps, exact, times):
 STILL = np.zeros((3, 5))
 
 
+@pytest.mark.few(12)
 @pytest.mark.parametrize("degree", [1, 2, 5])
 @pytest.mark.parametrize("turn", [4.0, 10.0, 30.0])
 @pytest.mark.parametrize("name", TURNING)

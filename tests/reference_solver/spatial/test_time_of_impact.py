@@ -153,7 +153,7 @@ def overlap_depth(first, second):
 
 
 @given(halves, halves, vectors, vectors, vectors, vectors, turns, turns)
-@hypothesis_settings(max_examples=40)
+@hypothesis_settings(max_examples=15)
 def test_boxes_are_apart_until_the_time_of_impact_and_touch_there(ha, hb, away, velocity, spin_a, spin_b, ta, tb):
     place, velocity = 3.0 * np.array(away), 4.0 * np.array(velocity)
     spin_a, spin_b, fall = 5.0 * np.array(spin_a), 5.0 * np.array(spin_b), (0.0, 0.0, -G)
@@ -173,7 +173,7 @@ def test_boxes_are_apart_until_the_time_of_impact_and_touch_there(ha, hb, away, 
 
 
 @given(halves, vectors, vectors, vectors, turns)
-@hypothesis_settings(max_examples=40)
+@hypothesis_settings(max_examples=15)
 def test_a_sphere_is_clear_of_a_turning_box_until_they_touch(half, away, velocity, spin, turn):
     place, velocity, spin = 3.0 * np.array(away), 4.0 * np.array(velocity), 5.0 * np.array(spin)
     turn, radius, fall = np.array(turn) / np.linalg.norm(turn), 0.3, (0.0, 0.0, -G)
@@ -209,7 +209,7 @@ def segment_gap(p, e, q, g):
 
 
 @given(vectors, vectors, vectors, vectors, turns, turns)
-@hypothesis_settings(max_examples=30)
+@hypothesis_settings(max_examples=15)
 def test_capsules_are_clear_until_they_touch(away, velocity, spin_a, spin_b, ta, tb):
     place, velocity = 3.0 * np.array(away), 4.0 * np.array(velocity)
     spin_a, spin_b, fall = 5.0 * np.array(spin_a), 5.0 * np.array(spin_b), np.array((0.0, 0.0, -G))

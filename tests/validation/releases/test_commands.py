@@ -55,6 +55,7 @@ def test_all_asks_every_release_and_only_then_says_that_it_is_the_only_change(ca
     assert "the only change of this check: every release ran" in done.stdout
 
 
+@pytest.mark.long
 def test_nothing_changed_is_said_and_is_no_alarm(call):
     slow = ["--dim", "2", "--param", "e=0.5", "--param", "v=2", "--jobs", "1"]
     done = call("bisect", "toy", "1.0.0,1.2.0", "impact", "--check", "rebound_ratio", *slow)
