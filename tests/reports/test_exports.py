@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
+from junitparser import TestSuite
 
 from reports import exports
 from reports.findings import finding_line
@@ -138,8 +139,8 @@ def test_junit_has_a_suite_per_engine_and_profile_and_counts_what_fails():
 def test_junit_counts_each_case_a_few_times_however_many_there_are(monkeypatch):
     """Counted, not timed: 35 000 rows of `make soak` took half an hour of counting each suite anew for every case."""
     counted = []
-    real = exports.TestSuite.update_statistics
-    monkeypatch.setattr(exports.TestSuite, "update_statistics", lambda suite: counted.append(len(suite)) or real(suite))
+    real = TestSuite.update_statistics
+    monkeypatch.setattr(TestSuite, "update_statistics", lambda suite: counted.append(len(suite)) or real(suite))
     document = junit(*[replace(ROW, metric=f"metric[{k}]") for k in range(200)], PASS, KNOWN)
     assert [suite.get("tests") for suite in document.iter("testsuite")] == ["201", "1"]
     assert sum(counted) <= 3 * 202
