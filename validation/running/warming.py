@@ -67,6 +67,8 @@ def key_of(slot: Slot) -> Key:
 def missing(slots: Iterable[Slot]) -> list[Part]:
     """Kernels of these cells that are not compiled yet, in the order of the profiles: a textbook step before others.
 
+    Of a profile 3-D comes first: it takes longest, and a long part at the end would leave the other workers idle.
+
     Empty for engines that compile nothing, have nowhere to keep kernels, or are not installed.
     """
     cells: dict[Key, dict[str, Slot]] = defaultdict(dict)
@@ -75,7 +77,7 @@ def missing(slots: Iterable[Slot]) -> list[Part]:
     folders = {name: _folder(name) for name in {name for name, _, _ in cells}}
     profiles = list(dict.fromkeys((name, profile) for name, profile, _ in cells))
     found = []
-    for key in sorted(cells, key=lambda key: (profiles.index(key[:2]), key[2])):
+    for key in sorted(cells, key=lambda key: (profiles.index(key[:2]), -key[2])):
         folder = folders[key[0]]
         if folder is not None:
             mark = folder / f"compiled-{hashlib.sha256(repr(key).encode()).hexdigest()[:12]}"
