@@ -17,10 +17,13 @@ import multiprocessing
 import os
 import secrets
 import signal
+import socket
+import struct
 import sys
 import time
 import weakref
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, cast
 
@@ -31,6 +34,8 @@ _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # <linux/prctl.h>
 GRACE = 60.0
 #: Stored bytes of a child's output: enough for the last lines of a traceback.
 LOG_BYTES = 2**16
+#: Longest pause [s] within an answer or a question: half an answer may be all that comes.
+PAUSE = 10
 LOG_LINES = 5
 #: Largest answer [bytes]: an observation takes some kilobytes, a recording about one megabyte.
 MOST_BYTES = 2**26
@@ -79,6 +84,7 @@ class Child:
         theirs.close()
         writing.close()
         os.set_blocking(self.log.fileno(), False)
+        _limit_pauses(self.connection)
         self.written = b""
         self._reason = ""
         self._mark = UNASKED
@@ -123,6 +129,9 @@ class Child:
                 raise Lost(self.stop())
         try:
             answer = self.connection.recv_bytes(len(UNASKED) + MOST_BYTES)
+        except BlockingIOError:
+            self.stop()
+            raise Lost("its process gave half an answer") from None
         except (EOFError, OSError):
             raise Lost(self.stop()) from None
         if not answer.startswith(self._mark):
@@ -192,14 +201,24 @@ def _main(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         _guard(parent, connection)
-    null = os.open(os.devnull, os.O_RDONLY)
+    null = os.open(os.devnull, os.O_RDWR)
     os.dup2(null, 0)
+    if sys.platform != "win32":  # the parent's tracker of semaphores prints errors of what foreign code writes to it
+        os.dup2(null, cast(int, resource_tracker.getfd()))
     os.close(null)
     for stream in (1, 2):
         os.dup2(log.fileno(), stream)
     log.close()
     limit(memory)
     serve(cast(Connection, _Marked(connection)))
+
+
+def _limit_pauses(connection: Connection) -> None:
+    """Let a read or a write fail that moves nothing for `PAUSE`, where a connection is a socket."""
+    if sys.platform != "win32":
+        with socket.socket(fileno=os.dup(connection.fileno())) as ours:
+            for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+                ours.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", PAUSE, 0))
 
 
 class _Marked:
@@ -263,7 +282,7 @@ def _guard(parent: int, connection: Connection) -> None:
         if signal.sigwait(blocked) == signal.SIGTERM:
             _kill(-child)
             _sweep()
-            os._exit(1)
+            _end_like(signal.SIGTERM)
         while (ended := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)) is not None:
             if ended.si_pid == child:
                 _kill(-child)  # its group, whose number is not given to others before the child is waited for

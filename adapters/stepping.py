@@ -147,7 +147,10 @@ def _copied(name: str, given: Any, shape: tuple[int, int]) -> Array:
     EngineError
         If it has another shape, or no numbers.
     """
-    found = np.array(given)
+    try:
+        found = np.array(given)
+    except ValueError:  # rows of different lengths
+        found = np.array(None)
     if found.shape != shape or found.dtype.kind not in "fiu":
         said = f"an array of shape {found.shape}" if found.dtype.kind in "fiu" and found.ndim else kind_of(given)
         raise EngineError(f"{name}: the engine gave {said}, numbers of shape {shape} are needed")
@@ -289,7 +292,7 @@ def _record(
         dt=dt,
         finish="diverged" if finish == "diverged" else "completed",
         reason=reason,
-        initial_change=tuple(simulation.initial_change),
+        initial_change=_sentences(simulation.initial_change),
         readback=simulation.readback(),
         certificate=simulation.certificate(),
         out_of_plane=outside,
@@ -324,6 +327,12 @@ def _pull(body: Body) -> float:
     """Acceleration that a body's external force and torque give to its outermost point [m/s^2]."""
     moment = min(body.inertia) if isinstance(body.inertia, tuple) else body.inertia
     return math.hypot(*body.force) / body.mass + reach(body.shape) * math.hypot(*body.torque) / moment
+
+
+def _sentences(given: Any) -> tuple[Any, ...]:
+    if not isinstance(given, tuple | list):
+        raise EngineError(f"initial_change: the engine gave {kind_of(given)}, a tuple of sentences is needed")
+    return tuple(given)
 
 
 def _kept(contacts: Contacts, scene: Scene) -> Contacts:

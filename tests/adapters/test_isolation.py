@@ -99,6 +99,7 @@ def test_a_child_answers_as_often_as_it_is_asked_until_it_is_stopped(child):
         ("os.kill(os.getpid(), 40)", "the process was killed by signal 40"),
         ("connection.close(); time.sleep(600)", "the process closed its connection"),
         ("start(600); os._exit(7)", "the process ended with exit code 7"),
+        ("os.kill(os.getppid(), signal.SIGTERM); time.sleep(600)", "the process was killed by SIGTERM"),
     ],
 )
 @pytest.mark.parametrize("timeout", [None, PATIENCE])
@@ -171,6 +172,32 @@ def test_an_answer_that_was_not_asked_for(child, order):
     with pytest.raises(Mistaken, match="not asked"):
         child.receive(PATIENCE), asked(child, "answer('third')")
     assert child.ended()
+
+
+def test_half_an_answer(serve, monkeypatch):
+    """Its length is sent and less than that: the parent does not wait for the rest for ever."""
+    monkeypatch.setattr(isolation, "PAUSE", 1)
+    child = Child(serve)
+    child.send(b"os.write(connection.fileno(), (10**6).to_bytes(4, 'big')); answer('short'); time.sleep(600)")
+    with pytest.raises(Lost, match=r"^its process gave half an answer$"):
+        child.receive(PATIENCE)
+    assert child.ended()
+
+
+def test_a_long_question_that_is_not_read(serve, monkeypatch):
+    monkeypatch.setattr(isolation, "PAUSE", 1)
+    child = Child(serve)
+    assert asked(child, "answer('begun'); os.kill(os.getpid(), signal.SIGSTOP)") == "begun"
+    child.send(b"answer(1) #" + b"x" * 2**22)
+    with pytest.raises(Lost, match=r"^no answer after 0\.1 s$"):
+        child.receive(0.1)
+    child.stop()
+
+
+def test_the_tracker_of_semaphores_of_the_parent(child):
+    """A child that writes to all that is open does not reach it; it would print errors."""
+    assert asked(child, "from multiprocessing.resource_tracker import getfd\n"
+                        "answer(os.fstat(getfd()).st_rdev == os.stat(os.devnull).st_rdev)") == "True"  # fmt: skip
 
 
 def test_a_copy_that_a_child_forks(child):

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -230,6 +231,40 @@ def leave_session():
     subprocess.Popen(["sleep", "3601"], start_new_session=True)
 
 
+def half_answer():
+    """The length of a long answer on each open socket, and no more."""
+    for number in sockets():
+        os.write(number, (10**6).to_bytes(4, "big"))
+
+
+def shut_sockets():
+    """Nothing more can be read from them: the next case ends the process."""
+    for number in sockets():
+        with socket.socket(fileno=os.dup(number)) as ours:
+            ours.shutdown(socket.SHUT_RD)
+
+
+def clear_modules():
+    sys.modules.clear()
+
+
+def change_later():
+    def change():
+        time.sleep(0.05)
+        patch_numpy(), patch_math()
+
+    threading.Thread(target=change, daemon=True).start()
+
+
+def sockets():
+    for number in range(3, 64):
+        try:
+            if stat.S_ISSOCK(os.fstat(number).st_mode):
+                yield number
+        except OSError:
+            continue
+
+
 def fork():
     """Two processes come back to their caller from here, as from a library that starts a server of its own."""
     os.fork()
@@ -243,12 +278,8 @@ def answer_for_another():
             "metrics": {"rebound_ratio": [12345.0, ""]}, "state_hash": "0" * 16, "settings": [], "receipts": [],
             "readback": {}, "certificate": {}, "initial_change": [], "log": ""}  # fmt: skip
     answer = json.dumps({"observation": told, "recording": None, "changed": "", "unwritten": None}).encode()
-    for number in range(3, 64):
-        try:
-            if stat.S_ISSOCK(os.fstat(number).st_mode):
-                os.write(number, len(answer).to_bytes(4, "big") + answer)
-        except OSError:
-            continue
+    for number in sockets():
+        os.write(number, len(answer).to_bytes(4, "big") + answer)
 
 
 #: What is done once while a world is built.
@@ -260,7 +291,8 @@ DEEDS = {
         trap_floats, ignore_numpy_errors, close_streams, close_stream_objects, close_files, open_files, limit_files,
         limit_file_size, change_environment, change_folder, change_mask, handle_signals, block_signals, patch_math,
         patch_numpy, patch_loop, patch_class, patch_json, patch_module, stop_collecting, lower_recursion, clear_path,
-        leave_thread, leave_child, leave_session, hang, fork, answer_for_another,
+        leave_thread, leave_child, leave_session, hang, fork, answer_for_another, half_answer, shut_sockets,
+        clear_modules, change_later,
     )
 }  # fmt: skip
 
@@ -270,7 +302,8 @@ class Odd:
 
     def __init__(self, inner, fault):
         self.inner, self.fault, self.samples = inner, fault, 0
-        self.initial_change = ("\x1b[31m" + "x" * 10**6,) if fault == "long_change" else ()
+        odd = {"long_change": ("\x1b[31m" + "x" * 10**6,), "change_number": 7}
+        self.initial_change = odd.get(fault, ())
 
     def __getattr__(self, name):
         return getattr(self.inner, name)
@@ -282,6 +315,8 @@ class Odd:
             pose = pose * math.nan
         if self.fault == "pose_shape":
             pose = pose[:, :2]
+        if self.fault == "pose_uneven":
+            return [[1.0], [1.0, 2.0]]
         if self.fault == "pose_text":
             return [["here"] * 3] * len(pose)
         if self.fault == "pose_jumps" and self.samples > 3:
@@ -313,13 +348,14 @@ class Odd:
         return odd.get(self.fault) or self.inner.readback()
 
     def certificate(self):
-        return ["certified"] if self.fault == "certificate_list" else {}
+        odd = {"certificate_list": ["certified"], "certificate_number": {"certified": False, "reasons": 7}}
+        return odd.get(self.fault, {})
 
 
 ODD = (
-    "pose_nan", "pose_shape", "pose_text", "pose_jumps", "twist_none", "contacts_number", "contacts_flat",
-    "contacts_beyond", "readback_list",
-    "readback_cyclic", "readback_odd", "readback_large", "certificate_list", "long_change",
+    "pose_nan", "pose_shape", "pose_text", "pose_uneven", "pose_jumps", "twist_none", "contacts_number",
+    "contacts_flat", "contacts_beyond", "readback_list", "readback_cyclic", "readback_odd", "readback_large",
+    "certificate_list", "certificate_number", "long_change", "change_number",
 )  # fmt: skip
 ASKED = (
     "settings_none", "settings_words", "settings_nan", "settings_object", "settings_raise", "settings_leave",

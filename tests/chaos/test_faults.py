@@ -63,6 +63,10 @@ CRASHES = {
     "declares_none": "declares: None was given",
     "build_none": "build: the engine gave None",
     "answer_for_another": "answered what it was not asked",
+    "half_answer": "half an answer",
+    "clear_modules": "sys",
+    "pose_uneven": "pose: the engine gave a list, numbers",
+    "change_number": "initial_change: the engine gave an int",
 }
 #: Faults that change what cells share, or give odd values beside a sound motion: the cell itself is as it is.
 ODD = {
@@ -71,7 +75,7 @@ ODD = {
     "block_signals", "patch_math", "patch_numpy", "patch_loop", "patch_class", "patch_json", "patch_module",
     "stop_collecting", "lower_recursion", "clear_path", "leave_thread", "leave_child", "leave_session",
     "readback_cyclic", "readback_odd", "readback_large", "long_change", "settings_object",
-    "pose_jumps", "fork",
+    "pose_jumps", "fork", "shut_sockets", "change_later", "certificate_number",
 }  # fmt: skip
 DIVERGES = {"pose_nan"}
 REFUSES = {"refusal_long"}

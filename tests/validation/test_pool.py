@@ -131,6 +131,16 @@ def test_a_process_that_a_cell_changed_is_renewed_and_its_answer_stands(run):
     assert run([*slots, cell("mujoco", 1.0)], {}, 2) == ([*slots, cell("mujoco", 1.0)], None)
 
 
+def test_a_case_that_ends_a_process_which_has_run_others(run):
+    """They may have left the cause there: it runs once more, in a new process, and its answer there stands."""
+    slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0)]
+    ends = {"outcome": Outcome.CRASHED, "changed": "what was raised"}
+    assert run(slots, {slots[1]: ends}, 3) == (slots, None)
+    assert [len(worker.asked) for worker in run.workers] == [2, 1, 1]
+    assert run(slots, {slots[0]: ends}, 2) == (slots, None)
+    assert [len(worker.asked) for worker in run.workers] == [1, 2], "the first process had run nothing else"
+
+
 @pytest.mark.parametrize("jobs", [1, 2, 3])
 def test_a_worker_is_asked_by_one_engine_alone(run, jobs):
     """What an engine does to its process can then reach no other's, whether or not it is noticed."""

@@ -7,6 +7,7 @@ import os
 import platform
 import signal
 import sys
+import threading
 import types
 
 import numpy as np
@@ -67,6 +68,16 @@ def test_a_recursion_limit_a_mask_a_handler_and_a_blocked_signal_are_named():
     one = {signal.SIGUSR2}
     assert seen(lambda: signal.pthread_sigmask(signal.SIG_BLOCK, one),
                 lambda: signal.pthread_sigmask(signal.SIG_UNBLOCK, one)) == "signal handlers"  # fmt: skip
+
+
+def test_a_thread_that_goes_on_and_a_module_that_is_gone(monkeypatch):
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait)
+    assert seen(thread.start, lambda: (ended.set(), thread.join())) == "threads"
+    monkeypatch.setitem(sys.modules, "crosscheck_that_goes", types.ModuleType("crosscheck_that_goes"))
+    before = state.taken()
+    del sys.modules["crosscheck_that_goes"]
+    assert state.changed(before) == "modules"
 
 
 def test_a_folder_and_traps_of_numbers_are_named(tmp_path):

@@ -116,7 +116,7 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
     if trajectory.finish == "diverged":  # an engine with a certificate reports why it ended the run
-        said = [trajectory.reason, *map(str, trajectory.certificate.get("reasons", ()))]
+        said = [trajectory.reason, *_reasons(trajectory)]
         return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
     # A check without an entry is newer than the run (`metrics.NEWER`), so each has one.
     metrics: dict[str, Measured] = {
@@ -127,7 +127,7 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
         metrics[OUT_OF_PLANE] = trajectory.out_of_plane, ""
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
     if trajectory.certificate.get("certified") is False:
-        reasons = one_line("; ".join(map(str, trajectory.certificate.get("reasons", ()))))
+        reasons = one_line("; ".join(_reasons(trajectory)))
         return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
     broken = [slip for slip in slips if not slip.holds and not blank.slot.is_own]
     if broken:
@@ -155,6 +155,12 @@ def _table(name: str, given: Any) -> dict[str, Any]:
     if not isinstance(given, Mapping):
         raise EngineError(f"{name}: {kind_of(given)} was given, a table is needed")
     return dict(plain(given))
+
+
+def _reasons(trajectory: Trajectory) -> list[str]:
+    """Why a run is not certified, as its engine reports it."""
+    given = trajectory.certificate.get("reasons", ())
+    return list(map(str, given if isinstance(given, list | tuple) else [given]))
 
 
 def _with_trajectory(observation: Observation, trajectory: Trajectory) -> Observation:

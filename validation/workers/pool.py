@@ -46,12 +46,13 @@ class Unwritten(OSError):
 class _Seat:
     """A slot of the pool for one worker; the worker changes with the engine.
 
-    ``started``: when it was, by the monotonic clock [s], if it is to measure its stages.
+    ``started``: when it was, by the monotonic clock [s], if it is to measure its stages. ``fresh``: it has run no cell.
     """
 
     child: Child | None = None
     engine: str = ""
     started: float | None = None
+    fresh: bool = True
     work: Slot | warming.Part | None = None
     until: float = 0.0
 
@@ -151,7 +152,8 @@ def run_cells(
 ) -> Iterator[Observation]:
     """Yield an observation per slot, in the order in which they finish.
 
-    A cell whose worker answers for another one runs again in a new process, once.
+    A cell whose worker answers for another one runs again in a new process, once; so does one that ends a worker which
+    has run others, as they may be the cause.
 
     An error while cells run is raised after all running cells have ended, so that no result is lost except of cells
     whose trajectory or recording could not be stored. Later errors are not reported.
@@ -230,6 +232,7 @@ def run_cells(
                     if not waiting.compiled(work):
                         seat.free()  # compiling leaves up to .95 GB in use, a cell needs a quarter of that
                     continue
+                fresh, seat.fresh = seat.fresh, False
                 try:
                     observation, recording = _collect(seat, work, timeout)
                 except Unwritten as error:
@@ -239,6 +242,9 @@ def run_cells(
                     if waiting.again(work):
                         continue
                     observation, recording = _lost(work, Outcome.CRASHED, str(mistaken), ""), None
+                # A process that has run others may end because of what they left in it.
+                if observation.outcome is Outcome.CRASHED and not fresh and seat.child is None and waiting.again(work):
+                    continue
                 if observation.outcome is Outcome.TIMED_OUT:
                     waiting.timed_out(work)
                 # Before the result is used, so that a worker does not wait while it is stored. No worker is started
@@ -262,7 +268,7 @@ def _engage(seat: _Seat, engine: str, memory: int) -> None:
     if seat.engine != engine or seat.child is None:
         seat.free()
         seat.started = time.monotonic() if stages.is_on() else None
-        seat.child, seat.engine = _started(memory), engine
+        seat.child, seat.engine, seat.fresh = _started(memory), engine, True
 
 
 @stage("starting processes")

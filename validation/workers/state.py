@@ -12,6 +12,7 @@ import locale
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -76,6 +77,8 @@ def still(before: State) -> State:
 def changed(before: State) -> str:
     """Differences from ``before``, in a few words; empty if there are none."""
     found = [name for name, look in _FACTS.items() if not _same(name, before.facts[name], look())]
+    if len(sys.modules) < before.modules:
+        found.append("modules")
     for place, (now, then) in before.names.items():
         replaced = [name for name, value in then.items() if now.get(name) is not value]
         found += [f"{place}.{name}" for name in replaced[:3]]
@@ -174,6 +177,7 @@ _FACTS: dict[str, Callable[[], Any]] = {
     "signal handlers": _handlers,
     "interpreter": _interpreter,
     "locale": _locale,
+    "threads": threading.active_count,  # one that goes on may change what later cells share
 }
 
 
