@@ -29,12 +29,14 @@ SLOTS = [Slot("impact", (("v", float(v)),), 2, "chipmunk", "tuned", DT) for v in
 def test_a_worker_that_is_killed_from_outside(dice, whose):
     """It costs the case that it ran, which says so; the others have their bits."""
     expected = {slot: execute(slot).state_hash for slot in SLOTS}
+    before = set(workers_of(os.getpid()))  # of tests that ran in this process
     cells, found = run_cells(SLOTS, jobs=1), []
     killed_at = dice.randrange(1, len(SLOTS) - 1)
     for observation in cells:
         found.append(observation)
         if len(found) == killed_at:
-            guardians = [pid for pid in workers_of(os.getpid()) if workers_of(pid) and is_running(pid)]
+            started = set(workers_of(os.getpid())) - before
+            guardians = [pid for pid in started if workers_of(pid) and is_running(pid)]
             (worker,) = [child for pid in guardians for child in workers_of(pid)]
             os.kill(worker if whose == "the worker" else guardians[0], signal.SIGKILL)
     assert [each.slot for each in found] == SLOTS

@@ -12,6 +12,7 @@ from reports.page import figures
 from reports.page.scenes import _iteration_table, _iterations
 from validation.cells import Observation, Outcome, Slot
 from validation.posed import resolve
+from validation.questions.convergence import declared_errors
 
 COUNTS = (4, 20, 100)
 ERRORS = {"chipmunk": (0.5, 0.05, 0.005), "bullet": (0.5, 0.5, 1e-12)}
@@ -99,7 +100,7 @@ def test_what_was_asked_at_several_counts_is_drawn_by_engine_and_profile_and_not
     one, other = ("chipmunk", "default"), ("bullet", "tuned")
     asked = [*observed(one, 4, 0.1), *observed(one, 40, 0.01), *observed(other, 4, 0.2), *observed(other, 40, 0.2)]
     beside = [*observed(one, None, 0.4), *observed(one, 10, 0.3, 1 / 60)]  # nobody chose a count; another step
-    found = _iteration_table([*asked, *beside])
+    found = _iteration_table(declared_errors([*asked, *beside]))
     assert sorted(found["error"]) == pytest.approx([0.01, 0.1, 0.2, 0.2])
     assert sorted(found[["engine", "profile", "iterations"]].itertuples(index=False, name=None)) == [
         ("bullet", "tuned", 4), ("bullet", "tuned", 40), ("chipmunk", "default", 4), ("chipmunk", "default", 40)

@@ -45,18 +45,18 @@ def judged_row(**changed):
     return {**row, **changed}
 
 
-def test_the_worst_row_of_a_column_says_where_it_is_how_far_off_and_how_many_pass(monkeypatch):
+def test_the_worst_row_of_a_column_says_where_it_is_how_far_off_and_how_many_pass():
     """A cell at its scene's defaults is called so; what stands in brackets is which of the same kind it is."""
     other = judged_row(metric="apex", value=0.64, error=1e-6, physics="pass", standing=None)
     asked = judged_row(metric="apex", params={"e": 0.8}, iterations=7, error=-0.2)
     asked["slot"] = {**asked["slot"], "params": {"e": 0.9}, "iterations": 7}
-    found = verdicts._worst(("toy", "default"), [other, judged_row()])
-    assert (found.engine, found.profile, found.row) == ("toy", "default", judged_row())
+    worst = judged_row(skill=0.78)
+    found = verdicts._worst(("toy", "default"), [other, worst])
+    assert (found.engine, found.profile, found.row) == ("toy", "default", worst)
     assert (found.mark.mark, found.mark.text) == ("known", "140")
     assert (found.where, found.value, found.truth, found.tolerance) == ("[2]", "0.5", "0.640001", "0.001")
-    assert (found.ratio, found.passing, found.skill) == ("140", "1/2", "0.78")  # 1 - .14/.64: against what is nothing
-    monkeypatch.setattr(verdicts, "skill_of", lambda row: (0.25, ""))
-    assert verdicts._worst(("toy", "default"), [judged_row()]).skill == "0.25"
+    assert (found.ratio, found.passing, found.skill) == ("140", "1/2", "0.78")
+    assert verdicts._worst(("toy", "default"), [judged_row(skill=0.25)]).skill == "0.25"
     assert verdicts._worst(("toy", "default"), [other]).skill == ""  # what passes needs no null beside it
     assert found.command.startswith("crosscheck run bounce") and found.why == ""
     assert verdicts._worst(("toy", "default"), [other]).where == "defaults"

@@ -76,7 +76,7 @@ def test_without_the_option_nothing_is_added_or_loaded(repository):
 def test_a_sound_engine_passes_and_what_it_cannot_be_asked_is_skipped(repository):
     output = repository(options=ASK)
     found = counts(output)
-    assert found["passed"] > 20 and found["skipped"] > 20 and "failed" not in found
+    assert found["passed"] > 20 and found["skipped"] >= 5 and "failed" not in found
     assert ("crosscheck: toy 1.0" in output and "the toy" in output) or "dimension" in output
 
 

@@ -1,6 +1,7 @@
 """Commands start at once: none imports what it does not need, and what takes long is done once a process."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -40,7 +41,8 @@ for words in json.loads(sys.argv[1]):
 def imported(*calls):
     """Modules that there are after each of these commands."""
     command = [sys.executable, "-c", CALLS, json.dumps([call.split() for call in calls])]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    free = {name: value for name, value in os.environ.items() if name != registry.REQUIRED}  # these are loaded first
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=free)
     return dict(zip(calls, (set(json.loads(line)) for line in done.stdout.splitlines()), strict=True))
 
 

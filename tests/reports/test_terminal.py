@@ -163,17 +163,6 @@ def test_every_command_has_the_console_that_reads_no_markup():
     assert made == ["terminal.py"]
 
 
-@pytest.mark.parametrize(
-    ("load", "said"), [(0.4, ""), (1.0, ""), (8.2, "; longer now, the machine is busy (load 8 on 2 cores)")]
-)
-def test_an_estimate_for_idle_cores_says_where_they_are_not_idle(monkeypatch, load, said):
-    from reports import stages
-
-    monkeypatch.setattr(stages.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(stages.os, "getloadavg", lambda: (load, 0.0, 0.0))
-    assert stages._busy() == said
-
-
 def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
     """Each told it again, seven lines of two words at 80 columns."""
     monkeypatch.setenv("COLUMNS", "80")
