@@ -231,7 +231,7 @@ def _heal(folder: Path) -> None:
     numba renames files that are complete, so none is damaged because it is being written.
     """
     with suppress(OSError):
-        damaged = [path for path in folder.rglob("*.nb[ic]") if not _is_pickled(path.read_bytes())]
+        damaged = [path for path in folder.rglob("*.nb[ic]") if not _is_whole(path)]
         for path in damaged + [path for path in folder.iterdir() if damaged and path.is_file()]:
             path.unlink(missing_ok=True)
         if damaged:
@@ -239,16 +239,18 @@ def _heal(folder: Path) -> None:
             warnings.warn(Notice(f"kernels: {count} thrown away; what is missing is compiled again"), stacklevel=2)
 
 
-def _is_pickled(data: bytes) -> bool:
-    """Whether a file consists of complete pickles; none is loaded."""
-    stream = BytesIO(data)
+def _is_whole(path: Path) -> bool:
+    """Whether a file of numba consists of two pickles (an index) or of one (machine code); none is loaded."""
+    data = path.read_bytes()
+    stream, count = BytesIO(data), 0
     try:
         while stream.tell() < len(data):
             for _ in genops(stream):
                 pass
+            count += 1
     except Exception:  # what is no pickle may raise anything
         return False
-    return len(data) > 0
+    return count == (2 if path.suffix == ".nbi" else 1)
 
 
 def _checked(settings: Mapping[str, Any], dt: float) -> Any:

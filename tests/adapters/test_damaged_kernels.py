@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+from io import BytesIO
+from pickletools import genops
 
 import pytest
 
@@ -10,11 +12,21 @@ from adapters.plain import Notice, is_visible
 from adapters.reference import engine
 
 KERNEL = "import numba\n\n@numba.njit(cache=True)\ndef double(x):\n    return x + x\n\nprint(double(1.5))\n"
+
+
+def first_pickle(data):
+    stream = BytesIO(data)
+    list(genops(stream))
+    return data[: stream.tell()]
+
+
 DAMAGE = {
     "empty": lambda data: b"",
     "cut": lambda data: data[: len(data) // 2],
     "zeros": lambda data: bytes(len(data)),
     "garbage": lambda data: b"\xffgarbage" * 100,
+    "cut after its first part": lambda data: first_pickle(data) if first_pickle(data) != data else b"",
+    "twice": lambda data: data + data,
     "cut after a full stop": lambda data: data[: data.rindex(b".", 0, len(data) - 1) + 1],
 }
 
