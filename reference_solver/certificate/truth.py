@@ -43,9 +43,9 @@ from reference_solver.certificate.audit import (
     answers,
     audit,
     ends_of_series,
+    first_without_order,
     grazes,
     shared_loads,
-    without_order,
 )
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
@@ -263,11 +263,10 @@ def _first_chain(record: Record) -> float:
 
 def _without_order(model: Model, record: Record, dt: float) -> tuple[float, str]:
     """First sample after impacts that round-off decides (E21) [s], and the numbers of their bodies."""
-    pieces, found = record.pieces, without_order(model, record, dt)
+    pieces, first = record.pieces, first_without_order(model, record, dt)
     assert pieces is not None
-    if not len(found):
+    if first is None:
         return float("inf"), ""
-    first = found[np.argmin(pieces.begin[found])]
     of_piece = slice(*pieces.first_contact[first : first + 2])
     bodies = sorted({*pieces.body_a[of_piece].tolist(), *pieces.body_b[of_piece].tolist()})
     return _sample_after(record.t, float(pieces.begin[first]), dt), ", ".join(map(str, bodies))

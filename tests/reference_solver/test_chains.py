@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.certificate.audit import chains
+from reference_solver.certificate.audit import chains, order
 from reference_solver.certificate.truth import certify
 
 DIGITS, MOST = 50, 30_000
@@ -314,6 +314,18 @@ def certified_and_wrong(d, seeds):
 def test_no_row_of_balls_is_certified_and_wrong(d, seeds):
     """What is refused says why."""
     assert not certified_and_wrong(d, seeds)[1]
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_of_a_series_that_round_off_decides_only_the_beginning_is_asked(known, monkeypatch):
+    """Three pairs meet at once, again and again, in more than a hundred impacts, whether or not the solver says so."""
+    asked, differs = [], order._differs
+    monkeypatch.setattr(order, "_differs", lambda *how: asked.append(how) or differs(*how))
+    if not known:
+        monkeypatch.setattr(chains, "without_order", lambda run: np.zeros(0, np.int64))
+    found = judged_by_seed(2, 2)[0]
+    assert any("struck together or one after the other" in reason for reason in found.reasons)
+    assert len(asked) == (0 if known else 1)
 
 
 @pytest.mark.long

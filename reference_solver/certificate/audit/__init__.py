@@ -151,14 +151,14 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
-def without_order(model: Model, record: Record, dt: float) -> np.ndarray:
-    """Return the pieces (k,) of a recorded run at which the motion hangs on round-off (`chains`, `order`).
+def first_without_order(model: Model, record: Record, dt: float) -> int | None:
+    """Return the first piece of a recorded run at which the motion hangs on round-off (`chains`, `order`), if any.
 
     Raises ValueError if the record has no pieces.
     """
     run = _run_of(model, record, dt)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return np.union1d(chains.without_order(run), order.decided_by_gaps(run))
+        return order.first_without_order(run, chains.without_order(run))
 
 
 def answers(model: Model, record: Record, dt: float) -> Answers:

@@ -278,8 +278,16 @@ def all_answers(problem: Problem) -> list[Array]:
     if not _is_linear(problem):
         redundant &= closed.all(axis=1)
     for k in np.flatnonzero(redundant):
-        _enter(found, _of_redundant(problem, closed[k], sticks[k], slip[k]))
+        if not any(_is_of_mode(u, closed[k], sticks[k]) for u in found):
+            _enter(found, _of_redundant(problem, closed[k], sticks[k], slip[k]))
     return found
+
+
+def _is_of_mode(u: Array, closed: NDArray[np.bool_], sticks: NDArray[np.bool_]) -> bool:
+    """Whether an answer (c, d) is one of a mode without slip of a chosen direction: another one is no second."""
+    size = TWO * max(1.0, float(np.abs(u).max()))
+    stays = np.where(closed, u[:, 0] <= SAME * size, u[:, 0] > size)
+    return bool(stays.all() and np.abs(u[sticks, 1:]).max(initial=0.0) <= SAME * size)
 
 
 def _enter(found: list[Array], velocities: Array) -> None:

@@ -28,13 +28,13 @@ FOLLOWED = 60
 SOON = 1e-9
 
 
-def decided_by_gaps(run: Run) -> Indices:
-    """Return the impacts (k,) whose outcome hangs on an order within round-off."""
+def first_without_order(run: Run, known: Indices) -> int | None:
+    """Return the first impact whose outcome hangs on an order within round-off, ``known`` (k,) ones among them."""
     pieces, owner = run.pieces, run.contact_owner
     if not len(owner):
-        return np.zeros(0, np.int64)
-    speed = speeds(run)
-    u = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+        return None
+    speed, velocity = speeds(run), run.meeting_velocity(after=False)
+    u = (velocity * pieces.normal).sum(axis=1)
     meets = run.is_impact[owner] & ~run.is_chain[owner] & (u < -HELD * speed)
     lies = run.is_impact[owner] & ~run.is_chain[owner] & (np.abs(u) <= HELD * speed)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
@@ -46,7 +46,11 @@ def decided_by_gaps(run: Run) -> Indices:
     row = np.column_stack(
         [np.where(run.free[i], side, -1) for i, side in zip((pieces.body_a, pieces.body_b), run.side, strict=True)]
     )
-    return np.array([k for k in asked.tolist() if _hangs(run, k, row, pairs, apart)], np.int64)
+    either = np.union1d(asked, known)
+    for k in either[np.argsort(pieces.begin[either], kind="stable")].tolist():
+        if k in known or _hangs(run, k, velocity, row, pairs, apart):
+            return int(k)
+    return None
 
 
 def _apart(run: Run, lies: NDArray[np.bool_], pairs: Indices) -> NDArray[np.bool_]:
@@ -67,14 +71,14 @@ def _apart(run: Run, lies: NDArray[np.bool_], pairs: Indices) -> NDArray[np.bool
     return found
 
 
-def _hangs(run: Run, piece: int, row: Indices, pairs: Indices, apart: NDArray[np.bool_]) -> bool:
+def _hangs(run: Run, piece: int, velocity: Array, row: Indices, pairs: Indices, apart: NDArray[np.bool_]) -> bool:
     own = np.arange(run.pieces.first_contact[piece], run.pieces.first_contact[piece + 1])
-    return any(_differs(run, np.sort(each), row, pairs, apart) for each in clusters(own, row))
+    return any(_differs(run, np.sort(each), velocity, row, pairs, apart) for each in clusters(own, row))
 
 
-def _differs(run: Run, own: Indices, row: Indices, pairs: Indices, apart: NDArray[np.bool_]) -> bool:
+def _differs(run: Run, own: Indices, velocity: Array, row: Indices, pairs: Indices, apart: NDArray[np.bool_]) -> bool:
     """Whether a cluster of contacts comes out otherwise if its pairs are struck in turn."""
-    impact = _Impact(run, own, row[own])
+    impact = _Impact(run, own, velocity[own], row[own])
     pair, gone, u = pairs[own], apart[own], impact.free
     speed = np.abs(u).max()
     meets = np.unique(pair[u[:, 0] < -APPROACH * speed])
@@ -92,12 +96,12 @@ def _differs(run: Run, own: Indices, row: Indices, pairs: Indices, apart: NDArra
 class _Impact:
     """A cluster of contacts that are struck: velocities (c, d) along normals and tangents."""
 
-    def __init__(self, run: Run, own: Indices, row: Indices) -> None:
+    def __init__(self, run: Run, own: Indices, velocity: Array, row: Indices) -> None:
         pieces, d, c = run.pieces, run.d, len(own)
         a, b = pieces.body_a[own], pieces.body_b[own]
         self.mu, self.e = run.model.friction[a, b], run.model.restitution[a, b]
         axes = np.concatenate([pieces.normal[own][:, None], tangents_of(pieces.normal[own])], axis=1)
-        self.free = np.einsum("cj,ckj->ck", run.meeting_velocity(after=False)[own], axes)
+        self.free = np.einsum("cj,ckj->ck", velocity, axes)
         rows = np.unique(row[row >= 0])
         moves = np.zeros((c, d, len(rows), pieces.twist_before.shape[1]))
         for side, sign in ((0, -1.0), (1, 1.0)):
