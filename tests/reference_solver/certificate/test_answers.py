@@ -5,12 +5,13 @@ Truth: enumeration of all modes of a rod between a floor and a wall (`exact_cont
 
 import math
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
-from reference_solver.certificate.audit import answers
+from reference_solver.certificate.audit import Answers, answers
 from reference_solver.certificate.audit.rolling import accelerations
 from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.relations import Change
@@ -193,6 +194,20 @@ def test_a_ball_between_three_walls(motion):
     """Their friction holds it from ``mu = tan(.3)`` on."""
     for friction, two in ((1.1 * math.tan(0.3), True), (0.9 * math.tan(0.3), False)):
         assert (searched(funnel(friction, -1.0, **motion)).begin == 0.0) is two
+
+
+def test_shares_of_redundant_contacts_are_not_searched_where_the_answer_is_found(monkeypatch):
+    """A box at rest: its four corners stick, and the record has shares with which they do."""
+    module, asked = import_module(Answers.__module__), []
+    monkeypatch.setattr(module, "_of_redundant", lambda *how: asked.append(how) or np.zeros((0, 4, 3)))
+    box = Body(Box((0.1, 0.1, 0.1)), 1.0, (1.0 / 150.0,) * 3, (0.0, 0.0, 0.1, *UPRIGHT))
+    floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+    model = Model(3, [floor, box], (0.0, 0.0, -G), 0.0, 0.5)
+    assert searched(model) == Answers(np.inf, "", np.inf, 0)
+    assert not asked
+    monkeypatch.setattr(module, "_is_of_mode", lambda *how: False)  # planted
+    searched(model)
+    assert asked
 
 
 def test_what_has_too_many_contacts_says_so():
