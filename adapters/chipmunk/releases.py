@@ -21,8 +21,8 @@ RELEASES = Releases(
 )  # fmt: skip
 
 
-#: A point of an arbiter: its bodies a and b by index, normal from a to b, place on a and on b, impulse on b, distance.
-Point = tuple[int, int, float, float, float, float, float, float, float, float, float]
+#: A point of an arbiter: its bodies a and b by index, place between them, normal from a to b, impulse on b, distance.
+Point = tuple[int, int, float, float, float, float, float, float, float]
 
 
 def shape_key(shape: Any) -> Any:
@@ -53,7 +53,8 @@ def points_of(
         on_a, on_b, jn, jt = contact.r1, contact.r2, contact.jnAcc, contact.jtAcc
         px, py, qx, qy = ax + on_a.x, ay + on_a.y, bx + on_b.x, by + on_b.y
         gap = (qx - px) * nx + (qy - py) * ny
-        points.append((a, b, nx, ny, px, py, qx, qy, nx * jn - ny * jt, ny * jn + nx * jt, gap))
+        middle = 0.5 * (px + qx), 0.5 * (py + qy)
+        points.append((a, b, *middle, nx, ny, nx * jn - ny * jt, ny * jn + nx * jt, gap))
     return points
 
 
@@ -65,6 +66,6 @@ def _public_points(arbiter: Any, body: int, index: Mapping[Any, int], free: Sequ
     told = arbiter.contact_point_set
     (x, y), count = arbiter.total_impulse, len(told.points)
     return [
-        (body, other, *told.normal, *each.point_a, *each.point_b, -x / count, -y / count, each.distance)
+        (body, other, *(0.5 * (each.point_a + each.point_b)), *told.normal, -x / count, -y / count, each.distance)
         for each in told.points
     ]

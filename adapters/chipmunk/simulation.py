@@ -6,13 +6,11 @@ same instant, and free fall lags the parabola by g t dt / 2. Line numbers are th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Mapping
 from operator import mul
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adapters.chipmunk.profiles import UNSET
 from adapters.chipmunk.releases import Point, points_of, shape_key
@@ -20,7 +18,7 @@ from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.copied import Copied
 from adapters.drives import velocity_over
-from adapters.engine import Array, Contacts, EngineError
+from adapters.engine import EngineError
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Scene
 
@@ -110,10 +108,6 @@ class ChipmunkSimulation(Copied):
             told += (*body.position, body.angle)
         return told
 
-    def poses_of(self, copies: Sequence[list[float]]) -> Array:
-        """See `Copied.poses_of`."""
-        return np.array(copies, float).reshape(len(copies), -1, 3)
-
     def copy_twist(self) -> list[float]:
         """Velocity and angular velocity of each body."""
         told: list[float] = []
@@ -121,12 +115,8 @@ class ChipmunkSimulation(Copied):
             told += (*body.velocity, body.angular_velocity)
         return told
 
-    def twists_of(self, copies: Sequence[list[float]]) -> Array:
-        """See `Copied.twists_of`."""
-        return np.array(copies, float).reshape(len(copies), -1, 3)
-
     def copy_contacts(self) -> list[Point]:
-        """Up to two points per pair."""
+        """Up to two points per pair; impulses per point."""
         points: list[Point] = []
         failures: list[Exception] = []
         places = [body.position for body in self.bodies]
@@ -143,16 +133,6 @@ class ChipmunkSimulation(Copied):
         if failures:
             raise EngineError(f"contacts: {type(failures[0]).__name__}: {failures[0]}")
         return points
-
-    def contacts_of(self, copies: Sequence[list[Point]]) -> tuple[NDArray[np.int64], Contacts]:
-        """Contacts sorted by pair; impulses per point."""
-        counts = np.array([len(points) for points in copies], np.int64)
-        told = np.array(list(chain.from_iterable(copies))).reshape(-1, 11)
-        i, j = told[:, :2].astype(np.int64).T
-        order = np.lexsort((np.maximum(i, j), np.minimum(i, j), np.repeat(np.arange(len(copies)), counts)))
-        told = told[order]
-        normal, on_a, on_b, impulse = (told[:, k : k + 2] for k in (2, 4, 6, 8))
-        return counts, Contacts.turned(i[order], j[order], 0.5 * (on_a + on_b), normal, impulse, told[:, 10])
 
     def readback(self) -> dict[str, Any]:
         """Values of the space, its bodies and shapes."""
