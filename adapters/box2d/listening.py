@@ -12,9 +12,6 @@ from typing import Any
 
 import Box2D
 
-#: Row of a contact: bodies, point, normal, impulse on the second one, gap.
-Row = tuple[int, int, tuple[float, float], tuple[float, float], tuple[float, float], float]
-
 
 class Listener(Box2D.b2ContactListener):
     """Sets the materials of new pairs, and records the contacts of a step while it is switched on.
@@ -39,7 +36,8 @@ class Listener(Box2D.b2ContactListener):
         self.radii, self.materials, self.early = radii, materials, early
         self.hears = False
         self.geometry: dict[tuple[int, int], tuple[Any, list[Any], list[float]]] = {}
-        self.rows: list[Row] = []
+        #: Contacts as of `adapters.copied.Copied`.
+        self.rows: list[tuple[float, ...]] = []
         self.failure: Exception | None = None
 
     def BeginContact(self, contact: Any) -> None:
@@ -90,15 +88,13 @@ class Listener(Box2D.b2ContactListener):
         """Gap of each point in the position solver [b2PositionSolverManifold::Initialize]."""
         skins = self.radii[a.userData] + self.radii[b.userData]
         kind, gaps = manifold.type_, []
+        face, other, sign = (b, a, -1.0) if kind == 2 else (a, b, 1.0)
+        px, py = face.GetWorldPoint(manifold.localPoint)
         for point in manifold.points[: manifold.pointCount]:
-            if kind == 0:  # two circles
-                p, q = a.GetWorldPoint(manifold.localPoint), b.GetWorldPoint(point.localPoint)
-                gaps.append(math.hypot(q[0] - p[0], q[1] - p[1]) - skins)
-                continue
-            face, other = (a, b) if kind == 1 else (b, a)
-            sign = 1.0 if kind == 1 else -1.0
-            p, q = face.GetWorldPoint(manifold.localPoint), other.GetWorldPoint(point.localPoint)
-            gaps.append(sign * ((q[0] - p[0]) * normal[0] + (q[1] - p[1]) * normal[1]) - skins)
+            qx, qy = other.GetWorldPoint(point.localPoint)
+            x, y = qx - px, qy - py
+            away = math.hypot(x, y) if kind == 0 else sign * (x * normal[0] + y * normal[1])  # 0: two circles
+            gaps.append(away - skins)
         return gaps
 
     def _add(self, contact: Any, impulse: Any) -> None:
@@ -108,4 +104,4 @@ class Listener(Box2D.b2ContactListener):
         solved = zip(points, gaps, impulse.normalImpulses, impulse.tangentImpulses, strict=False)
         for point, gap, jn, jt in solved:
             # The tangent is the normal turned by -90 degrees [b2Cross(normal, 1)].
-            self.rows.append((a, b, point, (nx, ny), (jn * nx + jt * ny, jn * ny - jt * nx), gap))
+            self.rows.append((a, b, *point, nx, ny, jn * nx + jt * ny, jn * ny - jt * nx, gap))

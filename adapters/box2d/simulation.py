@@ -7,20 +7,23 @@ before it. Lengths in the engine have the units of the profile; readings are in 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from adapters.engine import Array, Contacts, EngineError, Simulation
+from adapters.copied import Copied
+from adapters.engine import Array, Contacts, EngineError
 from adapters.ground import reach
 from adapters.meeting import common_material
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
 
-class Box2DSimulation(Simulation):
+class Box2DSimulation(Copied):
     """One ``b2World``; bodies in the scene's order.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
@@ -32,6 +35,7 @@ class Box2DSimulation(Simulation):
         self.box2d = module or import_module("Box2D")
         self.scene, self.dt, self.settings = scene, dt, settings
         self.units = float(settings["units_per_metre"])
+        self.metres = (1.0 / self.units, 1.0 / self.units, 1.0)
         gravity = self._vector(scene.gravity)
         self.world: Any = self.box2d.b2World(gravity=gravity)
         self.world.continuousPhysics = settings["continuous"]
@@ -101,7 +105,7 @@ class Box2DSimulation(Simulation):
         counts = self.settings["iterations"], self.settings["position_iterations"]
         listener.rows, listener.hears = [], False
         for k in range(steps):
-            listener.hears = k == steps - 1
+            listener.hears = self.observed and k == steps - 1
             for body, force, torque in self.loads:
                 body.ApplyForceToCenter(force, True)
                 body.ApplyTorque(torque, True)
@@ -109,35 +113,33 @@ class Box2DSimulation(Simulation):
         if listener.failure is not None:
             raise EngineError(f"contacts: {type(listener.failure).__name__}: {listener.failure}")
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`; a half-space's own pose is the origin, wherever its polygon is."""
-        per_metre = 1.0 / self.units
-        rows = [(p[0] * per_metre, p[1] * per_metre, body.angle) for body in self.bodies for p in (body.position,)]
-        for row, body in enumerate(self.scene.bodies):
-            if isinstance(body.shape, HalfSpace):
-                rows[row] = (0.0, 0.0, 0.0)
-        return np.array(rows, float)
+    def copy_pose(self) -> list[float]:
+        """Place and angle of each body."""
+        return [number for body in self.bodies for number in (*body.position, body.angle)]
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        per_metre = 1.0 / self.units
-        return np.array(
-            [
-                (v[0] * per_metre, v[1] * per_metre, body.angularVelocity)
-                for body in self.bodies
-                for v in (body.linearVelocity,)
-            ],
-            float,
-        )
+    def poses_of(self, copies: Sequence[list[float]]) -> Array:
+        """See `Copied.poses_of`; a half-space's own pose is the origin, wherever its polygon is."""
+        poses = super().poses_of(copies) * self.metres
+        poses[:, [isinstance(body.shape, HalfSpace) for body in self.scene.bodies]] = 0.0
+        return poses
 
-    def contacts(self) -> Contacts:
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        return [number for body in self.bodies for number in (*body.linearVelocity, body.angularVelocity)]
+
+    def twists_of(self, copies: Sequence[list[float]]) -> Array:
+        """See `Copied.twists_of`."""
+        return super().twists_of(copies) * self.metres
+
+    def copy_contacts(self) -> list[tuple[float, ...]]:
+        """Rows of the listener, which begins a new list with each call of `advance`."""
+        return self.listener.rows
+
+    def contacts_of(self, copies: Sequence[list[tuple[float, ...]]]) -> tuple[NDArray[np.int64], Contacts]:
         """Up to two points per pair; a pair with a continuous collision within the step has them twice."""
-        per_metre = 1.0 / self.units
-        rows = (
-            (a, b, np.multiply(point, per_metre), normal, np.multiply(impulse, per_metre), gap * per_metre)
-            for a, b, point, normal, impulse, gap in self.listener.rows
-        )
-        return Contacts.by_pair(rows, 2)
+        counts, found = super().contacts_of(copies)
+        metre = self.metres[0]
+        return counts, replace(found, point=found.point * metre, impulse=found.impulse * metre, gap=found.gap * metre)
 
     def readback(self) -> dict[str, Any]:
         """Values of the world, its bodies and shapes."""
