@@ -9,16 +9,18 @@ momentum; they only show that a contact pushed.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 import pyb2d3
+from numpy.typing import NDArray
 
-from adapters.engine import EngineError
+from adapters.engine import Array, EngineError
 from adapters.scene import Body, Box, Disc, HalfSpace
 
 #: Point and unit normal of a touching or pushing contact.
-Point = tuple[tuple[float, float], tuple[float, float]]
+Point = tuple[float, float, float, float]
 #: Colour of the points of speculative contacts, which do not touch. [b2DrawContacts, b2_colorGray3]
 AHEAD = 0x4D4D4D
 #: Round-off of the product of two unit normals in single precision, and the arc of a small rotation within a step.
@@ -64,53 +66,55 @@ def touching(pen: Pen, world: Any) -> list[Point]:
         If the numbers of points and vectors differ.
     """
     points, normals = pen.drawn(world, True)
-    _, pushes = pen.drawn(world, False)
+    # Pushes matter only where points are speculative.
+    _, pushes = pen.drawn(world, False) if any(ahead for _, ahead in points) else (points, normals)
     if not len(points) == len(normals) == len(pushes):
         raise EngineError(f"contacts: {len(points)} points are drawn with {len(normals)} normals")
     found = []
     for (place, ahead), (x, y), push in zip(points, normals, pushes, strict=True):
         length = math.hypot(x, y)
         if length > 0.0 and (not ahead or any(push)):
-            found.append((place, (x / length, y / length)))
+            found.append((*place, x / length, y / length))
     return found
 
 
-def named(point: Point, bodies: Sequence[Body], places: Sequence[tuple[float, float, float, float]]) -> tuple[int, int]:
-    """Bodies of a contact: both touch the plane through the point across the normal, the first one from behind.
+def named(
+    points: Array, normals: Array, bodies: Sequence[Body], places: Iterable[Array]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Bodies of k contacts: both touch the plane through the point across the normal, the first one from behind.
 
-    ``places``: x, y, cosine and sine of each body when the contact was found.
+    ``places``: x, y, cosine and sine of each body when each contact was found, (4, k).
     """
-    (x, y), (nx, ny) = point
-    level, each = nx * x + ny * y, list(zip(bodies, places, strict=True))
-    away = [max(0.0, _distance(body, at, x, y)) for body, at in each]
-    behind = [away[k] + abs(level - _farthest(body, at, nx, ny)) for k, (body, at) in enumerate(each)]
-    ahead = [away[k] + abs(level + _farthest(body, at, -nx, -ny)) for k, (body, at) in enumerate(each)]
-    pairs = [
-        (behind[i] + ahead[j], i, j)
-        for i in range(len(bodies))
-        for j in range(len(bodies))
-        if i != j and "free" in (bodies[i].motion, bodies[j].motion)
-    ]
-    _, i, j = min(pairs)
-    return i, j
+    (x, y), (nx, ny) = points.T, normals.T
+    level, behind, ahead = nx * x + ny * y, [], []
+    for body, at in zip(bodies, places, strict=True):
+        away = np.maximum(0.0, _distance(body, at, x, y))
+        behind.append(away + np.abs(level - _farthest(body, at, nx, ny)))
+        ahead.append(away + np.abs(level + _farthest(body, at, -nx, -ny)))
+    free = np.array([[body.motion == "free"] for body in bodies])
+    possible = (free | free.T) & ~np.eye(len(bodies), dtype=bool)
+    costs = (np.where(row[:, None], own + ahead, np.inf) for row, own in zip(possible, behind, strict=True))
+    least, second = np.moveaxis(np.array([(cost.min(axis=0), cost.argmin(axis=0)) for cost in costs]), 1, 0)
+    first = least.argmin(axis=0)
+    return first, second[first, np.arange(len(x))].astype(np.int64)
 
 
-def _farthest(body: Body, place: tuple[float, float, float, float], nx: float, ny: float) -> float:
+def _farthest(body: Body, place: Array, nx: Array, ny: Array) -> Array:
     """Extent of a body along a unit direction [m]; a half-space has one along its normal only."""
     shape = body.shape
     if isinstance(shape, HalfSpace):
         along = nx * shape.normal[0] + ny * shape.normal[1] > 1.0 - ALONG
-        return shape.offset if along else math.inf
+        return np.where(along, shape.offset, np.inf)
     x, y, c, s = place
     centre = nx * x + ny * y
     if not isinstance(shape, Box):
         assert isinstance(shape, Disc)  # the only other shape of this engine
         return centre + shape.radius
     a, b = shape.half_extents
-    return centre + a * abs(nx * c + ny * s) + b * abs(ny * c - nx * s)
+    return np.asarray(centre + a * abs(nx * c + ny * s) + b * abs(ny * c - nx * s))
 
 
-def _distance(body: Body, place: tuple[float, float, float, float], x: float, y: float) -> float:
+def _distance(body: Body, place: Array, x: Array, y: Array) -> Array:
     """Signed distance of a point from a body's surface, negative inside [m]."""
     shape = body.shape
     if isinstance(shape, HalfSpace):
@@ -119,7 +123,7 @@ def _distance(body: Body, place: tuple[float, float, float, float], x: float, y:
     u, v = x - px, y - py
     if not isinstance(shape, Box):
         assert isinstance(shape, Disc)
-        return math.hypot(u, v) - shape.radius
+        return np.asarray(np.hypot(u, v) - shape.radius)
     a = abs(c * u + s * v) - shape.half_extents[0]
     b = abs(c * v - s * u) - shape.half_extents[1]
-    return math.hypot(max(a, 0.0), max(b, 0.0)) + min(max(a, b), 0.0)
+    return np.asarray(np.hypot(np.maximum(a, 0.0), np.maximum(b, 0.0)) + np.minimum(np.maximum(a, b), 0.0))

@@ -7,29 +7,30 @@ before the step. Lengths in the engine have the units of the profile; readings a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
+from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.box2d3.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Row, Simulation
+from adapters.copied import Copied, by_pair
+from adapters.engine import Array, Contacts
 from adapters.ground import reach
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
 
-_UNKNOWN = (math.nan, math.nan)
 
-
-class Box2D3Simulation(Simulation):
+class Box2D3Simulation(Copied):
     """One world; bodies in the scene's order.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
     """
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any], module: Any = None) -> None:
-        from adapters.box2d3.drawing import Pen
+        from adapters.box2d3 import drawing
 
         self.pyb2d3 = module or import_module("pyb2d3")
         self.scene, self.dt, self.settings = scene, dt, settings
@@ -50,8 +51,8 @@ class Box2D3Simulation(Simulation):
             for i, body in enumerate(scene.bodies)
             if body.is_loaded
         ]
-        self.pen = Pen()
-        self.before = self._places()
+        self.drawing, self.pen = drawing, drawing.Pen()
+        self.before = self.copy_pose()
 
     def _vector(self, v: tuple[float, ...]) -> tuple[float, float]:
         return v[0] * self.units, v[1] * self.units
@@ -99,14 +100,6 @@ class Box2D3Simulation(Simulation):
         wide = self.reach * self.units
         return pyb2d3.box(wide, wide, center=(-nx * wide, -ny * wide))
 
-    def _places(self) -> list[tuple[float, float, float, float]]:
-        """Place [m], cosine and sine of each body."""
-        rows, units = [], self.units
-        for body in self.bodies:
-            (x, y), turn = body.position, body.rotation
-            rows.append((float(x) / units, float(y) / units, float(turn.c), float(turn.s)))
-        return rows
-
     def advance(self, steps: int) -> None:
         """See `Simulation.advance`; forces are cleared by every step."""
         step, dt, count = self.world.step, self.dt, self.settings["substeps"]
@@ -114,35 +107,40 @@ class Box2D3Simulation(Simulation):
             for body, force, torque in self.loads:
                 body.apply_force_to_center(force)
                 body.apply_torque(torque)
-            if k == steps - 1:
-                self.before = self._places()
+            if self.observed and k == steps - 1:
+                self.before = self.copy_pose()
             step(dt, count)
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`; a half-space's own pose is the origin."""
-        rows = []
-        for asked, (x, y, c, s) in zip(self.scene.bodies, self._places(), strict=True):
-            rows.append((0.0, 0.0, 0.0) if isinstance(asked.shape, HalfSpace) else (x, y, math.atan2(s, c)))
-        return np.array(rows, float)
+    def copy_pose(self) -> list[float]:
+        """Place [m], cosine and sine of each body."""
+        placed, units = [(body.position, body.rotation) for body in self.bodies], self.units
+        return [number for place, turn in placed for number in (place.x / units, place.y / units, turn.c, turn.s)]
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        units = self.units
-        rows = [
-            (x / units, y / units, body.angular_velocity) for body in self.bodies for x, y in (body.linear_velocity,)
-        ]
-        return np.array(rows, float)
+    def poses_of(self, copies: Sequence[list[float]]) -> Array:
+        """See `Copied.poses_of`; a half-space's own pose is the origin."""
+        poses = super().poses_of(copies)
+        poses[..., 2] = np.vectorize(math.atan2)(poses[..., 3], poses[..., 2])  # numpy's depends on the machine
+        poses[:, [isinstance(body.shape, HalfSpace) for body in self.scene.bodies]] = 0.0
+        return poses[..., :3]
 
-    def contacts(self) -> Contacts:
-        """Points and normals of contacts in the last step; impulses and gaps are not available (NaN)."""
-        from adapters.box2d3.drawing import named, touching
+    def copy_twist(self) -> list[float]:
+        """Velocity [m/s] and angular velocity of each body."""
+        moving, units = [(body.linear_velocity, body.angular_velocity) for body in self.bodies], self.units
+        return [number for v, omega in moving for number in (v.x / units, v.y / units, omega)]
 
-        rows: list[Row] = []
-        for (x, y), normal in touching(self.pen, self.world):
-            point = (x / self.units, y / self.units)
-            i, j = named((point, normal), self.scene.bodies, self.before)
-            rows.append((i, j, point, normal, _UNKNOWN, math.nan))
-        return Contacts.by_pair(rows, 2)
+    def copy_contacts(self) -> tuple[list[Any], list[float]]:
+        """Points and normals of contacts in the last step, and places of the bodies before it."""
+        return self.drawing.touching(self.pen, self.world), self.before
+
+    def contacts_of(self, copies: Sequence[tuple[list[Any], list[float]]]) -> tuple[NDArray[np.int64], Contacts]:
+        """Points and normals of contacts; impulses and gaps are not available (NaN)."""
+        found, before = zip(*copies, strict=True)
+        counts = np.array([len(rows) for rows in found], np.int64)
+        told = np.array(list(chain.from_iterable(found)), float).reshape(-1, 4) / (self.units, self.units, 1.0, 1.0)
+        sample = np.repeat(np.arange(len(counts)), counts)
+        places = (own.T[:, sample] for own in np.moveaxis(super().poses_of(before), 1, 0))
+        i, j = self.drawing.named(told[:, :2], told[:, 2:], self.scene.bodies, places)
+        return counts, by_pair(counts, np.column_stack([i, j, told, np.full((len(told), 3), np.nan)]))
 
     def readback(self) -> dict[str, Any]:
         """Values of the world, its bodies and shapes; the bindings cannot read springs and speeds."""
