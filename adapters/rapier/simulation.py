@@ -10,9 +10,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
-from adapters.engine import Array, Contacts, Row, Simulation
+from adapters.copied import Copied
 from adapters.impulses import along_normal
 from adapters.meeting import common_material
 from adapters.readback import free_parts, pair_materials
@@ -31,7 +29,7 @@ class Hooks:
         context.restitution, context.friction = self.materials[min(i, j), max(i, j)]
 
 
-class RapierSimulation(Simulation):
+class RapierSimulation(Copied):
     """One ``PhysicsWorld``; bodies in the scene's order.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
@@ -117,45 +115,45 @@ class RapierSimulation(Simulation):
         for _ in range(steps):
             step()
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`."""
-        bodies, rows = self.world.rigid_bodies, []
+    def copy_pose(self) -> list[float]:
+        """Position and quaternion of each body."""
+        told: list[float] = []
+        bodies = self.world.rigid_bodies
         for handle in self.bodies:
             body = bodies[handle]
             p, q = body.translation, body.rotation
-            rows.append((p.x, p.y, p.z, q.w, q.i, q.j, q.k))
-        return np.array(rows, float)
+            told += (p.x, p.y, p.z, q.w, q.i, q.j, q.k)
+        return told
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        bodies, rows = self.world.rigid_bodies, []
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        told: list[float] = []
+        bodies = self.world.rigid_bodies
         for handle, asked in zip(self.bodies, self.scene.bodies, strict=True):
             v, w = bodies[handle].linvel, bodies[handle].angvel
-            rows.append((v.x, v.y, v.z, w.x, w.y, w.z) if asked.motion != "fixed" else (0.0,) * 6)
-        return np.array(rows, float)
+            told += (v.x, v.y, v.z, w.x, w.y, w.z) if asked.motion != "fixed" else (0.0,) * 6
+        return told
 
-    def contacts(self) -> Contacts:
+    def copy_contacts(self) -> list[tuple[float, ...]]:
         """Up to four points per manifold, with their normal impulses; friction impulses are not available."""
-        rows: list[Row] = []
+        bodies, rows = self.world.rigid_bodies, []
         for pair in self.world.narrow_phase.contact_pairs():
             i, j = self.index[pair.collider1], self.index[pair.collider2]
             rough = self.materials.get((min(i, j), max(i, j)), (0.0, 0.0))[1] > 0.0
             for manifold in pair.manifolds:
-                n = manifold.data.normal
-                normal = np.array((n.x, n.y, n.z))
+                data = manifold.data
+                normal = (data.normal.x, data.normal.y, data.normal.z)
                 # A solver's point is relative to a body; in world axes each body has one, in its present pose.
-                bodies = self.world.rigid_bodies
                 places = {
-                    each.contact_id: manifold.data.solver_contact_world_points(each, bodies)
-                    for each in manifold.data.solver_contacts
+                    each.contact_id: data.solver_contact_world_points(each, bodies) for each in data.solver_contacts
                 }
                 for k, point in enumerate(manifold.points):
                     if k not in places:
                         continue
                     p, q = places[k]
                     middle = (0.5 * (p.x + q.x), 0.5 * (p.y + q.y), 0.5 * (p.z + q.z))
-                    rows.append((i, j, middle, normal, along_normal(point.impulse, normal, rough), point.dist))
-        return Contacts.by_pair(rows, 3)
+                    rows.append((i, j, *middle, *normal, *along_normal(point.impulse, normal, rough), point.dist))
+        return rows
 
     def readback(self) -> dict[str, Any]:
         """Values of the world, its bodies and colliders."""

@@ -8,13 +8,13 @@ from adapters.impulses import along_normal
 
 def test_a_smooth_contact_is_told_whole_by_its_part_along_the_normal():
     normal = np.array([0.6, 0.0, -0.8])
-    told = along_normal(2.5, normal, rough=False)
+    told = along_normal(2.5, normal.tolist(), rough=False)
     assert told == pytest.approx([1.5, 0.0, -2.0])
     assert told @ normal == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_of_a_rough_one_only_what_lies_along_an_axis_is_known(side):
-    told = along_normal(2.5, np.array([0.0, side, 1e-6]), rough=True)
-    assert told[1] == pytest.approx(2.5 * side) and np.isnan(told[[0, 2]]).all()
-    assert np.isnan(along_normal(2.5, np.array([0.6, 0.0, -0.8]), rough=True)).all()
+    told = along_normal(2.5, [0.0, side, 1e-6], rough=True)
+    assert told[1] == pytest.approx(2.5 * side) and np.isnan(told[::2]).all()
+    assert np.isnan(along_normal(2.5, [0.6, 0.0, -0.8], rough=True)).all()
