@@ -259,12 +259,16 @@ def _hash_of(folders: Iterable[Path]) -> str:
     return digest.hexdigest()[:16]
 
 
+#: What a damaged file raises: a ValueError if not even the message is text.
+_WRONG = (sqlite3.Error, ValueError)
+
+
 class Kept:
     """What is stored of judged runs; without a writable file it is made each time."""
 
     def __init__(self, folder: Path) -> None:
         self._db: sqlite3.Connection | None = None
-        with suppress(sqlite3.Error):
+        with suppress(*_WRONG):
             self._db = sqlite3.connect(folder / FILE, timeout=10.0)
             table = "kept (name TEXT, what TEXT, code TEXT, body, PRIMARY KEY (name, what))"
             self._db.execute(f"CREATE TABLE IF NOT EXISTS {table}")
@@ -281,7 +285,7 @@ class Kept:
     def read(self, name: str, what: str, code: str, read: Callable[[Any], T]) -> T | None:
         """What is stored under these names, if it is of the same code."""
         if self._db is not None:
-            with suppress(sqlite3.Error, zlib.error, ValueError, KeyError, TypeError, IndexError):
+            with suppress(*_WRONG, zlib.error, KeyError, TypeError, IndexError):
                 query = "SELECT body FROM kept WHERE name = ? AND what = ? AND code = ?"
                 found = self._db.execute(query, (name, what, code)).fetchone()
                 return read(found[0]) if found else None
@@ -290,13 +294,13 @@ class Kept:
     def write(self, name: str, what: str, code: str, body: str | bytes) -> None:
         """Store a text or bytes under these names."""
         if self._db is not None:
-            with suppress(sqlite3.Error), self._db:
+            with suppress(*_WRONG), self._db:
                 self._db.execute("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?)", (name, what, code, body))
 
     def forget(self, names: Iterable[str]) -> None:
         """Delete what is stored of deleted runs, and free the disk space."""
         if self._db is not None:
-            with suppress(sqlite3.Error):
+            with suppress(*_WRONG):
                 with self._db:
                     self._db.executemany("DELETE FROM kept WHERE name = ?", [(name,) for name in names])
                 self._db.execute("VACUUM")

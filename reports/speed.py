@@ -267,7 +267,7 @@ def busy(timings: pd.DataFrame) -> str:
 
 def quality_line(timings: pd.DataFrame) -> str:
     """Quality of the timings, in one line."""
-    used = timings[timings["void"] == ""]
+    used = timings[timings["void"] == ""] if len(timings) else timings
     if len(used) == 0:
         return "nothing was timed"
     return (

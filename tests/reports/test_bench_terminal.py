@@ -142,6 +142,7 @@ def test_the_quality_of_the_timings_is_one_line():
         "wall time / CPU time 1.25 (median)"
     )
     assert speed.quality_line(table[table["void"] != ""]) == "nothing was timed"
+    assert speed.quality_line(table.iloc[:0, :0]) == "nothing was timed", "a run that was ended before its first time"
 
 
 def test_costs_of_piles_hide_nothing_where_the_terminal_is_narrow():

@@ -165,3 +165,16 @@ def test_a_moved_start_mends_a_check_that_it_passes_and_none_that_it_misses_by_l
     moved = cell(replace(SLOT, ulp=3), ratio=row.truth + side * tolerances * row.tolerance)
     alone, both = (summarise(cells).cells[PANEL][SLOT.key()] for cells in ([cell()], [cell(), moved]))
     assert both[3] == alone[3] - mends
+
+
+def test_a_damaged_name_in_the_schema(tmp_path):
+    """SQLite's message is no text then; the file is as if it were not there."""
+    kept = brief.Kept(tmp_path)
+    kept.write("run", "what", "code", "body")
+    kept.close()
+    path = tmp_path / brief.FILE
+    path.write_bytes(path.read_bytes().replace(b"kept (name TEXT, what", b"kept (name TEXT, w\xd7at"))
+    kept = brief.Kept(tmp_path)
+    kept.write("run", "what", "code", "body")
+    kept.forget(["run"])
+    assert kept.read("run", "what", "code", str) is None

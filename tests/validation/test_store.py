@@ -105,6 +105,6 @@ def test_an_id_that_is_none(name):
     assert name[:3].strip() in str(error.value)
     row = ["20260101-000000", row[1], "abc\x07", '{"cpu": "x\\u0007"}', "ti\ntle", '["a"]', 1]
     sound = store_module.run_of(row)
-    machine = {"cpu": r"x\u{7}"}
+    machine = dict.fromkeys(("cores", "memory_gib", "system", "python"), "unknown") | {"cpu": r"x\u{7}"}
     assert sound == store_module.Run("20260101-000000", row[1], r"abc\u{7}", machine, "ti", ("a",), True)
     assert store_module.run_of([*row[:-1], 0]).finished is False

@@ -1,6 +1,7 @@
 """A store that is damaged, full, locked, read-only, of another version or crafted is one line, never a traceback."""
 
 import json
+import os
 import shutil
 import sqlite3
 import subprocess
@@ -197,6 +198,20 @@ def test_a_lock_that_lasts(tmp_path, monkeypatch):
         made.add(run, observed(SLOTS[0], reason="later"))
     assert len(said) == 1 and "later" in [each.reason for each in made.observations(run)]
     timer.join(), other.close()
+
+
+def test_a_pipe_in_place_of_the_file(tmp_path):
+    """Nothing waits for what comes out of it."""
+    os.mkfifo(tmp_path / FILE)
+    with pytest.raises(StoreError, match="is a pipe, not a file"):
+        Store(tmp_path, create=False)
+
+
+def test_a_machine_without_its_facts(tmp_path):
+    filled(tmp_path)
+    sql(tmp_path, 'UPDATE runs SET machine = \'{"cpu": "a"}\'')
+    told = Store(tmp_path, create=False).run().machine
+    assert told == {"cpu": "a"} | dict.fromkeys(("cores", "memory_gib", "system", "python"), "unknown")
 
 
 def test_a_file_cut_short_is_one_line(tmp_path):

@@ -55,6 +55,8 @@ _SCHEMA = (
     run TEXT NOT NULL REFERENCES runs(id), name TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (run, name))""",
 )
 _COLUMNS = "id, date, commit_hash, machine, title, plan, finished"
+#: Facts of a machine that pages name, for runs without them.
+_MACHINE = ("cpu", "cores", "memory_gib", "system", "python")
 _T = TypeVar("_T")
 #: A run's id names files and folders, so an id of another store must be checked.
 _ID = re.compile(r"[0-9A-Za-z][0-9A-Za-z_-]{0,63}")
@@ -108,6 +110,8 @@ class Store:
         self.lossy = False
         if not create and not self.path.exists():
             raise MissingError(f"out: there are no results at {self.path}; crosscheck run makes them")
+        if self.path.is_fifo():  # which would be waited for
+            raise StoreError(f"out: {self.path} is a pipe, not a file")
         with self._guarded("use"):
             if write:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -400,7 +404,8 @@ def run_of(row: Sequence[Any]) -> Run:
     }
     if wrong := [column for column, right in is_right.items() if not right]:
         raise ValueError(f"run {one_line(name, NAME)!r} is damaged ({', '.join(wrong)})")
-    return Run(name, one_line(date), one_line(made_at), plain(there), one_line(title), tuple(slots), bool(finished))
+    told = dict.fromkeys(_MACHINE, "unknown") | plain(there)
+    return Run(name, one_line(date), one_line(made_at), told, one_line(title), tuple(slots), bool(finished))
 
 
 def _parsed(text: Any) -> Any:
