@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from adapters.copied import Copied
 from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 from adapters.dart.translation import frictions, restitutions
-from adapters.engine import Array, Contacts, Row, Simulation
+from adapters.engine import Array
 from adapters.ground import reach
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
@@ -25,7 +26,7 @@ DETECTORS = {
 }
 
 
-class DartSimulation(Simulation):
+class DartSimulation(Copied):
     """One world; bodies in the scene's order, one skeleton each.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
@@ -129,33 +130,31 @@ class DartSimulation(Simulation):
                 node.setExtTorque(torque, False)
             step()
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`; a half-space's own pose is the origin."""
-        rows = []
+    def copy_pose(self) -> list[float]:
+        """Position and quaternion of each body; a half-space's own pose is the origin."""
+        told: list[float] = []
         for node, asked in zip(self.nodes, self.scene.bodies, strict=True):
-            if asked.motion != "free":
-                rows.append(asked.pose)
-                continue
-            place = node.getTransform()
-            q = place.quaternion()
-            rows.append((*place.translation(), q.w(), q.x(), q.y(), q.z()))
-        return np.array(rows, float)
+            if asked.motion == "free":
+                place = node.getTransform()
+                q = place.quaternion()
+                told += (*place.translation(), q.w(), q.x(), q.y(), q.z())
+            else:
+                told += asked.pose
+        return told
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        return np.array([(*node.getLinearVelocity(), *node.getAngularVelocity()) for node in self.nodes], float)
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        return [x for node in self.nodes for v in (node.getLinearVelocity(), node.getAngularVelocity()) for x in v]
 
-    def contacts(self) -> Contacts:
+    def copy_contacts(self) -> list[tuple[float, ...]]:
         """Contacts of the last step; the force is on the first body, along a normal that points to it."""
-        rows: list[Row] = []
+        rows: list[tuple[float, ...]] = []
         for contact in self.world.getLastCollisionResult().getContacts():
-            first, second = (
-                self.index[one.getShapeFrame().getBodyNode().getName()]
-                for one in (contact.collisionObject1, contact.collisionObject2)
-            )
+            frames = contact.collisionObject1.getShapeFrame(), contact.collisionObject2.getShapeFrame()
+            first, second = (self.index[frame.getBodyNode().getName()] for frame in frames)
             impulse = np.multiply(self.dt, contact.force)
-            rows.append((second, first, contact.point, contact.normal, impulse, -contact.penetrationDepth))
-        return Contacts.by_pair(rows, 3)
+            rows.append((second, first, *contact.point, *contact.normal, *impulse, -contact.penetrationDepth))
+        return rows
 
     def readback(self) -> dict[str, Any]:
         """Values of the world and its bodies."""
