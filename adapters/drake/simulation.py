@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from adapters.copied import Copied
 from adapters.drake.profiles import APPROXIMATIONS, OWN
 from adapters.drake.translation import frictions, pair_of
-from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.engine import EngineError
 from adapters.readback import free_parts
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, Sphere
 
 
-class DrakeSimulation(Simulation):
+class DrakeSimulation(Copied):
     """One plant and its simulator; bodies in the scene's order, fixed ones belong to the world.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
@@ -122,46 +123,38 @@ class DrakeSimulation(Simulation):
             self.steps += 1
             self.simulator.AdvanceTo(self.steps * self.dt)
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`."""
-        rows = []
+    def copy_pose(self) -> list[float]:
+        """Position and quaternion of each body."""
+        told: list[float] = []
         for body, asked in zip(self.bodies, self.scene.bodies, strict=True):
             if asked.motion != "free":
-                rows.append(asked.pose)
+                told += asked.pose
                 continue
             place = self.plant.EvalBodyPoseInWorld(self.context, body)
-            rows.append((*place.translation(), *place.rotation().ToQuaternion().wxyz()))
-        return np.array(rows, float)
+            told += (*place.translation(), *place.rotation().ToQuaternion().wxyz())
+        return told
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`."""
-        rows = []
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body."""
+        told: list[float] = []
         for body in self.bodies:
             velocity = self.plant.EvalBodySpatialVelocityInWorld(self.context, body)
-            rows.append((*velocity.translational(), *velocity.rotational()))
-        return np.array(rows, float)
+            told += (*velocity.translational(), *velocity.rotational())
+        return told
 
-    def contacts(self) -> Contacts:
+    def copy_contacts(self) -> list[tuple[float, ...]]:
         """Contacts of the last step: of a pair with a ball its point, of others the centroid of their surface."""
+        rows: list[tuple[float, ...]] = []
         if self.steps == 0:
-            return Contacts.from_rows([], 3)
+            return rows
         found = self.plant.get_contact_results_output_port().Eval(self.context)
-        rows: list[Row] = []
         for k in range(found.num_point_pair_contacts()):
             info = found.point_pair_contact_info(k)
             pair = info.point_pair()
+            first, second = self.owner[pair.id_A], self.owner[pair.id_B]
             # The normal points from B to A, and the force is on B.
             impulse = np.multiply(self.dt, info.contact_force())
-            rows.append(
-                (
-                    self.owner[pair.id_A],
-                    self.owner[pair.id_B],
-                    info.contact_point(),
-                    -pair.nhat_BA_W,
-                    impulse,
-                    -pair.depth,
-                )
-            )
+            rows.append((first, second, *info.contact_point(), *-pair.nhat_BA_W, *impulse, -pair.depth))
         for k in range(found.num_hydroelastic_contacts()):
             info = found.hydroelastic_contact_info(k)
             surface = info.contact_surface()
@@ -171,8 +164,8 @@ class DrakeSimulation(Simulation):
             normal = np.sum([surface.area(f) * surface.face_normal(f) for f in range(surface.num_faces())], axis=0)
             normal = normal / np.linalg.norm(normal)
             impulse = np.multiply(self.dt, force.translational())
-            rows.append((second, first, surface.centroid(), normal, impulse, np.nan))
-        return Contacts.by_pair(rows, 3)
+            rows.append((second, first, *surface.centroid(), *normal, *impulse, np.nan))
+        return rows
 
     def readback(self) -> dict[str, Any]:
         """Values of the plant, its bodies and their shapes."""
