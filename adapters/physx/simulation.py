@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from adapters.copied import Copied
 from adapters.drives import place_after, velocity_over
-from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.engine import EngineError
 from adapters.impulses import along_normal
 from adapters.means import mean, means
 from adapters.physx.translation import turn_to, turned
@@ -32,7 +33,7 @@ def imported() -> ModuleType:
     return sapien
 
 
-class PhysxSimulation(Simulation):
+class PhysxSimulation(Copied):
     """One CPU world; bodies in the scene's order, one entity each.
 
     ``module`` is the engine's module, or a recorder of its calls (`adapters.recording`).
@@ -138,37 +139,35 @@ class PhysxSimulation(Simulation):
             list(place), list(turned(body.pose[3:], body.twist[3:], time))
         )
 
-    def pose(self) -> Array:
-        """See `Simulation.pose`; a half-space's own pose is the origin."""
-        rows = []
+    def copy_pose(self) -> list[float]:
+        """Position and quaternion of each body; a half-space's own pose is the origin."""
+        told: list[float] = []
         for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
             held = part.entity.pose
-            rows.append(asked.pose if isinstance(asked.shape, HalfSpace) else (*held.p, *held.q))
-        return np.array(rows, float)
+            told += asked.pose if isinstance(asked.shape, HalfSpace) else (*held.p.tolist(), *held.q.tolist())
+        return told
 
-    def twist(self) -> Array:
-        """See `Simulation.twist`; that of a prescribed body is available after its first step."""
-        rows: list[tuple[float, ...]] = []
+    def copy_twist(self) -> list[float]:
+        """Velocity and angular velocity of each body; those of a prescribed one are known after its first step."""
+        told: list[float] = []
         for part, asked in zip(self.bodies, self.scene.bodies, strict=True):
-            if asked.motion == "fixed":
-                rows.append((0.0,) * 6)
-            elif asked.motion == "prescribed" and self.steps == 0:
-                rows.append((*velocity_over(asked, self.dt, 0), *asked.twist[3:]))
+            if asked.motion == "fixed" or (asked.motion == "prescribed" and self.steps == 0):
+                told += (*velocity_over(asked, self.dt, 0), *asked.twist[3:])
             else:
-                rows.append((*part.linear_velocity, *part.angular_velocity))
-        return np.array(rows, float)
+                told += (*part.linear_velocity.tolist(), *part.angular_velocity.tolist())
+        return told
 
-    def contacts(self) -> Contacts:
+    def copy_contacts(self) -> list[tuple[float, ...]]:
         """Points with normal impulses on the first body, along a normal that points to it; without friction."""
-        rows: list[Row] = []
+        rows: list[tuple[float, ...]] = []
         for contact in self.system.get_contacts():
             first, second = (self.index[part.entity.name] for part in contact.bodies)
             rough = self.materials.get((min(first, second), max(first, second)), (0.0, 0.0))[1] > 0.0
             for point in contact.points:
-                normal = point.normal.astype(float)
+                normal = point.normal.tolist()
                 impulse = along_normal(float(point.impulse @ point.normal), normal, rough)
-                rows.append((second, first, point.position, normal, impulse, float(point.separation)))
-        return Contacts.by_pair(rows, 3)
+                rows.append((second, first, *point.position.tolist(), *normal, *impulse, point.separation))
+        return rows
 
     def readback(self) -> dict[str, Any]:
         """Values of the world, its bodies and their materials; the typical size cannot be read."""
