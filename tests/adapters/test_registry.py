@@ -92,7 +92,7 @@ def test_our_engines_come_first_and_others_by_name(plugins: None) -> None:
     assert names == sorted(names) and len(names) == 12  # an engine of others under a name of ours is none of ours
 
 
-def test_entry_points_of_installed_packages_are_read_once_a_process(plugins: None, monkeypatch) -> None:
+def test_entry_points_read_twice(plugins: None, monkeypatch) -> None:
     calls, read = [], registry.entry_points
     monkeypatch.setattr(registry, "entry_points", lambda: calls.append("read") or read())
     catalogue.forget()

@@ -16,7 +16,7 @@ def spend(monkeypatch):
     stages.end()
 
 
-def test_time_counts_for_the_innermost_stage_and_for_the_outer_one_where_that_is_whole(spend):
+def test_times_of_nested_stages(spend):
     stages.begin(7.0)
     spend(1.0)
     for whole in (False, True):

@@ -317,7 +317,7 @@ def test_no_row_of_balls_is_certified_and_wrong(d, seeds):
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_of_a_series_that_round_off_decides_only_the_beginning_is_asked(known, monkeypatch):
+def test_order_in_a_series_of_impacts(known, monkeypatch):
     """Three pairs meet at once, again and again, in more than a hundred impacts, whether or not the solver says so."""
     asked, differs = [], order._differs
     monkeypatch.setattr(order, "_differs", lambda *how: asked.append(how) or differs(*how))

@@ -160,7 +160,7 @@ def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_pat
     store.close()
 
 
-def test_a_run_for_a_benchmark_leaves_it_no_case_and_judges_none_of_its_cases(tmp_path, asked):
+def test_run_beside_its_benchmark(tmp_path, asked):
     pytest.importorskip("pymunk")
     words = ["slide", "--engine", "chipmunk", "--profile", "tuned", "--dim", "2", "--quick", "--out", tmp_path]
     assert call("run", *words, "--for-bench").exit_code == 0

@@ -98,7 +98,7 @@ def test_lists_of_a_row_are_text_and_numbers_are_numbers_even_where_none_is_know
     assert json.loads(table["params"].iloc[0])["v"] == 2.0
 
 
-def test_files_are_written_into_a_folder_that_is_made_and_without_an_index(tmp_path, monkeypatch):
+def test_csv_into_a_new_folder(tmp_path, monkeypatch):
     class Kept:
         def observations(self, run):
             return {RUN.id: [TOLD, LOST], EARLIER.id: [LOST]}[run.id]

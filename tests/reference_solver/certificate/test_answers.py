@@ -196,7 +196,7 @@ def test_a_ball_between_three_walls(motion):
         assert (searched(funnel(friction, -1.0, **motion)).begin == 0.0) is two
 
 
-def test_shares_of_redundant_contacts_are_not_searched_where_the_answer_is_found(monkeypatch):
+def test_redundant_contacts_of_a_known_answer(monkeypatch):
     """A box at rest: its four corners stick, and the record has shares with which they do."""
     module, asked = import_module(Answers.__module__), []
     monkeypatch.setattr(module, "_of_redundant", lambda *how: asked.append(how) or np.zeros((0, 4, 3)))

@@ -68,7 +68,7 @@ def beside_the_axis(offset, dimension, way):
 
 @pytest.mark.parametrize("way", [0.02, 0.5])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_is_struck_at_once_within_round_off_ends_the_horizon(dimension, way):
+def test_horizon_at_blows_within_round_off(dimension, way):
     for offset in (0.0, 1e-15, 1e-14, 1e-13, 1e-10):
         model = beside_the_axis(offset, dimension, way)
         found = certify(model, Settings.reference(DT), round((way + 0.1) / DT))

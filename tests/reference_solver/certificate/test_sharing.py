@@ -164,7 +164,7 @@ def test_redundant_loads_of_one_motion_are_certified(name):
     assert found.error[-1] < 1e-9
 
 
-def test_shares_that_decide_whether_a_block_slips_are_two_answers():
+def test_two_answers_by_shares_of_load():
     model = plate_on_two_blocks()
     found = certify(model, Settings.reference(DT), 12)
     assert found.unique == "two motions obey the laws from 0 s: bodies 0 and 2 may slip, or stick"
