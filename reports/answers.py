@@ -23,8 +23,8 @@ from validation.posed import is_file, resolve
 Plain = Mapping[str, Any]
 #: (scene, dimension, engine, profile) -> cost [s of CPU per simulated s] of the cheapest step that passes.
 Costs = Mapping[tuple[str, int, str, str], float]
-#: Among kinds of metric with nearly as many failures as the worst, the scene's first one is shown.
-CLEAR = 0.8
+#: Errors within one order of magnitude of the largest, in tolerances, are as large: the scene's first check is shown.
+NEAR = 10.0
 #: Values count as equal below this share of the truth's range.
 SAME = 0.05
 
@@ -224,18 +224,15 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
-    """The error in words, by the kind of metric with most failures (among near equals, the scene's first)."""
+    """The error in words, by the first of the scene's kinds of metric with as large an error in tolerances as any."""
     lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
     kinds: dict[str, list[Plain]] = defaultdict(list)
     for row in failing:
         kinds[row["metric"].partition("[")[0]].append(row)
-    total: dict[str, int] = defaultdict(int)
-    for row in rows:
-        total[row["metric"].partition("[")[0]] += 1
-    share = {name: len(kinds[name]) / rows_of_it for name, rows_of_it in total.items()}
-    kind = next(name for name, part in share.items() if part >= CLEAR * max(share.values()))
+    worst = {name: max(map(severity, members)) for name, members in kinds.items()}
+    kind = next(name for name, error in worst.items() if NEAR * error >= max(worst.values()))
     members = [row for row in rows if row["metric"].partition("[")[0] == kind and row["value"] is not None]
     known_as = f"{kind}[1]"
     if any(row["metric"] == known_as for row in kinds[kind]):

@@ -1,6 +1,7 @@
 """What is judged in any scene: right motions pass whatever their speed, spin and length; each fault fails."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -356,10 +357,29 @@ def test_an_overlap_may_be_one_step_of_the_approach_that_led_to_it_and_what_a_sc
 
 
 def test_the_longest_step_since_an_overlap_began_counts_and_none_before():
-    granted = invariants._granted(np.array([0.0, 0.1, 0.1, 0.0, 0.1]), np.array([1.0, 2.0, 1.5, 0.25, 0.125]))
+    granted = invariants._granted(np.array([0.0, 0.1, 0.1, 0.0, 0.1]), np.array([1.0, 2.0, 1.5, 0.25, 0.125]), 0.0)
     assert granted.tolist() == [0.0, 2.0, 2.0, 0.0, 0.25]
-    granted = invariants._granted(np.array([0.5, 0.1, 0.1, 0.0, 0.1]), np.array([0.5, 2.0, 1.5, 0.25, 0.125]))
+    granted = invariants._granted(np.array([0.5, 0.1, 0.1, 0.0, 0.1]), np.array([0.5, 2.0, 1.5, 0.25, 0.125]), 0.0)
     assert granted.tolist() == [1.0, 2.5, 2.5, 0.0, 0.25]
+
+
+@pytest.mark.parametrize(("speed", "ends"), [(0.0, True), (1e-3, True), (2e-3, False)])
+def test_the_overlap_of_an_approach_ends_when_the_body_rests(speed, ends):
+    """A fall of 0.01 m in a step: at rest for 5 steps the load would have moved it by 0.125 m, more than the depth."""
+    step = np.array([0.2, *(speed * 0.01,) * 9])
+    granted = invariants._granted(np.array([0.0, *(0.1,) * 9]), step, 0.01)
+    assert granted[:5].tolist() == [0.0, *(0.2,) * 4]
+    assert granted[5:].tolist() == [speed * 0.01 if ends else 0.2] * 5
+
+
+def test_a_ball_that_rests_in_the_floor_after_a_blow_overlaps_it():
+    """Found a step late it may be 0.02 m deep; there it stays."""
+    scene = over_floor(ball())
+    blow = resting(scene, [-0.1, *(0.02,) * 200], speed=0.0)
+    twist = np.array(blow.twist)
+    twist[:2, 1, 1] = -0.02 / STEP
+    (beyond, _), (depth, _) = invariants.deepest(scene, replace(blow, twist=twist))
+    assert beyond == depth == pytest.approx(0.02)
 
 
 def test_an_approach_is_along_a_face_s_normal_or_of_both_centres_with_the_spin_of_boxes():

@@ -438,5 +438,12 @@ def test_a_force_that_an_engine_does_not_tell_is_no_failure_of_a_file(tmp_path):
         told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, why)})[OWN_CHECK]
         assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)
         assert told.reason == why
+    slot = Slot("bounce", (("e", 1.0),), 3, "newton", "default", 1 / 240)
+    told = {row.metric: row for row in rows_of("run", [Observation(slot, "c", 1, "9", Outcome.OK, metrics={
+        "force_in_flight": (None, UNTOLD[0]), "apex[1]": (None, "there is no apex")
+    })])}  # fmt: skip
+    silent, lost = told["force_in_flight"], told["apex[1]"]
+    assert (silent.outcome, silent.standing, silent.alarming) == ("unsupported", None, False)
+    assert lost.alarming
     lost = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, "the value is inf, not a finite number")})[OWN_CHECK]
     assert lost.alarming and lost.outcome == "ok"

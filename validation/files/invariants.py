@@ -26,6 +26,8 @@ from validation import metrics
 from validation.bounds import ROUND_OFF
 from validation.canonical import Check, Measured
 
+#: A pair rests at this share of the speed of a fall of one step: at 1/240 s it is pushed out by 1 mm in 25 s.
+RESTS = 1e-3
 #: Metrics that are judged even if the lawful motion is not unique.
 LAWS = ("energy_growth", "penetration", "deepest_overlap")
 
@@ -171,28 +173,33 @@ def deepest(scene: Scene, trajectory: Trajectory, overlaps: Overlaps | None = No
 
     ``overlaps`` are measured here if not given.
     """
-    beyond, depth = 0.0, 0.0
+    beyond, depth, fall = 0.0, 0.0, overlap_bound(scene, trajectory.dt)
     for (i, j), overlap in (metrics.overlaps(scene, trajectory) if overlaps is None else overlaps).items():
         depth = metrics.largest([depth, overlap.max()])
-        granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j))
+        granted = _granted(overlap, trajectory.dt * approach(scene, trajectory, i, j), fall)
         beyond = metrics.largest([beyond, (overlap - granted).max()])
     return (beyond, ""), (depth, "")
 
 
-def _granted(overlap: Array, step: Array) -> Array:
+def _granted(overlap: Array, step: Array, fall: float) -> Array:
     """Allowed depth of each sample of an overlap, (s,) [m]: the longest step since the sample before it began.
 
-    An overlap at the start is allowed.
+    An overlap at the start is allowed. What an approach allows ends when the pair rests: when it closes or parts by no
+    more than the share `RESTS` of the loads' ``fall`` in a step, a dt^2, for n steps in which they would have moved it
+    by the depth, n^2 a dt^2/2. A blow turns round in fewer steps, as its force is far above the loads.
     """
     granted = np.zeros(len(overlap))
     longest = start = 0.0
+    still = 0
     for k in range(len(overlap)):
+        still = still + 1 if step[k] <= RESTS * fall else 0
         if overlap[k] <= 0.0:
-            longest, start = float(step[k]), 0.0
+            longest, start, still = float(step[k]), 0.0, 0
             continue
         if k == 0:
             start = float(overlap[0])
-        longest = max(longest, float(step[k]))
+        rests = still > 0 and still * still * fall >= 2.0 * overlap[k]
+        longest = float(step[k]) if rests else max(longest, float(step[k]))
         granted[k] = start + longest
     return granted
 

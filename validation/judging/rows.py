@@ -224,9 +224,8 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
     doubt = _doubt(observation, check)
     if doubt:
         observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
-    if value is None and why in UNTOLD and observation.outcome is Outcome.OK and is_file(observation.slot.scene):
-        # A value that an engine does not report is no failure of its motion; for catalogue scenes such engines are
-        # listed.
+    if value is None and why in UNTOLD and observation.outcome is Outcome.OK and not _is_found(observation, check):
+        # A value that an engine does not report is no failure of its motion, unless it once reported it.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = Verdict(None, None, left_open) if left_open else _verdict(observation, scene, check, value, why, ready)
     reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
@@ -250,7 +249,8 @@ def _verdict(
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
-    if outcome is Outcome.UNSUPPORTED and findings is not None and not is_file(slot.scene) and not slot.is_own:
+    refused = outcome is Outcome.UNSUPPORTED and observation.reason not in UNTOLD
+    if refused and findings is not None and not is_file(slot.scene) and not slot.is_own:
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
@@ -270,6 +270,11 @@ def _known(observation: Observation, slot: Slot, check: Check) -> Known:
     if why_not:
         return Known(None, False, why_not)
     return known_of(slot, check.metric, observation.engine_version, findings)
+
+
+def _is_found(observation: Observation, check: Check) -> bool:
+    """Whether a check of a catalogue scene is listed, with a value or without."""
+    return not is_file(observation.slot.scene) and _known(observation, observation.slot, check).finding is not None
 
 
 def _not_as_asked(observation: Observation) -> list[str]:
