@@ -52,7 +52,7 @@ def measure(scene: Scene, trajectory: Trajectory, layers: Layers = ()) -> dict[s
         measured[f"interface_impulse[{i}]"] = mean
         scatter.append(deviation)
     known = [deviation for deviation in scatter if deviation is not None]
-    none = (None, "impulses are not available")  # those of one interface are enough, as it may be the one that shakes
+    none = (None, metrics.UNAVAILABLE)  # those of one interface are enough, as it may be the one that shakes
     measured["impulse_scatter"] = (metrics.largest(known), "") if known and len(known) == len(scatter) else none
     return measured
 
