@@ -10,6 +10,7 @@ from planted import carried, still
 from adapters.scene import Box, Disc, Sphere
 from adapters.trajectory import Sampling, Trajectory
 from validation.catalogue import CATALOGUE
+from validation.metrics import UNAVAILABLE
 from validation.truths import columns
 
 DT, G = 1 / 64, 8.0  # powers of two: sums and quotients below are exact
@@ -62,7 +63,7 @@ def test_loads_that_were_not_recorded_are_missing_with_their_reasons():
     scene = column()
     measured = columns.measure(scene, resting(scene))
     assert measured["interface_impulse[1]"] == (None, "contacts were not recorded")
-    assert measured["impulse_scatter"] == (None, "impulses are not available")
+    assert measured["impulse_scatter"] == (None, UNAVAILABLE)
 
 
 def test_an_interface_without_impulses_leaves_the_scatter_of_all_unknown():
@@ -71,7 +72,7 @@ def test_an_interface_without_impulses_leaves_the_scatter_of_all_unknown():
     measured = columns.measure(scene, resting(scene, [1.0, math.nan, 1.0]))
     assert measured["interface_impulse[1]"] == measured["interface_impulse[3]"] == (1.0, "")
     assert measured["interface_impulse[2]"][0] is None
-    assert measured["impulse_scatter"] == (None, "impulses are not available")
+    assert measured["impulse_scatter"] == (None, UNAVAILABLE)
 
 
 def test_energy_is_the_mean_of_the_last_second_and_rest_begins_after_the_last_motion():
