@@ -24,6 +24,7 @@ from validation.workers.limits import LimitError
 
 #: Runs tests of planted files, which must fail (`test_conftest.py`).
 pytest_plugins = ("pytester",)
+gc.disable()  # until all is collected
 #: Whether all tests run (`make test-all`), or what `make test` has time for.
 ALL = bool(os.environ.get("CROSSCHECK_ALL"))
 # Hypothesis fails an example that takes 200 ms: on a busy machine that says nothing of the code.
@@ -77,6 +78,12 @@ def pytest_runtest_setup(item):
 def bullet():
     """A test that needs Bullet is skipped where it is not installed."""
     pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
+
+
+def pytest_collection_finish():
+    """Collecting makes millions of objects that stay: searching them for garbage took half of its time."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="module", autouse=True)

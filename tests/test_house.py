@@ -1,6 +1,7 @@
 """The house: four packages in one line, no engine imported by importing them, no stray rooms."""
 
 import ast
+import gc
 import io
 import re
 import subprocess
@@ -28,27 +29,45 @@ SOLVER = registry.solver()
 COMMON = {*sys.stdlib_module_names, "numpy", "packaging", "scipy", *LINE}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _no_garbage():
+    """Trees of all files are kept meanwhile; searching them for garbage takes four times as long as parsing."""
+    gc.disable()
+    yield
+    for kept in (parsed, nodes, all_tests):
+        kept.cache_clear()
+    gc.enable()
+
+
 @cache
 def parsed(path):
-    """Syntax tree of a file, which many of these tests look at."""
+    """Syntax tree of a file."""
     return ast.parse(path.read_text())
 
 
+@cache
+def nodes(path):
+    """All nodes of a file, which many of these tests look at; finding them takes longer than parsing."""
+    return [*ast.walk(parsed(path))]
+
+
 def imported(path):
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield node.module.split(".")[0]
 
 
-ENGINES = sorted(
-    {name for folder in FOLDERS.values() for path in folder.rglob("*.py") for name in imported(path)} - COMMON
-)
+@cache
+def engines():
+    """Packages of engines, which nothing but the folder of an engine imports."""
+    folders = FOLDERS.values()
+    return {name for folder in folders for path in folder.rglob("*.py") for name in imported(path)} - COMMON
 
 
 def test_the_folders_import_the_engines_that_are_known_to_be_there():
-    assert {"pymunk", "pybullet", "mujoco"} <= set(ENGINES)
+    assert {"pymunk", "pybullet", "mujoco"} <= engines()
 
 
 @pytest.mark.parametrize("package", LINE)
@@ -80,7 +99,7 @@ def test_only_the_command_that_prints_them_imports_the_solver_s_tests():
 
 def named(path):
     """Modules that a file imports, by their whole names; of ``from a import b`` both a and a.b."""
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -119,7 +138,7 @@ def test_only_an_engine_s_own_folder_imports_it():
     for package in LINE:
         for path in (ROOT / package).rglob("*.py"):
             if not set(path.parents) & set(FOLDERS.values()):
-                assert not set(ENGINES) & set(imported(path)), path
+                assert not engines() & set(imported(path)), path
 
 
 @pytest.mark.parametrize("engine", FOLDERS)
@@ -227,7 +246,7 @@ def scenes_named(path, names):
     text = path.read_text()
     if path.suffix != ".py":
         return {word for word in re.findall(r"""["'`](\w+)["'`]""", text) if word in names}
-    found = {node.value for node in ast.walk(parsed(path)) if isinstance(node, ast.Constant)}
+    found = {node.value for node in nodes(path) if isinstance(node, ast.Constant)}
     return {value for value in found if isinstance(value, str) and value in names}
 
 
@@ -257,14 +276,13 @@ def searched_group(name):
 
 
 def whole_imports(path):
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom):
             yield node.module
 
 
-@pytest.mark.parametrize("module", ["adapters", "validation.judging.rows", "reports.command"])
-def test_importing_the_vocabulary_imports_no_engine_and_no_compiler(module):
-    code = f"import sys, {module}; print(*(set({[*ENGINES, 'numba']!r}) & set(sys.modules)))"
+def test_importing_the_vocabulary_imports_no_engine_and_no_compiler():
+    code = f"import sys, adapters, validation.judging.rows, reports.command; print(*(set({[*sorted(engines()), 'numba']!r}) & set(sys.modules)))"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.split() == []
 
@@ -277,7 +295,7 @@ def test_no_utils_and_no_packages_among_the_tests():
 def solver_functions():
     """Every function of the solver with the file it stands in."""
     for path in sorted((ROOT / "reference_solver").rglob("*.py")):
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if isinstance(node, ast.FunctionDef):
                 yield path.relative_to(ROOT / "reference_solver"), node
 
@@ -389,7 +407,7 @@ def test_what_is_measured_is_not_compared_by_a_max_that_passes_over_no_numbers()
     """Python's max(0.0, nan) is 0.0, which passes: `validation.metrics.largest` is NaN, which has no value."""
     found = []
     for path in sorted((ROOT / "validation").rglob("*.py")):
-        for function in (node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef)):
+        for function in (node for node in nodes(path) if isinstance(node, ast.FunctionDef)):
             given = [ast.unparse(each.annotation) for each in function.args.args if each.annotation]
             if any("Trajectory" in each or "Measured" in each for each in given):
                 named = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
@@ -433,7 +451,8 @@ def all_tests():
 
 def _all_tests():
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
-        for node in ast.walk(parsed(path)):
+        classes = [node for node in parsed(path).body if isinstance(node, ast.ClassDef)]
+        for node in (each for part in (parsed(path), *classes) for each in part.body):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 yield f"{path.relative_to(ROOT)}::{node.name}", node
 

@@ -12,7 +12,7 @@ import pytest
 from adapters import registry
 from validation import identity
 from validation.records.store import Store
-from validation.releases import choosing
+from validation.releases import choosing, environments
 
 HERE = Path(__file__).parent
 #: The engine itself; what a release does differently replaces the lines of `CHANGES`.
@@ -57,15 +57,16 @@ def released(tmp_path_factory):
     return made
 
 
+#: Parts of numpy's distribution that are not installed: what nothing here imports would be compiled for each release.
+LEFT_OUT = {"__pycache__", "..", "tests", "distutils", "f2py", "polynomial", "testing"}
+
+
 @pytest.fixture(scope="session")
 def wheels(released):
-    """All releases of `toyphysics`, and the numpy that is installed here."""
+    """All releases of `toyphysics`, and what they need of the numpy that is installed here."""
     numpy = distribution("numpy")
-    kept = [
-        f for f in numpy.files if "dist-info" not in str(f) and "tests" not in f.parts and not str(f).startswith("..")
-    ]
-    files = {str(f): f.locate().read_bytes() for f in kept if "__pycache__" not in f.parts}
-    return released(numpy.version, files)
+    kept = [f for f in numpy.files if "dist-info" not in str(f) and not LEFT_OUT & set(f.parts)]
+    return released(numpy.version, {str(f): f.locate().read_bytes() for f in kept})
 
 
 @pytest.fixture(scope="session")
@@ -95,6 +96,20 @@ def own_cache(local, tmp_path, monkeypatch):
     """A cache folder of this test alone, for those that damage or count."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture
+def copied(own_cache, shared_cache, monkeypatch):
+    """`copied(release)`: an environment in the cache folder of this test; the shared one that it copies is built once."""
+
+    def made(release):
+        with monkeypatch.context() as shared:
+            shared.setenv("XDG_CACHE_HOME", str(shared_cache))
+            first = environments.build(release).path
+        shutil.copytree(first, environments.folder() / first.name, symlinks=True)
+        return environments.existing(release)
+
+    return made
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from adapters import registry
 from reports.command import main
 from validation.releases import environments
+from validation.releases.choosing import chosen
 
 CELL = ["--dim", "2", "--param", "e=0.5", "--param", "v=10", "--jobs", "1"]
 
@@ -87,11 +88,10 @@ def test_compare_names_the_releases_that_there_are(call):
     assert "has no release toy==9; it has 1.0.0" in done.output
 
 
-def test_environments_are_listed_checked_and_removed(call, own_cache):
-    call("releases", "toy", "1.0.0", "impact", *CELL)
+def test_environments_are_listed_checked_and_removed(call, copied):
+    made = copied(chosen("toy", "1.0.0")[0])
     (row,) = json.loads(call("releases", "--environments", "--json").stdout)
     assert row["packages"]["toyphysics"] == "1.0.0" and row["wrong"] == "" and row["bytes"] > 1e6
-    (made,) = environments.found()
     next(made.path.glob("lib/python*/site-packages/toyphysics.py")).write_text("")
     assert "have changed since it was installed" in call("releases", "--environments", status=1).stdout
     assert "there is no environment" in call("releases", "--remove", "another", status=2).output

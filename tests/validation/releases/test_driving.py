@@ -167,8 +167,8 @@ drive(Store(Path(sys.argv[1])), chosen("toy", "1.0.0")[0], slots, Effort(jobs=1)
 """
 
 
-def driven():
-    """Processes that run in an environment of the toy."""
+def driven(place):
+    """Processes that run in an environment."""
     found = []
     for pid in filter(str.isdigit, os.listdir("/proc")):
         try:
@@ -176,28 +176,28 @@ def driven():
             state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
         except OSError:
             continue
-        if "environments/toy-1.0.0" in command and state != "Z":
+        if str(place) in command and state != "Z":
             found.append(int(pid))
     return found
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_nothing_goes_on_in_an_environment_when_its_run_is_killed(toy, own_cache, tmp_path):
-    environments.build(release("1.0.0"))
+def test_nothing_goes_on_in_an_environment_when_its_run_is_killed(toy, copied, tmp_path):
+    place = copied(release("1.0.0")).path
     own = os.environ | {"TOY_SLEEP": "60"}
     command = [sys.executable, "-c", ASKER, str(tmp_path / "out")]
     process = subprocess.Popen(command, env=own, stderr=subprocess.PIPE)
     ends = time.monotonic() + 60.0
-    while not driven() and time.monotonic() < ends:
+    while not driven(place) and time.monotonic() < ends:
         time.sleep(0.05)
-    assert driven(), process.communicate()[1]
+    assert driven(place), process.communicate()[1]
     process.send_signal(signal.SIGKILL)
     process.communicate()
     # Its first step takes a minute: it must end because its parent has, not because it is done.
     ends = time.monotonic() + 15.0
-    while driven() and time.monotonic() < ends:
+    while driven(place) and time.monotonic() < ends:
         time.sleep(0.1)
-    left = driven()
+    left = driven(place)
     for pid in left:
         os.kill(pid, signal.SIGKILL)
     assert not left

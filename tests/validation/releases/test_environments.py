@@ -24,8 +24,19 @@ def wheels(released):
     return released("1.0", {"numpy.py": ""})
 
 
-def test_an_environment_holds_the_release_and_numpy_and_a_receipt_says_so(own_cache):
-    made = environments.build(toy_release())
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory):
+    """Other files share environments that have a whole numpy."""
+    return tmp_path_factory.mktemp("environments")
+
+
+@pytest.fixture
+def made(copied):
+    """An environment that a test may damage."""
+    return copied(toy_release())
+
+
+def test_an_environment_holds_the_release_and_numpy_and_a_receipt_says_so(made):
     assert set(made.receipt["packages"]) == {"toyphysics", "numpy"}
     assert made.receipt["packages"]["toyphysics"] == "1.0.0"
     assert made.receipt["python"] == ".".join(map(str, sys.version_info[:3]))
@@ -35,21 +46,18 @@ def test_an_environment_holds_the_release_and_numpy_and_a_receipt_says_so(own_ca
     assert [each.name for each in environments.found()] == [made.name]
 
 
-def test_it_is_built_once(own_cache, monkeypatch):
-    first = environments.build(toy_release())
+def test_it_is_built_once(made, monkeypatch):
     monkeypatch.setattr(environments, "_install", lambda *args: pytest.fail("it was installed again"))
-    assert environments.build(toy_release()) == first
-    assert environments.existing(toy_release()) == first
+    assert environments.build(toy_release()) == made
+    assert environments.existing(toy_release()) == made
 
 
-def test_what_is_imported_there_does_not_change_it(own_cache):
-    made = environments.build(toy_release())
+def test_what_is_imported_there_does_not_change_it(made):
     subprocess.run([made.python, "-c", "import toyphysics"], check=True)
     assert environments.check(made) == ""
 
 
-def test_an_environment_that_was_changed_is_not_trusted_and_made_anew(own_cache):
-    made = environments.build(toy_release())
+def test_an_environment_that_was_changed_is_not_trusted_and_made_anew(made):
     (module,) = made.path.glob("lib/python*/site-packages/toyphysics.py")
     module.write_text(module.read_text() + "KEEPS = 0.5\n")
     assert "have changed since it was installed" in environments.check(made)
@@ -60,15 +68,13 @@ def test_an_environment_that_was_changed_is_not_trusted_and_made_anew(own_cache)
     assert "0.5" not in module.read_text()
 
 
-def test_a_file_that_was_added_is_noticed_as_well(own_cache):
-    made = environments.build(toy_release())
+def test_a_file_that_was_added_is_noticed_as_well(made):
     (site,) = made.path.glob("lib/python*/site-packages")
     (site / "sitecustomize.py").write_text("")
     assert environments.check(made)
 
 
-def test_an_environment_without_its_interpreter_is_noticed(own_cache):
-    made = environments.build(toy_release())
+def test_an_environment_without_its_interpreter_is_noticed(made):
     made.python.unlink()
     assert environments.check(made) == "its interpreter is gone"
 
@@ -90,8 +96,7 @@ def test_what_cannot_be_made_is_one_line(own_cache, monkeypatch):
         environments.build(toy_release())
 
 
-def test_removed_environments_are_gone(own_cache):
-    made = environments.build(toy_release())
+def test_removed_environments_are_gone(made):
     environments.remove(made)
     assert environments.found() == [] and not made.path.exists()
 
@@ -141,8 +146,7 @@ def test_a_kill_in_the_middle_of_an_installation_leaves_nothing_trusted(own_cach
     assert not list(environments.folder().glob(f"{environments.UNFINISHED}*"))
 
 
-def test_a_kill_between_receipt_and_name_leaves_nothing_trusted(own_cache):
-    made = environments.build(toy_release())
+def test_a_kill_between_receipt_and_name_leaves_nothing_trusted(made):
     made.path.rename(made.path.with_name(f"{environments.UNFINISHED}{made.name}-left"))
     assert environments.found() == []
 
@@ -164,8 +168,7 @@ def test_a_folder_of_that_name_without_a_receipt_is_replaced(own_cache):
     assert environments.check(environments.build(toy_release())) == ""
 
 
-def test_a_receipt_that_is_none_is_no_environment(own_cache):
-    made = environments.build(toy_release())
+def test_a_receipt_that_is_none_is_no_environment(made):
     (made.path / environments.RECEIPT).write_text("[1, 2")
     assert environments.found() == []
     (made.path / environments.RECEIPT).write_text(json.dumps([1]))
