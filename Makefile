@@ -46,7 +46,9 @@ run: $(USED)
 # has wheels for CPython 3.11 only.
 REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys; print(",bullet" * (sys.version_info < (3, 12)))' 2>/dev/null)
 
-# Kernels are compiled first, once per dimension: tests side by side would each compile the same.
+# Kernels are compiled first, once per dimension: tests side by side would each compile the same. Bytecode is kept,
+# whatever the environment says: each process that a test starts would compile our sources.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(STAMP)
 	$(BIN)/crosscheck compile --engine reference
 	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto --dist loadfile

@@ -33,6 +33,13 @@ settings.register_profile("all", deadline=None, max_examples=300)
 settings.load_profile("all" if ALL else "few")
 
 
+def pytest_addoption(parser):
+    """`PYTEST_ADDOPTS="--cpu 30" make test` prints the tables of docs/development/tests.md."""
+    parser.addoption(
+        "--cpu", type=int, metavar="N", help="tell the N tests that take most CPU, and what the rest takes"
+    )
+
+
 def pytest_configure(config):
     """Without its engines whole files are skipped: where they are required, that is a failure and not a skip."""
     config.addinivalue_line("markers", "long: takes seconds of CPU or more; `make test-all` runs it")
@@ -66,8 +73,38 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item in items if item not in out]
 
 
+#: CPU of this process and of those that it has waited for when a test began.
+BEGAN = pytest.StashKey[float]()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item):
+    """Each report has the CPU of its test so far; the last one, all of it."""
+    report = yield
+    report.cpu = sum(os.times()[:4]) - item.stash[BEGAN]
+    return report
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Tell what tests cost: a table of the dearest, and what nine in ten of them take."""
+    number = terminalreporter.config.option.cpu
+    if number is None:
+        return
+    reports = [report for reports in terminalreporter.stats.values() for report in reports]
+    ends = [report for report in reports if getattr(report, "when", "") == "teardown"]
+    costs = sorted(((report.cpu, report.nodeid.removeprefix("tests/")) for report in ends), reverse=True)
+    all_of_it, rest = (sum(cost for cost, _ in part) for part in (costs, costs[len(costs) // 10 :]))
+    lines = [f"| `{name}` | {cost:.1f} |" for cost, name in costs[:number]]
+    least = costs[len(costs) // 10][0]
+    lines += ["", f"Nine in ten of {len(costs)} tests take at most {least:.2f} s each, and together {rest:.0f} of "
+              f"{all_of_it:.0f} s; what is collected is not in it."]  # fmt: skip
+    terminalreporter.write("\n".join(["", "| test | CPU [s] |", "|---|---|", *lines, ""]))
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     """Skip a test of an optional engine that is not installed."""
+    item.stash[BEGAN] = sum(os.times()[:4])
     for mark in item.iter_markers("optional"):
         found = registry.find(*mark.args)
         if found.engine is None:

@@ -100,7 +100,7 @@ def own_cache(local, tmp_path, monkeypatch):
 
 @pytest.fixture
 def copied(own_cache, shared_cache, monkeypatch):
-    """`copied(release)`: an environment in the cache folder of this test; the shared one that it copies is built once."""
+    """`copied(release)`: an environment of this test alone, copied from the shared one, which is built once."""
 
     def made(release):
         with monkeypatch.context() as shared:

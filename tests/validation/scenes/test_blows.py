@@ -36,12 +36,20 @@ def spring_line(mass, radius, x, v, wall=None, stiffness=1e7, duration=1.0, step
             out[0] += stiffness * max(0.0, radius[0] - (x[0] - wall))
         return out
 
+    def flight():
+        """Whole steps until the next two touch."""
+        gaps = np.append(x[1:] - x[:-1] - radius[1:] - radius[:-1], np.inf if wall is None else x[0] - wall - radius[0])
+        closing = np.append(v[:-1] - v[1:], -v[0])
+        return min((gap / (h * speed) for gap, speed in zip(gaps, closing, strict=True) if speed > 0.0), default=np.inf)
+
     f = force(x)
-    for _ in range(steps):
+    while steps > 0:
+        ahead = 1 if f.any() else int(np.clip(flight(), 1, steps))
         v = v + 0.5 * h * f / mass
-        x = x + h * v
+        x = x + ahead * h * v
         f = force(x)
         v = v + 0.5 * h * f / mass
+        steps -= ahead
     return v
 
 
@@ -75,7 +83,6 @@ def failing(canonical, scene, trajectory):
 # ---- two balls ----
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize(("ratio", "v1", "v2"), [(1.0, 4.0, -2.0), (3.0, 4.0, -2.0), (0.1, 1.0, 0.0)])
 def test_two_balls_swap_what_springs_between_them_swap(ratio, v1, v2):
     _, scene, truth = made("head_on", ratio=ratio, e=1.0, v1=v1, v2=v2)
@@ -342,7 +349,6 @@ def test_one_pass_over_the_corners_fails(size):
 # ---- impacts one after the other ----
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
 def test_the_small_ball_is_thrown_as_springs_throw_it(ratio):
     _, scene, truth = made("stacked_balls", ratio=ratio, e=1.0)
@@ -435,7 +441,6 @@ def test_impacts_count_the_digits_of_pi(ratio, count):
     )
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0])
 def test_the_closed_form_is_what_springs_between_ball_ball_and_wall_make(ratio):
     _, scene, truth = made("galperin", ratio=ratio)
