@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import re
 import textwrap
 from collections.abc import Iterator
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +15,10 @@ import pandas as pd
 from adapters import registry
 from reports.cures import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
+from reports.symptoms.published import passed
 from reports.tables import unset_text
 from reports.wording import first_of, markdown, number, setting_text, word_of
 from validation.catalogue import CATALOGUE
-
-PUBLISHED = Path(__file__).parents[1] / "reports" / "published" / "report.html"
 
 
 def write(folder: Path) -> None:
@@ -123,32 +119,6 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
         },
     )
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
-
-
-class Links(HTMLParser):
-    """What a page offers to save: the address of each file by its name."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.files: dict[str, str] = {}
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """See `HTMLParser`."""
-        told = dict(attrs)
-        if tag == "a" and told.get("download"):
-            self.files[str(told["download"])] = str(told.get("href"))
-
-
-def passed() -> pd.DataFrame:
-    """Checks judged and failed of each scene, engine and profile in the published report."""
-    links = Links()
-    links.feed(PUBLISHED.read_text(encoding="utf-8"))
-    packed = links.files["rows.json.gz"].partition(",")[2]
-    rows = pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(packed))))
-    rows = rows[rows.iterations.isna() & rows.physics.isin(["pass", "fail"])]
-    rows["failed"] = rows.physics == "fail"
-    found = rows.groupby(["scene", "engine", "profile", "dimension"], sort=False)["failed"].agg(["size", "sum"])
-    return found.reset_index().rename(columns={"size": "judged", "sum": "failed"})
 
 
 def fixes(scene: str) -> list[dict[str, Any]]:

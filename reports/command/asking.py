@@ -1,34 +1,21 @@
-"""``ask``: from a symptom to the scene that shows it and to a fix; ``field``: public reports, run again."""
+"""``ask``: from a symptom to the scene that shows it, to who passes it, and to a fix. Imports nothing that is slow."""
 
 from __future__ import annotations
 
 import json
-import math
 import shlex
-import sys
-from collections.abc import Sequence
-from dataclasses import asdict
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import click
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
-from adapters import registry
-from reports.command import statuses
 from reports.command.group import AS_JSON, main
-from reports.command.selection import WORKERS
-from reports.cures import nothing_to_paste, recorded_fixes, recorded_paste, recorded_text
-from reports.terminal import terminal
-from reports.wording import number, reproduce
-from validation.field import CURED, Finding, ask, matching
-from validation.field.symptoms import matches, stems
-from validation.posed import resolve
-from validation.settings.cures import Cure, cures_of
-from validation.settings.switching import Reading
+from reports.symptoms.answers import COMMAND, NOTHING, OUTSIDE, PAGE, SCENE, SEVERAL, answer
 
-#: Largest number of scenes that are named beside the best one.
-OTHERS = 3
+Plain = Mapping[str, Any]
+#: Where it says how a situation of one's own is posed.
+POSE = "pose it: crosscheck run my-scene.toml, or a model (MJCF, URDF, SDF); docs: Run your own scene or model"
 
 
 @main.command("ask", epilog="Example: crosscheck ask my ball does not bounce")
@@ -37,141 +24,144 @@ OTHERS = 3
 def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     """Find a scene and a fix from a symptom in your words.
 
-    WORDS are yours, such as: grip slips; my ball does not bounce; or the number of a known report. Name an engine for
-    the lines to paste. Nothing is run: the numbers are those of the tables of fixes.
+    WORDS are yours, such as: grip slips; my ball does not bounce; or the number of a known report, or a scene. Name an
+    engine for its numbers and for lines to paste. Nothing is run: the numbers are those of the published results.
     """
     text = " ".join(words)
-    known = {facts.package.lower(): name for name in registry.names() if (facts := registry.facts(name))}
-    known |= {name: name for name in registry.names()}
-    named = list(dict.fromkeys(known[word] for word in text.lower().split() if word in known))
-    symptom = " ".join(word for word in text.split() if word.lower() not in known)
-    found = matches(symptom, named)
-    if not found:
-        reason = f"nothing is known of {symptom!r}; see crosscheck list scenes, and crosscheck field for known reports"
+    told = answer(text)
+    if not any(told[key] for key in ("missed", "scene", "candidates", "command", "strangers")):
+        reason = f"{text!r} tells no symptom; see crosscheck list scenes, and crosscheck field for known reports"
         raise click.BadParameter(reason, param_hint="WORDS")
-    best = found[0]
-    # Beside the best: what has as many of the words, or one that it does not have.
-    beside = [m for m in found[1:] if len(m.words) >= len(best.words) or set(m.words) - set(best.words)]
-    others = [match.scene for match in beside if match.scene][:OTHERS]
-    about = [best.report.engine] if best.report and "#" in text else named
-    fixes = recorded_fixes(best.scene, about or registry.names())
-    missed = [] if best.score == math.inf else [word for word in stems(symptom).values() if word not in best.words]
     if as_json:
-        plain = {
-            "scene": best.scene, "command": best.command, "words": best.words, "missed": missed, "others": others,
-            "report": best.report.source if best.report else None,
-            "fixes": [{**asdict(fix), "paste": recorded_paste(fix)} for fix in fixes],
-        }  # fmt: skip
-        click.echo(json.dumps(plain, indent=1, default=str))
+        click.echo(json.dumps(told, indent=1))
         return
-    console = terminal()
-    console.print(Text(best.command or f"{best.scene}: {resolve(best.scene).title}", style="bold"), soft_wrap=True)
-    if missed:
-        console.print(Text(f"no match for: {', '.join(missed)}", style="dim"))
-    if best.report and (not about or {best.report.engine, best.report.about} & set(about)):
-        console.print(Text(f"known report {best.report.source}: {best.report.symptom}"))
-    if best.scene:
-        _show_fixes(best.scene, about, fixes, text, console)
-    if others:
-        near = (f"{name} ({resolve(name).title.lower()})" for name in others)
-        console.print(Text(f"or: {'; '.join(near)}", style="dim"))
+    for line in _LINES[told["answer"]](told, text):
+        click.echo(line)
+    if told["missed"]:
+        click.echo(click.style(_wrapped(f"no match for: {', '.join(told['missed'])}"), dim=True))
+    if told["strangers"]:
+        click.echo(_wrapped(f"no adapter for: {', '.join(told['strangers'])}; crosscheck list engines"))
 
 
-def _show_fixes(scene: str, named: Sequence[str], fixes: Sequence[Cure], text: str, console: Console) -> None:
-    for fix in fixes:
-        console.print()
-        console.print(Text(f"{fix.engine} as shipped: {fix.failing} of {fix.judged} checks fail", style="bold"))
-        console.print(Text(recorded_text(fix)))
-        if fix.recommended and fix.engine in named:
-            console.print(Text(recorded_paste(fix) or nothing_to_paste(fix)), soft_wrap=True)
-    for engine in named:
-        if engine not in {fix.engine for fix in fixes}:
-            search = f"no fix is on record; to search: crosscheck cure {engine} {scene}"
-            console.print(Text(f"{engine}: {search if cures_of(engine) else 'has no table of fixes'}"))
-    if not fixes and not named:
-        console.print(Text("no fix of an engine as shipped is on record"))
-    console.print()
-    console.print(Text(f"run it: crosscheck run {scene}" + "".join(f" --engine {engine}" for engine in named)))
-    helped = [fix.engine for fix in fixes if fix.recommended and fix.engine not in named]
-    if helped:
-        engines = " or ".join(dict.fromkeys(helped))
-        console.print(
-            Text(f"lines to paste: name {engines}, as in: crosscheck ask {shlex.join(text.split())} {helped[0]}")
-        )
+def _wrapped(text: str, indent: str = "") -> str:
+    """A paragraph that fits the terminal; later lines are indented."""
+    return click.wrap_text(text, shutil.get_terminal_size().columns, "", indent)
 
 
-@main.command("field", epilog="Example: crosscheck field stack")
-@click.argument("words", nargs=-1)
-@click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
-@click.option("--commands", is_flag=True, help="Print the command of every report.")
-@AS_JSON
-def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> None:
-    """Run known reports (public questions and bugs) again.
+def _title(text: str) -> str:
+    return click.style(_wrapped(text), bold=True)
 
-    Prints whether each is still true of the installed engines. WORDS choose reports by repository, engine or scene; all
-    by default. Exits with 1 if a report is no longer true.
-    """
-    chosen = matching(words)
-    if not chosen:
-        raise click.BadParameter(f"no known report has {' or '.join(words)}", param_hint="WORDS")
-    found = ask(chosen, jobs)
-    if as_json:
-        click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
+
+def _scene(told: Plain, text: str) -> Iterator[str]:
+    yield _title(f"{told['scene']}: {told['title']}")
+    if told["report"]:
+        yield _wrapped(f"known report {told['report']['source']}: {told['report']['symptom']}")
+    elif told["line"]:
+        yield _wrapped(f"such as: {told['line']}")
+    if told["says"]:
+        yield _wrapped(told["says"])
+    yield _wrapped(f"truth: {told['law']}", "  ")
+    for engine in told["engines"]:
+        yield ""
+        yield from _engine(engine, told["scene"])
+    if not told["engines"]:
+        yield from _all_engines(told, text)
+    yield ""
+    yield _wrapped(f"run it: crosscheck run {told['scene']}" + "".join(f" --engine {e}" for e in told["asked"]), "  ")
+
+
+def _all_engines(told: Plain, text: str) -> Iterator[str]:
+    yield ""
+    if told["passes"]:
+        yield _wrapped(f"pass as shipped: {', '.join(told['passes'])}", "  ")
+    if told["fails"]:
+        yield _wrapped(f"fail checks as shipped: {', '.join(told['fails'])}", "  ")
+    if told["fixed"]:
+        shown = f"crosscheck ask {shlex.join(text.split())} {told['fixed'][0]}"
+        yield _wrapped(f"a fix is on record for {', '.join(told['fixed'])}; to see it: {shown}", "  ")
+    elif told["passes"] or told["fails"]:
+        yield _wrapped("name one for its numbers and what it does when nothing is set", "  ")
+
+
+def _engine(told: Plain, scene: str) -> Iterator[str]:
+    """What is on record of an engine on a scene."""
+    name = told["engine"]
+    if not told["judged"]:
+        yield _title(f"{name}: the scene is not run on it; crosscheck run {scene} --engine {name} says why")
+        return
+    which = f"({told['suite']} suite, release {told['release']})"
+    if not told["failed"]:
+        yield _title(f"{name} as shipped passes all {told['judged']} checks {which}")
+        yield from _settings(told, "then see what is set in your model; where nothing is:")
+        return
+    fix = told["fix"]
+    if fix:
+        yield _title(f"{name} as shipped: {fix['failing']} of {fix['judged']} checks fail")
+        yield _wrapped(fix["text"])
+        if fix["paste"]:
+            yield fix["paste"]
     else:
-        _show(found, commands)
-    sys.exit(statuses.verdict(not all(each.as_said for each in found), True))
+        where = f" in {' and '.join(told['where'])}"
+        yield _title(f"{name} as shipped: {told['failed']} of {told['judged']} checks fail{where} {which}")
+        if told["tuned"] == 0:
+            yield _wrapped(f"profile tuned passes all of them; its settings: crosscheck describe {name}", "  ")
+        else:
+            yield _wrapped(f"no setting is known that fixes it; to search: crosscheck cure {name} {scene}", "  ")
+    if not fix or not fix["paste"]:
+        yield from _settings(told, "what it does when nothing is set:")
 
 
-def _show(found: list[Finding], commands: bool) -> None:
-    console = terminal()
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("report, engine", "symptom", "on this machine"):
-        table.add_column(heading, overflow="fold")
-    for each in found:
-        note = each.note
-        who = f"{_broken(note.source, console.width // 3)}\n{note.about}" + (
-            "" if note.about == note.engine else f", run on {note.engine}"
-        )
-        table.add_row(Text(who), Text(note.symptom), Text(_said(each)))
-        table.add_row("", "", "")
-    console.print(table, highlight=False)
-    for each in found if commands else ():
-        console.print(Text(f"{each.note.source}: {reproduce(each.note.slot.as_dict())}"), soft_wrap=True)
-    if not commands:
-        console.print(Text("--commands prints the command of every report", style="dim"))
+def _settings(told: Plain, heading: str) -> Iterator[str]:
+    if told["unset"]:
+        yield heading
+    for row in told["unset"]:
+        both = "; the other body's number counts too" if " and " in row["what"] else ""
+        yield _wrapped(f"  {row['what']}: {row['how']}{both}", "    ")
 
 
-def _broken(source: str, width: int) -> str:
-    """``owner/repository#number``, on two lines if it is wider than its column: half a number cannot be searched."""
-    return source if len(source) < width else source.replace("/", "/\n", 1)
+def _several(told: Plain, text: str) -> Iterator[str]:
+    yield _title("several scenes may show this; nearest:")
+    yield from _listed(told["candidates"])
+    named = next((each["name"] for each in told["candidates"] if each["name"]), "")
+    if named:
+        yield _wrapped(f"more words help, or a name: crosscheck ask {' '.join([named, *told['asked']])}", "  ")
 
 
-def _said(each: Finding) -> str:
-    note = each.note
-    text = _word(each.now) + ("" if each.as_said else f" (the report says: {_word(note.said)})")
-    if each.before is not None:
-        text += f"\n{note.engine}/{note.profile} {note.scene} {note.dimension}-D: {note.metric} {_number(each.before)}"
-    if each.after is not None:
-        text += f"; with {note.cure_text}: {_number(each.after)}"
-    return text
+def _listed(candidates: Sequence[Plain]) -> Iterator[str]:
+    width = max((len(each["name"]) for each in candidates), default=0)
+    for each in candidates:
+        text = each["title"] if each["name"] else each.get("command") or each["title"]
+        yield _wrapped(f"  {each['name'].ljust(width)}  {text}", " " * (width + 4))
 
 
-def _word(said: str) -> str:
-    return "fixed" if said == CURED else said
+def _command(told: Plain, text: str) -> Iterator[str]:
+    yield _title(told["says"])
+    yield _wrapped(told["command"], "  ")
+    if told["scene"]:
+        yield _wrapped(f"nearest scene: {told['scene']} ({told['title']})", "  ")
 
 
-def _number(found: Reading) -> str:
-    if found.value is None:
-        return found.reason
-    unit = "" if found.check.unit == "1" else f" {found.check.unit}"
-    return f"{number(found.value, 3)}{unit} (truth {number(found.check.truth, 3)})"
+def _outside(told: Plain, text: str) -> Iterator[str]:
+    yield _title("no scene shows this: it is no contact of free rigid bodies")
+    yield _wrapped(told["says"])
+    yield from _nearest(told)
 
 
-def _as_plain(each: Finding) -> dict[str, object]:
-    note = each.note
-    return {
-        "source": note.source, "about": note.about, "symptom": note.symptom, "slot": note.slot.as_dict(),
-        "metric": note.metric, "command": reproduce(note.slot.as_dict()), "cure": note.cure_text, "said": note.said,
-        "now": each.now, "as_said": each.as_said,
-        "value": each.before.value if each.before else None, "cured": each.after.value if each.after else None,
-    }  # fmt: skip
+def _nothing(told: Plain, text: str) -> Iterator[str]:
+    yield _title("no scene shows this")
+    yield from _nearest(told)
+    yield _wrapped(POSE, "  ")
+
+
+def _nearest(told: Plain) -> Iterator[str]:
+    near = [each for each in told["candidates"] if each["name"]]
+    if near:
+        yield _wrapped(f"nearest: {near[0]['name']} ({near[0]['title']})", "  ")
+
+
+def _page(told: Plain, text: str) -> Iterator[str]:
+    yield _title(f"the docs have a page: {told['title']}")
+    yield told["scene"]
+
+
+_LINES = {SCENE: _scene, SEVERAL: _several, COMMAND: _command, OUTSIDE: _outside, NOTHING: _nothing, PAGE: _page}

@@ -76,7 +76,7 @@ def test_notes_are_chosen_by_words():
 def test_a_source_is_never_cut_within_its_number_at_80_columns(monkeypatch):
     """Folded by the width alone, 3328 was shown as 33 and 28."""
     found = [Finding(note, note.said) for note in notes()]
-    monkeypatch.setattr("reports.command.asking.ask", lambda notes, jobs: found)
+    monkeypatch.setattr("reports.command.fielding.ask", lambda notes, jobs: found)
     shown = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["field"]).stdout
     assert max(map(len, shown.splitlines())) <= 80
     words = shown.split()

@@ -275,7 +275,16 @@ SCENE = CanonicalScene(
     family="hard",
     version=1,
     title="Domino that is pushed against the next one",
-    symptoms=("dominoes fall too fast or too slowly",),
+    symptoms=(
+        "dominoes fall too fast or too slowly",
+        "a domino does not knock over the next one",
+        "a chain of dominoes stops in the middle",
+        "dominoes slide instead of toppling",
+        "a row of domino tiles falls at the wrong speed",
+        "a falling domino passes through its neighbour",
+        "the wave of toppling bricks dies out",
+        "a domino that is tapped tips over though it should fall back",
+    ),
     figure=__doc__ or "",
     law="falls over if w0^2 > (3 g/2 rho)(1 - cos(alpha)); passes on (1 + e)/2 of its spin where sin(theta) = "
     "gap/height",

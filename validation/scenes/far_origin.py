@@ -53,6 +53,13 @@ SCENE = CanonicalScene(
     symptoms=(
         "it behaves differently far away from the origin",
         "a large world loses precision",
+        "objects jitter far from the centre of the world",
+        "at coordinates of a million metres friction goes wrong",
+        "floating point errors in a big open world",
+        "physics shakes when the player is kilometres away",
+        "single precision is too coarse at large positions",
+        "bodies sink or slide at a great distance from zero",
+        "results change when the whole scene is shifted",
     ),
     figure=__doc__ or "",
     law="d = v^2/(2 mu g), wherever it is",

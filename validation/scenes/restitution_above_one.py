@@ -116,6 +116,12 @@ SCENE = CanonicalScene(
     symptoms=(
         "objects are thrown back faster than they came",
         "energy grows at each collision",
+        "a restitution larger than 1 is clamped or refused",
+        "a bumper or trampoline should add speed at every hit",
+        "a pinball kicker gives no extra speed",
+        "elasticity above one does not accelerate the ball",
+        "a bouncy pad should return more than it gets",
+        "a super bouncy wall with restitution 1.2",
     ),
     figure=__doc__ or "",
     law="v_n = e^n v after n blows, for engines that accept e > 1",

@@ -1,0 +1,139 @@
+"""The answer to a symptom, as plain data: from what was found to scenes, engines that pass or fail, and fixes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from reports.symptoms import Found, Match, search, table
+
+#: What an answer is: one scene, another command, none of what is measured here, several scenes, a page, or nothing.
+SCENE, COMMAND, OUTSIDE, SEVERAL, PAGE, NOTHING = "scene", "command", "outside", "several", "page", "nothing"
+#: Candidates where no match is clear, and lines about what an engine does where nothing is set.
+CANDIDATES, LINES = 3, 4
+
+Plain = dict[str, Any]
+
+
+def answer(question: str) -> Plain:
+    """Answer a question: the name of a scene, the number of a known report, or a symptom.
+
+    Returns
+    -------
+    ``answer``, which of the kinds above it is, and what belongs to it; empty where it does not apply.
+
+    Raises
+    ------
+    NoSearch
+        If this Python's SQLite has no FTS5.
+    """
+    found = search(question)
+    kept = table()
+    told: Plain = {
+        "answer": NOTHING, "scene": "", "title": "", "law": "", "line": "", "says": "", "command": "", "report": {},
+        "candidates": [], "missed": list(found.missed), "asked": list(found.engines),
+        "strangers": list(found.strangers), "engines": [], "passes": [], "fails": [], "fixed": [],
+    }  # fmt: skip
+    named = [source for source in kept["reports"] if any(_is_number(word, source) for word in question.split())]
+    name = "_".join(word for word in question.lower().split() if kept["names"].get(word) is None)
+    if named:
+        report = kept["reports"][named[0]]
+        told["missed"], told["asked"] = [], told["asked"] or report["engines"][:1]
+        return told | _of_scene(report["scene"], told["asked"], found, named[0])
+    if name in kept["scenes"]:
+        return told | {"missed": []} | _of_scene(name, found.engines, found)
+    if not found.is_shown:
+        return told | {"candidates": _candidates(found)[:1]}
+    first = found.matches[0]
+    if first.name.startswith("outside/"):
+        return told | _of_topic("outside") | {"answer": OUTSIDE, "missed": [], "candidates": _candidates(found)[:1]}
+    if not found.is_clear:
+        return told | {"answer": SEVERAL, "candidates": _candidates(found)}
+    if first.name in kept["scenes"]:
+        return told | _of_scene(first.name, found.engines, found)
+    if first.name in kept["topics"]:
+        return told | _of_topic(first.name) | {"answer": COMMAND, "candidates": _candidates(found)[1:]}
+    return told | {"answer": PAGE, "title": first.line, "scene": f"{first.name}.md"}
+
+
+def _is_number(word: str, source: str) -> bool:
+    return "#" in word and source.lower().endswith(word.lower().strip(".,;:?!()"))
+
+
+def _candidates(found: Found) -> list[Plain]:
+    """The first matches, each scene and topic once, with what they are in a line."""
+    kept, told = table(), {}
+    for match in found.matches:
+        name = match.name.partition("/")[0]
+        if name in kept["scenes"]:
+            told.setdefault(name, {"name": name, "title": kept["scenes"][name]["title"]})
+        elif name in kept["topics"]:
+            told.setdefault(name, {"name": "", "title": kept["topics"][name]["says"]} | _command(name))
+        else:
+            told.setdefault(match.name, {"name": "", "title": f"{match.line}: {match.name}.md"})
+        if len(told) == CANDIDATES:
+            break
+    return list(told.values())
+
+
+def _command(topic: str) -> Plain:
+    return {"command": table()["topics"][topic]["command"]}
+
+
+def _of_topic(name: str) -> Plain:
+    topic = table()["topics"][name]
+    near = topic["near"]
+    nearest = {"scene": near, "title": table()["scenes"][near]["title"]} if near else {}
+    return {"says": topic["says"], "command": topic["command"]} | nearest
+
+
+def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -> Plain:
+    """The answer that one scene is, for some engines; without any, for those with a fix."""
+    kept = table()
+    scene, fixes = kept["scenes"][name], {fix["engine"]: fix for fix in kept["fixes"].get(name, ())}
+    match = next((match for match in found.matches if match.name == name), Match(name, 0.0, 0.0, False, False, ""))
+    by_engine = {engine: of_engine(engine, name, found, fixes.get(engine)) for engine in kept["engines"]}
+    return {
+        "answer": SCENE, "scene": name, "title": scene["title"], "law": scene["law"],
+        "line": match.line if match.line != scene["title"] else "",
+        "says": kept["right"].get(match.line, ""), "report": _report(name, source, match.line, asked),
+        "engines": [by_engine.get(engine) or _unknown(engine) for engine in asked],
+        "passes": [engine for engine, told in by_engine.items() if told["judged"] and not told["failed"]],
+        "fails": [engine for engine, told in by_engine.items() if told["failed"]],
+        "fixed": [engine for engine, fix in fixes.items() if fix["helps"]],
+    }  # fmt: skip
+
+
+def _report(scene: str, source: str, line: str, asked: Sequence[str]) -> Plain:
+    """The known report that was named, or whose symptom is nearest: none about other engines than those asked for."""
+    for each, report in table()["reports"].items():
+        is_meant = each == source if source else report["symptom"] == line and report["scene"] == scene
+        if is_meant and (source or not asked or set(asked) & set(report["engines"])):
+            return {"source": each, "symptom": report["symptom"]}
+    return {}
+
+
+def _unknown(engine: str) -> Plain:
+    return {"engine": engine, "judged": 0, "failed": 0}
+
+
+def of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | None) -> Plain:
+    """What is on record of one engine on a scene: checks that fail as shipped and tuned, its fix, its defaults."""
+    kept = table()["engines"][engine]
+    rows = kept["scenes"].get(scene, [])
+    failed, judged = sum(row[1] for row in rows), sum(row[2] for row in rows)
+    tuned = [row[3] for row in rows if row[3] is not None]
+    return {
+        "engine": engine, "release": kept["release"], "suite": kept["suite"], "failed": failed, "judged": judged,
+        "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong] if failed else [],
+        "tuned": sum(tuned) if len(tuned) == len(rows) and rows else None, "fix": dict(fix or {}),
+        "unset": _unset(kept["unset"], scene, found),
+    }  # fmt: skip
+
+
+def _unset(rows: Sequence[Sequence[Any]], scene: str, found: Found) -> list[Plain]:
+    """What the engine does where nothing is set, as far as the question or the scene is about it: the nearest first."""
+    own, asked = set(table()["scenes"][scene]["terms"]), set(found.terms)
+    near = sorted(((-2 * len(asked & set(terms)) - len(own & set(terms)), k) for k, (_, _, terms) in enumerate(rows)))
+    chosen = sorted(k for score, k in near[:LINES] if score < 0)
+    return [{"what": rows[k][0], "how": rows[k][1]} for k in chosen]
