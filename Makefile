@@ -161,5 +161,7 @@ detection: $(STAMP)
 	COLUMNS=120 $(BIN)/crosscheck list checks --sensitivity > validation/questions/detection.txt
 
 # What scenes are, what is true and allowed in them, what laws predict and profiles set, as kept texts: read their diff.
+# And the table in which `ask` searches.
 tables: $(STAMP)
 	$(BIN)/python tests/tables/make.py
+	$(BIN)/python -m reports.symptoms.making

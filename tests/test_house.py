@@ -191,6 +191,7 @@ OTHER_WORDS = {
     ("reports/wording.py", "tuned"): "a role",
     ("reports/command/inspecting.py", "tuned"): "a role",
     ("reports/command/tuning.py", "tuned"): "a role",
+    ("reports/symptoms/making.py", "tuned"): "a role",
     ("reports/tables.py", "default"): "the default of a parameter",
     ("contact_crosscheck/cases.py", "tuned"): "a role",
     ("contact_crosscheck/models.py", "default"): "the default of a parameter",

@@ -330,7 +330,7 @@ class CanonicalScene:
     name, version, title
         Identity; a change of physics is a new version.
     symptoms
-        What users see where an engine fails, in their words; searched by `validation.field.symptoms`.
+        What users see where an engine fails, in their words, at least eight; ``crosscheck ask`` searches them.
     figure
         ASCII drawing with the law.
     law

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import shlex
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from textwrap import wrap
 from typing import Any
 
 import click
@@ -29,7 +30,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     """
     text = " ".join(words)
     told = answer(text)
-    if not any(told[key] for key in ("missed", "scene", "candidates", "command", "strangers")):
+    if not any(told[key] for key in ("missed", "scene", "candidates", "command", "page")):
         reason = f"{text!r} tells no symptom; see crosscheck list scenes, and crosscheck field for known reports"
         raise click.BadParameter(reason, param_hint="WORDS")
     if as_json:
@@ -44,8 +45,10 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
 
 
 def _wrapped(text: str, indent: str = "") -> str:
-    """A paragraph that fits the terminal; later lines are indented."""
-    return click.wrap_text(text, shutil.get_terminal_size().columns, "", indent)
+    """A paragraph that fits the terminal; later lines are indented, and no name is broken."""
+    width = shutil.get_terminal_size().columns
+    lines = wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines)
 
 
 def _title(text: str) -> str:
@@ -56,7 +59,7 @@ def _scene(told: Plain, text: str) -> Iterator[str]:
     yield _title(f"{told['scene']}: {told['title']}")
     if told["report"]:
         yield _wrapped(f"known report {told['report']['source']}: {told['report']['symptom']}")
-    elif told["line"]:
+    elif told["line"] and told["line"].lower() not in text.lower():
         yield _wrapped(f"such as: {told['line']}")
     if told["says"]:
         yield _wrapped(told["says"])
@@ -66,8 +69,10 @@ def _scene(told: Plain, text: str) -> Iterator[str]:
         yield from _engine(engine, told["scene"])
     if not told["engines"]:
         yield from _all_engines(told, text)
-    yield ""
-    yield _wrapped(f"run it: crosscheck run {told['scene']}" + "".join(f" --engine {e}" for e in told["asked"]), "  ")
+    run = [each["engine"] for each in told["engines"] if each["judged"]]
+    if run or not told["engines"]:
+        yield ""
+        yield _wrapped(f"run it: crosscheck run {told['scene']}" + "".join(f" --engine {e}" for e in run), "  ")
 
 
 def _all_engines(told: Plain, text: str) -> Iterator[str]:
@@ -92,7 +97,7 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
     which = f"({told['suite']} suite, release {told['release']})"
     if not told["failed"]:
         yield _title(f"{name} as shipped passes all {told['judged']} checks {which}")
-        yield from _settings(told, "then see what is set in your model; where nothing is:")
+        yield from _settings(told, "so it may be your model; where nothing is set:")
         return
     fix = told["fix"]
     if fix:
@@ -103,8 +108,10 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
     else:
         where = f" in {' and '.join(told['where'])}"
         yield _title(f"{name} as shipped: {told['failed']} of {told['judged']} checks fail{where} {which}")
-        if told["tuned"] == 0:
-            yield _wrapped(f"profile tuned passes all of them; its settings: crosscheck describe {name}", "  ")
+        if told["better"]:
+            yield _wrapped(
+                f"profile {told['better']} passes all of them; its settings: crosscheck describe {name}", "  "
+            )
         else:
             yield _wrapped(f"no setting is known that fixes it; to search: crosscheck cure {name} {scene}", "  ")
     if not fix or not fix["paste"]:
@@ -115,23 +122,21 @@ def _settings(told: Plain, heading: str) -> Iterator[str]:
     if told["unset"]:
         yield heading
     for row in told["unset"]:
-        both = "; the other body's number counts too" if " and " in row["what"] else ""
+        both = "; set that of both bodies" if " and " in row["what"] else ""
         yield _wrapped(f"  {row['what']}: {row['how']}{both}", "    ")
 
 
 def _several(told: Plain, text: str) -> Iterator[str]:
     yield _title("several scenes may show this; nearest:")
-    yield from _listed(told["candidates"])
-    named = next((each["name"] for each in told["candidates"] if each["name"]), "")
+    width = max(len(each["scene"]) for each in told["candidates"])
+    for each in told["candidates"]:
+        verdicts = "".join(f" ({engine} {verdict})" for engine, verdict in each["verdicts"].items())
+        yield _wrapped(f"  {each['scene']:{width}}  {each['title']}{verdicts}", " " * (width + 4))
+        if each["command"]:
+            yield _wrapped(f"  {'':{width}}  {each['command']}", " " * (width + 4))
+    named = next((each["scene"] for each in told["candidates"] if each["scene"]), "")
     if named:
-        yield _wrapped(f"more words help, or a name: crosscheck ask {' '.join([named, *told['asked']])}", "  ")
-
-
-def _listed(candidates: Sequence[Plain]) -> Iterator[str]:
-    width = max((len(each["name"]) for each in candidates), default=0)
-    for each in candidates:
-        text = each["title"] if each["name"] else each.get("command") or each["title"]
-        yield _wrapped(f"  {each['name'].ljust(width)}  {text}", " " * (width + 4))
+        yield _wrapped(f"say more, or name one: crosscheck ask {' '.join([named, *told['asked']])}", "  ")
 
 
 def _command(told: Plain, text: str) -> Iterator[str]:
@@ -142,8 +147,9 @@ def _command(told: Plain, text: str) -> Iterator[str]:
 
 
 def _outside(told: Plain, text: str) -> Iterator[str]:
-    yield _title("no scene shows this: it is no contact of free rigid bodies")
+    yield _title("no scene shows this")
     yield _wrapped(told["says"])
+    yield _wrapped(told["command"], "  ")
     yield from _nearest(told)
 
 
@@ -154,14 +160,14 @@ def _nothing(told: Plain, text: str) -> Iterator[str]:
 
 
 def _nearest(told: Plain) -> Iterator[str]:
-    near = [each for each in told["candidates"] if each["name"]]
-    if near:
-        yield _wrapped(f"nearest: {near[0]['name']} ({near[0]['title']})", "  ")
+    for each in told["candidates"][:1]:
+        if each["scene"]:
+            yield _wrapped(f"nearest: {each['scene']} ({each['title']})", "  ")
 
 
 def _page(told: Plain, text: str) -> Iterator[str]:
     yield _title(f"the docs have a page: {told['title']}")
-    yield told["scene"]
+    yield told["page"]
 
 
 _LINES = {SCENE: _scene, SEVERAL: _several, COMMAND: _command, OUTSIDE: _outside, NOTHING: _nothing, PAGE: _page}

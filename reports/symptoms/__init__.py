@@ -1,4 +1,4 @@
-"""Finds what shows a symptom that is told in somebody's own words: a full-text search in a table of the package.
+"""Finds what shows a symptom in somebody's own words: a full-text search in a table of the package.
 
 ``table.json`` is made of the scenes, known reports, fixes, published results, the docs' pages and ``words.toml``
 (`reports.symptoms.making`), so that a question imports neither scenes nor engines. SQLite's FTS5 brings stems (Porter
@@ -24,9 +24,9 @@ COLUMNS = {"title": 2.0, "symptoms": 1.0, "reports": 0.7, "physics": 0.3}
 LINE = 0.5
 #: Weight of a word that nothing has; one that a single scene has weighs 4.5.
 UNKNOWN = 1.5
-#: A match is clear if it has this share of the question, by weight, is nearly the first both as a whole and by its
-#: nearest line, and the next has at most this share of its rank.
-KNOWN, NEARLY, NEXT = 0.5, 0.9, 0.8
+#: A match is clear if its nearest line has this share of the question, by weight, if it is nearly the first both as a
+#: whole and by its nearest line, and if the next has at most this share of its rank.
+SAID, NEARLY, NEXT = 0.5, 0.9, 0.75
 #: Share of the question below which nothing shows it.
 LEAST = 0.3
 #: Most words of a phrase in `words.toml`.
@@ -49,8 +49,8 @@ class Match:
         Of the scene or topic.
     rank
         Larger is better; at most 1.
-    known
-        Share of the question that it has, by weight.
+    known, said
+        Share of the question that it has, by weight; ``said``: that its nearest line has.
     is_first
         Whether it is nearly the first both as a whole and by its nearest line.
     is_exact
@@ -62,6 +62,7 @@ class Match:
     name: str
     rank: float
     known: float
+    said: float
     is_first: bool
     is_exact: bool
     line: str
@@ -100,7 +101,7 @@ class Found:
         first, *others = self.matches or (None,)
         if first is None or first.is_exact:
             return first is not None
-        return first.known >= KNOWN and first.is_first and all(each.rank <= NEXT * first.rank for each in others)
+        return first.said >= SAID and first.is_first and all(each.rank <= NEXT * first.rank for each in others)
 
 
 @cache
@@ -150,8 +151,9 @@ def opened() -> sqlite3.Connection:
 
 
 def stems(texts: Iterable[str], database: sqlite3.Connection) -> list[list[str]]:
-    """Stems of the words of each text, in their order; an apostrophe divides no word."""
+    """Stems of the words of each text, in their order; an apostrophe divides no word, and a point no number."""
     plain = [re.sub("['\N{RIGHT SINGLE QUOTATION MARK}]", "", text) for text in texts]
+    plain = [re.sub(r"(?<=\d)\.(?=\d)", "p", text) for text in plain]
     database.execute("DELETE FROM words")
     database.executemany("INSERT INTO words(rowid, text) VALUES (?, ?)", enumerate(plain))
     found: list[list[str]] = [[] for _ in plain]
@@ -195,24 +197,25 @@ def _ranked(
     count = len({name for name, *_ in rows})
     weight = {term: math.log(1.0 + count / len(has)) if has else UNKNOWN for term, has in known.items()}
     total = sum(weight[term] for term in asked)
+    exact = {name for name, _, line, text in rows if line and set(text.split()) == set(asked)}
     whole, lines = _ranks(asked, rows, database)
-    most, longest = max(whole.values(), default=1.0), max((rank for rank, _ in lines.values()), default=1.0)
-    same = {name for name, _, line, text in rows if line and set(text.split()) == set(asked)}
+    most, longest = max(whole.values(), default=1.0), max((rank for rank, *_ in lines.values()), default=1.0)
     found = []
     for name, rank in whole.items():
-        near, line = lines.get(name, (0.0, ""))
+        near, line, text = lines.get(name, (0.0, "", ""))
         share = sum(weight[term] for term in asked if name in known[term]) / total
+        said = sum(weight[term] for term in asked if f" {term} " in f" {text} ") / total
         joint = (1.0 - LINE) * rank / most + LINE * near / longest
         is_first = rank >= NEARLY * most and near >= NEARLY * longest
-        found.append(Match(name, joint * share, share, is_first, same == {name}, line))
+        found.append(Match(name, joint * share, share, said, is_first, exact == {name}, line))
     found.sort(key=lambda match: (not match.is_exact, -match.rank))
     return found, [term for term in asked if not known[term]]
 
 
 def _ranks(
     asked: Sequence[str], rows: Sequence[Sequence[str]], database: sqlite3.Connection
-) -> tuple[dict[str, float], dict[str, tuple[float, str]]]:
-    """BM25 of all that is known of each scene and topic, and of its nearest line, with that line."""
+) -> tuple[dict[str, float], dict[str, tuple[float, str, str]]]:
+    """BM25 of all that is known of each scene and topic, and of its nearest line, with that line and its terms."""
     database.execute(f"CREATE VIRTUAL TABLE whole USING fts5(name UNINDEXED, {', '.join(COLUMNS)})")
     database.execute("CREATE VIRTUAL TABLE lines USING fts5(name UNINDEXED, shown UNINDEXED, text)")
     texts: dict[str, dict[str, list[str]]] = {}
@@ -224,11 +227,11 @@ def _ranks(
     )
     shown = ((name, line, text) for name, _, line, text in rows if line)
     database.executemany("INSERT INTO lines VALUES (?, ?, ?)", shown)
-    query = " OR ".join(f'"{term}"' for term in asked)
+    anything = (" OR ".join(f'"{term}"' for term in asked),)
     bm25 = f"-bm25(whole, 0, {', '.join(map(str, COLUMNS.values()))})"
-    whole = dict(database.execute(f"SELECT name, {bm25} FROM whole WHERE whole MATCH ?", (query,)))
-    lines: dict[str, tuple[float, str]] = {}
-    ordered = "SELECT name, -bm25(lines), shown FROM lines WHERE lines MATCH ? ORDER BY rank"
-    for name, rank, line in database.execute(ordered, (query,)):
-        lines.setdefault(name, (rank, line))
+    whole = dict(database.execute(f"SELECT name, {bm25} FROM whole WHERE whole MATCH ?", anything))
+    lines: dict[str, tuple[float, str, str]] = {}
+    ordered = "SELECT name, -bm25(lines), shown, text FROM lines WHERE lines MATCH ? ORDER BY rank"
+    for name, *line in database.execute(ordered, anything):
+        lines.setdefault(name, tuple(line))
     return whole, lines

@@ -32,7 +32,7 @@ def answer(question: str) -> Plain:
     told: Plain = {
         "answer": NOTHING, "scene": "", "title": "", "law": "", "line": "", "says": "", "command": "", "report": {},
         "candidates": [], "missed": list(found.missed), "asked": list(found.engines),
-        "strangers": list(found.strangers), "engines": [], "passes": [], "fails": [], "fixed": [],
+        "strangers": list(found.strangers), "engines": [], "passes": [], "fails": [], "fixed": [], "page": "",
     }  # fmt: skip
     named = [source for source in kept["reports"] if any(_is_number(word, source) for word in question.split())]
     name = "_".join(word for word in question.lower().split() if kept["names"].get(word) is None)
@@ -45,15 +45,16 @@ def answer(question: str) -> Plain:
     if not found.is_shown:
         return told | {"candidates": _candidates(found)[:1]}
     first = found.matches[0]
-    if first.name.startswith("outside/"):
-        return told | _of_topic("outside") | {"answer": OUTSIDE, "missed": [], "candidates": _candidates(found)[:1]}
+    if first.name.startswith(f"{OUTSIDE}/"):
+        near = [each for each in _candidates(found) if each["scene"]]
+        return told | _of_topic(OUTSIDE) | {"answer": OUTSIDE, "missed": [], "candidates": near[:1]}
     if not found.is_clear:
         return told | {"answer": SEVERAL, "candidates": _candidates(found)}
     if first.name in kept["scenes"]:
         return told | _of_scene(first.name, found.engines, found)
     if first.name in kept["topics"]:
-        return told | _of_topic(first.name) | {"answer": COMMAND, "candidates": _candidates(found)[1:]}
-    return told | {"answer": PAGE, "title": first.line, "scene": f"{first.name}.md"}
+        return told | _of_topic(first.name) | {"answer": COMMAND, "missed": []}
+    return told | {"answer": PAGE, "title": first.line, "page": f"{first.name}.md"}
 
 
 def _is_number(word: str, source: str) -> bool:
@@ -61,23 +62,27 @@ def _is_number(word: str, source: str) -> bool:
 
 
 def _candidates(found: Found) -> list[Plain]:
-    """The first matches, each scene and topic once, with what they are in a line."""
-    kept, told = table(), {}
-    for match in found.matches:
-        name = match.name.partition("/")[0]
+    """The first scenes and topics, each once: a scene with verdicts of engines asked for, a topic with a command."""
+    kept = table()
+    told: dict[str, Plain] = {}
+    for name in (match.name.partition("/")[0] for match in found.matches):
         if name in kept["scenes"]:
-            told.setdefault(name, {"name": name, "title": kept["scenes"][name]["title"]})
+            rows = {engine: kept["engines"].get(engine, {}).get("scenes", {}).get(name) for engine in found.engines}
+            verdicts = {engine: _verdict(own) for engine, own in rows.items() if own}
+            told.setdefault(name, {"scene": name, "title": kept["scenes"][name]["title"], "command": ""})
+            told[name]["verdicts"] = verdicts
         elif name in kept["topics"]:
-            told.setdefault(name, {"name": "", "title": kept["topics"][name]["says"]} | _command(name))
-        else:
-            told.setdefault(match.name, {"name": "", "title": f"{match.line}: {match.name}.md"})
+            command = kept["topics"][name]["command"] if name != OUTSIDE else ""
+            told.setdefault(
+                name, {"scene": "", "title": kept["topics"][name]["says"], "command": command, "verdicts": {}}
+            )
         if len(told) == CANDIDATES:
             break
     return list(told.values())
 
 
-def _command(topic: str) -> Plain:
-    return {"command": table()["topics"][topic]["command"]}
+def _verdict(rows: Sequence[Sequence[Any]]) -> str:
+    return "fails" if any(row[1] for row in rows) else "passes"
 
 
 def _of_topic(name: str) -> Plain:
@@ -91,7 +96,7 @@ def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -
     """The answer that one scene is, for some engines; without any, for those with a fix."""
     kept = table()
     scene, fixes = kept["scenes"][name], {fix["engine"]: fix for fix in kept["fixes"].get(name, ())}
-    match = next((match for match in found.matches if match.name == name), Match(name, 0.0, 0.0, False, False, ""))
+    match = next((match for match in found.matches if match.name == name), Match(name, 0.0, 0.0, 0.0, False, False, ""))
     by_engine = {engine: of_engine(engine, name, found, fixes.get(engine)) for engine in kept["engines"]}
     return {
         "answer": SCENE, "scene": name, "title": scene["title"], "law": scene["law"],
@@ -118,15 +123,16 @@ def _unknown(engine: str) -> Plain:
 
 
 def of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | None) -> Plain:
-    """What is on record of one engine on a scene: checks that fail as shipped and tuned, its fix, its defaults."""
+    """What is on record of one engine on a scene: failed checks, a profile that passes, its fix, its defaults."""
     kept = table()["engines"][engine]
     rows = kept["scenes"].get(scene, [])
     failed, judged = sum(row[1] for row in rows), sum(row[2] for row in rows)
-    tuned = [row[3] for row in rows if row[3] is not None]
+    left = [row[3] for row in rows if row[3] is not None]
     return {
         "engine": engine, "release": kept["release"], "suite": kept["suite"], "failed": failed, "judged": judged,
         "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong] if failed else [],
-        "tuned": sum(tuned) if len(tuned) == len(rows) and rows else None, "fix": dict(fix or {}),
+        "better": kept["better"] if rows and left and sum(left) == 0 and len(left) == len(rows) else "",
+        "fix": dict(fix or {}),
         "unset": _unset(kept["unset"], scene, found),
     }  # fmt: skip
 

@@ -27,8 +27,8 @@ from validation.scenes import OURS
 
 FOLDER = Path(__file__).parent
 DOCS = FOLDER.parents[1] / "docs"
-#: Lines in which a scene must have a word for it to be one of the scene's own.
-OWN = 3
+#: Share of a scene's lines that have a word of the scene's own.
+OWN = 0.2
 
 
 def made() -> dict[str, Any]:
@@ -53,7 +53,7 @@ def made() -> dict[str, Any]:
         [name, column, text if " " in text and column != "physics" else "", " ".join(own)]
         for (name, column, text), own in zip(lines, found, strict=True)
     ]
-    engines = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
+    engines = [name for name in registry.names() if (entry := registry.entry(name)) and registry.is_ours(entry)]
     return {
         "same": same,
         "idle": idle,
@@ -70,7 +70,13 @@ def made() -> dict[str, Any]:
             for note in notes()
         },
         "engines": {
-            name: {"release": release, "suite": suite, "scenes": scenes, "unset": _unset(name, terms_of)}
+            name: {
+                "release": release,
+                "suite": suite,
+                "better": registry.profile_of(name, "tuned"),
+                "scenes": scenes,
+                "unset": _unset(name, terms_of),
+            }
             for name, (release, suite, scenes) in _verdicts(engines).items()
         },
         "fixes": {name: fixes for name in OURS if (fixes := _fixes(name, engines))},
@@ -113,15 +119,17 @@ def _of_topics(topics: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, s
 def _of_pages() -> Iterator[tuple[str, str, str]]:
     """Title and headings of each page for users."""
     for path in sorted([*DOCS.glob("*.md"), *DOCS.glob("howto/*.md"), *DOCS.glob("reference/*.md")]):
-        titles = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+        text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        titles = re.findall(r"^##? (.+)$", text, re.MULTILINE)
         for title in titles if path.stem != "index" else ():
             yield f"docs/{path.relative_to(DOCS).with_suffix('').as_posix()}", "title", title
 
 
 def _own_terms(name: str, rows: Sequence[Sequence[str]]) -> list[str]:
-    """Terms that at least `OWN` lines about a scene have: what it is about."""
-    count = Counter(term for scene, _, _, text in rows if scene == name for term in set(text.split()))
-    return sorted(term for term, times in count.items() if times >= OWN)
+    """Terms of at least `OWN` of the lines about a scene: what it is about."""
+    lines = [set(text.split()) for scene, _, _, text in rows if scene == name]
+    count = Counter(term for line in lines for term in line)
+    return sorted(term for term, times in count.items() if times >= OWN * len(lines))
 
 
 def _unset(engine: str, terms_of: Callable[[Sequence[str]], list[list[str]]]) -> list[list[Any]]:

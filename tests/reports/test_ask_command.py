@@ -1,34 +1,25 @@
-"""``ask``: a symptom in plain words leads to the scene that shows it, to how wrong an engine is, and to a fix."""
+"""``ask``: a symptom in plain words leads to the scene that shows it, to who passes it, and to a fix."""
 
+import csv
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from reports.command import main
-from reports.cures import cure_paste
+from reports.symptoms import making, opened, search, stems, table
+from reports.symptoms.answers import COMMAND, NOTHING, OUTSIDE, SCENE, SEVERAL, answer
 from validation.catalogue import CATALOGUE
 from validation.field import notes
-from validation.field.symptoms import matches, stem
-from validation.settings.cures import cures_of
 
-#: Words of users that no scene has as they stand -> the scene that is about it.
-ASKED = {
-    "my ball does not bounce": "bounce",
-    "grip slips": "pinch",
-    "objects are slipping out of my gripper": "pinch",
-    "my stack creeps": "stack",
-    "boxes are sinking into one another": "stack",
-    "fast things pass through": "thin_wall",
-    "a shot is tunnelling through plates": "thin_wall",
-    "forces jump": "wipe",
-    "noisy contact force sensor": "wipe",
-    "crate creeps down a ramp": "incline",
-    "tiny objects behave differently": "scales",
-    "stumbling over seams between floor tiles": "seam",
-    "overlapping bodies explode at the start": "overlap",
-    "large mass ratio": "heavy_on_light",
-}
+#: Symptoms in people's words, with all scenes and topics that are right: 40 with the sense of public threads, 60 about
+#: other contacts, 20 about what is no contact. Written before the search; the words and weights of the search were
+#: chosen with every second one, the others were held out.
+SENTENCES = list(csv.DictReader((Path(__file__).parent / "asked_sentences.csv").open(encoding="utf-8")))
+TUNED, HELD_OUT = SENTENCES[::2], SENTENCES[1::2]
 
 
 def asked(*words, status=0):
@@ -37,97 +28,190 @@ def asked(*words, status=0):
     return result.output
 
 
-@pytest.mark.parametrize("words", ASKED)
-def test_words_of_a_user_lead_to_the_scene(words):
-    assert matches(words)[0].scene == ASKED[words]
-    assert asked(*words.split()).startswith(f"{ASKED[words]}: {CATALOGUE[ASKED[words]].title}"[:80])
+def led_to(question):
+    """Scenes and topics that an answer shows: one, or three candidates."""
+    found, told = search(question), answer(question)["answer"]
+    if told == NOTHING:
+        return [NOTHING]
+    names = [match.name.partition("/")[0] for match in found.matches]
+    return list(dict.fromkeys(names))[:3] if told == SEVERAL else names[:1]
 
 
-@pytest.mark.parametrize("scene", [name for name, scene in CATALOGUE.items() if scene.symptoms])
-def test_each_symptom_leads_to_its_own_scene(scene):
-    assert [matches(text)[0].scene for text in CATALOGUE[scene].symptoms] == [scene] * len(CATALOGUE[scene].symptoms)
+def is_right(sentence):
+    shown, right = led_to(sentence["sentence"]), sentence["right"].split()
+    return shown[0] == OUTSIDE if right == [OUTSIDE] else bool({*shown} & {*right})
+
+
+@pytest.mark.parametrize(("part", "least"), [(TUNED, 0.95), (HELD_OUT, 0.9)], ids=["tuned", "held-out"])
+def test_symptoms_in_words_of_people_lead_to_their_scenes(part, least):
+    assert len(part) == 60
+    wrong = [(each["sentence"], each["right"], led_to(each["sentence"])) for each in part if not is_right(each)]
+    assert len(wrong) <= (1.0 - least) * len(part), wrong
+
+
+def test_wrong_scene_is_seldom_the_only_one_shown():
+    """Only where a match is clear is a fix printed."""
+    clear = [each for each in TUNED if answer(each["sentence"])["answer"] == SCENE]
+    assert len(clear) >= 25
+    wrong = [
+        each["sentence"] for each in clear if search(each["sentence"]).matches[0].name not in each["right"].split()
+    ]
+    assert len(wrong) <= 0.05 * len(clear), wrong
+
+
+@pytest.mark.parametrize("scene", CATALOGUE)
+def test_scene_with_eight_symptoms_that_lead_to_it(scene):
+    symptoms = CATALOGUE[scene].symptoms
+    assert len(symptoms) >= 8
+    assert [text for text in symptoms if search(text).matches[0].name != scene] == []
+
+
+def test_sentences_are_no_symptoms_of_scenes():
+    """The search could otherwise know its own test by heart."""
+    database = opened()
+    known = {frozenset(own) for own in stems([text for s in CATALOGUE.values() for text in s.symptoms], database)}
+    assert not known & {frozenset(own) for own in stems([each["sentence"] for each in SENTENCES], database)}
+
+
+def test_table_of_the_package_is_made_of_what_the_scenes_and_engines_say_now():
+    assert making.text_of(making.made()) == making.TABLE.read_text(encoding="utf-8"), "make tables"
+
+
+def test_order_plurals_and_engines_do_not_matter():
+    one = led_to("my ball does not bounce")
+    assert one == led_to("balls do not bounce pymunk") == led_to("bouncing, mujoco: does not my ball") == ["bounce"]
+    assert search("a bullet passes through paper").engines == []
+    assert search("passes through paper bullet").engines == ["bullet"]
+
+
+@pytest.mark.parametrize(
+    ("words", "word"),
+    [("elasticity", "restitution"), ("sliding", "slipped"), ("gripper", "grasps"), ("solref", "stiffness"),
+     ("contactERP", "penetration correction"), ("slop", "margin"), ("passes through", "tunnelling ccd")],
+)  # fmt: skip
+def test_words_that_mean_the_same(words, word):
+    assert set(search(words).terms) & set(search(word).terms)
+
+
+def test_zero_restitution_is_not_a_restitution_of_a_half():
+    assert search("restitution is 0").terms == ["inelastic"] and search("restitution of 0.5").terms[0] == "restitution"
 
 
 @pytest.mark.parametrize("note", notes(), ids=lambda note: note.source)
-def test_the_number_of_a_known_report_finds_it(note):
-    short = note.source.split("/")[1]
-    found = matches(short)[0]
-    assert found.scene == note.scene and found.report.source.endswith(short)
+def test_number_of_a_known_report(note):
+    told = answer(note.source.split("/")[1])
+    assert told["scene"] == note.scene and told["report"]["source"] == note.source
 
 
-def test_a_word_is_known_in_all_its_forms():
-    for words in ("slip slips slipped slipping", "bounce bounces bouncing", "sink sinks sinking", "box boxes",
-                  "jitter jitters jittering", "penetrates penetrating penetration", "grip gripper grips"):  # fmt: skip
-        assert len({stem(word) for word in words.split()}) == 1, words
+def test_name_of_a_scene():
+    assert answer("tilt_table")["scene"] == answer("tilt table mujoco")["scene"] == "tilt_table"
 
 
-def test_an_engine_that_is_named_gets_its_numbers_and_the_lines_to_paste():
-    said, fix = asked("grip", "slips", "mujoco"), cures_of("mujoco")["pinch", 3]
-    assert f"{fix.failing} of {fix.judged} checks fail" in said and "bullet" not in said
-    assert all(line in said for line in cure_paste(fix).splitlines()), "as `cure` prints them, unbroken"
+def test_engine_that_fails_with_a_fix():
+    said, fix = asked("grip", "slips", "mujoco"), table()["fixes"]["pinch"]
+    (own,) = [each for each in fix if each["engine"] == "mujoco"]
+    assert own["helps"] and all(line in said for line in own["paste"].splitlines()), "as `cure` prints them, unbroken"
+    assert f"{own['failing']} of {own['judged']} checks fail" in said and "bullet" not in said
     assert said.count("\n") <= 24, "one screen"
     without = asked("grip", "slips")
-    assert cure_paste(fix).splitlines()[0] not in without and "crosscheck ask grip slips bullet" in without
+    assert own["paste"].splitlines()[0] not in without and "crosscheck ask grip slips" in without
 
 
-def test_names_of_packages_are_names_of_engines():
-    assert asked("stack", "sinks", "pymunk") == asked("stack", "sinks", "chipmunk")
+def test_engine_that_passes_says_how_its_numbers_combine():
+    said = " ".join(asked("elasticity", "of", "two", "shapes", "is", "multiplied", "pymunk").split())
+    assert "chipmunk as shipped passes all" in said and "0.36, the product; set that of both bodies" in said
+    assert "cure" not in said and "on record" not in said
 
 
-def test_a_question_about_releases_leads_to_the_command_that_answers_it():
-    assert asked("results", "changed", "with", "a", "release").startswith("crosscheck bisect ")
+@pytest.mark.parametrize("engine", [name for name in table()["engines"]])
+def test_every_engine_has_verdicts_and_what_it_does_unset(engine):
+    kept = table()["engines"][engine]
+    assert len(kept["scenes"]) > 20 and len(kept["unset"]) > 5
+    passed = next(name for name, rows in kept["scenes"].items() if not any(row[1] for row in rows))
+    assert f"{engine} as shipped passes all" in asked(passed, engine)
+    failed = next(name for name, rows in kept["scenes"].items() if any(row[1] for row in rows))
+    assert "checks fail" in asked(failed, engine)
 
 
-@pytest.mark.parametrize("words", ["it is slow", "the simulation is too slow", "my sim is slow in mujoco"])
-def test_a_question_about_time_leads_to_the_bench(words):
-    """A slow ball is a symptom of a scene; of a question that has nothing else the command comes first."""
-    assert asked(*words.split()).startswith("crosscheck bench ")
+def test_engine_that_does_not_run_the_scene():
+    assert "the scene is not run on it" in asked("conveyor", "drake")
 
 
-@pytest.mark.parametrize("words", ["the ball won't bounce", "the ball doesn\N{RIGHT SINGLE QUOTATION MARK}t bounce"])
-def test_an_apostrophe_divides_no_word(words):
-    said = asked(*words.split())
-    assert said.startswith("bounce: ") and "no match for" not in said
-
-
-def test_beside_the_best_scene_stand_those_with_as_many_of_the_words_or_another_one():
-    best, *others = matches("tower of blocks falls over")
-    named = json.loads(asked("tower", "of", "blocks", "falls", "over", "--json"))["others"]
-    told = {other.scene: set(other.words) for other in others}
-    assert named and all(len(told[s]) >= len(best.words) or told[s] - set(best.words) for s in named)
-
-
-def test_a_report_about_another_engine_than_the_one_that_is_named_is_left_out():
-    assert "known report bulletphysics" in asked("ball", "rolls", "straight", "on", "curves")
-    assert "known report" not in asked("ball", "rolls", "straight", "on", "curves", "pymunk")
-
-
-def test_a_scene_without_a_fix_on_record_says_so_and_not_that_nothing_fails():
-    """Bullet fails checks of both scenes; no search for a fix of them was kept."""
-    assert "no fix of an engine as shipped is on record" in asked("energy", "grows", "at", "each", "collision")
+def test_engine_that_fails_without_a_fix():
     said = " ".join(asked("stack", "sinks", "bullet").split())
-    assert "bullet: no fix is on record; to search: crosscheck cure bullet stack" in said and "no failure" not in said
+    assert "no setting is known that fixes it; to search: crosscheck cure bullet stack" in said
 
 
-def test_what_is_not_known_is_said():
-    assert "nothing is known of 'quantum'" in asked("quantum", status=2)
-    assert "nothing is known of ''" in asked("mujoco", status=2)
-    assert "no match for: quantum" in asked("grip", "slips", "quantum")
-    assert "box2d: has no table of fixes" in asked("sinks", "box2d")
+@pytest.mark.parametrize("words", ["a hinge joint is loose", "rope stretches", "the cloth tears", "camera is black"])
+def test_what_is_no_contact_is_out_of_scope(words):
+    said = asked(*words.split())
+    assert said.startswith("no scene shows this\nOut of scope: joints") and "--engine" not in said
 
 
-def test_settings_that_leave_most_failures_are_counted_and_not_given_to_paste():
-    fix = cures_of("mujoco")["wipe", 3]
-    assert fix.helps and not fix.recommended, "or choose another scene for this test"
-    said = asked("forces", "jump", "mujoco")
-    assert f"3-D: the best settings found fix {fix.failing - fix.left} of {fix.failing} checks" in said
-    assert cure_paste(fix).splitlines()[0] not in said
-    assert "lines to paste" not in asked("forces", "jump"), "no engine has any"
-    (plain,) = json.loads(asked("forces", "jump", "mujoco", "--json"))["fixes"]
-    assert plain["paste"] == ""
+def test_what_nothing_knows():
+    said = asked("quantum", "entanglement")
+    assert said.startswith("no scene shows this\n") and "my-scene.toml" in said and "no match for: quantum" in said
 
 
-def test_json_has_all_of_it():
-    found = json.loads(asked("mujoco#239", "--json"))
-    assert found["scene"] == "pinch" and found["report"] == "google-deepmind/mujoco#239"
-    assert [fix["engine"] for fix in found["fixes"]] == ["mujoco"] and "elliptic" in found["fixes"][0]["paste"]
+def test_unclear_question_has_three_candidates_and_no_fix():
+    said = " ".join(asked("restitution", "too", "small", "mujoco").split())
+    assert answer("restitution too small")["answer"] == SEVERAL
+    assert said.count("(mujoco fails)") == 2 and "solref" not in said
+
+
+@pytest.mark.parametrize(
+    ("words", "command"),
+    [("results changed with a release", "crosscheck bisect "), ("the simulation is too slow", "crosscheck bench "),
+     ("different results every run", "crosscheck run SCENE --engine E --invariance"),
+     ("falling body stops accelerating", "crosscheck describe ENGINE"),
+     ("body on a moving platform is left behind", "pose it in a scene file")],
+)  # fmt: skip
+def test_what_another_command_answers(words, command):
+    assert command in asked(*words.split()) and answer(words)["answer"] == COMMAND
+
+
+def test_what_is_right_is_said_to_be_right():
+    assert "That is right: in pure rolling" in asked("rolling", "ball", "never", "stops")
+
+
+def test_call_without_a_symptom():
+    assert "'mujoco' tells no symptom" in asked("mujoco", status=2)
+
+
+def test_engine_without_an_adapter():
+    assert "no adapter for: jolt" in asked("jolt", "stack", "jitters")
+
+
+def test_json():
+    told = json.loads(asked("mujoco#239", "--json"))
+    assert told["scene"] == "pinch" and told["report"]["source"] == "google-deepmind/mujoco#239"
+    assert [each["engine"] for each in told["engines"]] == ["mujoco"] and "elliptic" in told["engines"][0]["fix"][
+        "paste"
+    ]
+
+
+def test_every_line_fits_the_terminal_but_what_is_pasted():
+    for sentence in SENTENCES:
+        assert max(map(len, asked(*sentence["sentence"].split(), "chipmunk").splitlines())) <= 80, sentence
+
+
+def test_sqlite_without_full_text_search(monkeypatch):
+    class Poor:
+        def execute(self, *told):
+            import sqlite3
+
+            raise sqlite3.OperationalError("no such module: fts5")
+
+    monkeypatch.setattr("reports.symptoms.sqlite3.connect", lambda where: Poor())
+    said = asked("grip", "slips", status=4)
+    assert "FTS5" in said and said.count("\n") == 1
+
+
+def test_question_imports_no_scenes_engines_or_numbers():
+    """So it costs little more than ``--help``."""
+    code = "import sys; sys.argv[1:] = ['ask', 'grip slips mujoco']\n" + (
+        "from contact_crosscheck import main\ntry: main()\nexcept SystemExit: pass\n"
+        "print(*{'adapters', 'numpy', 'pandas', 'pydantic', 'rich', 'validation'} & set(sys.modules), file=sys.stderr)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.startswith("pinch: ") and ended.stderr.split() == []

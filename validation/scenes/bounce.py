@@ -260,6 +260,7 @@ SCENE = CanonicalScene(
         "the bounce height is wrong for the restitution that I set",
         "a ball with restitution 1 should bounce for ever and loses energy",
         "a ball gains energy with every bounce",
+        "energy grows at each bounce off the floor",
         "a dropped ball sticks to the floor on landing",
         "a ball keeps hopping with tiny bounces and never rests",
         "bounce height depends on the frame rate or time step",

@@ -127,6 +127,7 @@ SCENE = CanonicalScene(
         "two equal masses do not exchange their velocities",
         "restitution 0 is still bouncy",
         "kinetic energy is not conserved when two bodies collide",
+        "bodies are faster after a collision than before it",
         "a heavy ball hits a light one and the light one is too fast or too slow",
         "an elastic collision of two spheres loses energy",
         "bodies of different mass collide wrongly",

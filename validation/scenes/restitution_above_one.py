@@ -115,7 +115,7 @@ SCENE = CanonicalScene(
     title="Ball between plates that throw it back faster",
     symptoms=(
         "objects are thrown back faster than they came",
-        "energy grows at each collision",
+        "a restitution of 1.1 should add speed at every blow",
         "a restitution larger than 1 is clamped or refused",
         "a bumper or trampoline should add speed at every hit",
         "a pinball kicker gives no extra speed",

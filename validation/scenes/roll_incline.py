@@ -102,7 +102,7 @@ SCENE = CanonicalScene(
     title="Ball that rolls down an incline",
     symptoms=(
         "a wheel or ball rolls too slowly or too fast down a slope",
-        "there is rolling resistance that was not set",
+        "rolling resistance on a slope although none was set",
         "a cylinder rolls down a ramp with the wrong acceleration",
         "a sphere slides down a ramp instead of rolling",
         "a ball on a slope does not start to roll",

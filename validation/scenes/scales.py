@@ -119,6 +119,7 @@ SCENE = CanonicalScene(
         "huge objects fall or slide in a strange way",
         "which scale or units should I use",
         "small parts explode where large ones are fine",
+        "very small bodies are unstable and shake",
         "a gap is visible between small objects and the floor",
     ),
     figure=__doc__ or "",

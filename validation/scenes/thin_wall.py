@@ -114,7 +114,7 @@ SCENE = CanonicalScene(
         "fast things pass through walls",
         "a projectile tunnels through a thin plate",
         "objects fall through the floor",
-        "a bullet goes through the target without a collision",
+        "an arrow goes through the target without a collision",
         "collisions are missed at high speed",
         "continuous collision detection does not work",
         "a fast ball ends up on the other side of the wall",
