@@ -176,7 +176,7 @@ def terms(stemmed: Sequence[str], same: Mapping[str, str], idle: Collection[str]
 
 
 def _without_names(question: str, names: Mapping[str, str]) -> tuple[list[str], list[str], list[str]]:
-    """Words of a question without engines; the engines, ours and others. A bullet is none, and neither is a dart."""
+    """Words of a question without engines; the engines, ours and others. A name after an article is a thing."""
     words, engines, strangers = list[str](), list[str](), list[str]()
     for word in question.split():
         plain = word.lower().strip(".,;:?!()\"'")
