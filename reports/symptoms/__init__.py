@@ -26,9 +26,9 @@ LINE = 0.5
 UNKNOWN = 1.5
 #: A match is clear if its nearest line has this share of the question, by weight, if it is nearly the first both as a
 #: whole and by its nearest line, and if the next has at most this share of its rank.
-SAID, NEARLY, NEXT = 0.5, 0.9, 0.75
+SAID, NEARLY, NEXT = 0.55, 0.9, 0.75
 #: Share of the question below which nothing shows it.
-LEAST = 0.3
+LEAST = 0.25
 #: Most words of a phrase in `words.toml`.
 PHRASE = 5
 #: Stems that no phrase needs: "restitution is zero" is "restitution zero".
@@ -163,13 +163,13 @@ def stems(texts: Iterable[str], database: sqlite3.Connection) -> list[list[str]]
 
 
 def terms(stemmed: Sequence[str], same: Mapping[str, str], idle: Collection[str]) -> list[str]:
-    """Terms of a text: words and phrases that mean the same are one, the longest first; idle words are none."""
+    """Terms of a text: words and phrases that mean the same are one, the longest first; numbers are none."""
     found = []
     rest = [stem for stem in stemmed if stem not in LITTLE]
     while rest:
         length = next((n for n in range(PHRASE, 0, -1) if " ".join(rest[:n]) in same), 1)
         word = " ".join(rest[:length])
-        if word in same or word not in idle:
+        if word in same or not (word in idle or word.isdigit()):
             found.append(same.get(word, word))
         rest = rest[length:]
     return found
