@@ -260,11 +260,11 @@ def _guard(parent: int, connection: Connection) -> None:
     The guardian adopts orphaned descendants, so it also finds those that left its group. It ends like the child, or
     when its own parent dies.
     """
-    blocked = {signal.SIGTERM, signal.SIGCHLD}
+    blocked = {signal.SIGTERM, signal.SIGHUP, signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
     libc = ctypes.CDLL(None)
     libc.prctl(_PR_SET_CHILD_SUBREAPER, 1)
-    libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    libc.prctl(_PR_SET_PDEATHSIG, signal.SIGHUP)  # also where only the thread ends that has started this process
     if os.getppid() != parent:  # it had already ended
         os._exit(1)
     guardian = os.getpid()
@@ -279,7 +279,8 @@ def _guard(parent: int, connection: Connection) -> None:
         return
     connection.close()
     while True:
-        if signal.sigwait(blocked) == signal.SIGTERM:
+        said = signal.sigwait(blocked)
+        if said == signal.SIGTERM or os.getppid() != parent:
             _kill(-child)
             _sweep()
             _end_like(signal.SIGTERM)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import wait
 from pathlib import Path
 
@@ -328,3 +329,17 @@ def test_where_no_process_can_be_started_it_is_said_why(serve, monkeypatch, erro
     monkeypatch.setattr(isolation.multiprocessing.get_context("spawn").Process, "start", refuses)
     with pytest.raises(IsolationError, match=f"^process: cannot start one: {said}$"):
         Child(serve)
+
+
+def test_child_of_a_thread_that_ends(serve):
+    """The system reports the end of the thread like that of the process."""
+
+    def begun():
+        child = Child(serve)
+        assert asked(child, "answer(0)") == "0"
+        return child
+
+    with ThreadPoolExecutor(1) as threads:
+        child = threads.submit(begun).result()
+    assert not within(0.5, child.ended) and asked(child, "answer(1)") == "1"
+    child.stop()

@@ -1,11 +1,6 @@
 """The timing lane, on an engine whose cost and misbehaviour are known by construction."""
 
 import hashlib
-import multiprocessing
-import os
-import select
-import signal
-import subprocess
 import sys
 import textwrap
 from dataclasses import replace
@@ -144,43 +139,6 @@ def test_an_abort_or_a_hang_voids_its_own_unit_only(clockwork):
     assert [len(found[name]) for name in ("abort", "raise", "hang")] == [1, 1, 1]
     for name in ("one", "two"):
         assert len(found[name]) >= 5 and not any(t.void for t in found[name])
-
-
-#: A parent whose child of the lane reads from a pipe that the test holds the other end of.
-PARENT = """
-import os, signal, sys
-from multiprocessing.connection import Connection
-from validation.bench import lane
-lane.load_engines_here = lambda: print(os.getpid(), flush=True)  # the first that comes after its own arrangements
-parent = os.getpid()
-if os.fork() == 0:
-    lane._child(Connection(int(sys.argv[1])), parent, {})
-signal.pause()
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing tells a process that its parent has died")
-def test_a_child_of_the_lane_dies_with_its_parent_though_its_pipe_stays_open():
-    """A bench that is killed left a process behind that went on timing a unit that hung."""
-    ours, theirs = multiprocessing.Pipe()
-    with subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(theirs.fileno())],
-        stdout=subprocess.PIPE,
-        text=True,
-        pass_fds=(theirs.fileno(),),
-    ) as parent:
-        child = int(parent.stdout.readline())
-        watched = os.pidfd_open(child)
-        parent.kill()
-        try:
-            ended, _, _ = select.select([watched], [], [], 20.0)
-            assert ended, "it lives on"
-        finally:
-            if not ended:
-                os.kill(child, signal.SIGKILL)
-            os.close(watched)
-            ours.close()
-            theirs.close()
 
 
 def test_invalid_physics_voids_the_timing(clockwork):

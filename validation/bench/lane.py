@@ -10,27 +10,20 @@ every few rounds: the layout of memory differs between processes, and the interv
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import random
-import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
-from multiprocessing.connection import Connection
-from typing import Any, TypeVar
+from typing import Any
 
-from adapters.isolation import end_with
-from adapters.registry import load_engines_here
-from validation import posed
 from validation.bench.statistics import spread
-from validation.bench.stopwatch import Lap, lap, serve
+from validation.bench.stopwatch import Lap, lap
 from validation.bench.timing import Timing
 from validation.bench.units import Unit
+from validation.running.apart import Apart
 
-T = TypeVar("T")
 #: Number of threads of libraries. CPU time of helper threads would count for some engines only.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -88,66 +81,21 @@ class _Entry:
         self.closed = bool(found.void) or narrow or n >= limits.most or (n >= 3 and self.spent > limits.unit_seconds)
 
 
-class Lane:
-    """Handle of the timing process, which is replaced when it dies.
+class Lane(Apart):
+    """The timing process, which is replaced when it dies; ``count`` is the number of the present one."""
 
-    Parameters
-    ----------
-    patience
-        Seconds to wait for an answer.
-    """
-
-    def __init__(self, patience: float) -> None:
-        self.patience = patience
-        self.count = -1
-        self._process: Any = None
-        self._connection: Connection | None = None
+    count = -1
 
     def start(self) -> None:
-        """Start a process, in place of the previous one."""
-        self.stop()
-        context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
+        """See `Apart.start`."""
         with _one_thread():
-            self._process = context.Process(target=_child, args=(theirs, os.getpid(), posed.known_texts()), daemon=True)
-            self._process.start()
-        theirs.close()
+            super().start()
         self.count += 1
 
     def time(self, unit: Unit) -> Lap:
         """Time ``unit`` once; the lap is void if the process died or hung."""
-        answer, reason = self.ask(partial(lap, unit))
-        return answer or Lap("", 0.0, 0.0, self.patience, "", None, void=reason)
-
-    def ask(self, call: Callable[[], T]) -> tuple[T | None, str]:
-        """Result of ``call`` in the timing process and ""; None and the reason if the process died or hung."""
-        assert self._connection is not None
-        reason = f"no answer after {self.patience:g} s"
-        try:
-            self._connection.send(call)
-            if self._connection.poll(self.patience):
-                return self._connection.recv(), ""
-        except (EOFError, OSError):
-            self._process.join(5.0)
-            reason = f"the process ended with exit code {self._process.exitcode}"
-        self.start()
-        return None, reason
-
-    def stop(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._connection.close()  # type: ignore[union-attr]
-            self._process = None
-
-
-def _child(connection: Connection, parent: int, scenes: dict[str, str]) -> None:
-    end_with(parent)
-    posed.remember(scenes)  # this process may start no other, so it gets the models that engines have read
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
-    load_engines_here()
-    serve(connection)
+        found = self.ask(lap, unit)
+        return Lap("", 0.0, 0.0, self.patience, "", None, void=found) if isinstance(found, str) else found
 
 
 @contextmanager

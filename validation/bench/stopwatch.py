@@ -13,7 +13,6 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -136,17 +135,3 @@ def _clock_cost() -> float:
 
 
 CLOCK_COST = _clock_cost()
-
-
-def serve(connection: Connection) -> None:
-    """Run the calls that arrive and return their results until the other end closes; output of engines is discarded."""
-    import os
-
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 1)
-    os.dup2(null, 2)
-    while True:
-        try:
-            connection.send(connection.recv()())
-        except EOFError:
-            return

@@ -19,7 +19,6 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -272,8 +271,8 @@ class _Errors:
 
         def run(slot: Slot, contacts: bool) -> Found:
             tell(f"errors: {case.title}, {slot.engine}{f' at {slot.iterations} sweeps' if slot.iterations else ''}")
-            found, reason = lane.ask(partial(errors_of, case.errors, slot, case.seconds, contacts))
-            return found or Found({}, {}, None, 0, 0.0, reason)
+            found = lane.ask(errors_of, case.errors, slot, case.seconds, contacts)
+            return Found({}, {}, None, 0, 0.0, found) if isinstance(found, str) else found
 
         self.case, self.opponents = case, list[tuple[Opponent, Slot]]()
         for name in case.against:

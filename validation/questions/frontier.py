@@ -175,7 +175,7 @@ class Looking:
 def _looked(slot: Slot, apart: Apart) -> Observation:
     answer = apart.ask(run_only, slot)
     if isinstance(answer, str):
-        lost = Outcome.TIMED_OUT if "Timeout" in answer else Outcome.CRASHED
+        lost = Outcome.TIMED_OUT if answer.startswith("no answer") else Outcome.CRASHED
         return Observation(slot, "", 0, "", lost, answer)
     return answer
 

@@ -1,19 +1,23 @@
 """Runs a function in a separate process, for questions that a slot cannot express.
 
-Cells run in the pool of `validation.workers`. Other runs of an engine (in another pose, recorded in full) are made
-here: an engine that aborts or hangs loses one answer, and the next call starts a new process.
+Cells run in the pool of `validation.workers`. Other runs of an engine (in another pose, recorded in full, timed) are
+made here: an engine that aborts or hangs loses one answer, and the next call starts a new process. What an engine
+starts ends with its process (`adapters.isolation`).
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import os
+import pickle
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar, cast
 
+from adapters.foreign import said_by
+from adapters.isolation import Child, Lost
 from adapters.registry import load_engines_here
+from validation import posed
 
 T = TypeVar("T")
 #: Longest wait for one answer [s].
@@ -31,7 +35,7 @@ class Apart:
 
     def __init__(self, patience: float = PATIENCE) -> None:
         self.patience = patience
-        self._pool: ProcessPoolExecutor | None = None
+        self._child: Child | None = None
 
     def __enter__(self) -> Apart:
         return self
@@ -39,24 +43,45 @@ class Apart:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.stop()
 
-    def ask(self, question: Callable[..., T], *args: Any, fresh: bool = False) -> T | str:
+    def start(self) -> None:
+        """Start a process, in place of the previous one; it gets the models that engines have read."""
+        self.stop()
+        self._child = Child(_serve)
+        self.ask(posed.remember, posed.known_texts())
+
+    def ask(self, question: Callable[..., T], *args: object, fresh: bool = False) -> T | str:
         """Result of ``question(*args)``, or why there is none; with ``fresh`` in a new process."""
-        if fresh:
-            self.stop()
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=load_engines_here)
-        answer: Future[T] = self._pool.submit(question, *args)
+        if fresh or self._child is None:
+            self.start()
         try:
-            return answer.result(self.patience)
-        except (BrokenProcessPool, TimeoutError) as error:
+            if self._child is None:
+                raise Lost("its process did not start")
+            self._child.send(pickle.dumps((question, args)))
+            return cast(T, pickle.loads(self._child.receive(self.patience)))
+        except Exception as error:  # what an engine has changed may break even the answer
             self.stop()
-            return f"no answer: {type(error).__name__}"
+            return str(error) if isinstance(error, Lost) else said_by(error)
 
     def stop(self) -> None:
         """End the process."""
-        if self._pool is not None:
-            for process in list((self._pool._processes or {}).values()):
-                process.kill()
-            self._pool.shutdown(wait=False, cancel_futures=True)
-            self._pool = None
+        if self._child is not None:
+            self._child.stop()
+            self._child = None
+
+
+def _serve(connection: Connection) -> None:
+    """Answer questions until the other end closes; output of engines is discarded."""
+    load_engines_here()
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    while True:
+        try:
+            question, args = pickle.loads(connection.recv_bytes())
+        except EOFError:
+            return
+        try:
+            answer = pickle.dumps(question(*args))
+        except Exception as error:
+            answer = pickle.dumps(said_by(error))
+        connection.send_bytes(answer)
