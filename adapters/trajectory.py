@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array, Contacts
+from adapters.whole import write
 
 Finish = Literal["completed", "diverged"]
 #: A value from a trajectory, or None and the reason.
@@ -153,7 +155,9 @@ class Trajectory:
             for key in ("dt", "finish", "reason", "initial_change", "readback", "certificate", "out_of_plane")
         }
         arrays["meta"] = np.array(json.dumps(meta, default=str))
-        np.savez_compressed(path, **arrays)
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)
+        write(path, stream.getvalue())
 
 
 def load_trajectory(path: Path) -> Trajectory:

@@ -26,7 +26,7 @@ from typing import Any
 from reports import exports, speed
 from reports.page import load_source, render
 from reports.page.source import Source
-from reports.writing import csv_of
+from reports.wording import csv_of
 from validation.records.store import Run, Store
 
 README = """contact-crosscheck, run {run}

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adapters.stages import stage
+from adapters.whole import write
 from reports.brief import Judged, judged
 from reports.findings import finding_line, grouped
 from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
-from reports.writing import write
 from validation.judging.rows import Row, frame, is_alarming
 from validation.records.store import Run, Store
 

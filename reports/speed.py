@@ -14,8 +14,8 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters import registry
-from reports.wording import number, plural
-from reports.writing import csv_of, write
+from adapters.whole import write
+from reports.wording import csv_of, number, plural
 from validation.bench import agreement, reading, work
 from validation.cells import Observation, Outcome, checks_of, format_dt
 from validation.judging.verdicts import judge_physics

@@ -8,13 +8,16 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from adapters.registry import facts
 from adapters.settings import text_of
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
 from validation.metrics import NEVER as NEVER
 from validation.posed import resolve
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Characters at which a spreadsheet starts a formula.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -168,6 +171,11 @@ def number(value: float | None, digits: int = 4) -> str:
 def cell(value: Any) -> Any:
     """Value for a table that a spreadsheet may open: text that looks like a formula is quoted."""
     return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA and not _is_number(value) else value
+
+
+def csv_of(table: pd.DataFrame) -> str:
+    """A table as CSV; text that looks like a formula is quoted, headings as well."""
+    return str(table.map(cell).rename(columns=cell).to_csv(index=False, lineterminator="\n"))
 
 
 def _is_number(text: str) -> bool:

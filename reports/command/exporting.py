@@ -11,6 +11,7 @@ import click
 
 from adapters import own_settings, registry
 from adapters.scene import SceneError
+from adapters.whole import write
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import FILE, FOLDER, writable
 from reports.command.files import folder as writable_folder
@@ -94,7 +95,7 @@ def _cell(scene: str, options: dict[str, Any], as_json: bool) -> None:
                 f"output: {path.name} would be imported in the place of {path.stem} itself, name it otherwise"
             )
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write(path, text)
     if as_json:
         click.echo(json.dumps({"slot": slot.as_dict(), "path": str(path) if path else None, "text": text}))
     else:

@@ -13,13 +13,13 @@ import click
 from adapters import stages
 from adapters.engine import EngineError
 from adapters.extras import install
+from adapters.whole import write
 from reports.command.files import FILE, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.showing import which
 from reports.stages import say, stage
 from reports.terminal import terminal
 from reports.wording import missing_text
-from reports.writing import write
 from validation.records.store import MissingError, Store
 
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from adapters.engine import EngineError
 from adapters.plain import one_line
 from adapters.scene import SceneError
+from adapters.whole import write
 from reports import brief, exports
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
@@ -27,7 +28,6 @@ from reports.summary import show
 from reports.terminal import terminal
 from reports.verdicts import Verdicts
 from reports.wording import plural
-from reports.writing import write
 from validation import posed
 from validation.cells import Slot, prepare, slot_from_dict
 from validation.posed import is_file, pinned, resolve

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from adapters.whole import write
 from reports.command.group import main
 
 
@@ -25,4 +26,4 @@ def schema(output: Path | None) -> None:
     if output is None:
         click.echo(text, nl=False)
     else:
-        output.write_text(text)
+        write(output, text)

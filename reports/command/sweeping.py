@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from adapters.scene import SceneError
+from adapters.whole import write
 from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
@@ -18,8 +19,7 @@ from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_f
 from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import print_roles, terminal
-from reports.wording import at, plural
-from reports.writing import csv_of, write
+from reports.wording import at, csv_of, plural
 from validation.judging.rows import rows_of
 from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
 from validation.records.store import Store

@@ -3,10 +3,13 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from reports.writing import csv_of, write
+from adapters.trajectory import Trajectory, load_trajectory
+from adapters.whole import write
+from reports.wording import csv_of
 
 
 def test_a_file_that_cannot_be_written_whole(tmp_path):
@@ -25,6 +28,16 @@ def test_a_link_and_a_device(tmp_path):
     assert (tmp_path / "link").is_symlink() and (tmp_path / "file").read_text() == "text"
     write(Path(os.devnull), "text")
     assert not Path(os.devnull).is_file()
+
+
+def test_a_trajectory_that_is_read_while_another_is_written(tmp_path):
+    path = tmp_path / "kept.npz"
+    path.write_bytes(b"old")
+    found = Trajectory(np.array([0.0]), np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), None, 0.1, "completed")
+    with path.open("rb") as reader:
+        found.save(path)
+        assert reader.read() == b"old"
+    assert load_trajectory(path).state_hash() == found.state_hash()
 
 
 def test_a_formula_in_a_table():
