@@ -18,7 +18,8 @@ from rich.text import Text
 from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
-from reports.wording import LABELS, MARKS, STATUS, mark_of, word_of
+from reports.wording import FEW, LABELS, MARKS, STATUS, mark_of, word_of
+from validation.cells import ALONE
 from validation.metrics import NEWER, OUT_OF_PLANE
 
 #: Colours; they support the words and never replace them.
@@ -139,6 +140,15 @@ def newer(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     """How many checks did not exist when the run was made; one line, or none."""
     count = sum(row["reason"] == NEWER for row in rows)
     return [f"{count} of the checks are newer than this run: without a value, not judged."] if count else []
+
+
+def repeated(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Cases that ended a process which had run others, and do not end one of their own; one line, or none."""
+    alone = (row for row in rows if ALONE in row["reason"])
+    named = list(dict.fromkeys("{engine}/{profile} {scene} {dimension}-D".format(**row) for row in alone))
+    more = f" and {len(named) - FEW} more" * (len(named) > FEW)
+    said = f"Ended a process that had run other cases; {ALONE}: {', '.join(named[:FEW])}{more} (why: explain)"
+    return [said] if named else []
 
 
 def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bool = False) -> list[Table]:

@@ -28,6 +28,7 @@ from reports.matrix import (
     legend,
     matrix_of,
     newer,
+    repeated,
     status_of,
     sweeps_of,
     tables_of,
@@ -83,6 +84,7 @@ def show(
         *unranked(matrix.columns),
         *leaving(rows),
         *newer(rows),
+        *repeated(rows),
     ):
         console.print(_folded(line, console, ""), style="dim")
     for line in refusals(rows):
@@ -112,6 +114,7 @@ def _show_families(
         *unranked(matrix.columns),
         *leaving(rows),
         *newer(rows),
+        *repeated(rows),
     ):
         console.print(_folded(line, console, ""), style="dim")
     ran = ", ".join(f"{engine} {version.partition('+')[0]}" for engine, version in versions_of(rows).items())

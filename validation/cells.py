@@ -38,6 +38,8 @@ MOST_STEPS, MOST_SAMPLES = 10**7, 5 * 10**7
 #: Longest step [s]: the probes of an adapter resolve nothing coarser. At 0.15 s they cannot measure friction, at 0.25 s
 #: their boxes turn over between two samples; a property check would measure the step, not the engine.
 LONGEST_DT = 0.1
+#: End of the reason of a case that ran once more, alone, and then had a result (`validation.workers.pool`).
+ALONE = "alone it runs"
 #: What is stored of each setting and property check.
 SETTING = {field.name for field in fields(Setting)}
 RECEIPT = {"quantity", "asked", "declared", "measured", "band", "holds", "because"}

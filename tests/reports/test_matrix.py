@@ -14,6 +14,7 @@ from reports.matrix import (
     leaving,
     legend,
     matrix_of,
+    repeated,
     status_of,
     sweeps_of,
     tables_of,
@@ -205,6 +206,18 @@ def test_a_cell_that_is_missing_counts_among_what_does_not_pass():
     """Who leaves cells out must not look better by it."""
     field = Field(Counter({"pass": 6, "missing": 2, "unsupported": 5}))
     assert (field.judged, field.missed, field.mark) == (8, 2, "missing")
+
+
+def test_cases_that_ended_a_process_which_had_run_others():
+    """They have results, of a process of their own; the summary names each once, and no more than four."""
+    alone = "in a process that had run others (2): the process was killed by SIGSEGV; alone it runs"
+    rows = [row("impact", d, "deep", "soft") | {"reason": said} for d, said in ((2, alone), (2, alone), (3, ""))]
+    assert repeated(rows) == [
+        "Ended a process that had run other cases; alone it runs: deep/soft impact 2-D (why: explain)"
+    ]
+    assert repeated(rows[2:]) == []
+    many = [row(f"s{k}", 2, "deep", "soft") | {"reason": alone} for k in range(6)]
+    assert repeated(many)[0].endswith("deep/soft s3 2-D and 2 more (why: explain)")
 
 
 def test_what_leaves_the_plane_is_told_by_cells_at_the_profiles_own_iterations():

@@ -42,7 +42,12 @@ class Worker:
         if "compile" in self.job:
             raise Lost("no part is compiled here")
         slot = slot_from_dict(self.asked[-1])
-        answer = {"changed": "", "unwritten": None, "stages": [], "outcome": Outcome.OK} | self.told.get(slot, {})
+        told = self.told.get(slot)
+        if told == "ends" and len(self.asked) > 1:
+            raise Lost("the process was killed by SIGSEGV")
+        answer = {"changed": "", "unwritten": None, "stages": [], "outcome": Outcome.OK} | (
+            told if isinstance(told, dict) else {}
+        )
         observation = Observation(slot, "", 1, "1", answer.pop("outcome")).as_dict()
         return json.dumps({"observation": observation, "recording": None} | answer).encode()
 
@@ -61,7 +66,7 @@ def run(monkeypatch):
         _run.workers = [Worker(told) for _ in range(workers)]
         left = iter(_run.workers)
 
-        _run.begun = 0
+        _run.begun, _run.reasons = 0, {}
 
         def started(memory):
             worker = next(left, None)
@@ -76,6 +81,7 @@ def run(monkeypatch):
         try:
             for observation in run_cells(slots, jobs, **options):
                 found.append(observation.slot)
+                _run.reasons[observation.slot] = observation.reason
         except (limits.LimitError, OSError, ZeroDivisionError) as error:
             raised = error
         return found, raised
@@ -132,8 +138,11 @@ def test_a_process_that_a_cell_changed_is_renewed_and_its_answer_stands(run):
 
 
 def test_a_case_that_ends_a_process_which_has_run_others(run):
-    """They may have left the cause there: it runs once more, in a new process, and its answer there stands."""
+    """They may have left the cause there: it runs once more, in a new process, and its observation tells both."""
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0)]
+    assert run(slots, {slots[2]: "ends"}, 2) == (slots, None)
+    said = "in a process that had run others (2): the process was killed by SIGSEGV; alone it runs"
+    assert [run.reasons[slot] for slot in slots] == ["", "", said]
     ends = {"outcome": Outcome.CRASHED, "changed": "what was raised"}
     assert run(slots, {slots[1]: ends}, 3) == (slots, None)
     assert [len(worker.asked) for worker in run.workers] == [2, 1, 1]

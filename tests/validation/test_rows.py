@@ -61,6 +61,7 @@ def test_what_the_metric_says_stands_once_before_what_the_verdict_says():
     )
     assert judged(metrics={"creep": (None, "it never touched")}).reason == "the engine has no list of findings"
     assert judged(metrics={}).value is None
+    assert judged(metrics={"creep": (0.0, "")}, reason="alone it runs").reason == "alone it runs"
 
 
 def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatch):

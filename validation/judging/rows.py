@@ -228,7 +228,8 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
         # A value that an engine does not report is no failure of its motion, unless it once reported it.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = Verdict(None, None, left_open) if left_open else _verdict(observation, scene, check, value, why, ready)
-    reason = "; ".join(dict.fromkeys(text for text in (why if value is not None else "", verdict.reason) if text))
+    texts = why if value is not None else "", observation.reason * (observation.outcome is Outcome.OK), verdict.reason
+    reason = "; ".join(dict.fromkeys(text for text in texts if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
 
 

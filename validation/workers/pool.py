@@ -22,7 +22,7 @@ from adapters.foreign import said_by
 from adapters.isolation import Child, Lost, Mistaken
 from adapters.stages import stage
 from validation import posed
-from validation.cells import Observation, Outcome, Slot, observation_from_dict, prepare
+from validation.cells import ALONE, Observation, Outcome, Slot, observation_from_dict, prepare
 from validation.running import warming
 from validation.running.tracks import Recording, recording_from_bytes
 from validation.workers import limits
@@ -46,13 +46,13 @@ class Unwritten(OSError):
 class _Seat:
     """A slot of the pool for one worker; the worker changes with the engine.
 
-    ``started``: when it was, by the monotonic clock [s], if it is to measure its stages. ``fresh``: it has run no cell.
+    ``started``: when it was, by the monotonic clock [s], if it is to measure its stages. ``cells``: how many it ran.
     """
 
     child: Child | None = None
     engine: str = ""
     started: float | None = None
-    fresh: bool = True
+    cells: int = 0
     work: Slot | warming.Part | None = None
     until: float = 0.0
 
@@ -71,7 +71,7 @@ class _Waiting:
     ) -> None:
         self._leave = leave
         self._timeouts: Counter[tuple[str, str]] = Counter()
-        self._repeated: set[Slot] = set()
+        self._repeated: dict[Slot, str] = {}
         self._parts = deque(parts)
         self._held: dict[warming.Key, list[Slot]] = {part.key: [] for part in parts}
         self._ready: dict[str, deque[Slot]] = {}
@@ -121,13 +121,20 @@ class _Waiting:
         """Count a time-out."""
         self._timeouts[slot.engine, slot.scene] += 1
 
-    def again(self, slot: Slot) -> bool:
+    def again(self, slot: Slot, why: str) -> bool:
         """Let a cell run once more, next of its engine; False if it has."""
         if slot in self._repeated:
             return False
-        self._repeated.add(slot)
+        self._repeated[slot] = why
         self._ready.setdefault(slot.engine, deque()).appendleft(slot)
         return True
+
+    def told(self, observation: Observation) -> Observation:
+        """With what happened before, where a cell that was repeated runs alone."""
+        why = self._repeated.get(observation.slot)
+        if why is None or observation.outcome in (Outcome.CRASHED, Outcome.TIMED_OUT):
+            return observation
+        return replace(observation, reason="; ".join(filter(None, (observation.reason, f"{why}; {ALONE}"))))
 
     def compiled(self, part: warming.Part) -> bool:
         """Let the cells start that waited for these kernels; whether others are left to compile.
@@ -153,7 +160,7 @@ def run_cells(
     """Yield an observation per slot, in the order in which they finish.
 
     A cell whose worker answers for another one runs again in a new process, once; so does one that ends a worker which
-    has run others, as they may be the cause.
+    has run others, as they may be the cause; its observation tells both.
 
     An error while cells run is raised after all running cells have ended, so that no result is lost except of cells
     whose trajectory or recording could not be stored. Later errors are not reported.
@@ -232,19 +239,22 @@ def run_cells(
                     if not waiting.compiled(work):
                         seat.free()  # compiling leaves up to .95 GB in use, a cell needs a quarter of that
                     continue
-                fresh, seat.fresh = seat.fresh, False
+                others, seat.cells = seat.cells, seat.cells + 1
                 try:
                     observation, recording = _collect(seat, work, timeout)
                 except Unwritten as error:
                     failure = failure or error
                     continue
                 except Mistaken as mistaken:
-                    if waiting.again(work):
+                    if waiting.again(work, str(mistaken)):
                         continue
                     observation, recording = _lost(work, Outcome.CRASHED, str(mistaken), ""), None
                 # A process that has run others may end because of what they left in it.
-                if observation.outcome is Outcome.CRASHED and not fresh and seat.child is None and waiting.again(work):
+                why = f"in a process that had run others ({others}): {observation.reason}"
+                ended = observation.outcome is Outcome.CRASHED and seat.child is None
+                if ended and others and waiting.again(work, why):
                     continue
+                observation = waiting.told(observation)
                 if observation.outcome is Outcome.TIMED_OUT:
                     waiting.timed_out(work)
                 # Before the result is used, so that a worker does not wait while it is stored. No worker is started
@@ -268,7 +278,7 @@ def _engage(seat: _Seat, engine: str, memory: int) -> None:
     if seat.engine != engine or seat.child is None:
         seat.free()
         seat.started = time.monotonic() if stages.is_on() else None
-        seat.child, seat.engine, seat.fresh = _started(memory), engine, True
+        seat.child, seat.engine, seat.cells = _started(memory), engine, 0
 
 
 @stage("starting processes")
