@@ -3,6 +3,7 @@
     statements    facts, profiles, refusals, capabilities
     worlds        start, read-back, shared state, the same bits again, memory
     mechanics     free fall, momentum, contacts and their impulses, symmetry
+    shapes        size along each axis and each moment of inertia, of each shape
     parameters    the property checks of every profile
     toy, faults   a correct engine, and faults for it
     self_test     each fault is noticed by its check
@@ -29,7 +30,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from adapters.conformance import mechanics, statements, worlds
+from adapters.conformance import mechanics, shapes, statements, worlds
 from adapters.conformance.finding import Check, Finding, NotAsked, found
 from adapters.conformance.parameters import PROBES, receipt_findings
 from adapters.engine import Engine
@@ -52,6 +53,8 @@ CHECKS: dict[str, Check] = {
     "contacts": mechanics.contacts,
     "impulse": mechanics.impulse,
     "sampling": mechanics.sampling,
+    "sizes": shapes.sizes,
+    "moments": shapes.moments,
     "order": mechanics.order,
     "mirror": mechanics.mirror,
     "quarter_turn": mechanics.quarter_turn,

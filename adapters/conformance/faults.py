@@ -66,6 +66,13 @@ def _extent(body: Body, size: float) -> Body:
     return replace(body, shape=Sphere((1.0 - size) * body.shape.radius)) if isinstance(body.shape, Sphere) else body
 
 
+def _long(body: Body, size: float) -> Body:
+    if not isinstance(body.shape, Box):
+        return body
+    *others, last = body.shape.half_extents
+    return replace(body, shape=Box((*others, (1.0 + size) * last)))
+
+
 def _torque(body: Body, size: float) -> Body:
     return replace(body, torque=tuple((1.0 - size) * t for t in body.torque))
 
@@ -233,6 +240,8 @@ FAULTS: dict[str, Fault] = {
     "mass too small": Fault("receipt mass", SHARES, "share", told=_each(_mass)),
     "inertia too small": Fault("receipt inertia", SHARES, "share", told=_each(_inertia)),
     "inertia of a disc given to a ball": Fault("receipt inertia", COARSE, "share", told=_each(_disc)),
+    "box too long along one axis": Fault("sizes", (0.1, 0.03, 0.01), "share", told=_each(_long)),
+    "inertia too small about every axis": Fault("moments", SHARES, "share", told=_each(_inertia)),
     "principal axes swapped": Fault("receipt inertia", COARSE, "share", told=_each(_swapped)),
     "torque too small": Fault("receipt inertia", SHARES, "share", told=_each(_torque)),
     "torque with the wrong sign": Fault("receipt turn", told=lambda scene, _: _each(_torque)(scene, 2.0)),

@@ -37,7 +37,7 @@ BOOKKEEPING = 1e-3
 SYMMETRY = 1e-4
 
 
-def _loss(engine: Engine, profile: str, scene: Scene) -> tuple[float, float]:
+def loss(engine: Engine, profile: str, scene: Scene) -> tuple[float, float]:
     """Largest declared loss of speed and spin within the scene."""
     declared = engine.declares(profile, needs(scene), DT)
     lost = []
@@ -56,7 +56,7 @@ def free_fall(engine: Engine) -> str:
         # A declared delay of d steps is a distance d g t dt behind the scheme, with the band of d.
         late = engine.declares(profile, needs(asked), DT).get("sampling")
         offset = engine.scheme(profile).position_offset - 2.0 * (late.value if late else 0.0)
-        linear, angular = _loss(engine, profile, asked)
+        linear, angular = loss(engine, profile, asked)
         found, g, body = driven(engine, asked, profile), np.array(scene.gravity), scene.bodies[0]
         t = found.t[:, None]
         velocity = np.array(body.twist[:2]) + g * t
@@ -108,7 +108,7 @@ def _conserved(engine: Engine, what: str, measure: Callable[[Scene, Trajectory],
             if np.abs(planar.twist[-1] - planar.twist[0]).max() < 0.01:
                 return f"{profile}: the balls passed through each other"
             total, slack = measure(scene, planar)
-            lost = max(_loss(engine, profile, scene))
+            lost = max(loss(engine, profile, scene))
             band = engine.facts.round_off + slack + lost
             off = float(np.abs(total - total[0]).max())
             if not off <= band:

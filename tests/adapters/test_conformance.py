@@ -1,6 +1,7 @@
 """The checker of adapters: healthy ones pass, and what is wrong with another one is a finding, never an exception."""
 
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from adapters.conformance import CHECKS, check_adapter, items, worlds
 from adapters.conformance.spoilt import Spoilt
 from adapters.engine import Expected
 from adapters.receipts import QUANTITIES
-from adapters.scene import Box
+from adapters.scene import Box, Capsule, Hull
 
 
 def failing(findings):
@@ -125,6 +126,28 @@ def test_our_adapters_conform(name):
     assert [str(finding) for finding in findings if not finding.holds] == []
     if found.facts.profile("solution"):
         assert {finding.status for finding in findings} == {"ok"} and not found.engine.expected
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "change"),
+    [
+        ("bullet", Capsule, lambda shape: Capsule(1.02 * shape.half_length, shape.radius)),
+        ("mujoco", Hull, lambda shape: Hull(tuple((x, 0.98 * y, z) for x, y, z in shape.vertices))),
+    ],
+)
+def test_shape_of_another_size_in_an_adapter(name, shape, change, monkeypatch):
+    """By 2 %: too long, and too small along one axis."""
+    engine = registry.find(name).engine
+    if engine is None:
+        pytest.skip(f"{name} is not installed")
+    build = engine.build
+
+    def changed(scene, dt, settings):
+        bodies = (replace(b, shape=change(b.shape)) if isinstance(b.shape, shape) else b for b in scene.bodies)
+        return build(replace(scene, bodies=tuple(bodies)), dt, settings)
+
+    monkeypatch.setattr(engine, "build", changed)
+    assert f"{shape.__name__} 3-D" in CHECKS["sizes"](engine) and not CHECKS["moments"](engine)
 
 
 @pytest.mark.long

@@ -202,13 +202,13 @@ def test_a_fall_may_miss_its_law_by_what_a_profile_declares_and_no_more(made, de
 def test_drag_takes_its_share_of_the_largest_speed_and_twice_of_the_spin():
     """A profile that takes 10 % a second: 2 % of a speed of 3.1 m/s in 0.2 s, which may grow with its square."""
     scene = scenes.flying()
-    linear, angular = mechanics._loss(
+    linear, angular = mechanics.loss(
         Dragged(linear_damping=share(0.1), angular_damping=Declared(0.2, 0.1)), "second", scene
     )
     assert linear == pytest.approx(-math.log(0.9) * 0.2) and angular == pytest.approx(-math.log(0.7) * 0.2)
-    assert mechanics._loss(Dragged(linear_damping=share(0.1)), "first", scene) == (0.0, 0.0)
+    assert mechanics.loss(Dragged(linear_damping=share(0.1)), "first", scene) == (0.0, 0.0)
     # All of it and more is 99 %: there is a logarithm of that.
-    assert mechanics._loss(Dragged(linear_damping=share(7.0)), "second", scene)[0] == pytest.approx(
+    assert mechanics.loss(Dragged(linear_damping=share(7.0)), "second", scene)[0] == pytest.approx(
         -math.log(0.01) * 0.2
     )
     for spare, said in ((0.9, False), (1.1, True)):
