@@ -63,6 +63,10 @@ def read(text: str, drop: bool) -> Model:
     joints = [child for child in root.children if child.tag == "joint"]
     notes = ["friction 1 in all pairs: URDF states none, this is MuJoCo's default"]
     notes += _let_go(root, links, joints)
+    free = {_link_of(joint, "child") for joint in joints if joint.attributes["type"] == "floating"}
+    bare = [link.attributes["name"] for link in links if all(child.tag != "inertial" for child in link.children)]
+    if light := free.intersection(bare):
+        notes.append(f"density 1000 kg/m^3 of {one_line(', '.join(sorted(light)), 120)}: no inertial, MuJoCo's default")
     own = Element("mujoco", {}, 0, [Element("compiler", {"fusestatic": "false"}, 0)])
     root.children.insert(0, own)
 

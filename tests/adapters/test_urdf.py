@@ -64,6 +64,15 @@ def test_a_root_is_free_unless_it_is_the_world_or_has_no_mass():
         read(robot(BALL.replace('name="ball"', 'name="world"')), False)
 
 
+def test_a_free_link_without_inertial():
+    """MuJoCo gives it the density of water, which is said; a link of no mass that is fixed has none."""
+    link = BALL.replace(INERTIA, "").replace('"ball"', '"{}"')
+    joint = '<joint name="{0}" type="floating"><parent link="world"/><child link="{0}"/></joint>'
+    crowd = "".join(link.format(name) + joint.format(name) for name in ("one", "two")) + link.format("world")
+    assert "density 1000 kg/m^3 of one, two: no inertial, MuJoCo's default" in read(robot(crowd), False).notes
+    assert not any("density" in note for note in read(robot(BALL), False).notes)
+
+
 ARM = (
     f'<link name="world"/>{BALL}'
     '<joint name="f" type="floating"><parent link="world"/><child link="ball"/></joint>'
@@ -95,6 +104,9 @@ REFUSED = [
      "<link> 'ball': has several geoms", None),
     (robot(BALL.replace("<mass", '<origin xyz="0 0 1"/><mass')), "<link> 'ball': its centre of mass", None),
     (robot(BALL.replace('"ball"', '"b&#x202e;l"')), "cannot be a name", None),
+    (robot(f'{BALL}<link name="tip">{INERTIA}</link>'
+           '<joint name="j" type="fixed"><parent link="ball"/><child link="tip"/></joint>'),
+     "<link> 'ball': a body with a mass is fixed to it", None),
     (robot(BALL + BALL), "<link> 'ball': is a second root", None),
     (robot(BALL + BALL.replace('"ball"', '"other"')), "<link> 'other': is a second root", None),
     (robot("<link/>" * 1001), "are more than the 1000", None),
