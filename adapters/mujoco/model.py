@@ -242,8 +242,8 @@ class _Reading:
                     "body", self._name("body", body), "mocap: nothing moves the bodies of a scene from outside"
                 )
             if m.body_weldid[body] not in (0, body) and m.body_mass[body] > 0.0:
-                weld = self._name("body", int(m.body_weldid[body]))
-                raise Refused("body", weld, "a body with a mass is fixed to it; a scene's body has one mass")
+                holder = self._name("body", int(m.body_weldid[body]))
+                raise Refused("body", holder, "a body with a mass is fixed to it; a scene's body has one mass")
             if m.body_gravcomp[body]:
                 raise Refused("body", self._name("body", body), "gravcomp: in a scene gravity acts on all bodies alike")
 
