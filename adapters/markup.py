@@ -1,8 +1,8 @@
 """XML models as trees of elements, checked before an engine's own parser reads them.
 
 Parsers of engines open included files and reserve any amount of memory. So the text is parsed here first: no document
-types or entities, no more elements and levels than a model of a thousand bodies has. Each element has its line for
-messages about unsupported elements (`adapters.model`).
+types or entities, no more elements, levels and attributes than a model of a thousand bodies has. Each element has its
+line for messages about unsupported elements (`adapters.model`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from adapters.scene import SceneError
 
 #: Most elements, and most levels of them: a model of a thousand bodies has some ten thousand, ten deep.
 MOST_ELEMENTS, MOST_LEVELS = 50_000, 64
+#: Most attributes of an element: twice those that a geom of MJCF may have.
+MOST_ATTRIBUTES = 100
 #: Most bodies and shapes of a model: as many bodies as a scene file may have.
 MOST_MADE = 1000
 
@@ -74,6 +76,8 @@ def parsed(text: str, tag: str, otherwise: str) -> Element:
             raise SceneError(
                 f"model: {element}: more than {MOST_ELEMENTS} elements, or nested deeper than {MOST_LEVELS}"
             )
+        if len(attributes) > MOST_ATTRIBUTES:
+            raise SceneError(f"model: {element}: more than {MOST_ATTRIBUTES} attributes")
         (stack[-1].children if stack else roots).append(element)
         stack.append(element)
 

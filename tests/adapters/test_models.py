@@ -103,6 +103,7 @@ def test_what_has_no_place_is_refused_with_its_element_or_left_out_and_said(name
     (model_of(f'<replicate count="99"><replicate count="99">{BALL}</replicate></replicate>'), "are more than the 1000"),
     (model_of(f'<replicate count="inf">{BALL}</replicate>'), "are more than the 1000"),
     ("<mujoco>" + "<body>" * 200, "nested deeper than 64"),
+    ("<mujoco " + " ".join(f'a{k}="1"' for k in range(101)) + "/>", "<mujoco>: more than 100 attributes"),
     ("<robot/>", "begins with <mujoco>"),
     ("", "is not XML"),
     ("<mujoco/>", "has no free body"),
