@@ -12,11 +12,12 @@ from typing import Any
 import click
 
 from reports.command.group import AS_JSON, main
-from reports.symptoms.answers import COMMAND, NOTHING, OUTSIDE, PAGE, SCENE, SEVERAL, answer
+from reports.symptoms import OUTSIDE
+from reports.symptoms.answers import COMMAND, NOTHING, PAGE, SCENE, SEVERAL, answer
 
 Plain = Mapping[str, Any]
-#: Where it says how a situation of one's own is posed.
-POSE = "pose it: crosscheck run my-scene.toml, or a model (MJCF, URDF, SDF); docs: Run your own scene or model"
+#: How a situation of one's own is posed.
+POSED = ": crosscheck run my-scene.toml, or a model (MJCF, URDF, SDF); docs: Run your own scene or model"
 
 
 @main.command("ask", epilog="Example: crosscheck ask my ball does not bounce")
@@ -97,7 +98,8 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
     which = f"({told['suite']} suite, release {told['release']})"
     if not told["failed"]:
         yield _title(f"{name} as shipped passes all {told['judged']} checks {which}")
-        yield from _settings(told, "so it may be your model; where nothing is set:")
+        yield _wrapped(f"so it may be your model{'; where nothing is set:' if told['unset'] else POSED}", "  ")
+        yield from _settings(told)
         return
     fix = told["fix"]
     if fix:
@@ -115,12 +117,12 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
         else:
             yield _wrapped(f"no setting is known that fixes it; to search: crosscheck cure {name} {scene}", "  ")
     if not fix or not fix["paste"]:
-        yield from _settings(told, "what it does when nothing is set:")
+        if told["unset"]:
+            yield "what it does when nothing is set:"
+        yield from _settings(told)
 
 
-def _settings(told: Plain, heading: str) -> Iterator[str]:
-    if told["unset"]:
-        yield heading
+def _settings(told: Plain) -> Iterator[str]:
     for row in told["unset"]:
         both = "; set that of both bodies" if " and " in row["what"] else ""
         yield _wrapped(f"  {row['what']}: {row['how']}{both}", "    ")
@@ -156,7 +158,7 @@ def _outside(told: Plain, text: str) -> Iterator[str]:
 def _nothing(told: Plain, text: str) -> Iterator[str]:
     yield _title("no scene shows this")
     yield from _nearest(told)
-    yield _wrapped(POSE, "  ")
+    yield _wrapped(f"pose it{POSED}", "  ")
 
 
 def _nearest(told: Plain) -> Iterator[str]:

@@ -22,6 +22,8 @@ TABLE = Path(__file__).parent / "table.json"
 COLUMNS = {"title": 2.0, "symptoms": 1.0, "reports": 0.7, "physics": 0.3}
 #: Share of the nearest line in a rank; the rest is that of all that is known of a scene.
 LINE = 0.5
+#: Name of what is out of scope, and its weight in a rank: a rope or a camera says more than the verbs beside it.
+OUTSIDE, APART = "outside", 1.4
 #: Weight of a word that nothing has; one that a single scene has weighs 4.5.
 UNKNOWN = 1.5
 #: A match is clear if its nearest line has this share of the question, by weight, if it is nearly the first both as a
@@ -206,6 +208,7 @@ def _ranked(
         share = sum(weight[term] for term in asked if name in known[term]) / total
         said = sum(weight[term] for term in asked if f" {term} " in f" {text} ") / total
         joint = (1.0 - LINE) * rank / most + LINE * near / longest
+        joint *= APART if name.startswith(f"{OUTSIDE}/") else 1.0
         is_first = rank >= NEARLY * most and near >= NEARLY * longest
         found.append(Match(name, joint * share, share, said, is_first, exact == {name}, line))
     found.sort(key=lambda match: (not match.is_exact, -match.rank))

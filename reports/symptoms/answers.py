@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.symptoms import Found, Match, search, table
+from reports.symptoms import OUTSIDE, Found, Match, search, table
 
-#: What an answer is: one scene, another command, none of what is measured here, several scenes, a page, or nothing.
-SCENE, COMMAND, OUTSIDE, SEVERAL, PAGE, NOTHING = "scene", "command", "outside", "several", "page", "nothing"
+#: What an answer is, beside `OUTSIDE`: one scene, another command, several scenes, a page of the docs, or nothing.
+SCENE, COMMAND, SEVERAL, PAGE, NOTHING = "scene", "command", "several", "page", "nothing"
 #: Candidates where no match is clear, and lines about what an engine does where nothing is set.
 CANDIDATES, LINES = 3, 4
 
@@ -67,8 +67,7 @@ def _candidates(found: Found) -> list[Plain]:
     told: dict[str, Plain] = {}
     for name in (match.name.partition("/")[0] for match in found.matches):
         if name in kept["scenes"]:
-            rows = {engine: kept["engines"].get(engine, {}).get("scenes", {}).get(name) for engine in found.engines}
-            verdicts = {engine: _verdict(own) for engine, own in rows.items() if own}
+            verdicts = {engine: _verdict(kept["engines"][engine]["scenes"].get(name, ())) for engine in found.engines}
             told.setdefault(name, {"scene": name, "title": kept["scenes"][name]["title"], "command": ""})
             told[name]["verdicts"] = verdicts
         elif name in kept["topics"]:
@@ -82,7 +81,7 @@ def _candidates(found: Found) -> list[Plain]:
 
 
 def _verdict(rows: Sequence[Sequence[Any]]) -> str:
-    return "fails" if any(row[1] for row in rows) else "passes"
+    return "fails" if any(row[1] for row in rows) else "passes" if rows else "does not run it"
 
 
 def _of_topic(name: str) -> Plain:
@@ -102,7 +101,7 @@ def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -
         "answer": SCENE, "scene": name, "title": scene["title"], "law": scene["law"],
         "line": match.line if match.line != scene["title"] else "",
         "says": kept["right"].get(match.line, ""), "report": _report(name, source, match.line, asked),
-        "engines": [by_engine.get(engine) or _unknown(engine) for engine in asked],
+        "engines": [by_engine[engine] for engine in asked],
         "passes": [engine for engine, told in by_engine.items() if told["judged"] and not told["failed"]],
         "fails": [engine for engine, told in by_engine.items() if told["failed"]],
         "fixed": [engine for engine, fix in fixes.items() if fix["helps"]],
@@ -116,10 +115,6 @@ def _report(scene: str, source: str, line: str, asked: Sequence[str]) -> Plain:
         if is_meant and (source or not asked or set(asked) & set(report["engines"])):
             return {"source": each, "symptom": report["symptom"]}
     return {}
-
-
-def _unknown(engine: str) -> Plain:
-    return {"engine": engine, "judged": 0, "failed": 0}
 
 
 def of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | None) -> Plain:

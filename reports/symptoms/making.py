@@ -17,7 +17,7 @@ from typing import Any
 from adapters import registry
 from adapters.engine_folder import unset_of
 from reports.cures import nothing_to_paste, recorded_fixes, recorded_paste, recorded_text
-from reports.symptoms import LITTLE, PHRASE, TABLE, opened, stems, terms
+from reports.symptoms import LITTLE, OUTSIDE, PHRASE, TABLE, opened, stems, terms
 from reports.symptoms.published import of_matrix, passed
 from validation.catalogue import CATALOGUE
 from validation.field import notes
@@ -110,9 +110,9 @@ def _of_scenes() -> Iterator[tuple[str, str, str]]:
 
 
 def _of_topics(topics: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, str, str]]:
-    """Lines of topics; those of one that is apart (``outside``) have nothing to do with each other."""
+    """Lines of topics; those of what is out of scope have nothing to do with each other."""
     for name, topic in topics.items():
-        apart = topic["is_apart"]
+        apart = name == OUTSIDE
         yield from ((f"{name}/{k}" if apart else name, "symptoms", line) for k, line in enumerate(topic["symptoms"]))
 
 

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from reports.command import main
-from reports.symptoms import making, opened, search, stems, table
-from reports.symptoms.answers import COMMAND, NOTHING, OUTSIDE, SCENE, SEVERAL, answer
+from reports.symptoms import OUTSIDE, making, opened, search, stems, table
+from reports.symptoms.answers import COMMAND, NOTHING, SCENE, SEVERAL, answer
 from validation.catalogue import CATALOGUE
 from validation.field import notes
 
