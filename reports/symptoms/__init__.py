@@ -31,6 +31,8 @@ UNKNOWN = 1.5
 SAID, NEARLY, NEXT = 0.55, 0.9, 0.75
 #: Share of the question below which nothing shows it.
 LEAST = 0.25
+#: What may stand beside a word.
+MARKS = ".,;:?!()\"'"
 #: Most words of a phrase in `words.toml`.
 PHRASE = 5
 #: Stems that no phrase needs: "restitution is zero" is "restitution zero".
@@ -81,7 +83,7 @@ class Found:
     terms
         The question's words, those that mean the same as one.
     missed
-        Stems of its words that nothing has.
+        Its words that nothing has.
     engines
         Engines that it names, by our names; ``strangers`` have no adapter.
     """
@@ -122,15 +124,16 @@ def search(question: str) -> Found:
         If this Python's SQLite has no FTS5.
     """
     kept = table()
-    words, engines, strangers = _without_names(question, kept["names"])
+    readable = question.encode("utf-8", "replace").decode()  # bytes of a shell may be no text
+    words, engines, strangers = _without_names(readable, kept["names"])
     database = opened()
     try:
-        (stemmed,) = stems([" ".join(words)], database)
-        asked = terms(list(dict.fromkeys(stemmed)), kept["same"], kept["idle"])
+        word_of = {stem: word for word, own in zip(words, stems(words, database), strict=True) for stem in own}
+        asked = terms(list(word_of), kept["same"], kept["idle"])
         matches, missed = _ranked(asked, kept["rows"], database) if asked else ([], [])
     finally:
         database.close()
-    return Found(matches, asked, missed, engines, strangers)
+    return Found(matches, asked, [word_of.get(term, term).strip(MARKS) for term in missed], engines, strangers)
 
 
 def opened() -> sqlite3.Connection:
@@ -181,7 +184,7 @@ def _without_names(question: str, names: Mapping[str, str]) -> tuple[list[str], 
     """Words of a question without engines; the engines, ours and others. A name after an article is a thing."""
     words, engines, strangers = list[str](), list[str](), list[str]()
     for word in question.split():
-        plain = word.lower().strip(".,;:?!()\"'")
+        plain = word.lower().strip(MARKS)
         if plain not in names or (words and words[-1].lower() in ("a", "an", "the", "my", "each", "every")):
             words.append(word)
         elif names[plain]:

@@ -150,7 +150,11 @@ def test_what_is_no_contact_is_out_of_scope(words):
 
 def test_what_nothing_knows():
     said = asked("quantum", "entanglement")
-    assert said.startswith("no scene shows this\n") and "my-scene.toml" in said and "no match for: quantum" in said
+    assert (
+        said.startswith("no scene shows this\n")
+        and "my-scene.toml" in said
+        and "no match for: quantum, entanglement" in said
+    )
 
 
 def test_unclear_question_has_three_candidates_and_no_fix():
@@ -176,6 +180,11 @@ def test_what_is_right_is_said_to_be_right():
 
 def test_call_without_a_symptom():
     assert "'mujoco' tells no symptom" in asked("mujoco", status=2)
+
+
+@pytest.mark.parametrize("words", ['"', "*", "NEAR(grip) AND NOT", "\udce9", "\x00", "#", "0.5", "grip " * 3000])
+def test_question_of_any_characters(words):
+    assert answer(words)["answer"] in (NOTHING, SCENE, SEVERAL)
 
 
 def test_engine_without_an_adapter():
