@@ -38,7 +38,8 @@ def test_cells_are_those_of_a_release_that_answers_where_none_is_installed_here(
     assert found == [SLOT]
 
 
-def test_a_release_is_measured_under_its_own_version(toy, store):
+def test_a_release_is_measured_under_its_own_version_and_is_never_the_latest_run(toy, store, monkeypatch):
+    latest, _ = store.start("quick: impact", [SLOT])
     (observation,) = ask(store, "1.0.0")
     assert (observation.outcome, observation.engine_version) == (Outcome.OK, "1.0.0")
     assert observation.metrics["rebound_ratio"][0] == pytest.approx(0.5, abs=1e-12)
@@ -46,6 +47,13 @@ def test_a_release_is_measured_under_its_own_version(toy, store):
     (run,) = store.release_runs("toy")
     told = store.protocol(run)["told"]
     assert told["distribution_version"] == "1.0.0" and told["numpy"]
+    assert store.run("latest").id == latest.id
+    # What other code measured does not count.
+    assert list(answered(store, release("1.0.0"), [SLOT])) == [SLOT]
+    for name in ("scene_code", "adapter_hash"):
+        with monkeypatch.context() as other:
+            other.setattr(f"validation.releases.driving.{name}", lambda asked: "another")
+            assert answered(store, release("1.0.0"), [SLOT]) == {}
 
 
 def test_the_planted_change_shows_in_the_release_that_has_it(toy, store):
@@ -88,21 +96,6 @@ def test_what_an_adapter_refuses_is_stored_but_a_release_that_was_never_asked_is
     unknown = replace(release("1.1.0"), unknown="1.1.0 is not known")
     assert drive(store, unknown, [SLOT], ONE)[0].outcome is Outcome.UNSUPPORTED
     assert answered(store, unknown, [SLOT]) == {}  # no code of ours has spoken: nothing of it counts
-
-
-def test_what_other_code_measured_does_not_count(toy, store, monkeypatch):
-    ask(store, "1.0.0")
-    assert list(answered(store, release("1.0.0"), [SLOT])) == [SLOT]
-    for name in ("scene_code", "adapter_hash"):
-        with monkeypatch.context() as other:
-            other.setattr(f"validation.releases.driving.{name}", lambda asked: "another")
-            assert answered(store, release("1.0.0"), [SLOT]) == {}
-
-
-def test_runs_on_releases_are_never_the_latest_run(toy, store):
-    run, _ = store.start("quick: impact", [SLOT])
-    ask(store, "1.0.0")
-    assert store.run("latest").id == run.id
 
 
 def test_a_profile_of_which_a_receipt_fails_has_no_verdicts_on_that_release(toy, store):
