@@ -112,8 +112,10 @@ def test_a_system_that_tells_nothing_holds_nothing(monkeypatch):
     assert worlds.taken() is None and worlds._settled() == (0.0, 0.0)
 
 
-def test_worlds_that_are_never_freed_are_seen_in_a_heap_full_of_holes():
-    """Blocks of 3 kB fit between blocks that stay: twice a thousand worlds then take no page more."""
+def test_worlds_that_are_never_freed_are_seen_in_a_heap_full_of_holes(monkeypatch):
+    """Blocks of 3 kB fit between blocks that stay: twice a hundred worlds then take no page more."""
+    for name, value in {"WARM": 20, "BUILDS": 100, "STEADY": worlds.STEADY / 10}.items():
+        monkeypatch.setattr(worlds, name, value)
     blocks = [bytes(3_100) for _ in range(8_000)]
     del blocks[::2]
     assert self_test.broken(Spoilt("worlds are never freed", 3e3), "memory")
