@@ -113,6 +113,7 @@ SCENE = CanonicalScene(
         "a stack explodes or blows up",
         "resting boxes vibrate and never go to sleep",
         "a stack of ten boxes wobbles",
+        "a high stack does not stay up",
         "piled up cubes slowly slip sideways",
         "contacts at rest are too soft: bodies interpenetrate under their weight",
         "how deep does a box sink at rest",

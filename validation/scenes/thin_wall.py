@@ -123,6 +123,7 @@ SCENE = CanonicalScene(
         "a landing body is deep in the ground before it is stopped",
         "the player falls through the map at low frame rate",
         "a quick body jumps over an obstacle between two steps",
+        "bodies fall through a fixed body whose mass is 0",
         "objects clip through a thin barrier",
         "two fast bodies pass through one another",
     ),
