@@ -128,12 +128,13 @@ def search(question: str) -> Found:
     words, engines, strangers = _without_names(readable, kept["names"])
     database = opened()
     try:
-        word_of = {stem: word for word, own in zip(words, stems(words, database), strict=True) for stem in own}
-        asked = terms(list(word_of), kept["same"], kept["idle"])
+        pairs = [(stem, word) for word, own in zip(words, stems(words, database), strict=True) for stem in own]
+        asked = list(dict.fromkeys(terms([stem for stem, _ in pairs], kept["same"], kept["idle"])))
         matches, missed = _ranked(asked, kept["rows"], database) if asked else ([], [])
     finally:
         database.close()
-    return Found(matches, asked, [word_of.get(term, term).strip(MARKS) for term in missed], engines, strangers)
+    word_of = {stem: word.strip(MARKS) for stem, word in pairs}
+    return Found(matches, asked, [word_of.get(term, term) for term in missed], engines, strangers)
 
 
 def opened() -> sqlite3.Connection:

@@ -87,7 +87,8 @@ def test_order_plurals_and_engines_do_not_matter():
 @pytest.mark.parametrize(
     ("words", "word"),
     [("elasticity", "restitution"), ("sliding", "slipped"), ("gripper", "grasps"), ("solref", "stiffness"),
-     ("contactERP", "penetration correction"), ("slop", "margin"), ("passes through", "tunnelling ccd")],
+     ("contactERP", "penetration correction"), ("slop", "margin"), ("passes through", "tunnelling ccd"),
+     ("on top of one another", "stacked")],
 )  # fmt: skip
 def test_words_that_mean_the_same(words, word):
     assert set(search(words).terms) & set(search(word).terms)
