@@ -9,9 +9,10 @@ from pathlib import Path
 def write(path: Path, content: str | bytes) -> None:
     """Write a file under another name, and rename it: a reader or a kill never finds half of it.
 
-    A device, and a file in a folder that may not be written, is written as it is.
+    A device, and a file in a folder that may not be written, is written as it is; a link that leads to itself is
+    replaced.
     """
-    path, data = path.resolve(), content.encode() if isinstance(content, str) else content
+    path, data = Path(os.path.realpath(path)), content.encode() if isinstance(content, str) else content
     if (path.exists() and not path.is_file()) or not os.access(path.parent, os.W_OK):
         path.write_bytes(data)
         return

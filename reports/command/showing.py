@@ -511,7 +511,7 @@ def _print_explanation(
     table.show_header = False
     table.columns[0].no_wrap = True
     off = f" = {_ratio(row)} tolerances" if severity(row) else ""
-    skill, invalid = skill_text(row), row["outcome"] == "invalid"
+    skill, why = skill_text(row), "reason" if row["outcome"] == "invalid" or row["physics"] == "pass" else "cause"
     role = f" ({word})" if (word := word_of(row["engine"], row["profile"])) else ""
     lines = [
         ("check", f"{row_id(row)}, {LABELS[mark_of(row)]}"),
@@ -522,7 +522,7 @@ def _print_explanation(
         ("error", f"{quantity(row['error'], row['unit'], 4)}{off}" if row["error"] is not None else "-"),
         ("tolerance", f"{quantity(row['tolerance'], row['unit'], 4)}: {row['because']}"),
         *([("skill", skill)] if skill else []),
-        *([("reason" if invalid else "cause", row["reason"])] if row["reason"] else []),
+        *([(why, row["reason"])] if row["reason"] else []),
         *([("off plane", beside)] if beside else []),
     ]
     if better:

@@ -26,6 +26,9 @@ def test_a_link_and_a_device(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "file")
     write(tmp_path / "link", "text")
     assert (tmp_path / "link").is_symlink() and (tmp_path / "file").read_text() == "text"
+    (tmp_path / "loop").symlink_to("loop")
+    write(tmp_path / "loop", "text")
+    assert (tmp_path / "loop").read_text() == "text"
     write(Path(os.devnull), "text")
     assert not Path(os.devnull).is_file()
 

@@ -424,10 +424,12 @@ def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
     assert "matched" not in call("explain", "mujoco/default/bounce/apex", "--out", tmp_path).stdout
 
 
-def test_explain_says_why_a_run_is_not_certified(two_engines, monkeypatch):
+@pytest.mark.parametrize(("outcome", "physics"), [("invalid", None), ("ok", "pass")])
+def test_explain_gives_the_reason_of_a_row_that_fails_nothing(outcome, physics, two_engines, monkeypatch):
+    """One that is not certified, or one that passes alone after it ended a process of others."""
     out, _ = two_engines
     why = "certificate: a contact pulls"
-    ended = {"outcome": "invalid", "physics": None, "standing": None, "reason": why}
+    ended = {"outcome": outcome, "physics": physics, "standing": None, "reason": why}
     changed(monkeypatch, lambda rows: [replace(row, **ended) for row in rows])
     lines = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout.splitlines()
     assert [line.split(None, 1)[1].strip() for line in lines if line.startswith("reason")] == [why]
