@@ -21,6 +21,14 @@ def test_process_that_an_engine_leaves_behind(kind):
         os.kill(left, 0)
 
 
+def test_process_that_a_call_has_changed():
+    """Its answer stands, and the next call has another process."""
+    with Apart(60.0) as apart:
+        first = apart.ask(os.getpid)
+        assert apart.ask(os.getpid) == first
+        assert apart.ask(os.umask, 0o7) is not None and apart.ask(os.getpid) != first
+
+
 def test_answer_that_is_lost():
     with Apart(60.0) as apart:
         assert apart.ask(os._exit, 3) == "the process ended with exit code 3"

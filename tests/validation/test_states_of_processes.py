@@ -13,7 +13,7 @@ import types
 import numpy as np
 import pytest
 
-from validation.workers import state
+from validation.running import state
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what a process shares is asked of Linux here")
 
@@ -48,7 +48,7 @@ def test_what_is_not_changed_is_not_named():
         ("environment", lambda: (lambda: os.environ.update(CROSSCHECK_X="1"), lambda: os.environ.pop("CROSSCHECK_X"))),
         ("streams", lambda: setting(sys, "stdin", None)),
         ("json.dumps", lambda: setting(json, "dumps", lambda thing: "")),
-        ("validation.workers.state.State.__eq__", lambda: setting(state.State, "__eq__", len)),
+        ("validation.running.state.State.__eq__", lambda: setting(state.State, "__eq__", len)),
     ],
 )
 def test_what_a_cell_may_change_is_named(name, change):
@@ -185,11 +185,11 @@ def test_what_a_system_does_not_have_is_nothing(monkeypatch):
 
 def test_functions_classes_and_modules_are_watched_of_ours_and_of_what_judging_computes_with():
     found = state._names()
-    assert {"json", "numpy.linalg", "math", "validation.workers.state", "validation.workers.state.State"} <= set(found)
+    assert {"json", "numpy.linalg", "math", "validation.running.state", "validation.running.state.State"} <= set(found)
     assert "types" not in found and not any(name.startswith(("pytest", "reports")) for name in found)
     live, fixed = found["json"]
     assert live is vars(json) and fixed["dumps"] is json.dumps and fixed["decoder"] is json.decoder
     assert "__name__" not in fixed and "json.JSONDecoder" not in found
-    assert found["validation.workers.state"][1].keys() >= {"taken", "State", "ctypes"}
-    assert "SPARE_FILES" not in found["validation.workers.state"][1]
-    assert "validation.workers.state.Path" not in found
+    assert found["validation.running.state"][1].keys() >= {"taken", "State", "ctypes"}
+    assert "SPARE_FILES" not in found["validation.running.state"][1]
+    assert "validation.running.state.Path" not in found

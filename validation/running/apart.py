@@ -1,8 +1,8 @@
 """Runs a function in a separate process, for questions that a slot cannot express.
 
 Cells run in the pool of `validation.workers`. Other runs of an engine (in another pose, recorded in full, timed) are
-made here: an engine that aborts or hangs loses one answer, and the next call starts a new process. What an engine
-starts ends with its process (`adapters.isolation`).
+made here: an engine that aborts or hangs loses one answer, and the next call starts a new process; so does one that
+changes what calls share (`validation.running.state`). What it starts ends with its process (`adapters.isolation`).
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
 from adapters.registry import load_engines_here
 from validation import posed
+from validation.running import state
 
 T = TypeVar("T")
 #: Longest wait for one answer [s].
 PATIENCE = 300.0
+#: First byte of an answer: whether the call has changed what calls share.
+UNCHANGED, CHANGED = b"0", b"1"
 
 
 class Apart:
@@ -57,7 +60,10 @@ class Apart:
             if self._child is None:
                 raise Lost("its process did not start")
             self._child.send(pickle.dumps((question, args)))
-            return cast(T, pickle.loads(self._child.receive(self.patience)))
+            told = self._child.receive(self.patience)
+            if told[:1] == CHANGED:
+                self.stop()
+            return cast(T, pickle.loads(told[1:]))
         except Exception as error:  # what an engine has changed may break even the answer
             self.stop()
             return str(error) if isinstance(error, Lost) else said_by(error)
@@ -75,13 +81,15 @@ def _serve(connection: Connection) -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.dup2(null, 2)
+    before = state.taken()
     while True:
         try:
             question, args = pickle.loads(connection.recv_bytes())
         except EOFError:
             return
+        before = state.still(before)
         try:
             answer = pickle.dumps(question(*args))
         except Exception as error:
             answer = pickle.dumps(said_by(error))
-        connection.send_bytes(answer)
+        connection.send_bytes((CHANGED if state.changed(before) else UNCHANGED) + answer)

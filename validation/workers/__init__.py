@@ -1,6 +1,6 @@
 """Runs cells in worker processes: an abort, a hang or a leak affects only its cell.
 
-    parent (pool.py) --(slot)--> worker (process.py): execute(), then: has the process changed (state.py)?
+    parent (pool.py) --(slot)--> worker (process.py): execute(), then: has the process changed (running/state.py)?
        ^ observation, recording; or how the worker ended, with the last of what it wrote
 
 A worker runs one engine. It is a separate session, so processes that an engine starts end with it; its memory limit

@@ -18,7 +18,7 @@ from adapters.foreign import said_by
 from adapters.stages import stage
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.workers import state
+from validation.running import state
 
 READY = b"ready"
 
