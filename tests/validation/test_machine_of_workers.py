@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validation.workers import limits, state
+from validation.running import state
+from validation.workers import limits
 from validation.workers.limits import GIB, LimitError
 
 

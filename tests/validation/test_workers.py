@@ -15,7 +15,8 @@ import time
 import pytest
 
 from validation.cells import Outcome, Slot
-from validation.workers import limits, run_cells, state
+from validation.running import state
+from validation.workers import limits, run_cells
 
 DT = 1 / 240
 
