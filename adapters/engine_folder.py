@@ -15,7 +15,8 @@
                           where there is no tuning.toml (`adapters.experiment`)
         unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
         decisive.csv      decisive settings of its fixes, as measured (`validation.settings.decisive`)
-        cures.csv         fixes by scene, and their cost, as measured (`validation.settings.cures`)
+        cures.csv         fixes by scene, and their cost, as measured (`validation.fixes`)
+        panels.csv        what its profiles break in other cases (`validation.fixes.panel`)
 
 All except the first are optional; an entry point that names a plain module provides an adapter only. Ours are in
 ``adapters/<engine>/`` and found in the same way.
@@ -48,7 +49,7 @@ from adapters.scene import Scene
 from adapters.unset import Unset
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
-CURES, TUNING = "cures.csv", "tuning.toml"
+CURES, PANELS, TUNING = "cures.csv", "panels.csv", "tuning.toml"
 
 
 def located(module: str) -> Path | None:
@@ -108,6 +109,16 @@ def cured_of(engine: str) -> tuple[Cured, ...]:
 def candidates_of(engine: str) -> Mapping[str, tuple[Any, ...]]:
     """Stock settings for tuning, with their values."""
     return _tuning(engine)[0].candidates
+
+
+def local_of(engine: str) -> tuple[str, ...]:
+    """Settings that single pairs or bodies can have, with those that belong to them."""
+    return _tuning(engine)[0].local
+
+
+def instead_of(engine: str) -> tuple[tuple[Mapping[str, Any], Mapping[str, Any]], ...]:
+    """Settings of the world, each with those of single pairs or bodies that do the same."""
+    return _tuning(engine)[0].instead
 
 
 def belongs_of(engine: str) -> Mapping[str, str]:
@@ -226,4 +237,4 @@ def _tuning(engine: str) -> tuple[Tuning, str]:
     module = None if _experiments(engine)[1] else _module(engine, EXPERIMENTS)[0]
     tried = {name: tuple(values) for name, values in getattr(module, "CANDIDATES", {}).items()}
     belongs = {name: str(other) for name, other in getattr(module, "BELONGS", {}).items()}
-    return Tuning(tried, belongs, tuple(getattr(module, "CURED", ()))), ""
+    return Tuning(tried, belongs, cured=tuple(getattr(module, "CURED", ()))), ""

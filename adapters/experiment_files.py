@@ -6,6 +6,12 @@
     [belongs]               settings that mean nothing without another one, and which; they are switched with it
     kappa_elastic = "solref"
 
+    local = ["solref"]      settings that single pairs or bodies can have, before the first table
+
+    [[instead]]             settings of the world, and what single pairs or bodies can have instead
+    of = { contactERP = 0.0 }
+    set = { contactStiffness = 0.0, contactDamping = 1e15 }
+
     [[cured]]               what fails as shipped and passes with a better profile (`adapters.experiment.Cured`)
     shipped = "default"
     better = "tuned"
@@ -41,6 +47,8 @@ class Tuning:
 
     candidates: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
     belongs: Mapping[str, str] = field(default_factory=dict)
+    local: tuple[str, ...] = ()
+    instead: tuple[tuple[Mapping[str, Any], Mapping[str, Any]], ...] = ()
     cured: tuple[Cured, ...] = ()
 
 
@@ -70,8 +78,11 @@ TABLE: Kind = (lambda value: isinstance(value, dict), "a table")
 _PARTS: Fields = {
     "candidates": TABLE,
     "belongs": TABLE,
+    "local": (is_list_of(is_word), "a list of names"),
+    "instead": (lambda value: isinstance(value, list), "a list of tables"),
     "cured": (lambda value: isinstance(value, list), "a list of tables"),
 }
+_INSTEAD: Fields = {"of": TABLE, "set": TABLE}
 _CURED: Fields = {
     "shipped": NAME,
     "better": NAME,
@@ -148,4 +159,6 @@ def _tuning(data: Mapping[str, Any]) -> Tuning:
         Cured(**cure | {"cells": tuple(map(params_of, cure["cells"])), "metrics": tuple(cure.get("metrics", ()))})
         for cure in cures
     ]
-    return Tuning(settings_of(candidates), belongs, tuple(found))
+    instead = [checked(f"instead {k}", each, _INSTEAD, _INSTEAD) for k, each in enumerate(data.get("instead", []), 1)]
+    swaps = tuple((settings_of(each["of"]), settings_of(each["set"])) for each in instead)
+    return Tuning(settings_of(candidates), belongs, tuple(data.get("local", ())), swaps, tuple(found))

@@ -228,19 +228,24 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
-    kinds: dict[str, list[Plain]] = defaultdict(list)
-    for row in failing:
-        kinds[row["metric"].partition("[")[0]].append(row)
-    worst = {name: max(map(severity, members)) for name, members in kinds.items()}
-    kind = next(name for name, error in worst.items() if NEAR * error >= max(worst.values()))
+    kind = named_kind(failing)
     members = [row for row in rows if row["metric"].partition("[")[0] == kind and row["value"] is not None]
     known_as = f"{kind}[1]"
-    if any(row["metric"] == known_as for row in kinds[kind]):
+    if any(row["metric"] == known_as for row in failing):
         seen = [_as_seen(row, known_as) for row in members if row["metric"] == known_as]
         members = [row for row in seen if row is not None] or members
     # The truth of a scene file depends on no parameters.
     constant = "" if is_file(rows[0]["scene"]) else _constant(kind, members)
     return constant or _worst(kind, [row for row in members if mark_of(row) != "pass"])
+
+
+def named_kind(failing: Iterable[Plain]) -> str:
+    """The kind of metric that a headline names."""
+    worst: dict[str, float] = {}
+    for row in failing:
+        kind = row["metric"].partition("[")[0]
+        worst[kind] = max(worst.get(kind, 0.0), severity(row))
+    return next(name for name, error in worst.items() if NEAR * error >= max(worst.values()))
 
 
 def _instead(row: Plain, kind: str, told_as_size: bool) -> str:

@@ -13,16 +13,20 @@ from adapters.engine_folder import belongs_of
 from adapters.scene import SceneError
 from adapters.settings import text_of
 from reports.wording import number, params_text, setting_text
-from validation.cells import Observation, Slot, format_dt
+from validation.cells import Observation, Slot, format_dt, scene_of
 from validation.cells import settings_of as settings_in
+from validation.fixes.kept import Cure, cures_of, panels_of
+from validation.fixes.panel import Panel, carried
+from validation.fixes.search import asked_of
 from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
-from validation.settings.cures import Cure, asked_of, cures_of
 from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Decisive, changes_of, decisive
 from validation.settings.switching import switched
 
 #: Text of a search without a result.
 NONE_HELPS = "no setting helps"
+#: Most cases that a fix breaks by name.
+NAMED = 2
 #: Words for the role of a setting in a fix.
 ROLES = {
     ALONE: "enough alone",
@@ -163,11 +167,18 @@ def known_cures(
 def recorded_text(cure: Cure, where: str = "") -> str:
     """`cure_text` after what it achieves; only the count where it is not `Cure.recommended`."""
     where = where or f"{cure.dimension}-D"
+    if cure.withdrawn:
+        return f"{where}: {withdrawn_text(cure)}"
     if cure.helps and not cure.recommended:
         fixed = f"{cure.failing - cure.left} of {cure.failing} checks"
         return f"{where}: the best settings found fix {fixed} ({cure.tried} tried)"
     what = "smallest fix, " if not cure.left else "best settings found, "
     return (what if cure.helps else "") + cure_text(cure, where)
+
+
+def withdrawn_text(cure: Cure) -> str:
+    """Why a fix is not printed."""
+    return f"no fix: what was found breaks more elsewhere than it fixes ({panel_text(cure.panel)})"
 
 
 def told_cure(row: Mapping[str, Any]) -> str:
@@ -178,6 +189,8 @@ def told_cure(row: Mapping[str, Any]) -> str:
     cure = _listed(row)
     if cure is None:
         return f"none was searched for in this case; to search: {search_command(row)}" if can_be_searched(row) else ""
+    if cure.withdrawn:
+        return withdrawn_text(cure)
     kinds = cure.mends or (cure.metric.partition("[")[0],)  # its own metric if no kind is fixed in all cases
     if not cure.helps or _is_mended(cure, row):
         return cure_text(cure)
@@ -187,7 +200,7 @@ def told_cure(row: Mapping[str, Any]) -> str:
 def cure_of(row: Mapping[str, Any]) -> Cure | None:
     """The listed fix for the check of a row in its own case, with its values there; None if there is none."""
     cure = _listed(row)
-    if cure is None or not cure.helps or not _is_mended(cure, row):
+    if cure is None or not cure.helps or cure.withdrawn or not _is_mended(cure, row):
         return None
     params = dict(_minimal(row))
     if params == dict(cure.params):
@@ -313,10 +326,35 @@ def cure_text(cure: Cure, where: str = "") -> str:
     left = f", {said.left}" if said.left else ""
     cost = f", at {said.times} times the cost" if said.times else ""
     cost = ", at the same cost" if said.times == "1" else cost
+    elsewhere = f"; {text}" if (text := panel_text(cure.panel)) else ""
     alone = ""
     if cure.alone:
         alone = f"; {_assigned(changes_in_words(cure, cure.alone))} alone: {number(cure.alone_after, 3)}{unit}"
-    return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}"
+    return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}{elsewhere}"
+
+
+def panel_text(panel: Panel | None) -> str:
+    """``tried in 24 other cases: breaks a thrown ball (forward_speed 1.4 -> 0.953 m/s, true 1.43)``."""
+    if panel is None:
+        return ""
+    named: dict[str, str] = {}
+    for cost in panel.breaks:
+        before, after, truth = told_apart(cost.before, cost.after, cost.truth)
+        unit = "" if cost.unit == "1" else f" {cost.unit}"
+        named.setdefault(cost.case, f"{cost.case} ({cost.metric} {before} -> {after}{unit}, true {truth})")
+    rest = len(named) - NAMED
+    told = ", ".join([*list(named.values())[:NAMED], *([f"{rest} more"] if rest > 0 else [])])
+    return f"tried in {panel.cases} other cases: breaks {told or 'nothing'}"
+
+
+def profile_costs(columns: Iterable[tuple[str, str]]) -> list[str]:
+    """What profiles break in other cases than those they were tuned for: a line each; empty for one as shipped."""
+    found = []
+    for engine, profile in dict.fromkeys(columns):
+        panel = panels_of(engine).get(profile)
+        if panel and panel.breaks:
+            found.append(f"{engine}/{profile}, against the engine as shipped, {panel_text(panel)}")
+    return found
 
 
 def _assigned(settings: Iterable[tuple[str, str]]) -> str:
@@ -364,9 +402,17 @@ def cure_paste(cure: Cure) -> str:
     loaded = registry.adapter(cure.engine)
     if loaded is None or not cure.changes:
         return ""
-    slot = _slot(cure, cure.changes)
-    scene = resolve(cure.scene).scene(cure.dimension, dict(cure.params))
-    return loaded.snippet(_settings(slot), list(cure.changes), scene, slot.dt)
+    here = _slot(cure, {})
+    there = _at_usual_step(here)
+    settings = _settings(switched(there, carried(cure.changes, here, there)))
+    return loaded.snippet(settings, list(cure.changes), scene_of(there), there.dt)
+
+
+def _at_usual_step(slot: Slot) -> Slot:
+    """A case of the catalogue at the engine's usual step instead of ours: what is pasted has the numbers for it."""
+    known = registry.facts(slot.engine)
+    ours = slot.dt == QUICK_DT and not is_file(slot.scene)
+    return replace(slot, dt=known.customary_dt) if known and ours else slot
 
 
 def how_measured(engine: str, scene: str, dimension: int, before: str, after: str) -> str:
@@ -398,11 +444,9 @@ def pasteable(
         return ""
     shipped = shown_cell(observations, scene, dimension, engine, before, params)
     old = {s["name"]: s["value"] for s in shipped.settings} if shipped else {}
-    settings = {s["name"]: s["value"] for s in cell.settings}
-    names = [name for name, value in settings.items() if name not in old or old[name] != value]
-    scene_of = resolve(cell.slot.scene)
-    made = scene_of.scene(cell.slot.dimension, dict(cell.slot.params))
-    return loaded.snippet(settings, names, made, cell.slot.dt)
+    names = [s["name"] for s in cell.settings if s["name"] not in old or old[s["name"]] != s["value"]]
+    there = _at_usual_step(cell.slot)
+    return loaded.snippet(_settings(there), names, scene_of(there), there.dt)
 
 
 def fix(row: Mapping[str, Any], observations: Sequence[Observation], better: str) -> tuple[str, str]:

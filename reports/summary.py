@@ -21,6 +21,7 @@ from rich.text import Text
 from adapters.stages import stage
 from reports import overview
 from reports.answers import Costs, answers, choices
+from reports.cures import profile_costs
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import (
     Matrix,
@@ -132,6 +133,7 @@ def _show_families(
     _heading(f"What is wrong as shipped, and what fixes it: the worst scene of each group{count}", console)
     for answer in worst:
         console.print(_folded(answer.line, console))
+    _elsewhere(rows, console)
 
 
 def _fits(table: Table, console: Console) -> bool:
@@ -186,6 +188,13 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
     _heading("What is wrong, and what fixes it" if found else _nothing_wrong(rows), console)
     for answer in found:
         console.print(_folded(answer.line, console))
+    _elsewhere(rows, console)
+
+
+def _elsewhere(rows: Sequence[Plain], console: Console) -> None:
+    """What the tuned profiles of a run break in other scenes than its own."""
+    for line in profile_costs((row["engine"], row["profile"]) for row in rows):
+        console.print(_folded(line, console), style="dim")
 
 
 def _nothing_wrong(rows: Sequence[Plain]) -> str:

@@ -108,7 +108,7 @@ def named(path):
 
 #: Rooms of `validation`, each of which imports only what stands to its left; on the ground floor stands what all share.
 ROOMS = ["truths", "scenes", "files", "running", "records", "workers", "bench"]
-ROOMS += ["findings", "judging", "questions", "settings", "releases", "field"]
+ROOMS += ["findings", "judging", "questions", "settings", "fixes", "releases", "field"]
 #: What stands in a room further right and is imported all the same.
 LOW = {
     ("truths", "validation.scenes.parts"): "parts of which scenes are made, which name none",

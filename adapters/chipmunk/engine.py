@@ -116,10 +116,8 @@ class ChipmunkEngine(CheckedEngine):
             told = {}
         lines = [f"space.{name} = {settings[name]!r}{told.get(name, '')}" for name in names if name != "start_overlap"]
         if "start_overlap" in names and settings["start_overlap"]:
-            lines.append(f"# and let bodies that touch start {settings['start_overlap']:.6g} m deep in each other")
-            formula = self.words(settings, scene, dt)["start_overlap"][1]
-            if isinstance(formula, str):
-                lines[-1] += f": for dt = {dt:.9g} and g = {needed.pull:.9g}, for others {formula}"
+            deep = self.words(settings, scene, dt)["start_overlap"][1]
+            lines.append(f"# let bodies that touch start {deep} deep in each other, in your space's units")
         return "\n".join(["# space: your pymunk.Space", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
@@ -127,7 +125,7 @@ class ChipmunkEngine(CheckedEngine):
         deep = settings["start_overlap"]
         is_share = deep > 0.0 and deep == START_SHARE * (needs(scene).pull * dt * dt)
         said = f"{START_SHARE:g}*g*dt^2" if is_share else deep
-        return {"start_overlap": ("overlap of touching bodies at the start [m]", said)}
+        return {"start_overlap": ("overlap of touching bodies at the start", said)}
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Single contacts and constant forces are exact here; totals of impulses are not where e = 1 and friction meet.

@@ -43,8 +43,8 @@ def words(settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tup
 def snippet(settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
     """See `adapters.engine.Engine.snippet`.
 
-    One ``<default>`` where all pairs of the scene are alike; else one ``<pair>`` for each material, with its friction,
-    for each pair of geoms.
+    A class of geoms where all pairs of the scene are alike: nothing else changes. Else one
+    ``<pair>`` for each material, with its friction, for each pair of geoms.
     """
     pairs: dict[Material, list[str]] = {}
     for i, j, material in scene.contact_pairs():
@@ -57,8 +57,6 @@ def snippet(settings: Mapping[str, Any], names: Collection[str], scene: Scene, d
     lines: list[str] = []
     if any(asked.values()):
         lines = _of_all(pairs, asked, scene, dt) if shared else _of_pairs(pairs, asked, scene, dt)
-        if any(formula for told in asked.values() for _, formula in told.values()):
-            option = {"timestep": (dt, ""), **option}
     return "\n".join([*([_element("option", option)] if option else []), *lines])
 
 
@@ -86,20 +84,27 @@ def _of_pair(
 def _of_all(
     pairs: Mapping[Material, Sequence[str]], asked: Mapping[Material, Mapping[str, Told]], scene: Scene, dt: float
 ) -> list[str]:
-    """Defaults for all geoms and for explicit pairs, which take nothing from their geoms."""
+    """A class of geoms with priority over those without, and the same for explicit pairs.
+
+    With equal priority MuJoCo would mix the values of both geoms, and take the larger ``condim``.
+    """
     pair = next(iter(asked.values()))
     bounces = {restitution for restitution, _ in pairs} if "solref" in pair else set()
-    said = ["every geom of the model that has no value of its own"]
+    name, which = ("rebounds", "rebound") if any(e > 0.0 for e, _ in pairs) else ("rests", "rest, slide or roll")
+    said = [f'give class="{name}" to geoms that {which}; their values count, friction too, not the other geom\'s']
     if pair.get("condim", (3, ""))[0] == 1:
         said.append('condim="1" takes all friction from them: leave it out of those with friction')
-    geom = dict(pair)
-    if "margin" in pair:  # the value of a pair is the sum of its geoms'
-        depth, _ = pair["margin"]
-        geom["margin"] = (0.5 * depth, _margin_formula(0.5 * depth, scene, dt))
-    of_geoms = _comment([*said, *_holds(geom, bounces, scene, dt)])
+    of_geoms = _comment([*said, *_holds(pair, bounces, scene, dt)])
     of_pairs = _comment(["the same for explicit pairs, which take nothing from geoms", *_formulas(pair, bounces)])
+    geom: dict[str, Told] = {"priority": (1, ""), **pair}
     lines = (of_geoms, _element("geom", geom), of_pairs, _element("pair", pair))
-    return ["<default>", *(f"  {line}" for line in lines), "</default>"]
+    return [
+        "<default>",
+        f'  <default class="{name}">',
+        *(f"    {line}" for line in lines),
+        "  </default>",
+        "</default>",
+    ]
 
 
 def _of_pairs(

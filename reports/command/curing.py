@@ -11,19 +11,21 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.engine import EngineError
-from adapters.engine_folder import CURES, folder_of
-from adapters.registry import load, profile_of
+from adapters.engine_folder import CURES, PANELS, folder_of
+from adapters.registry import is_ranked, load, profile_of
 from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, fixed, scene_names_of
-from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste
+from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste, panel_text
 from reports.speed import duration
 from reports.terminal import terminal
 from reports.wording import number, params_text
 from validation.cells import parse_dt
+from validation.fixes.kept import Cure, cures_of, write, write_panels
+from validation.fixes.panel import of_profile
+from validation.fixes.search import Unsearched, search
 from validation.posed import is_file, resolve
-from validation.settings.cures import Cure, Unsearched, cures_of, search, write
 
 
 @main.command(epilog="Example: crosscheck cure ENGINE pinch")
@@ -82,6 +84,8 @@ def cure(
                 _keep(engine, listed)
             if not as_json:
                 _show(engine, name, dimension, result, console)
+    if keep and not scenes:
+        _keep_panels(engine, version, jobs)
     if as_json:
         click.echo(json.dumps([{**asdict(each), "paste": cure_paste(each)} for each in found], indent=1, default=str))
 
@@ -92,6 +96,14 @@ def _keep(engine: str, listed: dict[tuple[str, int], Cure]) -> None:
     if folder is None:
         raise EngineError(f"cure: {engine} has no folder of its own to keep {CURES} in")
     write([listed[key] for key in sorted(listed)], folder / CURES)
+
+
+def _keep_panels(engine: str, version: str, jobs: int) -> None:
+    shipped, folder = profile_of(engine, "shipped"), folder_of(engine)
+    assert shipped is not None and folder is not None  # they were needed before
+    others = [name for name in load(engine).profiles if is_ranked(engine, name) and name != shipped]
+    panels = {name: of_profile(engine, shipped, name, jobs) for name in others}
+    write_panels(version, panels, folder / PANELS)
 
 
 def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, console: Console) -> None:
@@ -124,6 +136,10 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         console.print(
             f"what fixes {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
         )
+    if told := panel_text(found.panel):
+        console.print(told, markup=False, highlight=False, soft_wrap=True)
+    if found.withdrawn:
+        console.print("not recommended: it breaks more than it fixes", style="bold")
     for name, value in changes_in_words(found, found.changes):
         console.print(f"  {name} = {value}", markup=False, highlight=False, soft_wrap=True)
     if found.profile:
@@ -131,7 +147,9 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     if found.others:
         console.print(f"  or alone: {_alternatives(found)}", markup=False, highlight=False, soft_wrap=True)
     paste = cure_paste(found)
-    if paste:
+    if found.withdrawn:
+        pass
+    elif paste:
         console.print("to paste:", style="bold")
         console.print(Text(paste), soft_wrap=True)
     else:

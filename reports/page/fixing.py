@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from reports.answers import Answer, configured
-from reports.cures import cure_paste, is_standard, known_cures, told, told_cures
+from reports.answers import Answer, configured, named_kind
+from reports.cures import cure_paste, is_standard, known_cures, panel_text, told, told_cures
 from reports.page.source import Source
 from reports.wording import mark_of
-from validation.settings.cures import Cure
+from validation.fixes.kept import Cure
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Fix:
     left: str
     cost: str
     paste: str
+    elsewhere: str
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,20 @@ def _wrong(source: Source, answer: Answer) -> Wrong:
     dimensions = sorted({row["dimension"] for row in rows if mark_of(row) != "pass" and is_standard(row)})
     which = (answer.engine, rows[0]["engine_version"], answer.scene, answer.profile, dimensions)
     known = known_cures(*which)
-    fixes = [_fix(cure, "" if len(known) == 1 else where) for cure, where in known if cure.recommended]
+    kind = named_kind(row for row in rows if mark_of(row) != "pass")
+    fixes = [_fix(cure, kind, "" if len(known) == 1 else where) for cure, where in known if cure.recommended]
     said = answer.cure.partition("; ")[0].partition(", by ")[0].replace("->", "→")
     return Wrong(answer, fixes, said if fixes else "; ".join([said, *told_cures(*which)]))
 
 
-def _fix(cure: Cure, where: str) -> Fix:
-    said = told(cure)
+def _of(cure: Cure, kind: str) -> Cure:
+    """The fix with the numbers of the check that the sentence beside it names, where it fixes that."""
+    shown = next((each for each in cure.shown if each.metric.partition("[")[0] == kind), None)
+    return replace(cure, **vars(shown)) if shown else cure
+
+
+def _fix(cure: Cure, kind: str, where: str) -> Fix:
+    said = told(_of(cure, kind))
     unit = f"\N{NO-BREAK SPACE}{said.unit}" if said.unit else ""
     return Fix(
         where,
@@ -62,4 +70,5 @@ def _fix(cure: Cure, where: str) -> Fix:
         said.left,
         f"{said.times}×" if said.times else "",
         cure_paste(cure),
+        panel_text(cure.panel),
     )

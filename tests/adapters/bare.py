@@ -119,6 +119,8 @@ def mujoco(scene, dt, steps, paste):
     import mujoco as mj
 
     pasted, names = pasted_mjcf(paste), [body.name for body in scene.bodies]
+    named = [one.get("class") for element in pasted if element.tag == "default" for one in element]
+    classes = {"class": named[0]} if named else {}
     pairs = list(scene.contact_pairs())
     frictions = {material.friction for *_, material in pairs}
     shared = numbers(frictions.pop(), 0.005, 0.0001) if len(frictions) == 1 else None
@@ -148,6 +150,7 @@ def mujoco(scene, dt, steps, paste):
             size, turn = (shape.radius, shape.half_length), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
         free = body.motion == "free"
         friction = f' friction="{shared}"' if shared else ""
+        friction += f' class="{classes["class"]}"' if classes and free else ""
         geom = f'<geom name="{body.name}" type="{kind}"{extra}{friction} pos="{numbers(*x)}" quat="{numbers(*turn)}"'
         geom += f' size="{numbers(*size)}"' if size else ""
         geom += f' conaffinity="{int(free)}"/>'
@@ -164,7 +167,7 @@ def mujoco(scene, dt, steps, paste):
     defaults, options = "", {}
     for element in pasted:
         if element.tag == "default":
-            for one in element:
+            for one in element.iter():
                 valued(one, dt=dt, g=needs(scene).pull, e=max(m.restitution for *_, m in pairs))
             defaults += ET.tostring(element, encoding="unicode")
         elif element.tag == "option":
@@ -174,7 +177,7 @@ def mujoco(scene, dt, steps, paste):
         if all(isinstance(scene.bodies[k].shape, HalfSpace) for k in (i, j)) or not (lines or not shared):
             continue
         mu = numbers(material.friction, material.friction, 0.005, 0.0001, 0.0001)
-        pair = ET.Element("pair", {"friction": mu})
+        pair = ET.Element("pair", classes | {"friction": mu})
         for line in map(copy.deepcopy, lines):
             valued(line, dt=dt, g=needs(scene).pull, e=material.restitution)
             pair.attrib |= line.attrib
@@ -411,9 +414,8 @@ def chipmunk(scene, dt, steps, paste):
             made.surface_velocity = asked.surface_velocity
         bodies.append(body)
         shapes.append(made)
-    for deep, formula in re.findall(r"start (\S+) m deep.*?(?:for others (\S+))?$", paste, re.MULTILINE):
-        known = {"dt": dt, "g": needs(scene).pull}
-        start_deep(bodies, shapes, eval(formula.replace("^", "**"), {}, known) if formula else float(deep))
+    for deep in re.findall(r"start (\S+) deep", paste):
+        start_deep(bodies, shapes, eval(deep.replace("^", "**"), {}, {"dt": dt, "g": needs(scene).pull}))
     space.add(*bodies, *shapes)
 
     def state():

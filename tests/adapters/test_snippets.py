@@ -34,12 +34,13 @@ def test_mjcf_rebounds_as_asked_where_the_same_model_without_it_does_not(e):
     mujoco = pytest.importorskip("mujoco")
     scene = drop(3, e)
     paste = registry.load("mujoco").snippet(*changed(registry.load("mujoco"), scene), scene, DT)
-    body = (
-        '<worldbody><geom type="plane" size="0 0 1"/><body pos="0 0 1"><freejoint/>'
-        '<geom type="sphere" size=".5" mass="1"/></body></worldbody>'
-    )
     ratios = []
-    for head in (paste, f'<option timestep="{DT!r}"/>'):
+    step = f'<option timestep="{DT!r}"/>'
+    for head, of in ((step + paste, f'class="{"rebounds" if e else "rests"}"'), (step, "")):
+        body = (
+            '<worldbody><geom type="plane" size="0 0 1"/><body pos="0 0 1"><freejoint/>'
+            f'<geom {of} type="sphere" size=".5" mass="1"/></body></worldbody>'
+        )
         model = mujoco.MjModel.from_xml_string(f"<mujoco>{head}{body}</mujoco>")
         model.opt.gravity[:] = 0.0
         data = mujoco.MjData(model)
@@ -171,15 +172,15 @@ def test_a_pasted_rebound_holds_at_any_step_by_the_formula_beside_it_and_at_its_
     assert abs(wrong.twist[k, 1, 2] - up[k]) > 0.1
 
 
-def test_a_default_says_whom_it_touches_and_numbers_without_a_formula_are_for_any_step():
+def test_a_class_says_whom_it_touches_and_no_line_has_a_step():
     pytest.importorskip("mujoco")
     engine, scene = registry.load("mujoco"), drop(3, 0.8)
     settings, names = changed(engine, scene)
     text = engine.snippet(settings, names, scene, DT)
-    assert "every geom of the model that has no value of its own" in text and "takes all friction from them" in text
-    assert "timestep=" in text and "timestep=" not in engine.snippet(settings, ["solimp", "cone"], scene, DT)
+    assert 'class="rebounds" to geoms that rebound;' in text and "takes all friction from them" in text
+    assert "timestep" not in text
     assert engine.snippet(settings, [], scene, DT) == ""
-    for element in pasted_mjcf(text)[1]:
+    for element in list(pasted_mjcf(text)[1].iter())[2:]:
         assert element.get("solref") == "0 -432" and element.get("condim") == "1"
 
 
@@ -189,7 +190,5 @@ def test_a_start_overlap_of_chipmunk_has_its_formula():
     engine = registry.load("chipmunk")
     settings, names = changed(engine, scene)
     text = engine.snippet(settings, names, scene, DT)
-    assert "start 5.10937e-05 m deep" in text and text.endswith(
-        "dt = 0.00416666667 and g = 9.81, for others 0.3*g*dt^2"
-    )
+    assert text.endswith("# let bodies that touch start 0.3*g*dt^2 deep in each other, in your space's units")
     assert engine.words(settings | {"start_overlap": 1e-5}, scene, DT)["start_overlap"][1] == 1e-5

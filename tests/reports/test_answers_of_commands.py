@@ -21,13 +21,14 @@ from validation.canonical import Check
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.findings import Family, Finding
+from validation.fixes.kept import cures_of, read
+from validation.fixes.search import Unsearched
 from validation.judging.acceptance import Change, Proposal
 from validation.questions import frontier
 from validation.questions.residuals import LAWS, Residuals
 from validation.questions.spread import Spread
 from validation.records.store import Store
 from validation.running.plan import Request
-from validation.settings.cures import Unsearched, cures_of, read
 from validation.settings.switching import Reading
 
 for package in ("pymunk", "mujoco"):

@@ -18,7 +18,7 @@ from validation.judging.comparison import Kind, compare_rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
 from validation.metrics import NEWER, UNTOLD
 from validation.posed import pinned
-from validation.running.execution import UNMEASURED
+from validation.running.execution import UNMEASURED, execute
 
 #: A box below the edge of the friction cone: one check, its creep.
 SLOT = Slot("incline", (("ratio", 0.99),), 3, "nameless", "soft", 1 / 240, 7)
@@ -420,6 +420,30 @@ def test_a_number_that_the_author_of_a_file_states_and_an_engine_misses_is_an_al
     assert (missed.physics, missed.standing, missed.alarming) == ("fail", "new", True)
     met = of_a_file(tmp_path, engine, **{OWN_CHECK: (0.005, "")})[OWN_CHECK]
     assert met.physics == "pass" and not met.alarming and not met.failing
+
+
+FLOOR = """
+[[bodies]]
+name = "floor"
+shape = { type = "half_space", normal = [0.0, 1.0] }
+motion = "fixed"
+[[bodies]]
+name = "ball"
+pose = [0.0, 1.5, 0.0]
+"""
+
+
+@pytest.mark.parametrize(("profile", "named"), [("default", True), ("tuned", False)])
+def test_a_failure_of_a_file_has_the_cause_of_the_law_that_predicts_it(tmp_path, profile, named):
+    """A ball without friction falls on the floor: as shipped MuJoCo does not throw it up again, whatever e is."""
+    pytest.importorskip("mujoco")
+    text = FILE_TEXT.replace('[[bodies]]\nname = "ball"\n', FLOOR.lstrip()).replace("duration = 0.1", "duration = 0.6")
+    text = text.replace("restitution = 0.0", "restitution = 0.8").replace("value = 0.0", "value = 9.0")
+    (tmp_path / "ball.toml").write_text(text)
+    ran = execute(Slot(pinned(str(tmp_path / "ball.toml")), (), 2, "mujoco", profile, 1 / 240))
+    (row,) = [row for row in rows_of("r", [ran]) if row.metric == OWN_CHECK]
+    assert (row.physics, row.standing, row.alarming) == ("fail", "new", True)
+    assert ("and e is none of its parameters (predicted" in row.reason) == named
 
 
 def test_of_an_engine_without_a_list_only_cells_that_are_lost_are_alarms(tmp_path):

@@ -14,8 +14,11 @@ from adapters.engine import Setting
 from adapters.experiment import Cured
 from validation.bench.units import Unit
 from validation.cells import Observation, Outcome, Slot
-from validation.settings import cures, decisive, tuning
-from validation.settings.cures import Cure, Unsearched
+from validation.fixes import kept
+from validation.fixes import search as cures
+from validation.fixes.kept import Cure
+from validation.fixes.search import Unsearched
+from validation.settings import decisive, tuning
 from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Part
 from validation.settings.switching import readings
 from validation.settings.tuning import Score
@@ -161,6 +164,8 @@ def cured(monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("defa
     monkeypatch.setattr(cures, "belongs_of", lambda engine: {"c": "b"})
     monkeypatch.setattr(cures, "has_iterations", lambda engine, slot: more.get("counts", False))
     monkeypatch.setattr(cures, "changes_of", lambda slot, name: dict(whole.get(name, {})))
+    monkeypatch.setattr(cures, "carried", lambda changes, here, there: changes)
+    monkeypatch.setattr(cures, "on_panel", lambda engine, trials, failing, found: (found[0] if found else None, None))
     clocks = []
     monkeypatch.setattr(cures, "clocked", lambda slots: clocks.append(slots) or (2e-3, 3e-3))
     return cures.search("toy", "pinch", 2, jobs=2), asked, clocks
@@ -179,7 +184,9 @@ def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monk
     assert isinstance(found, Cure)
     bound = found.tolerance
     assert bound == pytest.approx(4.0875e-4, rel=1e-6)  # of `turned` at this step, as the scene states it
-    assert found == Cure(
+    (shown,) = found.shown
+    assert (shown.metric, shown.before, shown.after) == ("turned", found.before, found.after)
+    assert replace(found, shown=()) == Cure(
         "toy", "toy 2.1", "default", "pinch", 2, ({}, {"margin": 1.05}, {"margin": 100.0}), failing=3, left=1,
         judged=JUDGED, metric="turned", unit="m/s", params={"margin": 1.05}, truth=0.0, tolerance=bound,
         before=2.1 * bound, after=0.25 * bound, changes={"a": 1}, profile="tuned", others=(), tried=8, cost_before=2e-3,
@@ -378,8 +385,8 @@ def test_a_table_of_cures_has_costs_to_three_digits_and_names_in_any_letters(tmp
         "", (), 3,
         1.23456e-5, 2.34567e-5, ("creep",),
     )  # fmt: skip
-    cures.write([cure], tmp_path / "cures.csv")
-    assert cures.read(tmp_path / "cures.csv") == [replace(cure, cost_before=1.23e-5, cost_after=2.35e-5)]
+    kept.write([cure], tmp_path / "cures.csv")
+    assert kept.read(tmp_path / "cures.csv") == [replace(cure, cost_before=1.23e-5, cost_after=2.35e-5)]
     lines = (tmp_path / "cures.csv").read_bytes().decode("utf-8").split("\n")
     assert len(lines) == 3 and lines[0].startswith("engine,version,shipped,scene,dimension,cells,failing")
     assert not list(tmp_path.glob("*.new"))

@@ -13,6 +13,7 @@ from adapters.engine_folder import covering, laws_of
 from adapters.isolation import end_with
 from adapters.registry import load_engines_here
 from adapters.scene import Scene
+from adapters.trajectory import Measured, Trajectory
 from validation.cells import Slot, scene_of
 from validation.judging.verdicts import Prediction, predicted
 from validation.posed import resolve
@@ -22,6 +23,7 @@ from validation.workers.limits import cores
 Asked = tuple[Slot, str, str]
 #: A prediction without its law, which cannot be pickled: index of the law, centre and band.
 Said = tuple[int, float, float]
+Measures = dict[str, Measured]
 #: Fewest rows for which processes are started: each imports for about two seconds, a law takes some 4 ms on average.
 MANY = 2000
 #: Rows of one task: a row of a column takes a second, and neighbouring rows share one recurrence.
@@ -38,6 +40,40 @@ def predictions(slot: Slot, version: str, metric: str, scene: Scene) -> list[Pre
     """
     laws = covering(slot.engine, version, slot.profile, scene.name, metric)
     return predicted(laws, scene, slot, resolve(slot.scene).measure)
+
+
+def cause_in_file(slot: Slot, version: str, metric: str, value: float, scene: Scene) -> str:
+    """What a contact law of the engine says of a value of a scene file; empty if none predicts it.
+
+    A law of a catalogue scene predicts the motion of every scene that it fits, and this value is measured of that. It
+    is a cause in words: what the author of a file states is excused by no law.
+    """
+    measure, known = resolve(slot.scene).measure, set[str]()
+    for law in laws_of(slot.engine):
+        if not law.covers(slot.engine, version, slot.profile, law.scene, named(law.metric)) or law.because in known:
+            continue
+        seen: list[Scene] = []
+
+        def told(made: Scene, found: Trajectory, name: str = named(law.metric), seen: list[Scene] = seen) -> Measures:
+            seen.append(made)
+            return {name: measure(made, found)[metric]}
+
+        try:
+            said = law.says(scene, slot.dt, told, slot.iterations)
+        except (ArithmeticError, AssertionError, LookupError, ValueError):  # a law of scenes with other bodies
+            continue
+        if not seen or said is None:  # what it says is of a check of its own
+            continue
+        known.add(law.because)
+        centre, band = said
+        if abs(value - centre) <= band:
+            return f"{law.because} (predicted {centre:.6g} +- {band:.1g})"
+    return ""
+
+
+def named(pattern: str) -> str:
+    """The metric of `adapters.law.exactly`."""
+    return pattern.replace("[[]", "[")
 
 
 def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[Prediction]]:

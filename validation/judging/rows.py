@@ -19,7 +19,7 @@ from validation.files.invariants import LAWS
 from validation.files.stated import STATED, instant_of
 from validation.findings import Findings, FindingsError, Known, known_of
 from validation.findings.files import brought_by_ours, findings_of
-from validation.judging.predicting import Asked, foretold, predictions
+from validation.judging.predicting import Asked, cause_in_file, foretold, predictions
 from validation.judging.studies import StudyResult, results, study_of
 from validation.judging.verdicts import (
     Physics,
@@ -246,7 +246,8 @@ def _verdict(
             said = _predictions(observation, scene, check, ready)
         except EngineError as error:  # laws of another package fail: no predictions
             known = replace(known, remark="; ".join(filter(None, (known.remark, str(error)))))
-        return judge(value, check, said, known, why)
+        verdict = judge(value, check, said, known, why)
+        return replace(verdict, reason=_cause(observation, scene, check, verdict) or verdict.reason)
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
@@ -255,6 +256,17 @@ def _verdict(
         expected = findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
+
+
+def _cause(observation: Observation, scene: Scene, check: Check, verdict: Verdict) -> str:
+    """The cause of a failure in a scene file, where a law of the engine as it is set predicts the value."""
+    slot = observation.slot
+    value = observation.metrics[check.metric][0]
+    if verdict.physics is not Physics.FAIL or value is None or not is_file(slot.scene) or slot.switched:
+        return ""
+    if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
+        return ""
+    return cause_in_file(slot, observation.engine_version, check.metric, value, scene)
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:

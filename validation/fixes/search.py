@@ -19,23 +19,19 @@ engine's folder, by scene *and dimension*: a fix measured in 2-D is not claimed 
 
 from __future__ import annotations
 
-import csv
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import cache
-from pathlib import Path
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from adapters.engine_folder import CURES, belongs_of, candidates_of, inside
+from adapters.engine_folder import belongs_of, candidates_of, instead_of, local_of
 from adapters.registry import find, is_ranked, load, profile_of
 from adapters.stepping import step_count
 from validation.canonical import Params
 from validation.catalogue import CATALOGUE
 from validation.cells import Outcome, Slot, prepare, settings_of
+from validation.fixes.kept import Cure, Shown
+from validation.fixes.panel import MOVES, Changes, Panel, carried, tried
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT, has_iterations
 from validation.settings.decisive import changes_of
@@ -45,6 +41,10 @@ from validation.settings.switching import Reading, observe, readings, switched
 MOST_CELLS = 6
 #: Rounds of timing; the least is the undisturbed time.
 ROUNDS = 7
+#: Most fixes of a scene that are tried on the panel as found.
+BEST = 3
+#: Errors within one order of magnitude of the largest, in tolerances, are as large.
+NEAR = 10.0
 #: Simulated time of a timing [s].
 CLOCKED = 0.5
 #: Further sizes and the step [s] at which a fix must also hold: bodies of centimetres, as for grippers, instead of
@@ -54,86 +54,6 @@ ELSEWHERE = (0.3, 1.0 / 500.0)
 INVISIBLE = 1e-3
 #: Largest share of the error that may remain for a single setting to be shown beside a fix with several.
 HALF = 0.5
-
-Changes = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Cure:
-    """The fix of an engine as shipped on one scene and dimension.
-
-    Parameters
-    ----------
-    cells
-        Parameters of the cells that ran, where they differ from the scene's defaults.
-    failing, left, judged
-        Number of checks of these cells that fail as shipped and with the fix, and of all.
-    metric, unit, params
-        The check that is shown: the first of the scene's checks that the fix corrects (or that fails, if none), in the
-        cell with the largest error.
-    truth, tolerance, before, after
-        Its numbers; a value is None where the engine has no result.
-    changes
-        Settings of the fix with their values in that cell; empty if no change helps.
-    profile
-        Profile with all of these settings; empty if there is none.
-    others
-        Other single settings that correct as many checks alone.
-    tried
-        Number of tried changes.
-    cost_before, cost_after
-        CPU time per step [s] in that cell; None where it was not timed.
-    mends
-        Kinds of metrics, without index, that failed as shipped and pass in all cells with the fix. Nothing is claimed
-        for other kinds; empty in older tables.
-    dt
-        Step of the cells [s].
-    alone, alone_after
-        Where the fix has several settings: the one with the largest effect alone that breaks nothing, if it removes at
-        least half of the error of the shown check, and the value with it.
-    """
-
-    engine: str
-    version: str
-    shipped: str
-    scene: str
-    dimension: int
-    cells: tuple[Params, ...]
-    failing: int
-    left: int
-    judged: int
-    metric: str
-    unit: str
-    params: Params
-    truth: float
-    tolerance: float
-    before: float | None
-    after: float | None
-    changes: Changes
-    profile: str
-    others: tuple[Changes, ...]
-    tried: int
-    cost_before: float | None
-    cost_after: float | None
-    mends: tuple[str, ...] = ()
-    dt: float = QUICK_DT
-    alone: Changes = field(default_factory=dict)
-    alone_after: float | None = None
-
-    @property
-    def helps(self) -> bool:
-        """Whether there is a fix."""
-        return self.left < self.failing
-
-    @property
-    def recommended(self) -> bool:
-        """Whether it corrects at least half of the failing checks; otherwise most of what a user sees stays wrong."""
-        return self.helps and 2 * self.left <= self.failing
-
-    @property
-    def times(self) -> float | None:
-        """Cost of the fix over the cost as shipped."""
-        return self.cost_after / self.cost_before if self.cost_before and self.cost_after else None
 
 
 def asked_of(scene: str, dimension: int) -> tuple[Params, ...]:
@@ -167,22 +87,25 @@ class _Found:
 class _Trials:
     """Results of all cells under changes; a change may have another value in each cell. Each cell runs once.
 
-    With ``elsewhere`` each cell also runs in other sizes at another step, where a change must correct the same checks.
+    Each cell also runs in ``variants`` of itself, where a change must correct the same checks.
     """
 
-    def __init__(self, slots: Sequence[Slot], jobs: int, elsewhere: bool = False) -> None:
+    def __init__(
+        self, slots: Sequence[Slot], jobs: int, variants: Callable[[Slot], Sequence[Slot]] = lambda slot: ()
+    ) -> None:
         self.slots, self.jobs = slots, jobs
         self.seen: dict[Slot, list[Reading]] = {}
         self.found: list[_Found] = []
         self.own = [_own(slot) for slot in slots]
-        size, dt = ELSEWHERE
-        self.others = [replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt) for slot in slots] if elsewhere else []
-        names = _profiles(slots[0].engine) if elsewhere else []
-        #: Changes of each profile in both sizes, cell by cell.
+        #: Variants of all cells together.
+        self.variants = list(zip(*map(variants, slots), strict=True))
+        names = _profiles(slots[0].engine) if self.variants else []
+        #: Changes of each profile here and in a variant, cell by cell.
         self.profiles = [
-            [(changes_of(slot, name), changes_of(other, name)) for name in names]
-            for slot, other in zip(slots, self.others, strict=elsewhere)
-        ]
+            [[(changes_of(slot, name), changes_of(other, name)) for name in names]
+             for slot, other in zip(slots, others, strict=True)]
+            for others in self.variants
+        ]  # fmt: skip
         self._run(slots)
         self.start = [found for slot in slots for found in self.seen[slot]]
 
@@ -202,13 +125,15 @@ class _Trials:
         new = [slot for slot in slots if slot not in self.seen]
         self.seen |= {slot: readings(found) for slot, found in observe(new, self.jobs).items()}
 
-    def _elsewhere(self, changes: Sequence[Changes]) -> list[Slot]:
-        """The cells in other sizes under a change, with the profile's values there."""
-        found = []
-        for other, profiles, own in zip(self.others, self.profiles, changes, strict=bool(self.others)):
-            of_profile = (there for here, there in profiles if own.items() <= here.items())
-            there = next(of_profile, own)
-            found.append(switched(other, {name: there[name] for name in own if name in there}))
+    def _elsewhere(self, changes: Sequence[Changes]) -> list[list[Slot]]:
+        """The variants under a change: with the profile's values there, else with numbers for their step."""
+        found: list[list[Slot]] = []
+        for others, profiles in zip(self.variants, self.profiles, strict=True):
+            found.append([])
+            for slot, other, both, own in zip(self.slots, others, profiles, changes, strict=True):
+                of_profile = (there for here, there in both if own.items() <= here.items())
+                there = next(of_profile, None) or carried(own, slot, other)
+                found[-1].append(switched(other, {name: there[name] for name in own if name in there}))
         return found
 
     def all(self, many: Sequence[Sequence[Changes]]) -> list[_Found]:
@@ -217,7 +142,7 @@ class _Trials:
         kept = [one for one in kept if any(one)]
         self._run(slot for one in kept for slot in self._here(one))
         helpful = [one for one in kept if self._mends(one)]
-        self._run(slot for one in helpful for slot in self._elsewhere(one))
+        self._run(slot for one in helpful for others in self._elsewhere(one) for slot in others)
         self.found += (tried := [self._found(one) for one in kept])
         return tried
 
@@ -227,12 +152,12 @@ class _Trials:
         return any(old.badness > 1.0 >= new.badness for old, new in zip(self.start, after, strict=True))
 
     def badness(self, changes: Sequence[Changes]) -> list[float]:
-        """Errors over tolerances with a change; for checks that failed as shipped the worse of both sizes."""
+        """Errors over tolerances with a change; for checks that failed as shipped the worst of all variants."""
         here, elsewhere = self._readings(self._here(changes)), self._elsewhere(changes)
-        if not elsewhere or any(slot not in self.seen for slot in elsewhere):  # or it corrects nothing here
+        if any(slot not in self.seen for others in elsewhere for slot in others):  # it corrects nothing here
             return [found.badness for found in here]
-        worse = zip(self.start, here, self._readings(elsewhere), strict=True)
-        return [max(new.badness, other.badness) if old.badness > 1.0 else new.badness for old, new, other in worse]
+        every = zip(self.start, here, *map(self._readings, elsewhere), strict=True)
+        return [max(each.badness for each in (news if old.badness > 1.0 else news[:1])) for old, *news in every]
 
     def _found(self, changes: Sequence[Changes]) -> _Found:
         after = self.badness(changes)
@@ -250,6 +175,18 @@ def _own(slot: Slot) -> dict[str, Any]:
 def _differing(changes: Changes, own: Changes) -> Changes:
     """Settings that a change sets differently from the profile; an experiment may add others."""
     return {name: value for name, value in changes.items() if name not in own or own[name] != value}
+
+
+def in_other_size(slot: Slot) -> list[Slot]:
+    """A case in another size at another step: see `ELSEWHERE`."""
+    size, dt = ELSEWHERE
+    return [replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt)]
+
+
+def at_other_steps(slot: Slot) -> list[Slot]:
+    """A single case at half and double its step, and from moved starts: one that is mended at one step by chance."""
+    steps = [replace(slot, dt=factor * slot.dt) for factor in (0.5, 2.0)]
+    return [*steps, *(replace(slot, ulp=move) for move in MOVES)]
 
 
 @dataclass(frozen=True)
@@ -296,18 +233,64 @@ def search(
     for found in first.values():
         if found.outcome in (Outcome.UNSUPPORTED, Outcome.NOT_INSTALLED):
             return Unsearched(False, found.reason)
-    trials = _Trials(own, jobs, elsewhere=scene in CATALOGUE and params is None and dt == QUICK_DT)
+    whole = scene in CATALOGUE and params is None and dt == QUICK_DT
+    trials = _Trials(own, jobs, in_other_size if whole else at_other_steps)
     if not trials.start:
         return Unsearched(False, "no check of its cases is judged")
     failing = [found for found in trials.start if found.badness > 1.0]
     if not failing:
         return Unsearched(True, f"it passes all {len(trials.start)} checks")
-    best, singles = _best(engine, trials, own, len(failing))
-    return _cure(engine, trials, failing, best, singles)
+    ranked = _best(engine, trials, own, len(failing))
+    best, panel = on_panel(engine, trials, failing, ranked)
+    singles = [each for each in ranked if best and each.size == 1 and each.failing == best.failing]
+    return replace(_cure(engine, trials, failing, best, singles), panel=panel)
 
 
-def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tuple[_Found | None, list[_Found]]:
-    """The best change, and all single settings that are as good."""
+def on_panel(
+    engine: str, trials: _Trials, failing: Sequence[Reading], found: Sequence[_Found]
+) -> tuple[_Found | None, Panel | None]:
+    """The fix of which the fewest checks fail, those of the panel that it breaks among them; with its panel.
+
+    Tried are the best ones, also with settings of single bodies instead of the world; and, where the first breaks more
+    than it mends, with what profiles have in the cases that it breaks. Such a one is taken only if there is no other.
+    """
+
+    def tried_on(each: _Found) -> Panel:
+        order = sorted(
+            range(len(trials.slots)), key=lambda k: k != trials.slots.index(_shown(trials, failing, each)[0].slot)
+        )
+        return tried([trials.slots[k] for k in order], [each.changes[k] for k in order], trials.jobs)
+
+    panels = [(each, tried_on(each)) for each in found[:BEST] if each.failing == found[0].failing]
+    more = [each for each in _varied(engine, trials, panels) if each not in [known.changes for known in found]]
+    for each in trials.all(more):
+        if not each.broken and each.failing <= found[0].failing:
+            panels.append((each, tried_on(each)))
+    panels.sort(key=lambda each: (each[1].withdrawn, each[0].failing + len(each[1].breaks), *each[0].rank()))
+    return panels[0] if panels else (None, None)
+
+
+def _varied(engine: str, trials: _Trials, panels: Sequence[tuple[_Found, Panel]]) -> list[list[Changes]]:
+    """Changes of fixes with what other profiles have in cases that they break, and those of single bodies."""
+    found: list[list[Changes]] = []
+    for each, panel in panels[:1]:
+        for name in _profiles(engine) if panel.withdrawn else ():
+            more: dict[str, Any] = {}
+            for cost in panel.breaks:
+                if cost.slot is not None:
+                    more = carried(changes_of(cost.slot, name), cost.slot, trials.slots[0]) | more
+            for some in (more, {n: value for n, value in more.items() if n in local_of(engine)}):
+                found.append([{**some, **own} for own in each.changes] if some else [])
+    for changes in [[dict(own) for own in each.changes] for each, _ in panels] + found:
+        for of, instead in instead_of(engine):
+            if any(of.items() <= own.items() for own in changes):
+                kept = [{n: v for n, v in own.items() if n not in of} for own in changes]
+                found.append([{**own, **instead} for own in kept])
+    return [each for k, each in enumerate(found) if each and each not in found[:k]]
+
+
+def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> list[_Found]:
+    """Changes that mend something and break nothing, the best first."""
     others = [name for name in _profiles(engine) if name != own[0].profile]
     wholes = {name: [changes_of(slot, name) for slot in own] for name in others}
     singles = _singles(engine, own, list(wholes.values()))
@@ -318,9 +301,7 @@ def _best(engine: str, trials: _Trials, own: Sequence[Slot], failing: int) -> tu
         found += _useful(trials.all(pairs), failing)
     if not found or min(each.failing for each in found):
         found += [_smallest(trials, engine, each) for each in _useful(trials.all(list(wholes.values())), failing)]
-    found.sort(key=_Found.rank)
-    best = found[0] if found else None
-    return best, [each for each in found if best and each.size == 1 and each.failing == best.failing]
+    return sorted(found, key=_Found.rank)
 
 
 def _profiles(engine: str) -> list[str]:
@@ -363,24 +344,39 @@ def _smallest(trials: _Trials, engine: str, whole: _Found) -> _Found:
 def _cure(
     engine: str, trials: _Trials, failing: Sequence[Reading], best: _Found | None, singles: Sequence[_Found]
 ) -> Cure:
-    told = _told(trials, failing, best)
+    shown = _shown(trials, failing, best)
+    told = shown[0]
     place = trials.slots.index(told.slot)
     changes: Changes = best.changes[place] if best else {}
     if best and not changes:  # no setting corrects the shown check; show values of a cell with changes
         changes = next(each for each in best.changes if each)
     cured = switched(told.slot, best.changes[place]) if best else told.slot
-    after = next(each for each in trials.seen[cured] if each.check.metric == told.check.metric)
+    after = _after(trials, told, best)
     before_cost, after_cost = clocked([told.slot, cured]) if best else (None, None)
     others = tuple(each.changes[place] for each in singles if best and each.changes != best.changes)
-    check = told.check
-    assert check.truth is not None and check.bound is not None  # only judged checks can fail
+    check, (truth, bound, before) = told.check, _numbers(told)
     return Cure(
         engine, find(engine).version, told.slot.profile, told.slot.scene, told.slot.dimension,
         tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
-        len(trials.start), check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value,
-        after.value, changes, _profile_of(engine, trials.slots, best), others, len(trials.found), before_cost,
+        len(trials.start), check.metric, check.unit, dict(told.slot.params), truth, bound, before,
+        after, changes, _profile_of(engine, trials.slots, best), others, len(trials.found), before_cost,
         after_cost, _mended(trials, failing, best), told.slot.dt, *_alone(trials, told, best),
+        shown=tuple(
+            Shown(one.check.metric, one.check.unit, dict(one.slot.params), *_numbers(one), _after(trials, one, best))
+            for one in shown
+        ),
     )  # fmt: skip
+
+
+def _numbers(told: Reading) -> tuple[float, float, float | None]:
+    assert told.check.truth is not None and told.check.bound is not None  # only judged checks can fail
+    return told.check.truth, told.check.bound, told.value
+
+
+def _after(trials: _Trials, told: Reading, best: _Found | None) -> float | None:
+    """Value of a check with the fix."""
+    cured = switched(told.slot, best.changes[trials.slots.index(told.slot)]) if best else told.slot
+    return next(each.value for each in trials.seen[cured] if each.check.metric == told.check.metric)
 
 
 def _alone(trials: _Trials, told: Reading, best: _Found | None) -> tuple[Changes, float | None]:
@@ -406,13 +402,20 @@ def _mended(trials: _Trials, failing: Sequence[Reading], best: _Found | None) ->
     return tuple(kind for kind in dict.fromkeys(_kind(each) for each in failing) if kind not in left)
 
 
-def _told(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> Reading:
-    """The shown check: the first of the scene's checks that the fix corrects, in its worst cell."""
+def _shown(trials: _Trials, failing: Sequence[Reading], best: _Found | None) -> list[Reading]:
+    """Of each kind of check that the fix corrects (or that fails, if none) the one with the largest error.
+
+    First the kind that a headline names: the first of the scene's with an error within a factor `NEAR` of the largest.
+    """
     after = trials.badness(best.changes) if best else []
     mended = [old for old, new in zip(trials.start, after, strict=False) if old.badness > 1.0 >= new]
-    shown = mended or failing
-    first = next(each.check.metric for each in failing if each.check.metric in {one.check.metric for one in shown})
-    return max((each for each in shown if each.check.metric == first), key=lambda each: each.badness)
+    worst: dict[str, Reading] = {}
+    for each in mended or failing:
+        kind = _kind(each)
+        worst[kind] = max(worst.get(kind, each), each, key=lambda one: one.badness)
+    largest = max(each.badness for each in worst.values())
+    first = next(each for each in worst.values() if NEAR * each.badness >= largest)
+    return [first, *(each for each in worst.values() if each is not first)]
 
 
 def _profile_of(engine: str, slots: Sequence[Slot], best: _Found | None) -> str:
@@ -445,67 +448,3 @@ def clocked(slots: Sequence[Slot]) -> tuple[float | None, ...]:
         good = [lap[k].seconds / unit.steps for lap in laps if not lap[k].void and lap[k].seconds > 0.0]
         found.append(min(good) if good else None)
     return tuple(found)
-
-
-# ---- the committed table ---------------------------------------------------------------------------------------------
-
-
-@cache
-def cures_of(engine: str) -> Mapping[tuple[str, int], Cure]:
-    """Listed fixes by scene and dimension; empty for an engine without them."""
-    path = inside(engine, CURES)
-    try:
-        found = read(path) if path else []
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are tested
-        return {}
-    return {(cure.scene, cure.dimension): cure for cure in found if cure.engine == engine}
-
-
-#: Format of fields of the table: JSON for composite or optional ones, text for the rest.
-_PLAIN = ("engine", "version", "shipped", "scene", "metric", "unit", "profile")
-
-
-def write(cures: Iterable[Cure], path: Path) -> None:
-    """Write a table of fixes; the old one stays until it is complete."""
-    fresh = path.with_suffix(".new")
-    with fresh.open("w", encoding="utf-8", newline="") as lines:
-        table = csv.writer(lines, lineterminator="\n")
-        names = [field.name for field in fields(Cure)]
-        table.writerow(names)
-        for cure in cures:
-            rounded = replace(cure, cost_before=_digits(cure.cost_before, 3), cost_after=_digits(cure.cost_after, 3))
-            values = [getattr(rounded, name) for name in names]
-            cells = [v if n in _PLAIN else json.dumps(v, default=_of_numpy) for n, v in zip(names, values, strict=True)]
-            table.writerow(cells)
-    fresh.replace(path)
-
-
-def _of_numpy(value: Any) -> Any:
-    """A numpy number as a Python number."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(f"{value!r} cannot be written into a table of cures")
-
-
-def _digits(value: float | None, digits: int) -> float | None:
-    return None if value is None else float(f"{value:.{digits}g}")
-
-
-def read(path: Path) -> list[Cure]:
-    """Read a table of fixes."""
-    with path.open(encoding="utf-8", newline="") as lines:
-        return [_cure_of(row) for row in csv.DictReader(lines)]
-
-
-def _cure_of(row: Mapping[str, str]) -> Cure:
-    values: dict[str, Any] = {name: text if name in _PLAIN else json.loads(text) for name, text in row.items()}
-    others = tuple(_settings(each) for each in values["others"])
-    values |= {"cells": tuple(values["cells"]), "others": others}
-    values |= {name: _settings(values[name]) for name in ("changes", "alone") if name in values}
-    values["mends"] = tuple(values.get("mends", ()))  # older tables do not have it
-    return Cure(**values)
-
-
-def _settings(plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with tuples again, which JSON turned into lists."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()}

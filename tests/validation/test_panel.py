@@ -1,0 +1,120 @@
+"""The panel of a fix: what it mends and breaks in cases of other groups."""
+
+from dataclasses import replace
+
+import pytest
+
+from reports.cures import panel_text, recorded_paste, recorded_text
+from validation.canonical import Check
+from validation.cells import Slot
+from validation.fixes import panel, search
+from validation.fixes.kept import cures_of
+from validation.fixes.panel import Cost, Panel, carried, compared, judged, other_cases
+from validation.posed import pinned, resolve
+from validation.settings.switching import Reading, switched
+
+SLOT = Slot("pinch", (), 3, "mujoco", "default", 1 / 240)
+#: MuJoCo's restitution without stiffness, as it was printed for `thin_wall`.
+DAMPER = {"solref": "reflect", "kappa_elastic": 0.0, "kappa_plastic": 0.0}
+
+
+def reading(value, metric="creep"):
+    return Reading(SLOT, Check(metric, "m", 0.0, 1.0, "because", "source"), value, "")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "breaks", "mends"),
+    [(0.5, 1.5, 1, 0), (2.0, 0.5, 0, 1), (2.0, 5.9, 0, 0), (2.0, 6.1, 1, 0), (0.5, 0.9, 0, 0), (0.5, None, 1, 0)],
+)
+def test_a_check_that_passed_or_fails_three_times_as_much_is_broken(before, after, breaks, mends):
+    found = judged({("a grip", "creep"): [(reading(before), reading(after))]}, 1)
+    assert (len(found.breaks), found.mends) == (breaks, mends)
+
+
+def test_a_check_of_many_variants_counts_once_and_is_mended_where_none_breaks():
+    good, bad = (reading(2.0), reading(0.5)), (reading(0.5), reading(2.0))
+    assert judged({("0", "creep"): [good, good]}, 2).mends == 1
+    found = judged({("0", "creep"): [good, bad, bad]}, 3)
+    assert found.mends == 0 and [each.case for each in found.breaks] == ["its own scene elsewhere"]
+
+
+def test_a_fix_that_breaks_more_than_it_mends_is_counted_and_not_printed():
+    cost = Cost("a body at rest", "penetration", "m", 1e-4, 0.041, 0.0)
+    fix = next(each for each in cures_of("mujoco").values() if each.recommended)
+    kept = replace(fix, panel=Panel(20, 1, (cost,)))
+    assert not kept.withdrawn and "tried in 20 other cases: breaks a body at rest" in recorded_text(kept)
+    assert "(penetration 1.0e-4 -> 0.041 m, true 0)" in recorded_text(kept)
+    gone = replace(fix, panel=Panel(20, 1, (cost, cost)))
+    assert gone.withdrawn and not gone.recommended and recorded_paste(gone) == ""
+    assert "no fix: what was found breaks more elsewhere than it fixes" in recorded_text(gone)
+    assert panel_text(Panel(20, 3, ())) == "tried in 20 other cases: breaks nothing"
+
+
+def test_a_number_with_a_formula_has_its_value_at_the_step_and_the_gravity_of_a_case():
+    pytest.importorskip("mujoco")
+    here = Slot("stack", (), 3, "mujoco", "default", 1 / 240)
+    margin = {"margin": 0.001 * 9.81 / 240**2}
+    assert carried(margin, here, replace(here, dt=1 / 60))["margin"] == pytest.approx(16.0 * margin["margin"])
+    assert carried(margin, here, Slot("impact", (), 3, "mujoco", "default", 1 / 240))["margin"] == 0.0
+
+
+def test_a_contact_without_stiffness_sinks_on_the_panel():
+    """A damper holds nothing: a body that rests on it sinks without end."""
+    pytest.importorskip("mujoco")
+    words, slot = next(each for each in other_cases("mujoco", "default") if each[0] == "a bouncy body at rest")
+    found = compared([(words, slot, switched(slot, DAMPER))])
+    assert "penetration" in {each.metric for each in found.breaks} and found.withdrawn
+
+
+def test_settings_of_single_pairs_are_left_out_where_nothing_rebounds():
+    pytest.importorskip("mujoco")
+    thrown, rest = Slot("thin_wall", (), 3, "mujoco", "default", 1 / 240), replace(SLOT, scene="long_rest")
+    assert panel._meant({"cone": "elliptic", **DAMPER}, thrown, rest) == {"cone": "elliptic"}
+    lively = replace(SLOT, scene=pinned(str(panel._FILES / "lively_box_at_rest.toml")))
+    assert panel._meant(DAMPER, thrown, lively) == DAMPER
+
+
+def test_a_case_is_of_every_group_and_short():
+    cases = other_cases("mujoco", "default")
+    assert len({words for words, _ in cases}) == len(panel.OTHERS) == len(cases)
+    assert all(resolve(slot.scene).scene(3, dict(slot.params)).duration <= 60.0 for _, slot in cases)
+    assert all(slot.dimension == 2 for _, slot in other_cases("chipmunk", "default"))
+
+
+#: A cube that slides at 6 m/s never turns, since mu < 1.
+CUBE = """
+name = "a fast cube"
+dimension = 3
+gravity = [0.0, 0.0, -9.81]
+duration = 1.5
+[[bodies]]
+name = "floor"
+shape = { type = "half_space", normal = [0.0, 0.0, 1.0] }
+motion = "fixed"
+[[bodies]]
+name = "cube"
+shape = { type = "box", half_extents = [0.05, 0.05, 0.05] }
+mass = 1.0
+pose = [0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0]
+twist = [6.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+[[pairs]]
+restitution = 0.0
+friction = 0.5
+[[checks]]
+quantity = "cube.angle"
+value = 0.0
+tolerance = 0.02
+because = "never tips"
+"""
+
+
+@pytest.mark.parametrize(("elsewhere", "mended"), [(lambda slot: (), True), (search.at_other_steps, False)])
+def test_a_setting_that_mends_a_chaotic_case_at_one_step_alone_is_no_fix(tmp_path, elsewhere, mended):
+    """It hops on MuJoCo's pyramid: a margin changes the hops, and where the cube ends by chance."""
+    pytest.importorskip("mujoco")
+    (tmp_path / "cube.toml").write_text(CUBE)
+    slot = Slot(pinned(str(tmp_path / "cube.toml")), (), 3, "mujoco", "default", 1 / 240)
+    trials = search._Trials([slot], 1, elsewhere)
+    (found,) = trials.all([[{"margin": 0.001 * 9.81 / 240**2}]])
+    after = dict(zip((each.check.metric for each in trials.start), trials.badness(found.changes), strict=True))
+    assert (after["final[cube.angle]"] <= 1.0) == mended
