@@ -108,6 +108,7 @@ SCENE = CanonicalScene(
         "a pile of crates shakes and collapses after a while",
         "a tall tower leans and topples although nothing touches it",
         "a box at rest sinks into the floor",
+        "a ball or box that lies on the floor sinks into it",
         "a column of blocks is squeezed under its own weight",
         "blocks in a tower penetrate each other",
         "a stack explodes or blows up",
