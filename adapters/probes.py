@@ -38,8 +38,8 @@ REBOUND_PHASES = (0.1, 0.37, 0.6, 0.87)
 REBOUND_LEAD = 3
 #: Time of a rebound [s]: twice that of the softest known contact (0.1 s).
 REBOUND_TIME = 0.2
-#: Sliding: least speed at the start [m/s] and time [s].
-SLIDE_SPEED, SLIDE_TIME = 3.0, 0.5
+#: Sliding: least speed at the start [m/s], time [s], and half width of the box [m].
+SLIDE_SPEED, SLIDE_TIME, SLIDE_WIDTH = 3.0, 0.5, 0.5
 #: Friction up to which it brakes by at most a weight. Larger friction is used only in probes that measure friction: its
 #: effects in an engine (a box sinks, or is thrown up) must not count as a wrong size or sign.
 MOST_FRICTION = 1.0
@@ -337,11 +337,15 @@ def slide_speed(friction: float) -> float:
     return max(SLIDE_SPEED, 2.0 * friction * slide_load(friction) * SLIDE_TIME / 0.85)
 
 
+def slide_height(friction: float) -> float:
+    """Half height of the sliding box [m]: flatter above mu = 0.5, so that it is far from tipping."""
+    return SLIDE_WIDTH * min(1.0, 0.5 / friction) if friction > 0.0 else SLIDE_WIDTH
+
+
 def slide(case: Case) -> Scene:
-    """A unit box slides along x; flatter above mu = 0.5, so that it is far from tipping."""
-    speed = slide_speed(case.friction)
-    height = 0.5 * min(1.0, 0.5 / case.friction) if case.friction > 0.0 else 0.5
-    box = _box(case, "box", 1.0, (0.5, 0.5, height), 0.0, height)
+    """A box slides along x."""
+    speed, height = slide_speed(case.friction), slide_height(case.friction)
+    box = _box(case, "box", 1.0, (SLIDE_WIDTH, SLIDE_WIDTH, height), 0.0, height)
     twist = (*_vector(case, speed, 0.0), *((0.0,) if case.dimension == 2 else (0.0, 0.0, 0.0)))
     down = _vector(case, 0.0, -slide_load(case.friction))
     return _scene(case, "slide", [_floor(case), replace(box, twist=twist)], SLIDE_TIME, down)

@@ -102,7 +102,7 @@ def choices(rows: Sequence[Plain], costs: Costs | None = None) -> list[Choice]:
         untold = Counter(
             (row["engine"], row["profile"])
             for row in rows
-            if row["scene"] == scene and row["outcome"] == "unsupported" and row["iterations"] is None
+            if row["scene"] == scene and row["outcome"] in ("unsupported", "refused") and row["iterations"] is None
         )
         names = [_named(key, own[key], dimensions[scene], price[key], untold[key]) for key in good]
         shares = {key: len(_failing(group)) / len(group) for key, group in own.items()}
@@ -165,7 +165,7 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     """The other profile that passes every row, or the nearest one; or that none is better, or none was run."""
     failed = _failing(own[profile])
     if all(mark_of(row) == "invalid" for row in failed):
-        return "the measurement is broken, so it says nothing about the engine"
+        return "the measurement contradicts itself, so it says nothing about the engine"
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed if is_standard(row)})
     others = {
         name: group for name, group in own.items()

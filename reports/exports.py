@@ -13,7 +13,7 @@ from adapters.stages import stage
 from adapters.whole import write
 from reports.brief import Judged, judged
 from reports.findings import finding_line, grouped
-from reports.matrix import leaving, legend, matrix_of, status_of, unranked, versions_of
+from reports.matrix import UNJUDGED, leaving, legend, matrix_of, status_of, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, is_alarming
 from validation.records.store import Run, Store
@@ -152,7 +152,7 @@ def _mark_case(case: TestCase, row: Plain) -> None:
         case.result = [failed]
     elif is_alarming(row):
         case.result = [Failure(finding_line(row))]
-    elif mark in ("unsupported", "not_installed", "none"):
+    elif mark in UNJUDGED:
         case.result = [Skipped(row["reason"])]
     elif mark != "pass":
         case.system_out = finding_line(row)

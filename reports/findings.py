@@ -17,13 +17,13 @@ from validation.posed import is_file
 
 Plain = Mapping[str, Any]
 #: Marks with exit status 1 of the command.
-ALARMING = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
-#: Outcomes of cases that were not run, and their words.
-REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED"}
+ALARMING = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted")
+#: Outcomes of cases without an answer that is judged, and their words.
+REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED", "refused": "REFUSED"}
 #: Marks of cases without a valid result: their rows have one reason, and no worst metric.
-WHOLE = ("crashed", "timed_out", "missing", "invalid")
+WHOLE = ("crashed", "timed_out", "missing", "invalid", "refused")
 #: Marks in display order.
-ORDER = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained")
+ORDER = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted", "fail", "known", "explained")
 
 
 def finding_line(row: Plain) -> str:
@@ -39,8 +39,8 @@ def finding_line(row: Plain) -> str:
 
 
 def has_answer(row: Plain) -> bool:
-    """Whether a row has a valid value: an INVALID one has only a reason."""
-    return row["value"] is not None and row["outcome"] != "invalid"
+    """Whether a row has a valid value: a REFUSED or INVALID one has only a reason."""
+    return row["value"] is not None and row["outcome"] not in ("refused", "invalid")
 
 
 def said(row: Plain, digits: int = 4) -> str:
@@ -52,7 +52,7 @@ def said(row: Plain, digits: int = 4) -> str:
 
 
 def first_reason(row: Plain) -> str:
-    """The first reason of an INVALID row, and the number of others."""
+    """The first reason of a row without an answer, and the number of others."""
     first, *others = str(row["reason"]).split("; ")
     return f"{first} (and {len(others)} more)" if others else first
 
@@ -71,8 +71,7 @@ def grouped(rows: Iterable[Plain]) -> Iterator[tuple[str, list[Plain]]]:
 class Family:
     """Rows of one engine, profile, scene, kind of metric and standing, the worst first.
 
-    Cases without a result form one family for each reason, of all metrics (``"*"``); INVALID ones for each property
-    check, and for the certificate.
+    Cases without a result form one family for each reason, of all metrics (``"*"``), whatever its numbers are.
     """
 
     mark: str
@@ -99,7 +98,7 @@ class Family:
         """One line: standing, engine, metric and error of its worst row."""
         count = f"{len(self.rows)} checks"
         more = "" if len(self.rows) == 1 else f" ({count})" if self.mark in WHOLE else f", the worst of {count}"
-        what = first_reason(self.worst) if self.mark == "invalid" else said(self.worst)
+        what = first_reason(self.worst) if self.mark in ("refused", "invalid") else said(self.worst)
         return f"{LABELS[self.mark]}: {self.engine}/{self.profile} {self.scene} {self.where}: {what}{more}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -117,7 +116,7 @@ def families(rows: Iterable[Plain]) -> list[Family]:
         members: dict[tuple[str, str, str, str], list[Plain]] = defaultdict(list)
         for row in group:
             kind = row["reason"] if mark in WHOLE else row["metric"].partition("[")[0]
-            if mark == "invalid":  # "receipt size: measured ...": the numbers differ from case to case
+            if mark in ("refused", "invalid"):  # "bodies overlap: by ...": the numbers differ from case to case
                 kind = kind.partition(":")[0]
             members[row["engine"], row["profile"], row["scene"], kind].append(row)
         for (engine, profile, scene, kind), own in members.items():
@@ -127,18 +126,23 @@ def families(rows: Iterable[Plain]) -> list[Family]:
 
 
 def refusals(rows: Sequence[Plain]) -> Iterator[str]:
-    """One line per engine and scene that it cannot run, with the reason.
+    """One line per engine and scene that it cannot run, with the reason; per profile where one refuses to answer.
 
     An engine that is not installed has one line for all scenes. The matrix covers the catalogue's scenes, which are
-    listed only if there is nothing else.
+    listed only if there is nothing else. Refusals of checks of one case, each with its numbers, share a line.
     """
-    found: dict[tuple[Any, ...], None] = {}
+    found: dict[tuple[Any, ...], str] = {}
     nothing = all(row["outcome"] in REFUSED for row in rows)
     for row in rows:
-        if row["outcome"] in REFUSED and (nothing or (is_file(row["scene"]) and row["outcome"] == "unsupported")):
-            scene = "" if row["outcome"] == "not_installed" else f" {row['scene']}"
-            found[REFUSED[row["outcome"]], row["engine"], scene, row["reason"]] = None
-    return (f"{label}: {engine}{scene}: {reason}" for label, engine, scene, reason in found)
+        outcome, reason = row["outcome"], row["reason"]
+        shown = nothing or (is_file(row["scene"]) and outcome != "not_installed")
+        if outcome in REFUSED and mark_of(row) != "refused" and shown:
+            scene = "" if outcome == "not_installed" else f" {row['scene']}"
+            who, kind = row["engine"], reason
+            if outcome == "refused":
+                who, kind = f"{row['engine']}/{row['profile']}", reason.partition(":")[0].partition(";")[0]
+            found.setdefault((REFUSED[outcome], who, scene, kind), reason)
+    return (f"{label}: {who}{scene}: {reason}" for (label, who, scene, _), reason in found.items())
 
 
 def severity(row: Plain) -> float:

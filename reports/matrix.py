@@ -28,7 +28,7 @@ ALARM = "bold white on red"
 #: Space before a scene [columns]: one of padding, and the box's divider.
 GAP = 2
 #: Marks of rows without a verdict.
-UNJUDGED = ("unsupported", "none", "not_installed")
+UNJUDGED = ("unsupported", "declined", "none", "not_installed")
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,9 @@ def legend(matrix: Matrix) -> str:
     marks = {mark for field in matrix.fields.values() for mark in field.marks}
     said = ["A check is one measured quantity of one case; it fails outside its tolerance."]
     if "invalid" in marks:
-        said.append("INVALID: the measurement is broken and says nothing about the engine.")
+        said.append("INVALID: the measurement contradicts itself and says nothing about the engine.")
+    if marks & {"refused", "declined"}:
+        said.append("REFUSED: a solver that certifies its answers gives none here.")
     if "unsupported" in marks:
         said.append("A dash: the engine cannot run the scene.")
     return " ".join(said)
@@ -291,7 +293,8 @@ def legend(matrix: Matrix) -> str:
 MEANT = {
     "known": "cause on record",
     "explained": "the engine's contact model predicts them",
-    "invalid": "the measurement is broken",
+    "invalid": "the measurement contradicts itself",
+    "refused": "not certified",
     "drifted": "value differs from the record",
 }
 

@@ -285,7 +285,7 @@ def sensitivity(
     console.print(table)
     for fault, receipts in receipts_alone.items():
         console.print(
-            Text(f"{fault}: no check of these scenes notices it; the case is INVALID by {', '.join(receipts)}")
+            Text(f"{fault}: no check of these scenes notices it; the property checks {', '.join(receipts)} do")
         )
     for line in (
         "Faults: values are set or reported 10, 1 or 0.1 % too low. For added motion 1 % means 0.01 m/s: drift along",

@@ -24,12 +24,26 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Largest number of names, as of scenes, in one line.
 FEW = 4
 #: Priority of marks of a group of rows: the first that occurs is its mark.
-MARKS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted", "fail", "known", "explained", "pass")
+MARKS = (
+    "crashed",
+    "timed_out",
+    "missing",
+    "invalid",
+    "refused",
+    "new",
+    "drifted",
+    "fail",
+    "known",
+    "explained",
+    "pass",
+)
 LABELS = {
     "crashed": "CRASHED",
     "timed_out": "TIMED OUT",
     "missing": "MISSING",
     "invalid": "INVALID",
+    "refused": "REFUSED",
+    "declined": "REFUSED",
     "diverged": "DIVERGED",
     "new": "FAIL, new",
     "drifted": "changed",
@@ -43,8 +57,9 @@ LABELS = {
 }
 #: Words for the number of checks with a mark: their regression status.
 STATUS = {
-    "crashed": "crashed", "timed_out": "timed out", "missing": "missing", "invalid": "INVALID", "new": "new",
-    "drifted": "changed", "fail": "without a list of known failures", "known": "known", "explained": "explained",
+    "crashed": "crashed", "timed_out": "timed out", "missing": "missing", "invalid": "INVALID", "refused": "REFUSED",
+    "new": "new", "drifted": "changed", "fail": "without a list of known failures", "known": "known",
+    "explained": "explained",
 }  # fmt: skip
 
 
@@ -84,9 +99,14 @@ def profiles_called(words: Iterable[str], engines: Iterable[str]) -> list[str]:
 
 
 def mark_of(row: Mapping[str, Any]) -> str:
-    """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing."""
+    """One word for a row: its outcome if it has no physics, else pass, or a FAIL's standing.
+
+    A scene that an exact profile refuses is *refused*, an alarm, in the standard suite, and *declined* elsewhere.
+    """
     if row["outcome"] in ("crashed", "timed_out", "missing", "invalid", "not_installed"):
         return str(row["outcome"])
+    if row["outcome"] == "refused":
+        return "refused" if row["standing"] == "new" else "declined"
     if row["outcome"] == "unsupported":
         return "new" if row["standing"] == "new" else "unsupported"
     if row["standing"] in ("drifted", "new"):  # also without a value, or if a PASS left its band

@@ -28,7 +28,7 @@ from adapters.stages import stage
 from validation.bounds import planar
 from validation.canonical import CanonicalScene, Check, Measured
 from validation.identity import adapter_hash, scene_code
-from validation.metrics import OUT_OF_PLANE
+from validation.metrics import OUT_OF_PLANE, realised
 from validation.posed import is_known, resolve
 
 #: Largest iteration count (a C integer) and largest move in units in the last place (made one by one).
@@ -51,6 +51,9 @@ class Outcome(Enum):
     OK = "ok"
     UNSUPPORTED = "unsupported"
     NOT_INSTALLED = "not_installed"
+    #: An exact profile gives no answer that it can certify, and says why.
+    REFUSED = "refused"
+    #: The measurement contradicts itself (`adapters.receipts.contradictions`).
     INVALID = "invalid"
     DIVERGED = "diverged"
     CRASHED = "crashed"
@@ -291,7 +294,9 @@ def _measured(value: Any, reason: Any) -> Measured:
 
 
 def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
-    """Scene of an observation and all its checks: the scene's own, and its plane where it is embedded in 3-D.
+    """Scene of an observation and all its checks.
+
+    These are the scene's own, its plane where it is embedded in 3-D, and property checks that do not hold.
 
     Raises
     ------
@@ -301,7 +306,15 @@ def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
     slot = observation.slot
     canonical, scene = resolve(slot.scene), scene_of(slot)
     lifted = OUT_OF_PLANE in observation.metrics
-    return scene, [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]
+    own = [*canonical.checks(scene, slot.dt), *(lifted * plane_of(canonical, scene, slot.dt))]
+    broken = [each for each in observation.receipts if realised(each["quantity"]) in observation.metrics]
+    return scene, own + list(map(_realised, broken))
+
+
+def _realised(receipt: Mapping[str, Any]) -> Check:
+    """The property check as a check of its cell; all its quantities are ratios, shares, coefficients or signs."""
+    told = f"the scene asks for {receipt['asked']:.4g}: {receipt['because']}"
+    return Check(realised(receipt["quantity"]), "1", receipt["declared"], receipt["band"], told, "property check")
 
 
 def scene_of(slot: Slot) -> Scene:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from adapters.engine import Array
 from adapters.near import near_pairs
+from adapters.receipts import QUANTITIES
 from adapters.scene import Scene
 from adapters.shapes import reach as reach
 from adapters.trajectory import Trajectory
@@ -38,6 +39,8 @@ OVER_TIME: Mapping[str, Callable[[Array], float]] = {
 SILENT = "does not rebound"
 #: Largest distance of a 2-D scene from its plane on a 3-D engine [m]; measured at the samples.
 OUT_OF_PLANE = "out_of_plane"
+#: Begin of the metrics of property checks that do not hold: what an engine realises of a property.
+REALISED = "realised_"
 #: Meaning of a metric's value in words, for readers of reports. ``name=0`` is for the value 0, ``name<0`` takes the
 #: size of a negative value: creeping down at -0.003 m/s is creeping up. A scene has words for its other metrics
 #: (`CanonicalScene.words`).
@@ -59,11 +62,16 @@ WORDS = {
     "hop": "leaves the floor, up or down, by {value}",
     "astray": "strays sideways by {value}",
     OUT_OF_PLANE: "leaves its plane by {value}",
-}
+} | {REALISED + quantity: f"realises a {quantity.replace('_', ' ')} of {{value}}" for quantity in QUANTITIES}
 #: Reason of a missing time: the value was never reached.
 NOT_PASSED = "it never arrives there"
 #: Start of the reason where a time is only the end of the run: the motion never came to rest.
 NEVER = "never settled"
+
+
+def realised(quantity: str) -> str:
+    """Metric of a property check (`adapters.receipts.QUANTITIES`)."""
+    return REALISED + quantity
 
 
 def total_impulse(trajectory: Trajectory, a: int, b: int) -> tuple[Array | None, str]:

@@ -154,12 +154,11 @@ class DrakeEngine(CheckedEngine):
             declared["impulse"] = Declared(1.0, SOLVED_SHARE, because)
         if needs.friction > 0.0 and profile in APPROXIMATE:
             because = APPROXIMATE[profile]
-            # A convex step satisfies its friction cone: friction is at most mu times the load. In Lagged it may be
-            # more.
+            # A convex step satisfies its friction cone, to what its solver leaves of the load: friction is at most mu
+            # times the load. In Lagged it may be more.
             half = 0.5 * needs.friction
-            capped = Declared(
-                half, half + FRICTION_SHARE * needs.friction, f"{because}: less than the scene's value, never more"
-            )
+            left = FRICTION_SHARE * needs.friction + SOLVED_SHARE
+            capped = Declared(half, half + left, f"{because}: less than the scene's value, never more")
             told = Declared(needs.friction, UNTOLD, because) if profile == "default" else capped
             declared |= {"friction": told, "friction_impulse": told}
             if profile == "sap":  # measured: 1 except for a box that lands in 3-D at 1/60 s: 1.42, without a known law

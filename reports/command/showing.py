@@ -493,7 +493,8 @@ def _measured_text(row: Plain) -> str:
     if row["value"] is None:
         return f"no value: {row['reason']}"
     text = f"{row['metric']} = {measured(row, 8)}"
-    return text if has_answer(row) else f"{text}; not judged: the measurement is broken"
+    why = "no certificate" if row["outcome"] == "refused" else "the measurement contradicts itself"
+    return text if has_answer(row) else f"{text}; not judged: {why}"
 
 
 def _print_explanation(
@@ -511,7 +512,8 @@ def _print_explanation(
     table.show_header = False
     table.columns[0].no_wrap = True
     off = f" = {_ratio(row)} tolerances" if severity(row) else ""
-    skill, why = skill_text(row), "reason" if row["outcome"] == "invalid" or row["physics"] == "pass" else "cause"
+    plain = row["outcome"] in ("refused", "invalid") or row["physics"] == "pass"
+    skill, why = skill_text(row), "reason" if plain else "cause"
     role = f" ({word})" if (word := word_of(row["engine"], row["profile"])) else ""
     lines = [
         ("check", f"{row_id(row)}, {LABELS[mark_of(row)]}"),

@@ -95,7 +95,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    broken = any(row.outcome in ("invalid", "crashed", "timed_out", "missing") for row in rows)
+    broken = any(row.failing and row.outcome not in ("ok", "diverged", "unsupported") for row in rows)
     sys.exit(statuses.verdict(broken, complete and not absent))
 
 

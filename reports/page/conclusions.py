@@ -13,6 +13,7 @@ from typing import Any
 
 from adapters.registry import is_ranked
 from reports.findings import has_answer
+from reports.matrix import UNJUDGED
 from reports.page.source import Source
 from reports.page.verdicts import (
     ALARMS,
@@ -254,7 +255,7 @@ def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
     groups: dict[str, dict[tuple[Any, ...], list[Plain]]] = defaultdict(lambda: defaultdict(list))
     for row in source.rows:
         mark = mark_of(row)
-        if mark not in ("pass", "unsupported", "none", "not_installed"):
+        if mark not in ("pass", *UNJUDGED):
             key = (row["engine"], row["profile"], row["scene"], row["dimension"], family_of(row["metric"]))
             groups[mark][key].append(row)
     order = [mark for mark in (*ALARMS, "fail", "known", "explained") if mark in groups]

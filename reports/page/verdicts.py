@@ -28,6 +28,8 @@ SAID = {
     "drifted": ("✗", "CHANGED"),
     "diverged": ("✗", "DIVERGED"),
     "invalid": ("!", "INVALID"),
+    "refused": ("!", "REFUSED"),
+    "declined": ("–", "refused"),
     "crashed": ("!", "CRASHED"),
     "timed_out": ("!", "TIMED OUT"),
     "missing": ("!", "MISSING"),
@@ -35,7 +37,7 @@ SAID = {
     "not_installed": ("–", "not installed"),
     "none": ("–", "no value"),
 }
-ALARMS = ("crashed", "timed_out", "missing", "invalid", "new", "drifted")
+ALARMS = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted")
 #: Mark -> class of a value's background: one letter, because tables of every value contain it thousands of times.
 GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.fromkeys(ALARMS, "a")
 #: Meaning of the words, for the legend.
@@ -47,7 +49,9 @@ MEANINGS = {
     "new": "fails or has no value; not on record",
     "drifted": "another value than is on record or predicted",
     "diverged": "the state exploded or stopped being finite",
-    "invalid": "the measurement is broken, so that nothing is judged",
+    "invalid": "the measurement contradicts itself, so that nothing is judged",
+    "refused": "a solver that certifies its answers gives none here",
+    "declined": "a solver that certifies its answers gives none here",
     "crashed": "the engine raised an error or killed its process",
     "timed_out": "no answer in time",
     "missing": "planned, but the run has nothing of it",
@@ -143,7 +147,7 @@ def matrix_lines(source: Source, found: Matrix, wanted: Sequence[tuple[str, int]
 
 def family_mark(field: Field | None, anchor: str) -> Mark:
     """A field of the matrix: its worst mark, the number of rows that do not pass, and its link."""
-    if field is None or field.mark in ("unsupported", "not_installed"):
+    if field is None or field.mark in ("unsupported", "declined", "not_installed"):
         return Mark(field.mark if field else "unsupported", "")
     text = "" if not field.judged else f"{field.missed}/{field.judged}" if field.missed else str(field.judged)
     said = ", ".join(f"{n} {SAID[m][1]}" for m, n in field.marks.most_common())
@@ -223,7 +227,7 @@ def scene_verdicts(source: Source, scene: str, dimension: int) -> SceneVerdicts:
     seen: dict[tuple[str, str], bool] = {}
     for row in rows:
         column = row["engine"], row["profile"]
-        seen[column] = seen.get(column, False) or mark_of(row) not in ("unsupported", "not_installed")
+        seen[column] = seen.get(column, False) or mark_of(row) not in ("unsupported", "declined", "not_installed")
     asked = [column for column in source.columns if seen.get(column)]
     refused = dict.fromkeys(engine for engine, profile in seen if not any(c[0] == engine for c in asked))
     families: dict[str, list[Plain]] = defaultdict(list)
@@ -290,7 +294,7 @@ def _block(
         list(becauses)[:4] + ([f"and {len(becauses) - 4} more, each beside its row"] if len(becauses) > 4 else []),
         [text for text in dict.fromkeys(row["source"] for row in rows) if text],
         {(w.engine, w.profile): Mark(w.mark.mark, w.ratio, "#" + anchor) for w in worst},
-        [w for w in worst if w.mark.mark not in ("pass", "unsupported", "not_installed")],
+        [w for w in worst if w.mark.mark not in ("pass", "unsupported", "declined", "not_installed")],
         command,
         lines,
     )

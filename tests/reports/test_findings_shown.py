@@ -96,11 +96,11 @@ def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_chec
 
 def test_a_run_that_is_not_certified_is_told_once_with_the_first_reason_of_its_certificate():
     """It has values, but none that counts."""
-    why = "certificate: bodies overlap at the start: 0.1, at most 1e-06; energy was gained: 2, at most 1e-09; a third"
-    ended = {"outcome": "invalid", "physics": None, "standing": None}
+    why = "bodies overlap at the start: 0.1, at most 1e-06; energy was gained: 2, at most 1e-09; a third"
+    ended = {"outcome": "refused", "physics": None, "standing": "new"}
     (family,) = families([row("impulse[1]", **ended, reason=why), row("drift", **ended, reason=why)])
-    told = "certificate: bodies overlap at the start: 0.1, at most 1e-06 (and 2 more)"
-    assert family.line == f"INVALID: mujoco/default incline 3-D ratio=0.99: {told} (2 checks)"
+    told = "bodies overlap at the start: 0.1, at most 1e-06 (and 2 more)"
+    assert family.line == f"REFUSED: mujoco/default incline 3-D ratio=0.99: {told} (2 checks)"
     assert families([row(**ended, reason="receipt mass: 2")])[0].line.endswith("ratio=0.99: receipt mass: 2")
 
 
@@ -119,9 +119,11 @@ def test_a_family_is_told_in_one_line_and_as_plain_data():
 
 
 def test_marks_come_in_the_order_of_their_weight_and_what_passes_is_none_of_them():
-    marks = ["explained", "known", "drifted", "new", "invalid", "missing", "timed_out", "crashed"]
+    marks = ["explained", "known", "drifted", "new", "refused", "invalid", "missing", "timed_out", "crashed"]
     ended = ("invalid", "missing", "timed_out", "crashed")
-    rows = [row(standing=None if m in ended else m, outcome=m if m in ended else "ok") for m in marks]
+    rows = [row(standing=None if m in ended else m, outcome=m if m in ended else "ok") for m in marks if m != "refused"]
+    rows.append(row(standing="new", outcome="refused"))
+    rows.append(row(standing=None, outcome="refused"))
     rows += [row(standing=None), row(physics="pass", standing=None), row(physics="pass", standing="known")]
     assert [mark for mark, _ in grouped(rows)] == list(findings.ORDER)
     assert [family.mark for family in alarms(rows)] == list(findings.ALARMING)

@@ -186,7 +186,7 @@ def test_the_legend_explains_what_occurs():
         "A dash: the engine cannot run the scene."
     )
     broken = Matrix((), (), {(("a", 2), ("e", "p")): Field(Counter({"invalid": 2, "pass": 1}))})
-    assert "INVALID: the measurement is broken" in legend(broken) and "dash" not in legend(broken)
+    assert "INVALID: the measurement contradicts itself" in legend(broken) and "dash" not in legend(broken)
 
 
 def test_the_regression_status_counts_what_fails_apart_from_how_wrong_it_is():

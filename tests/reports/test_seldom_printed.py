@@ -64,7 +64,7 @@ def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
     assert [line.split("   ")[0] for line in said[2:4]] == ["stack/creep", "receipt damping"]
     assert said[2].endswith("   mu 1 %, g 0.1 %") and said[3].endswith("   none of these faults")
     assert said[0].split("   ") == ["check or property check", "smallest fault that it notices"]
-    assert said[4] == "spin: no check of these scenes notices it; the case is INVALID by inertia, spin"
+    assert said[4] == "spin: no check of these scenes notices it; the property checks inertia, spin do"
     angle, creep = ([cell for cell in line.split("  ") if cell] for line in said[-2:])
     assert [cell.strip() for cell in angle] == [
         "incline/angle", "g", "0.001", "0.05", "50.0 %", "1/1920 s", "speed, drift",

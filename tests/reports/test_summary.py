@@ -285,7 +285,9 @@ def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
     rows = [*broken, row("impact", 2, "bullet", "one")]
     text = " ".join(" ".join(shown(rows, 100)).split())
     assert f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} (3 checks)" in text
-    assert f"bullet/tuned impact: no result for 3 of 3 checks (INVALID: {why}); the measurement is broken" in text
+    assert (
+        f"bullet/tuned impact: no result for 3 of 3 checks (INVALID: {why}); the measurement contradicts itself" in text
+    )
     assert "truth 1" not in text and "tuned fixes it" not in text and "one fixes it" not in text
     assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
 

@@ -1,13 +1,17 @@
-"""A cell whose receipts or certificate do not hold is INVALID: its numbers are no answer of that profile."""
+"""Cells whose engine realises something else, whose record contradicts itself, or whose answer is not certified."""
 
 import math
 from dataclasses import replace
 
 import pytest
 
+from adapters.engine import EngineError
+from adapters.planted_faults import Planted
 from adapters.receipts import Receipt
 from adapters.registry import find
 from validation.cells import Outcome, Slot
+from validation.findings import Findings
+from validation.judging import rows as rows_module
 from validation.judging.rows import rows_of
 from validation.posed import resolve
 from validation.running import execution
@@ -46,12 +50,60 @@ def test_receipts_that_hold_leave_the_cell_its_verdicts(monkeypatch):
     assert {row.physics for row in rows_of("run", [observation])} == {"pass"}
 
 
-def test_one_broken_receipt_makes_the_cell_invalid_and_every_row_an_alarm(monkeypatch):
+def test_friction_that_is_not_realised(monkeypatch):
+    """It is a failure of the engine, beside the checks of the scene, which are judged."""
     observation = observed(monkeypatch, HOLDS, BROKEN)
+    assert observation.outcome is Outcome.OK
+    rows = {row.metric: row for row in rows_of("run", [observation])}
+    own = rows.pop("realised_friction")
+    assert (own.physics, own.standing, own.alarming) == ("fail", "new", True)
+    assert (own.value, own.truth, own.tolerance) == (0.49, 0.5, 1e-6)
+    assert own.reason.endswith("; realised mu = 0.49 of 0.5")
+    assert rows and {row.physics for row in rows.values()} == {"pass"}
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_restitution_a_tenth_too_small(monkeypatch, listed):
+    """A regression of the engine: its checks fail and say why; where failures are listed, each is an alarm."""
+    found = find("chipmunk")
+    planted = replace(found, engine=Planted(found.engine, "restitution", 0.1))
+    monkeypatch.setattr(execution, "find", lambda name: planted)
+    observation = execute(replace(SLOT, params=(("e", 0.8),)))
+    empty = Findings("chipmunk", {}, (), {}) if listed else None
+    monkeypatch.setattr(rows_module, "findings_of", lambda engine: empty)
+    failing = [row for row in rows_of("run", [observation]) if row.physics == "fail"]
+    assert {"rebound_ratio", "realised_restitution"} <= {row.metric for row in failing}
+    assert all("realised e = 0.72 of 0.8" in row.reason for row in failing)
+    assert {row.alarming for row in failing} == {listed}
+
+
+@pytest.mark.parametrize("settings", [(), (("damping", 0.5),)])
+def test_settings_of_a_user_have_no_check_of_what_is_realised(monkeypatch, settings):
+    slot = replace(SLOT, params=(("e", 0.5),)).with_own(settings) if settings else SLOT
+    monkeypatch.setattr(execution, "receipts", lambda *arguments: (BROKEN,))
+    found = {row.metric for row in rows_of("run", [execute(slot)])}
+    assert ("realised_friction" in found) == (not settings)
+
+
+def test_a_record_that_contradicts_itself(monkeypatch):
+    late = Receipt("sampling", 0.0, 0.0, 1e-12, 1.0, False, "exact")
+    observation = observed(monkeypatch, HOLDS, late)
     assert observation.outcome is Outcome.INVALID
-    assert observation.reason == "receipt friction: measured 0.49, declared 0.5 +- 1e-06"
+    assert observation.reason == "states are not those of their times: sampling is 1, declared 0 +- 1e-12"
     rows = rows_of("run", [observation])
     assert rows and all(row.alarming and row.physics is None for row in rows)
+
+
+def test_a_solver_that_raises_with_a_reason(monkeypatch):
+    """An exact profile refuses; the same of any other profile is a crash."""
+
+    def gives_up(*arguments):
+        raise EngineError("no contact problem of this size")
+
+    monkeypatch.setattr(execution, "run", gives_up)
+    refused = execute(Slot("impact", (), 2, "reference", "reference", 1 / 240))
+    assert (refused.outcome, refused.reason) == (Outcome.REFUSED, "no contact problem of this size")
+    assert execute(Slot("impact", (), 2, "reference", "classical", 1 / 240)).outcome is Outcome.CRASHED
 
 
 def test_a_measure_that_is_not_finite_is_a_missing_value_with_its_reason(monkeypatch):
@@ -82,9 +134,10 @@ def test_a_receipt_that_could_not_be_measured_and_does_not_hold_is_broken_too(mo
 
 @pytest.mark.parametrize(
     ("certificate", "outcome"),
-    [({"certified": False, "reasons": ["gap"]}, Outcome.INVALID), ({"certified": True}, Outcome.OK), ({}, Outcome.OK)],
+    [({"certified": False, "reasons": ["gap"]}, Outcome.REFUSED), ({"certified": True}, Outcome.OK), ({}, Outcome.OK)],
 )
-def test_a_certificate_that_does_not_hold_makes_the_cell_invalid(monkeypatch, certificate, outcome):
+def test_a_certificate_that_does_not_hold(monkeypatch, certificate, outcome):
     observation = observed(monkeypatch, HOLDS, certificate=certificate)
     assert observation.outcome is outcome
-    assert ("certificate: gap" in observation.reason) == (outcome is Outcome.INVALID)
+    assert observation.reason == ("gap" if outcome is Outcome.REFUSED else "")
+    assert {row.alarming for row in rows_of("run", [observation])} == {outcome is Outcome.REFUSED}

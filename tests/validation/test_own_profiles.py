@@ -147,7 +147,7 @@ def test_a_row_has_a_verdict_and_no_standing_and_says_what_was_measured():
     assert failing and all(row.physics == "pass" for row in plain if row.tolerance)
     for row in failing:
         assert row.standing is None and not row.alarming and predictions_of(row) == []
-        assert row.reason.startswith(OWN_SETTINGS) and "linear_damping asked 0, measured 0.5" in row.reason
+        assert row.reason.startswith(OWN_SETTINGS) and "realised linear_damping = 0.5 of 0" in row.reason
     assert not any(row.alarming for row in own)
 
 

@@ -204,7 +204,7 @@ def test_each_body_has_a_reach_of_its_own():
 
 
 def test_a_run_that_is_invalid_keeps_how_far_it_left_its_plane(observed):
-    slip = Receipt("friction", 0.5, 0.5, 0.01, 0.75, False, "planted")
+    slip = Receipt("step", 1.0, 1.0, 0.01, 0.75, False, "planted")
     kept = execution._measured
 
     def unsound(blank, prepared, slips, trajectory):

@@ -190,14 +190,16 @@ def test_a_unit_that_is_empty_leaves_no_space_behind():
     [
         (0.0, "ok", ""),
         (MOST, "ok", ""),
-        (math.nextafter(MOST, 1.0), "invalid", f"{MOST:.3g}"),
-        (0.25, "invalid", "0.25"),
-        (None, "invalid", "infinite"),
+        (math.nextafter(MOST, 1.0), "refused", f"{MOST:.3g}"),
+        (0.25, "refused", "0.25"),
+        (None, "refused", "infinite"),
     ],
 )
 def test_a_run_whose_step_errs_by_more_than_a_tenth_of_the_tolerance_is_no_truth(error, outcome, said):
     row = judged(metrics={"creep": (0.0, "")}, certificate={"metric_errors": {"creep": error}})
-    wanted = f"certificate: error for the step {said}, at most {MOST:.3g}, a tenth of the tolerance" if said else ""
+    wanted = (
+        f"its error for the step is {said}; a truth has at most {MOST:.3g}, a tenth of the tolerance" if said else ""
+    )
     assert (row.outcome, row.reason) == (outcome, wanted)
     assert row.physics == ("pass" if outcome == "ok" else None)
     assert (row.value, row.cells) == (0.0, ["c0ffee"])  # what was measured stays to be seen

@@ -27,7 +27,7 @@ from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Store
 from validation.running.plan import Request, slots
 
 #: Outcomes that repeat if the same case runs again.
-REPEATS = (Outcome.OK, Outcome.DIVERGED, Outcome.UNSUPPORTED, Outcome.INVALID)
+REPEATS = (Outcome.OK, Outcome.DIVERGED, Outcome.UNSUPPORTED, Outcome.REFUSED, Outcome.INVALID)
 #: Step at which a full benchmark also times the cost with every step sampled [s].
 SAMPLED_DT = 1.0 / 240.0
 

@@ -179,8 +179,8 @@ def propose(
         key = row_key(slot, row.metric)
         if row.outcome not in ("ok", "diverged"):
             # A cell without a result does not change a finding: its entries stay.
-            if row.outcome == "invalid":
-                refused.append((row, "its property checks or its certificate fail"))
+            if row.outcome in ("invalid", "refused"):
+                refused.append((row, f"{row.outcome}: {row.reason}"))
             continue
         judged.add(key)
         if not about(key) and not _must_not_be_listed(row):

@@ -43,6 +43,8 @@ ALARMING_OUTCOMES = ("invalid", "crashed", "timed_out", "missing")
 OWN_MODEL = "not listed: your own model"
 #: Reason of rows with settings of a user, which have none.
 OWN_SETTINGS = "not listed: with settings of your own"
+#: Short names of what property checks measure.
+SYMBOLS = {"restitution": "e", "friction": "mu"}
 #: What laws say about rows, asked ahead of the others.
 Ready = Mapping[Asked, list[Prediction]]
 #: Scenes from files with several motions: by what was asked, when they part [s], and what is said of them.
@@ -108,9 +110,9 @@ class Row:
 def is_alarming(row: Mapping[str, Any]) -> bool:
     """Whether a row, as plain data, makes the command fail.
 
-    Alarms are cells that crash, time out or are missing, rows that should be listed and are not, and values stated in a
-    scene file (`_known` gives both their standing). For models, and for engines without a list, neither INVALID nor
-    FAIL is an alarm.
+    Alarms are cells that crash, time out or are missing, rows that should be listed and are not, values stated in a
+    scene file, and catalogue scenes that an exact profile refuses (`_known` and `_verdict` give their standing). For
+    models, and for engines without a list, neither INVALID nor FAIL is an alarm.
     """
     if row["outcome"] == Outcome.INVALID.value and not is_listed(row["engine"], row["scene"]):
         return False
@@ -175,8 +177,8 @@ def _missing(slot: Slot) -> Observation:
 
 
 def _floor(row: Row, moved: Iterable[Observation]) -> float | None:
-    """Largest change of a value when its start moves by some units in the last place; INVALID runs do not count."""
-    sound = [observation for observation in moved if observation.outcome is not Outcome.INVALID]
+    """Largest change of a value when its start moves by some units in the last place; runs without answer excluded."""
+    sound = [observation for observation in moved if observation.outcome not in (Outcome.INVALID, Outcome.REFUSED)]
     values = [observation.metrics.get(row.metric, (None, ""))[0] for observation in sound]
     changes = [_difference(value, row.value) for value in values]
     return max((abs(change) for change in changes if change is not None), default=None)
@@ -210,7 +212,7 @@ def _is_left_open(observation: Observation, check: Check, value: float | None, s
     until, told = several[posed(observation.slot)]
     at = instant_of(check.metric)
     certificate = observation.certificate.get("full", {})
-    runs = observation.outcome is Outcome.OK or (observation.outcome is Outcome.INVALID and certificate.get("several"))
+    runs = observation.outcome is Outcome.OK or (observation.outcome is Outcome.REFUSED and certificate.get("several"))
     if not runs or (at is not None and at <= until) or judge_physics(value, check) is not Physics.FAIL:
         return ""
     return f"not judged: {told}"
@@ -223,12 +225,14 @@ def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: 
         observation = replace(observation, outcome=Outcome.OK, reason="")
     doubt = _doubt(observation, check)
     if doubt:
-        observation = replace(observation, outcome=Outcome.INVALID, reason=doubt)
+        observation = replace(observation, outcome=Outcome.REFUSED, reason=doubt)
     if value is None and why in UNTOLD and observation.outcome is Outcome.OK and not _is_found(observation, check):
         # A value that an engine does not report is no failure of its motion, unless it once reported it.
         observation = replace(observation, outcome=Outcome.UNSUPPORTED, reason=why)
     verdict = Verdict(None, None, left_open) if left_open else _verdict(observation, scene, check, value, why, ready)
-    texts = why if value is not None else "", observation.reason * (observation.outcome is Outcome.OK), verdict.reason
+    off = _not_as_asked(observation) if verdict.physics is Physics.FAIL else []
+    own = observation.reason * (observation.outcome is Outcome.OK)
+    texts = why if value is not None else "", own, verdict.reason, *off
     reason = "; ".join(dict.fromkeys(text for text in texts if text))
     return _assemble(run, observation, observation.slot, dict(scene.params), check, value, verdict, reason)
 
@@ -251,9 +255,9 @@ def _verdict(
     if outcome is Outcome.DIVERGED:
         return judge_divergence(_known(observation, slot, check), observation.reason)
     findings, _ = _findings(slot.engine)
-    refused = outcome is Outcome.UNSUPPORTED and observation.reason not in UNTOLD
+    refused = outcome is Outcome.REFUSED or (outcome is Outcome.UNSUPPORTED and observation.reason not in UNTOLD)
     if refused and findings is not None and not is_file(slot.scene) and not slot.is_own:
-        expected = findings.unsupported_by(slot)
+        expected = outcome is Outcome.UNSUPPORTED and findings.unsupported_by(slot)
         return Verdict(None, Standing.KNOWN if expected else Standing.NEW, observation.reason)
     return Verdict(None, None, observation.reason)
 
@@ -270,11 +274,10 @@ def _cause(observation: Observation, scene: Scene, check: Check, verdict: Verdic
 
 
 def _known(observation: Observation, slot: Slot, check: Check) -> Known:
-    off = _not_as_asked(observation) if slot.is_own else []
     if check.source == STATED:  # stated by the file's author: neither a list nor a user's settings excuse it
-        return Known(None, True, "; ".join(off))
+        return Known(None, True)
     if slot.is_own:
-        return Known(None, False, "; ".join([OWN_SETTINGS, *off]))
+        return Known(None, False, OWN_SETTINGS)
     if resolve(slot.scene).brought(slot.engine, slot.profile) is not None:
         return Known(None, False, "as soft as the model: the profile is the model's own, not the engine's")
     if is_model(slot.scene):  # its failures cannot be listed
@@ -291,9 +294,13 @@ def _is_found(observation: Observation, check: Check) -> bool:
 
 
 def _not_as_asked(observation: Observation) -> list[str]:
-    """Properties under a user's settings that differ from the scene's values."""
+    """What the engine realises, beside what was asked of it, where a property check does not hold."""
     off = [slip for slip in observation.receipts if not slip["holds"] and slip["measured"] is not None]
-    return [f"{s['quantity']} asked {s['asked']:.4g}, measured {s['measured']:.4g}" for s in off]
+    return [
+        f"realised {SYMBOLS.get(s['quantity'], s['quantity'])} = {s['measured']:.6g} of {s['asked']:.6g}"
+        + (f" (declared {s['declared']:.6g})" if s["declared"] != s["asked"] else "")
+        for s in off
+    ]
 
 
 def _findings(engine: str) -> tuple[Findings | None, str]:
@@ -313,7 +320,7 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
     truth for positions, but its energy and overlaps are judged like those of any engine. Before that time the motion is
     unique, for checks that end there.
     """
-    if observation.outcome is not Outcome.INVALID or not is_file(observation.slot.scene):
+    if observation.outcome is not Outcome.REFUSED or not is_file(observation.slot.scene):
         return False
     full = observation.certificate.get("full", {})
     if not full.get("lawful") or not all(slip["holds"] for slip in observation.receipts):
@@ -331,7 +338,7 @@ def _doubt(observation: Observation, check: Check) -> str:
     if error is not None and error <= most:
         return ""
     known = "infinite" if error is None else f"{error:.3g}"
-    return f"certificate: error for the step {known}, at most {most:.3g}, a tenth of the tolerance"
+    return f"its error for the step is {known}; a truth has at most {most:.3g}, a tenth of the tolerance"
 
 
 def _certificate(observation: Observation, check: Check) -> str:

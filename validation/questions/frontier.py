@@ -37,7 +37,8 @@ FATES = {
     Outcome.DIVERGED: "NaN or exploded",
     Outcome.CRASHED: "crashed",
     Outcome.TIMED_OUT: "no answer in time",
-    Outcome.INVALID: "not certified",
+    Outcome.REFUSED: "not certified",
+    Outcome.INVALID: "contradicts itself",
     Outcome.MISSING: "no answer",
 }
 

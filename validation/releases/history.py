@@ -21,8 +21,10 @@ from validation.records.store import RELEASE_TITLE, Store
 
 #: Outcomes with a result of the engine; the others are reasons for having none.
 ANSWERS = (Outcome.OK.value, Outcome.DIVERGED.value, Outcome.CRASHED.value, Outcome.TIMED_OUT.value)
+#: Outcomes of cells that ran to the end and are not judged.
+UNJUDGED = (Outcome.INVALID.value, Outcome.REFUSED.value)
 #: Outcomes without a value to judge: fewer failures are no improvement if these increase.
-ENDED = (Outcome.CRASHED.value, Outcome.TIMED_OUT.value, Outcome.INVALID.value)
+ENDED = (Outcome.CRASHED.value, Outcome.TIMED_OUT.value, *UNJUDGED)
 #: Engine, profile, scene, dimension.
 Key = tuple[str, str, str, int]
 
@@ -101,7 +103,7 @@ def observations(store: Store, engine: str, version: str) -> list[Observation]:
     for run in store.release_runs(engine, version):
         for observation in store.observations(run):
             kept = found.get(observation.slot)
-            answers = observation.outcome.value in ANSWERS or observation.outcome is Outcome.INVALID
+            answers = observation.outcome.value in (*ANSWERS, *UNJUDGED)
             if kept is None or answers or kept.outcome.value not in ANSWERS:
                 found[observation.slot] = observation
     return list(found.values())
@@ -129,7 +131,7 @@ def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapp
         if broken and not observation.slot.is_own and observation.slot.profile not in doubts:
             doubts[observation.slot.profile] = f"receipt {broken[0]['quantity']} fails in {observation.slot.scene}"
     rows = tuple(_doubted(row, doubts) for row in rows_of(f"{engine}=={version}", found))
-    answered = any(row.outcome in ANSWERS or row.outcome == Outcome.INVALID.value for row in rows)
+    answered = any(row.outcome in (*ANSWERS, *UNJUDGED) for row in rows)
     reason = "" if answered else next((row.reason for row in rows), "it was not run")
     said = tuple(f"{profile}: {why}" for profile, why in doubts.items())
     return Told(engine, version, rows, reason, said, taken or {})
@@ -138,7 +140,7 @@ def told_by(engine: str, version: str, found: Iterable[Observation], taken: Mapp
 def _doubted(row: Row, doubts: dict[str, str]) -> Row:
     """A row without verdict where its profile fails a property check: a pass by chance is none."""
     why = doubts.get(row.profile)
-    if why is None or row.outcome == Outcome.INVALID.value:
+    if why is None or row.outcome in UNJUDGED:
         return row
     return replace(row, outcome=Outcome.INVALID.value, physics=None, standing=None, reason=f"no verdict: {why}")
 

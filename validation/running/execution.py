@@ -16,7 +16,7 @@ from adapters.foreign import checked_refusal, said_by
 from adapters.needs import needs
 from adapters.own_settings import own
 from adapters.plain import kind_of, one_line, plain
-from adapters.receipts import Receipt, receipts
+from adapters.receipts import Receipt, contradictions, receipts
 from adapters.registry import find
 from adapters.scene import SceneError
 from adapters.stages import stage
@@ -24,7 +24,7 @@ from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
 from validation.canonical import Measured
 from validation.cells import Observation, Outcome, Prepared, Slot, prepare, settings_of
-from validation.metrics import OUT_OF_PLANE
+from validation.metrics import OUT_OF_PLANE, realised
 from validation.posed import resolve
 from validation.running.certification import fully_certified
 from validation.running.tracks import Recording, record
@@ -107,6 +107,10 @@ def _observe(
         trajectory = run(engine, scene, slot.dt, values, sampling)
         trajectory = fully_certified(engine, prepared, slot, values, trajectory)
         return _measured(blank, prepared, slips, trajectory), trajectory
+    except EngineError as error:
+        if engine.facts.roles.get(slot.base) == "solution":
+            return replace(blank, outcome=Outcome.REFUSED, reason=one_line(error)), None
+        return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
     except BaseException as error:
         return replace(blank, outcome=Outcome.CRASHED, reason=said_by(error)), None
 
@@ -115,9 +119,11 @@ def _observe(
 def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], trajectory: Trajectory) -> Observation:
     measured = replace(blank, outcome=Outcome.OK, receipts=tuple(_plain(slip) for slip in slips))
     measured = _with_trajectory(measured, trajectory)
+    refused = trajectory.certificate.get("certified") is False
     if trajectory.finish == "diverged":  # an engine with a certificate reports why it ended the run
-        said = [trajectory.reason, *_reasons(trajectory)]
-        return replace(measured, outcome=Outcome.DIVERGED, reason=one_line("; ".join(said)))
+        said = [*_reasons(trajectory), trajectory.reason] if refused else [trajectory.reason, *_reasons(trajectory)]
+        outcome = Outcome.REFUSED if refused else Outcome.DIVERGED
+        return replace(measured, outcome=outcome, reason=one_line("; ".join(said)))
     # A check without an entry is newer than the run (`metrics.NEWER`), so each has one.
     metrics: dict[str, Measured] = {
         check.metric: (None, UNMEASURED) for check in prepared.canonical.checks(prepared.scene, blank.slot.dt)
@@ -125,16 +131,13 @@ def _measured(blank: Observation, prepared: Prepared, slips: Sequence[Receipt], 
     metrics |= prepared.canonical.measure(prepared.scene, trajectory)
     if trajectory.out_of_plane is not None:
         metrics[OUT_OF_PLANE] = trajectory.out_of_plane, ""
+    if not blank.slot.is_own:
+        metrics |= {realised(slip.quantity): (slip.measured, "") for slip in slips if not slip.holds}
     measured = replace(measured, metrics={name: _finite(*found) for name, found in metrics.items()})
-    if trajectory.certificate.get("certified") is False:
-        reasons = one_line("; ".join(_reasons(trajectory)))
-        return replace(measured, outcome=Outcome.INVALID, reason=f"certificate: {reasons}")
-    broken = [slip for slip in slips if not slip.holds and not blank.slot.is_own]
-    if broken:
-        worst = broken[0]
-        reason = f"receipt {worst.quantity}: measured {worst.measured:.6g}, declared {worst.declared:.6g}"
-        return replace(measured, outcome=Outcome.INVALID, reason=f"{reason} +- {worst.band:.2g}")
-    return measured
+    if refused:
+        return replace(measured, outcome=Outcome.REFUSED, reason=one_line("; ".join(_reasons(trajectory))))
+    against = [] if blank.slot.is_own else contradictions(slips)
+    return replace(measured, outcome=Outcome.INVALID, reason=one_line(against[0])) if against else measured
 
 
 def _finite(value: float | None, reason: str) -> Measured:
