@@ -204,7 +204,7 @@ class Simulation(ABC):
         """How well the results satisfy the engine's equations; empty where it does not report that.
 
         For an exact profile ``certified`` says whether the solution was found, and ``reasons`` why not. A run that is
-        not certified is INVALID: it is no truth and takes part in no comparison.
+        not certified is REFUSED: it is no truth and takes part in no comparison.
         """
         return {}
 

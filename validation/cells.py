@@ -313,7 +313,7 @@ def checks_of(observation: Observation) -> tuple[Scene, list[Check]]:
 
 def _realised(receipt: Mapping[str, Any]) -> Check:
     """The property check as a check of its cell; all its quantities are ratios, shares, coefficients or signs."""
-    told = f"the scene asks for {receipt['asked']:.4g}: {receipt['because']}"
+    told = f"{receipt['asked']:.4g} in the scene; {receipt['because']}"
     return Check(realised(receipt["quantity"]), "1", receipt["declared"], receipt["band"], told, "property check")
 
 

@@ -12,7 +12,7 @@ def too_far_at_the_start(scene: Scene) -> str | None:
     """Reason for a body so far away that double precision is too coarse for its size; None if there is none.
 
     At 1e8 m double precision has a spacing of 1.5e-8 m, and gaps, lever arms and depths are no more accurate. The
-    certificate limits it to a share of the smallest half width; this check comes before a run that would be INVALID.
+    certificate limits it to a share of the smallest half width; this check comes before a run that would be refused.
     """
     from reference_solver.tally_summary import GATES
 
@@ -34,7 +34,7 @@ def overlap_at_the_start(scene: Scene) -> str | None:
     """Reason for two bodies that overlap at the start by more than round-off of the input; None if there are none.
 
     The laws define no motion of overlapping rigid bodies. The solver's certificate limits the overlap to a share of the
-    smaller half width; this check comes before a run that would be INVALID.
+    smaller half width; this check comes before a run that would be refused.
     """
     from reference_solver.geometry import gap
     from reference_solver.tally_summary import GATES

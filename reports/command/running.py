@@ -72,9 +72,9 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     unless --engine names some.
 
     Exits with 1 if a result is unexpected: a failure that is not on record, a value that differs from its record,
-    INVALID, crashed, timed out or missing. Exits with 2 if the call is wrong, with 4 if not all of it ran. A failed
-    check that a scene file states is unexpected. Failures of models, and of engines without a list of known failures,
-    are shown and do not change the exit status, unless --strict is given.
+    INVALID, REFUSED, crashed, timed out or missing. Exits with 2 if the call is wrong, with 4 if not all of it ran. A
+    failed check that a scene file states is unexpected. Failures of models, and of engines without a list of known
+    failures, are shown and do not change the exit status, unless --strict is given.
 
     With --invariance one case of each scene, engine and profile is run again with bodies renumbered, the world turned,
     mirrored, moving or far away, with a body out of reach, and in a fresh process. Nothing is stored. Exits with 1 if

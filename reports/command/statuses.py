@@ -7,7 +7,7 @@ from __future__ import annotations
 
 #: Everything ran, and no result is unexpected.
 FINE = 0
-#: A verdict: checks new, drifted, INVALID, CRASHED, TIMED OUT or missing; a regression; a bound that does not hold.
+#: A verdict: checks new, drifted, INVALID, REFUSED, CRASHED, TIMED OUT or missing; a regression; a failed bound.
 ALARM = 1
 #: The call is wrong: an unknown name, a value out of range, an invalid scene file. Nothing has run.
 WRONG_CALL = 2
@@ -21,8 +21,8 @@ INTERRUPTED = 130
 #: Status -> meaning, as in docs/reference/status.md.
 MEANING = {
     FINE: "everything ran, no result is unexpected",
-    ALARM: "an unexpected result: a new failure, a changed value, INVALID, crashed, timed out or missing; a "
-    "regression; a failed test; a cause refuted; a better setting found",
+    ALARM: "an unexpected result: a new failure, a changed value, INVALID, REFUSED, crashed, timed out or missing; "
+    "a regression; a failed test; a cause refuted; a better setting found",
     WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
     RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
     INCOMPLETE: "not everything ran: a named engine is missing, cases did not finish in time, too little memory",

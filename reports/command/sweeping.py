@@ -95,7 +95,8 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    broken = any(row.failing and row.outcome not in ("ok", "diverged", "unsupported") for row in rows)
+    lost = ("invalid", "crashed", "timed_out", "missing")
+    broken = any(row.outcome in lost or (row.outcome == "refused" and row.alarming) for row in rows)
     sys.exit(statuses.verdict(broken, complete and not absent))
 
 

@@ -294,7 +294,7 @@ def _is_found(observation: Observation, check: Check) -> bool:
 
 
 def _not_as_asked(observation: Observation) -> list[str]:
-    """What the engine realises, beside what was asked of it, where a property check does not hold."""
+    """What the engine realises, beside what the scene has, where a property check does not hold."""
     off = [slip for slip in observation.receipts if not slip["holds"] and slip["measured"] is not None]
     return [
         f"realised {SYMBOLS.get(s['quantity'], s['quantity'])} = {s['measured']:.6g} of {s['asked']:.6g}"

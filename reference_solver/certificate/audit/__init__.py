@@ -77,7 +77,7 @@ CHECKS = {
     # A thousandth of the overlap that is allowed.
     "apart": Check(1e-9, "an impulse acts between bodies that do not touch"),
     # Loss of separation along the solver's normal, as a share of the body.
-    "direction": Check(1e-9, "a contact's normal is none of its bodies"),
+    "direction": Check(1e-9, "the normal at a contact, as at a corner, is not unique"),
     "place": Check(1e-9, "a contact's point is on no surface of its bodies"),
     # As ``apart``, and speeds as those after a solve.
     "stays": Check(1e-9, "a contact carries beyond where a face, an edge or a corner of its bodies ends"),
@@ -99,7 +99,7 @@ CHECKS = {
     # As much as may be gained.
     "lost": Check(1e-9, "energy was lost that friction does not take"),
     # The fixed-step law gets g h wrong, the impulse-level scheme h^2, without saying where.
-    "fallback": Check(0.0, "steps went by a scheme of lower order"),
+    "fallback": Check(0.0, "steps that could not be cut at their events have errors that are not bounded"),
 }
 
 
