@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from adapters.stages import stage
 from adapters.whole import write
 from reports.brief import Judged, judged
-from reports.findings import finding_line, grouped
-from reports.matrix import UNJUDGED, leaving, legend, matrix_of, status_of, unranked, versions_of
+from reports.findings import finding_line, grouped, refusals
+from reports.matrix import UNJUDGED, leaving, legend, matrix_of, status_of, unjudged, unranked, versions_of
 from reports.wording import LABELS, cell, mark_of, markdown, plural
 from validation.judging.rows import Row, frame, is_alarming
 from validation.records.store import Run, Store
@@ -111,7 +111,8 @@ def as_markdown(rows: Sequence[Plain]) -> str:
         fields = [matrix.fields.get((line, column)) for column in matrix.columns]
         out.append(f"| {markdown(line[0])} {line[1]}-D | " + " | ".join(f.text if f else "" for f in fields) + " |")
     out += [""]
-    lines = (legend(matrix), *filter(None, [status_of(matrix)]), *unranked(matrix.columns), *leaving(rows))
+    beside = (*unranked(matrix.columns), *leaving(rows), *unjudged(rows), *refusals(rows))
+    lines = (legend(matrix), *filter(None, [status_of(matrix)]), *beside)
     out += [f"{markdown(line)}\n" for line in lines]
     for mark, group in grouped(rows):
         out.append(f"**{LABELS[mark]}**: {plural(len(group), 'check')}")

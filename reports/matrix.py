@@ -20,6 +20,7 @@ from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
 from reports.wording import FEW, LABELS, MARKS, STATUS, mark_of, word_of
 from validation.cells import ALONE
+from validation.judging.verdicts import NOT_JUDGED
 from validation.metrics import NEWER, OUT_OF_PLANE
 
 #: Colours; they support the words and never replace them.
@@ -136,10 +137,13 @@ def leaving(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     return [f"2-D scenes that leave their plane in a 3-D engine: {', '.join(counts)}"] if counts else []
 
 
-def newer(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """How many checks did not exist when the run was made; one line, or none."""
-    count = sum(row["reason"] == NEWER for row in rows)
-    return [f"{count} of the checks are newer than this run: without a value, not judged."] if count else []
+def unjudged(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """How many checks did not exist when the run was made, and how many are not judged for another reason."""
+    reasons = [row["reason"] for row in rows if row["physics"] is None]
+    count = reasons.count(NEWER)
+    said = [f"{count} of the checks are newer than this run: without a value, not judged."] if count else []
+    others = Counter(reason for reason in reasons if reason.startswith(NOT_JUDGED))
+    return said + [f"{count} of the checks {'is' if count == 1 else 'are'} {why}." for why, count in others.items()]
 
 
 def repeated(rows: Iterable[Mapping[str, Any]]) -> list[str]:

@@ -28,11 +28,11 @@ from reports.matrix import (
     leaving,
     legend,
     matrix_of,
-    newer,
     repeated,
     status_of,
     sweeps_of,
     tables_of,
+    unjudged,
     unranked,
     versions_of,
 )
@@ -84,7 +84,7 @@ def show(
         *sweeps_of(matrix),
         *unranked(matrix.columns),
         *leaving(rows),
-        *newer(rows),
+        *unjudged(rows),
         *repeated(rows),
     ):
         console.print(_folded(line, console, ""), style="dim")
@@ -114,7 +114,7 @@ def _show_families(
         *_beside(matrix),
         *unranked(matrix.columns),
         *leaving(rows),
-        *newer(rows),
+        *unjudged(rows),
         *repeated(rows),
     ):
         console.print(_folded(line, console, ""), style="dim")

@@ -452,7 +452,7 @@ def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain
 
     Unranked profiles are no fixes: they differ in more than settings, so lines to paste would not reproduce them.
     """
-    if mark_of(row) == "pass":
+    if mark_of(row) == "pass" or row["outcome"] == "refused":  # a profile without a certificate is no fix of one
         return "", "", "", []
     same = ("engine", "scene", "dimension", "params", "dt", "metric")
     good = [

@@ -22,7 +22,8 @@ import minify_html
 from markupsafe import Markup
 
 from reports.answers import Answer
-from reports.matrix import leaving, newer, unranked
+from reports.findings import refusals
+from reports.matrix import leaving, unjudged, unranked
 from reports.overview import families_of, worst_answers
 from reports.page import choosing, conclusions, cost, explorer, fairness, fixing, opening, replay, takeaway, verdicts
 from reports.page.families import families
@@ -90,7 +91,7 @@ def render(source: Source) -> str:
             grounds=verdicts.GROUNDS,
             meanings=verdicts.MEANINGS,
             marks_used=_marks_used(source),
-            beside=[*unranked(source.columns), *leaving(source.rows), *newer(source.rows)],
+            beside=[*unranked(source.columns), *leaving(source.rows), *unjudged(source.rows), *refusals(source.rows)],
         )
     )
     return minify_html.minify(page)  # style and scripts must stay the same: the policy has their hashes

@@ -62,6 +62,8 @@ def asked(monkeypatch):
         (row(None, Standing.NEW), listed(False), "Failed", "its report"),  # no answer is a failure
         (row(None, outcome="crashed"), None, "Failed", "its report"),
         (row(None, reason="no boxes", outcome="unsupported"), None, "Skipped", "no boxes"),
+        (row(None, reason="not unique", outcome="refused"), None, "Skipped", "not unique"),
+        (row(None, Standing.NEW, outcome="refused"), None, "Failed", "its report"),
         (None, None, "Failed", "there is no result of speed: the case did not finish"),
     ],
 )  # fmt: skip

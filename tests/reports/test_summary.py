@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import re
 from dataclasses import replace
 from itertools import product
@@ -15,12 +16,13 @@ from adapters.scene import SceneError
 from reports import brief
 from reports.answers import answers, choices
 from reports.command import main, showing
-from reports.exports import load_rows
-from reports.findings import finding_line, grouped
+from reports.exports import as_junit, as_markdown, load_rows
+from reports.findings import families, finding_line, grouped
 from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity, row_id
 from validation.cells import Slot
+from validation.judging.rows import is_alarming
 from validation.records.store import Store
 from validation.running.execution import execute
 
@@ -290,6 +292,54 @@ def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
     )
     assert "truth 1" not in text and "tuned fixes it" not in text and "one fixes it" not in text
     assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
+
+
+FILE_TEXT = """
+name = "ball"
+dimension = 2
+gravity = [0.0, -9.81]
+duration = 0.1
+[[bodies]]
+name = "ball"
+shape = { type = "disc", radius = 0.5 }
+mass = 1.0
+"""
+NOT_CERTIFIED = {"outcome": "refused", "physics": None, "standing": None, "reason": "the normal is not unique: 9e-8"}
+
+
+def refused(scene, **changes):
+    whole = row("impact", 2, "reference", "reference", value=1.0, truth=1.0) | NOT_CERTIFIED | changes
+    return [whole | {"scene": scene, "metric": metric} for metric in ("a", "b[1]")]
+
+
+def test_refusal_of_a_file(tmp_path, monkeypatch):
+    """It is told once, with its reason, and is neither a failure nor an alarm."""
+    monkeypatch.chdir(tmp_path)
+    Path("ball.toml").write_text(FILE_TEXT)
+    rows = [*refused("ball.toml"), row("impact", 2, "bullet", "tuned") | {"scene": "ball.toml"}]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert text.count("the normal is not unique: 9e-8") == 1 == as_markdown(rows).count("the normal is not unique: 9e")
+    assert "REFUSED: reference/reference ball.toml: the normal is not unique: 9e-8" in text
+    assert "Every check passes" in text and "fail," not in text and "Needs attention" not in text
+    assert not any(is_alarming(each) for each in rows) and families(rows) == []
+    junit = as_junit(rows)
+    assert "<failure" not in junit and junit.count("<skipped") == 2
+
+
+def test_refusal_in_the_standard_suite():
+    rows = [*refused("impact", standing="new"), row("impact", 2, "bullet", "tuned")]
+    text = " ".join(" ".join(shown(rows, 100)).split())
+    assert "Needs attention: 2 unexpected results (exit status 1)" in text
+    assert "REFUSED: reference/reference impact 2-D e=0.8 height=1: the normal is not unique: 9e-8 (2 checks)" in text
+    assert "2 of 2 fail, 2 REFUSED" in text and as_junit(rows).count("<failure") == 2
+
+
+def test_tolerance_that_is_not_finite():
+    said = {"tolerance": math.inf, "physics": None, "standing": None, "reason": "not judged: the tolerance is inf"}
+    rows = [row("impact", 2, "bullet", "tuned"), row("impact", 2, "bullet", "tuned") | said]
+    for text in ("\n".join(shown(rows, 100)), as_markdown(rows)):
+        assert "1 of the checks is not judged: the tolerance is inf." in text
+    assert "<skipped" in as_junit(rows)
 
 
 # ---- a real run ----

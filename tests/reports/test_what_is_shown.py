@@ -35,6 +35,7 @@ ALARMING = {
     "a pass that drifted": replace(PASS, standing="drifted"),
     "no value, and not listed": replace(ROW, value=None, error=None, physics=None),
     "invalid": with_outcome("invalid"),
+    "refused, in the standard suite": replace(with_outcome("refused"), standing="new"),
     "crashed": with_outcome("crashed"),
     "timed_out": with_outcome("timed_out"),
     "missing": with_outcome("missing"),
@@ -49,6 +50,7 @@ QUIET = {
     "no value, listed": replace(ROW, value=None, error=None, physics=None, standing="known"),
     "unsupported": replace(with_outcome("unsupported"), standing="known"),
     "not_installed": with_outcome("not_installed"),
+    "refused, of a file": with_outcome("refused"),
 }
 
 

@@ -22,6 +22,7 @@ from validation.findings.files import brought_by_ours, findings_of
 from validation.judging.predicting import Asked, cause_in_file, foretold, predictions
 from validation.judging.studies import StudyResult, results, study_of
 from validation.judging.verdicts import (
+    NOT_JUDGED,
     Physics,
     Prediction,
     Standing,
@@ -215,7 +216,7 @@ def _is_left_open(observation: Observation, check: Check, value: float | None, s
     runs = observation.outcome is Outcome.OK or (observation.outcome is Outcome.REFUSED and certificate.get("several"))
     if not runs or (at is not None and at <= until) or judge_physics(value, check) is not Physics.FAIL:
         return ""
-    return f"not judged: {told}"
+    return f"{NOT_JUDGED}: {told}"
 
 
 def _row(run: str, observation: Observation, scene: Scene, check: Check, ready: Ready, several: Several) -> Row:

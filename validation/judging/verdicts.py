@@ -20,6 +20,8 @@ from validation.canonical import Check
 from validation.cells import Slot
 from validation.findings import Finding, Known
 
+#: Begin of the reason of a check that has a tolerance and no verdict.
+NOT_JUDGED = "not judged"
 #: A law, its predicted value and its band.
 Prediction = tuple[Deviation, float, float]
 
@@ -88,7 +90,7 @@ def judge(value: float | None, check: Check, predictions: Iterable[Prediction], 
     if check.truth is None or check.bound is None:
         return Verdict(None, None)
     if not math.isfinite(check.bound):
-        return Verdict(None, None, f"not judged: its tolerance is {check.bound}")
+        return Verdict(None, None, f"{NOT_JUDGED}: the tolerance is {check.bound}")
     if value is None:
         return _without_value(known, why)
     physics = judge_physics(value, check)
