@@ -46,8 +46,8 @@ def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own
     print(Counter((o.slot.engine, re.sub(r"^[^:]*: |[0-9.+-]+", "", o.reason)) for o in found
                   if o.outcome is Outcome.UNSUPPORTED))  # fmt: skip
     print(Counter((o.slot.engine, o.slot.profile, re.sub(r"[0-9.e+-]+", "", o.reason)) for o in found
-                  if o.outcome is Outcome.INVALID))  # fmt: skip
-    allowed = (Outcome.OK, Outcome.UNSUPPORTED, Outcome.INVALID, Outcome.DIVERGED)
+                  if o.outcome is Outcome.REFUSED))  # fmt: skip
+    allowed = (Outcome.OK, Outcome.UNSUPPORTED, Outcome.REFUSED, Outcome.INVALID, Outcome.DIVERGED)
     ended = [(o.slot.engine, o.slot.profile, o.slot.scene, o.reason) for o in found if o.outcome not in allowed]
     assert not ended, ended[:5]
     assert all(len(o.reason.splitlines()) <= 1 and "Traceback" not in o.reason for o in found)

@@ -176,6 +176,15 @@ def test_rows_whose_receipts_do_not_hold_are_refused():
     assert why.startswith("invalid: ")
 
 
+def test_failures_of_an_engine_that_realises_another_restitution():
+    """A list would make a regression of the engine known."""
+    judged = rows()
+    own = replace(judged[0], metric="realised_restitution", physics="fail", standing="new")
+    found = propose([*judged, own], "nameless", listed(FAMILY)).refused
+    assert {row.metric for row, _ in found} == {row.metric for row in judged if row.physics == "fail"} | {own.metric}
+    assert {why for _, why in found} == {"its property checks do not hold"}
+
+
 def test_rows_of_the_profile_that_promises_a_solution_are_refused():
     slot = replace(SLOT, engine="reference", profile="reference")
     family = replace(FAMILY, profiles=("reference",))

@@ -36,6 +36,7 @@ from validation.findings import Family, Finding, Findings, Key, row_key, solutio
 from validation.judging.rows import Row, predictions_of
 from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
+from validation.metrics import REALISED
 from validation.running.plan import is_standard
 
 #: Moves of the start, in units in the last place, that sample the scatter of a value.
@@ -172,6 +173,9 @@ def propose(
     findings = findings or Findings(engine, {}, (), {})
     changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
     kept, refused, judged, left_out = dict(findings.members), [], set(), []
+    rows = list(rows)
+    # What an engine does not realise is declared by its adapter, or mended; its effects are no known failures.
+    otherwise = {slot_from_dict(row.slot) for row in rows if row.metric.startswith(REALISED)}
     for row in rows:
         slot = slot_from_dict(row.slot)
         if row.engine != engine or not is_standard(slot):
@@ -181,6 +185,9 @@ def propose(
             # A cell without a result does not change a finding: its entries stay.
             if row.outcome in ("invalid", "refused"):
                 refused.append((row, f"{row.outcome}: {row.reason}"))
+            continue
+        if slot in otherwise and row.physics == "fail":
+            refused.append((row, "its property checks do not hold"))
             continue
         judged.add(key)
         if not about(key) and not _must_not_be_listed(row):
