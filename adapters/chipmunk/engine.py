@@ -117,7 +117,7 @@ class ChipmunkEngine(CheckedEngine):
         lines = [f"space.{name} = {settings[name]!r}{told.get(name, '')}" for name in names if name != "start_overlap"]
         if "start_overlap" in names and settings["start_overlap"]:
             deep = self.words(settings, scene, dt)["start_overlap"][1]
-            lines.append(f"# let bodies that touch start {deep} deep in each other, in your space's units")
+            lines.append(f"# bodies that touch start {deep} deep in each other, in units of your space")
         return "\n".join(["# space: your pymunk.Space", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:

@@ -190,5 +190,5 @@ def test_a_start_overlap_of_chipmunk_has_its_formula():
     engine = registry.load("chipmunk")
     settings, names = changed(engine, scene)
     text = engine.snippet(settings, names, scene, DT)
-    assert text.endswith("# let bodies that touch start 0.3*g*dt^2 deep in each other, in your space's units")
+    assert text.endswith("# bodies that touch start 0.3*g*dt^2 deep in each other, in units of your space")
     assert engine.words(settings | {"start_overlap": 1e-5}, scene, DT)["start_overlap"][1] == 1e-5

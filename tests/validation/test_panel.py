@@ -1,14 +1,17 @@
 """The panel of a fix: what it mends and breaks in cases of other groups."""
 
+import csv
 from dataclasses import replace
 
 import pytest
 
-from reports.cures import panel_text, recorded_paste, recorded_text
+from adapters.engine_folder import PANELS, inside
+from adapters.registry import find, load, names
+from reports.cures import panel_text, profile_costs, recorded_paste, recorded_text
 from validation.canonical import Check
 from validation.cells import Slot
 from validation.fixes import panel, search
-from validation.fixes.kept import cures_of
+from validation.fixes.kept import cures_of, panels_of
 from validation.fixes.panel import Cost, Panel, carried, compared, judged, other_cases
 from validation.posed import pinned, resolve
 from validation.settings.switching import Reading, switched
@@ -118,3 +121,17 @@ def test_a_setting_that_mends_a_chaotic_case_at_one_step_alone_is_no_fix(tmp_pat
     (found,) = trials.all([[{"margin": 0.001 * 9.81 / 240**2}]])
     after = dict(zip((each.check.metric for each in trials.start), trials.badness(found.changes), strict=True))
     assert (after["final[cube.angle]"] <= 1.0) == mended
+
+
+@pytest.mark.parametrize("engine", [name for name in names() if inside(name, PANELS)])
+def test_the_committed_panels_are_of_the_installed_release_and_of_profiles_that_exist(engine):
+    with inside(engine, PANELS).open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    assert {row["version"] for row in rows} == {find(engine).version}
+    assert set(panels_of(engine)) == {row["profile"] for row in rows} <= set(load(engine).profiles)
+
+
+def test_a_tuned_profile_says_what_it_breaks():
+    """Bullet's drops friction's points of a cube that is pushed, which as shipped goes as far as it should."""
+    (line,) = [each for each in profile_costs([("bullet", "tuned"), ("bullet", "default")]) if "a push" in each]
+    assert line.startswith("bullet/tuned, against the engine as shipped, tried in 18 other cases: breaks a push")
