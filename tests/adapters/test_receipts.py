@@ -632,6 +632,24 @@ def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
     assert finer["gravity"].band == pytest.approx(rate(0.05) * 8 / 960 + 1e-12)  # slower than 1 m/s: not less than 1
 
 
+@pytest.mark.parametrize(
+    ("engine", "profile", "asked"),
+    [
+        pytest.param("box2d3", "tuned", replace(IMPACT, restitution=0.9, friction=0.6, gravity=0.0, pull=0.0),
+                     marks=pytest.mark.optional("box2d3")),
+        pytest.param("rapier", "default", replace(IMPACT, dimension=3, restitution=1.0, friction=1.0),
+                     marks=pytest.mark.optional("rapier")),
+        pytest.param("drake", "similar", replace(REST, dimension=3, friction=0.002),
+                     marks=pytest.mark.optional("drake")),
+    ],
+)  # fmt: skip
+def test_friction_that_differs_by_round_off_and_residual(engine, profile, asked):
+    found = find(engine).engine
+    assert found is not None
+    slips = [slip for slip in receipts(found, profile, asked, 1 / 240) if slip.quantity.startswith("friction")]
+    assert slips and all(slip.holds for slip in slips)
+
+
 # ---- a finding about the engine, or a measurement that contradicts itself ----
 
 
