@@ -36,6 +36,12 @@ def test_healthy_toy_passes(toy, name):
     assert self_test.broken(toy(), name) == ""
 
 
+def test_a_step_of_its_own():
+    """It is measured, where an engine that cannot be built would be noticed as well."""
+    said = self_test.broken(Spoilt("step of its own", 0.1), "receipt step")
+    assert said.startswith("measured ")
+
+
 def test_every_check_and_receipt_has_a_fault_and_at_least_25_have_three_sizes():
     named = {fault.check for fault in FAULTS.values()}
     # Which packages lie on the path is no matter of an adapter.

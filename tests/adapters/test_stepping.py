@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adapters import registry
+from adapters.conformance.scenes import accepted, resting, values
 from adapters.conformance.worlds import one_by_one
 from adapters.engine import Contacts, Engine, EngineError, EngineFacts, Recorded, Scheme, Setting, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Scene, Sphere
@@ -665,3 +667,17 @@ def test_what_is_no_answer_stays_none_and_a_long_run_is_granted_its_overlap_over
     assert diverged.finish == "diverged" and "which nothing in the scene explains" in diverged.reason
     apart = run(Toy({3}, parting_at(0.9 * fast)), two_cubes(-0.02, duration=100.0), 1 / 240, {}, Sampling(24000))
     assert apart.finish == "diverged"
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_a_world_of_a_run_that_ends(monkeypatch, name):
+    """What `record` raises leads to a second world, which goes step by step: only its time would tell."""
+    engine = registry.find(name).engine
+    if engine is None:
+        pytest.skip(f"{name} is not installed")
+    profile = next(iter(engine.profiles))
+    scene = accepted(engine, profile, resting(), resting(box=False))
+    made, build = [], type(engine).build
+    monkeypatch.setattr(type(engine), "build", lambda *given: made.append(build(*given)) or made[-1])
+    assert run(engine, scene, 1 / 60, values(engine, profile, scene)).finish == "completed"
+    assert len(made) == 1
