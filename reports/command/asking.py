@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from textwrap import wrap
@@ -69,21 +68,21 @@ def _scene(told: Plain, text: str) -> Iterator[str]:
         yield ""
         yield from _engine(engine, told["scene"])
     if not told["engines"]:
-        yield from _all_engines(told, text)
+        yield from _all_engines(told)
     run = [each["engine"] for each in told["engines"] if each["judged"]]
     if run or not told["engines"]:
         yield ""
         yield _wrapped(f"run it: crosscheck run {told['scene']}" + "".join(f" --engine {e}" for e in run), "  ")
 
 
-def _all_engines(told: Plain, text: str) -> Iterator[str]:
+def _all_engines(told: Plain) -> Iterator[str]:
     yield ""
     if told["passes"]:
         yield _wrapped(f"pass as shipped: {', '.join(told['passes'])}", "  ")
     if told["fails"]:
         yield _wrapped(f"fail checks as shipped: {', '.join(told['fails'])}", "  ")
     if told["fixed"]:
-        shown = f"crosscheck ask {shlex.join(text.split())} {told['fixed'][0]}"
+        shown = f"crosscheck ask {told['scene']} {told['fixed'][0]}"
         yield _wrapped(f"a fix is on record for {', '.join(told['fixed'])}; to see it: {shown}", "  ")
     elif told["passes"] or told["fails"]:
         yield _wrapped("name one for its numbers and what it does when nothing is set", "  ")
@@ -152,19 +151,14 @@ def _outside(told: Plain, text: str) -> Iterator[str]:
     yield _title("no scene shows this")
     yield _wrapped(told["says"])
     yield _wrapped(told["command"], "  ")
-    yield from _nearest(told)
 
 
 def _nothing(told: Plain, text: str) -> Iterator[str]:
     yield _title("no scene shows this")
-    yield from _nearest(told)
-    yield _wrapped(f"pose it{POSED}", "  ")
-
-
-def _nearest(told: Plain) -> Iterator[str]:
     for each in told["candidates"][:1]:
         if each["scene"]:
             yield _wrapped(f"nearest: {each['scene']} ({each['title']})", "  ")
+    yield _wrapped(f"pose it{POSED}", "  ")
 
 
 def _page(told: Plain, text: str) -> Iterator[str]:

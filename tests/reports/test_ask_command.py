@@ -115,7 +115,7 @@ def test_engine_that_fails_with_a_fix():
     assert f"{own['failing']} of {own['judged']} checks fail" in said and "bullet" not in said
     assert said.count("\n") <= 24, "one screen"
     without = asked("grip", "slips")
-    assert own["paste"].splitlines()[0] not in without and "crosscheck ask grip slips" in without
+    assert own["paste"].splitlines()[0] not in without and "crosscheck ask pinch bullet" in without
 
 
 def test_engine_that_passes_says_how_its_numbers_combine():
