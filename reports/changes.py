@@ -14,8 +14,8 @@ from reports import brief
 from reports.wording import first_of, markdown, number, plural, reproduce, roles_line
 from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
-from validation.judging.comparison import Change, Kind, by_seriousness, families
-from validation.records.store import RELEASE_TITLE, MissingError, Store
+from validation.judging.comparison import Change, Kind, by_seriousness, checks_in, families, times_in
+from validation.records.store import MissingError, Store
 from validation.releases.history import told as told_by_releases
 from validation.releases.history import versions
 
@@ -86,10 +86,7 @@ def _load_run(folder: Path, run_id: str) -> Side:
     """Rows of the run; ratios of the run itself, or of the last bench run if no run is named."""
     store = Store(folder, create=False)
     try:
-        timed = bench_runs(store)
-        benches = {bench.id for bench in timed}
-        judged = [run for run in store.runs() if run.id not in benches and not run.title.startswith(RELEASE_TITLE)]
-        run = store.run(run_id) if run_id != "latest" or not judged else judged[-1]
+        timed, run = bench_runs(store), store.run(run_id)
         source = timed[-1:] if run_id == "latest" else [bench for bench in timed if bench.id == run.id]
         tables = [ratios(store, bench) for bench in source]
         table = [{str(k): v for k, v in row.items()} for t in tables for row in t.to_dict("records")]
@@ -129,18 +126,27 @@ def header(a: Side, b: Side) -> list[str]:
     return lines
 
 
-def headline(changes: Sequence[Change]) -> str:
-    """``1 newly failing, 2 fixed, 3 value changed (1 worse)``; or the text for no change."""
+def in_both(a: Side, b: Side) -> int:
+    """Number of checks and of times that both sides have."""
+    sides = [[checks_in(each.rows).keys(), times_in(each.ratios).keys()] for each in (a, b)]
+    return sum(len(one & other) for one, other in zip(*sides, strict=True))
+
+
+def headline(changes: Sequence[Change], a: Side, b: Side) -> str:
+    """``189 in both: 1 newly failing; 3 value changed (1 worse); 140 only in B``."""
     counts = Counter((change.kind, change.regressed) for change in changes)
-    parts = []
+    parts, apart = [], []
     for kind in Kind:
         worse, other = counts[kind, True], counts[kind, False]
         if kind is Kind.FLIP:
             parts += [f"{n} {WORDS[regressed]}" for n, regressed in ((worse, True), (other, False)) if n]
+        elif kind in ONE_SIDED:
+            apart += [f"{other} {kind.value}"] if other else []
         elif worse + other:
-            judged = "" if kind in ONE_SIDED else f" ({worse} worse)"
-            parts.append(f"{worse + other} {kind.value}{judged}")
-    return "; ".join(parts) or "nothing changed"
+            parts.append(f"{worse + other} {kind.value} ({worse} worse)")
+    both = in_both(a, b)
+    told = f"{both} in both: {'; '.join(parts) or 'none changed'}" if both else "no check is in both"
+    return "; ".join([told, *apart])
 
 
 #: Kinds of checks that only one side has.
@@ -166,8 +172,7 @@ def _size(change: Change) -> str:
 
 def as_text(changes: Sequence[Change], a: Side, b: Side) -> str:
     """Both sides, the headline, and the largest change of each family, one line each."""
-    apart = b.rows and sum(change.kind is Kind.ADDED for change in changes) == len(b.rows)
-    lines = [*header(a, b), headline(changes) + ("; no check is in both" if apart else "")]
+    lines = [*header(a, b), headline(changes, a, b)]
     for family in families(change for change in changes if change.kind not in ONE_SIDED):
         change, more = family.first, len(family.changes) - 1
         flips = change.kind is Kind.FLIP
@@ -198,7 +203,7 @@ def _of_one_side(changes: Sequence[Change]) -> list[str]:
 
 def as_markdown(changes: Sequence[Change], a: Side, b: Side, most: int = 50) -> str:
     """Both sides, the headline, and a table of at most ``most`` families of changes."""
-    out = ["**contact-crosscheck compare**: " + headline(changes), ""]
+    out = ["**contact-crosscheck compare**: " + headline(changes, a, b), ""]
     out += [f"* {markdown(line)}" for line in header(a, b)]
     found = families(changes)
     if found:
@@ -235,4 +240,5 @@ def as_json(changes: Sequence[Change], a: Side, b: Side) -> str:
         name: {"run": s.run, "date": s.date, "commit": s.commit, "rows": len(s.rows), "versions": s.versions}
         for name, s in (("a", a), ("b", b))
     }
-    return json.dumps({**sides, "headline": headline(changes), "changes": [c.as_dict() for c in changes]}, indent=1)
+    said = {"headline": headline(changes, a, b), "in_both": in_both(a, b)}
+    return json.dumps({**sides, **said, "changes": [c.as_dict() for c in changes]}, indent=1)

@@ -18,10 +18,10 @@ from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS
 from reports.progress import run_plan
 from reports.terminal import terminal
-from reports.wording import number, plural
+from reports.wording import first_of, number, plural
 from validation.cells import Observation, prepare
 from validation.findings import Family, Findings, FindingsError, Key, files
-from validation.findings.files import FAMILIES, MEMBERS, add_families, findings_of, write_members
+from validation.findings.files import FAMILIES, MEMBERS, add_entries, findings_of, write_members
 from validation.judging.acceptance import (
     Change,
     Draws,
@@ -34,6 +34,7 @@ from validation.judging.acceptance import (
 )
 from validation.judging.rows import Row, rows_of, with_floors
 from validation.records.store import SCATTER_TITLE, Store
+from validation.running.plan import is_standard
 
 #: Largest number of refused rows that are printed; the others are counted.
 SHOWN = 12
@@ -51,9 +52,11 @@ SHOWN = 12
 def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json: bool, out: Path) -> None:
     """Add failing checks of a run to the list of known failures.
 
-    RUN is an id that `list runs` prints; the latest by default. Each failed check is listed with its value and a band
-    around it, and with its cause. To measure the band, failed cases are run again from initial positions moved by some
-    units in the last place; if the scatter is too wide to notice an improvement, from twelve more.
+    RUN is an id that `list runs` prints; the latest by default. Each check that fails, here or from a moved start, is
+    listed with its value and a band around it, and with its cause. To measure the band, failed cases are run again from
+    initial positions moved by some units in the last place; if the scatter is too wide to notice an improvement, from
+    twelve more. If nothing fails, the list is empty. Once an engine has a list, every other failure is new, and `run`
+    exits with 1.
 
     The command shows the causes whose lists would change. Those named by --family are accepted. On a terminal you are
     asked about the others; without a terminal they stay as they are. The command refuses checks that a law of the
@@ -79,22 +82,28 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     folder = files.findings_folder(engine)
     if folder is None:
         raise FindingsError(f"accept: {engine} is a plain module and has no folder to list findings in")
-    add_families(folder, written)
     members = accepted(_with_reasons(proposal, written), chosen)
     path = folder / MEMBERS
-    if members or findings is not None:  # an empty list would make every failure of the engine new
-        write_members(folder, members)
     left = [change.family.id for change in changed if change.family.id not in chosen]
+    done = not (left or proposal.refused or proposal.left_out)
+    if members or findings is not None or done:  # a list makes every other failure of the engine new
+        add_entries(folder, [*written, *proposal.unsupported])
+        write_members(folder, members)
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
         result = {"engine": engine, "rows": len(members), "families": listed, "file": str(path)}
         counts = {"refused": len(proposal.refused), "left_out": len(proposal.left_out)}
         click.echo(json.dumps({**result, **counts, "not_accepted": left}, indent=1))
     else:
-        counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')}"
-        as_before = findings is not None and members == findings.members
-        where = f"listed in {path}{', as before' if as_before else ''}"
-        click.echo(f"{engine}: {f'{counted} {where}' if members or findings is not None else 'nothing is listed'}")
+        counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')} listed in {path}"
+        if findings is None:
+            gated = f"{counted}; from now on every other failure is new, and run exits with 1"
+            click.echo(f"{engine}: {gated if members or done else 'nothing is listed'}")
+        else:
+            click.echo(f"{engine}: {counted}{', as before' if members == findings.members else ''}")
+    if proposal.unsupported and (members or findings is not None or done):
+        told = first_of([f"{each.scene} {each.dimension}-D".replace("* ", "all ") for each in proposal.unsupported])
+        click.echo(f"cannot run, and listed as that: {told}", err=True)
     _show_refused(proposal.refused)
     if left:
         drafts = any(change.is_draft for change in changed if change.family.id in left)
@@ -102,7 +111,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         click.echo(f"not accepted: {', '.join(left)}{hint if drafts else ''}", err=True)
     if proposal.left_out:
         click.echo(f"not named by --family: {plural(len(proposal.left_out), 'check')} new or changed", err=True)
-    sys.exit(1 if left or proposal.refused or proposal.left_out else 0)
+    sys.exit(0 if done else 1)
 
 
 def _selection(families: Sequence[str], findings: Findings | None) -> Callable[[Key], bool]:
@@ -134,6 +143,8 @@ def _rows_with_scatter(
         title = f"{SCATTER_TITLE}{chosen.id}"
         for earlier in (run for run in store.runs() if run.title == title):
             own += filter(_is_of_this_code, store.observations(earlier))
+        if not any(is_standard(observation.slot) for observation in own):
+            raise FindingsError(f"run: {chosen.id} has no case of the standard suite on {engine}")
         rows = rows_of(chosen.id, own)  # once: laws may take a while, and moved starts are not judged
         moves = slots_to_move(rows, engine, about)
         if moves:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from reports import changes as rendering
+from reports.command import statuses
 from reports.command.group import AS_JSON, OUT, main
 from validation.judging.comparison import FAIL_ON, by_seriousness, compare_rows, compare_speeds, failing
 
@@ -38,7 +39,9 @@ def compare(
 
     Prints changes from A to B: checks that began or ceased to fail, then errors, then speed. A and B are ids that `list
     runs` prints, or latest; releases that were run into OUT (myengine==3.2.7); results folders (FOLDER or FOLDER:RUN);
-    or .jsonl files that `run` wrote.
+    or .jsonl files that `run` wrote. latest~1 is the run before the latest.
+
+    Exits with 1 if something got worse (--fail-on), with 4 if no check is in both.
     """
     a, b = rendering.load_side(before, out), rendering.load_side(after, out)
     changes = sorted(compare_rows(a.rows, b.rows) + compare_speeds(a.ratios, b.ratios), key=by_seriousness)
@@ -48,4 +51,4 @@ def compare(
         changes = [change for change in changes if change.kind not in rendering.ONE_SIDED]
     render = rendering.as_json if as_json else rendering.as_markdown if markdown else rendering.as_text
     click.echo(render(changes, a, b), nl=False)
-    sys.exit(1 if failing(changes, fail_on) else 0)
+    sys.exit(statuses.verdict(failing(changes, fail_on), rendering.in_both(a, b) > 0))

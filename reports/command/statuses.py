@@ -25,7 +25,8 @@ MEANING = {
     "a regression; a failed test; a cause refuted; a better setting found",
     WRONG_CALL: "the call is wrong: unknown name, value out of range, invalid scene file; nothing has run",
     RESULTS: "results could not be kept, read or written: disk full, store damaged or of a later version",
-    INCOMPLETE: "not everything ran: a named engine is missing, cases did not finish in time, too little memory",
+    INCOMPLETE: "not everything ran: a named engine is missing, cases did not finish in time, too little memory, no "
+    "check in both runs",
     INTERRUPTED: "interrupted; finished cases are kept, the same command resumes",
 }
 

@@ -28,6 +28,7 @@ releases = ">=7.3,<7.4"
 """
 CELL = ["run", "stack", "--param", "n=10", "--iterations", "1", "--engine", "chipmunk", "--profile", "default",
         "--dim", "2", "--jobs", "1"]  # fmt: skip
+IMPACT = ["impact", "--param", "v=6", "--dim", "2", "--jobs", "1"]
 
 
 def call(*arguments, **kwargs):
@@ -78,6 +79,25 @@ def test_where_nothing_was_ever_listed_and_nothing_is_accepted_no_list_is_made(o
     assert result.exit_code == 1 and "chipmunk: nothing is listed" in result.stdout, result.output
     assert "default-stack-interface-impulse" in result.stderr.partition("not accepted")[0], "an id is not cut off"
     assert str(findings / files.FAMILIES) in result.stderr and not findings.exists()
+
+
+def test_an_engine_of_which_nothing_fails(findings, tmp_path):
+    """It had no list after `accept`, so that no later failure was ever new."""
+    run = ["run", *IMPACT, "--engine", "chipmunk", "--profile", "tuned", "--out", tmp_path / "out"]
+    assert call(*run).exit_code == 0
+    accepted = accept(tmp_path / "out")
+    assert accepted.exit_code == 0, accepted.output
+    assert "0 checks with 0 causes" in accepted.stdout and "every other failure is new" in accepted.stdout
+    assert not files.findings_of("chipmunk").members and call(*run).exit_code == 0
+    failing = call(*CELL, "--out", tmp_path / "out")
+    assert failing.exit_code == 1 and "new" in failing.stdout
+
+
+def test_a_run_without_a_case_of_the_engine(findings, tmp_path):
+    call("run", *IMPACT, "--engine", "mujoco", "--out", tmp_path / "out")
+    refused = accept(tmp_path / "out")
+    assert refused.exit_code == 2 and "has no case of the standard suite on chipmunk" in refused.stderr
+    assert not findings.exists()
 
 
 def test_a_named_family_is_listed_with_values_and_bands_and_the_run_is_quiet_then(out, findings):

@@ -12,6 +12,7 @@ from validation.bench.agreement import ratios
 from validation.bench.reading import bench_runs
 from validation.cells import Observation, Outcome, Slot
 from validation.judging.comparison import Change, Kind
+from validation.metrics import NEWER
 from validation.records.store import MissingError, Store
 
 SLOT = {"scene": "stack", "params": {"n": 5.0}, "dimension": 2, "engine": "bullet", "profile": "tuned",
@@ -27,7 +28,7 @@ ADDED = replace(FLIP, kind=Kind.ADDED, regressed=False, scene="incline", metric=
 
 
 def side(run, *engines, commit="", date=""):
-    rows = [{"engine": name, "engine_version": version} for name, version in engines]
+    rows = [{"engine": name, "engine_version": version, "slot": {}, "metric": name} for name, version in engines]
     return Side(rows, (), run, date, commit)
 
 
@@ -49,17 +50,26 @@ def test_the_header_says_runs_commits_and_which_versions_moved():
 
 
 def test_the_headline_counts_kinds_and_what_got_worse():
-    assert headline([ADDED, GONE, BETTER, FLIP, FASTER, MILDER, ALSO_GONE]) == (
-        "2 newly failing; 1 value changed (0 worse); 1 speed changed (0 worse); 1 only in B; 2 not run in B"
+    assert headline([ADDED, GONE, BETTER, FLIP, FASTER, MILDER, ALSO_GONE], A, B) == (
+        "2 in both: 2 newly failing; 1 value changed (0 worse); 1 speed changed (0 worse); 1 only in B; 2 not run in B"
     )
-    assert headline([FLIP, replace(FLIP, regressed=False)]) == "1 newly failing; 1 fixed"
-    assert headline([]) == "nothing changed"
+    assert headline([FLIP, replace(FLIP, regressed=False)], A, B) == "2 in both: 1 newly failing; 1 fixed"
+    assert headline([], A, A) == "4 in both: none changed"
+
+
+def test_headline_of_runs_of_different_extent():
+    assert headline([GONE, ALSO_GONE, ADDED], A, B) == "2 in both: none changed; 1 only in B; 2 not run in B"
+    timed = Side((), [{"purpose": "work", "slot": {}, "opponent": "toy"}])
+    assert headline([], timed, timed) == "1 in both: none changed"
+    newer = Side([{**row, "reason": NEWER} for row in A.rows], ())
+    for other in (newer, Side((), ()), side("", ("rapier", "1"))):
+        assert headline([GONE], A, other) == "no check is in both; 1 not run in B"
 
 
 def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
     again = reproduce(SLOT)
     lines = as_text([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B).splitlines()
-    assert lines[:5] == [*header(A, B), headline([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED])]
+    assert lines[:5] == [*header(A, B), headline([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B)]
     assert sorted(lines[5:]) == sorted([
         "newly failing: bullet/tuned stack 2-D n=5 drift: pass 1e-6 m -> FAIL 3e-3 m error +2.5 tolerances "
         "[3.2.6 -> 3.2.7], and 1 more like it",
@@ -70,7 +80,7 @@ def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
         f"{Kind.REMOVED.value}: bullet/tuned: 2 checks of stack",
         f"{Kind.ADDED.value}: bullet/tuned: 1 check of incline",
     ])  # fmt: skip
-    assert as_text([], A, A).endswith("nothing changed\n")
+    assert as_text([], A, A).endswith("\n4 in both: none changed\n")
 
 
 def test_checks_of_one_side_are_a_line_for_each_profile_with_its_first_scenes_and_roles_stand_below():
@@ -93,7 +103,7 @@ def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
     text = as_markdown([FLIP, MILDER, odd], A, B)
     value, flip = Kind.ERROR.value, "newly failing"
     assert text == "\n".join([
-        f"**contact-crosscheck compare**: {headline([FLIP, MILDER, odd])}", "",
+        f"**contact-crosscheck compare**: {headline([FLIP, MILDER, odd], A, B)}", "",
         *[f"* {line.replace('>', '&gt;')}" for line in header(A, B)], "",
         "| change | | checks | where | metric | before | after | size |",
         "|---|---|---|---|---|---|---|---|",
@@ -124,7 +134,8 @@ def test_json_has_both_sides_and_every_change():
               "versions": {"bullet": "3.2.6", "mujoco": "4.0.1", "chipmunk": "7.3.1"}},
         "b": {"run": "", "date": "today", "commit": "", "rows": 3,
               "versions": {"bullet": "3.2.7", "mujoco": "4.0.1", "planck": "1.0"}},
-        "headline": headline([FLIP, MILDER]),
+        "headline": headline([FLIP, MILDER], A, B),
+        "in_both": 2,
         "changes": [FLIP.as_dict(), MILDER.as_dict()],
     }  # fmt: skip
     assert text.startswith('{\n "a": {\n  "run"')
@@ -136,12 +147,13 @@ CELL = Slot("impact", (("e", 0.8),), 2, "nameless", "default", 1 / 240)
 
 
 @pytest.fixture
-def results(tmp_path):
-    """A folder with two runs, and their ids."""
+def results(tmp_path, request):
+    """A folder with two runs, and their ids; one of them may be a bench."""
+    bench = getattr(request, "param", None)
     store, ids = Store(tmp_path / "results"), []
     for e in (0.5, 0.8):
         asked = replace(CELL, params=(("e", e),))
-        run, _ = store.start(f"e = {e}", [asked])
+        run, _ = store.start(f"{'bench ' if e == bench else ''}e = {e}", [asked])
         store.add(run, Observation(asked, f"cell {e}", 1, "1.0", Outcome.OK, metrics={"rebound_ratio": (e, "")}))
         store.finish(run)
         ids.append(run)
@@ -220,6 +232,7 @@ def test_a_side_is_a_run_of_the_folder_or_a_folder_or_a_run_of_it(results, tmp_p
         assert list(found.ratios) == []
 
 
+@pytest.mark.parametrize("results", [0.8], indirect=True)
 def test_times_are_of_the_last_bench_run_unless_a_run_is_named(results, monkeypatch):
     """The last run is a bench run here: rows are of the last that is none, ratios of the bench run."""
     import pandas as pd
@@ -307,13 +320,13 @@ def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
 
 
 def test_a_side_is_the_last_run_with_its_date_and_the_times_of_the_last_bench(page_folder, monkeypatch):
-    kept = Store.runs
-    monkeypatch.setattr(Store, "runs", lambda self: [replace(run, commit=f"made at {run.id}") for run in kept(self)])
+    kept = Store.run
+    monkeypatch.setattr(Store, "run", lambda self, name: replace(found := kept(self, name), commit=f"at {found.id}"))
     store = Store(page_folder, create=False)
     bench = bench_runs(store)[-1]
     run = [run for run in store.runs() if run.id != bench.id][-1]
     wanted = [row for table in [ratios(store, bench)] for row in table.to_dict("records")]
     store.close()
     found = changes._load_run(page_folder, "latest")
-    assert (found.run, found.date, found.commit) == (run.id, run.date, f"made at {run.id}") and found.rows
+    assert (found.run, found.date, found.commit) == (run.id, run.date, f"at {run.id}") and found.rows
     assert list(found.ratios) == [{str(k): v for k, v in row.items()} for row in wanted] and wanted

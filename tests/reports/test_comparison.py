@@ -78,6 +78,19 @@ def test_rows_of_one_side_only_are_said(tmp_path):
     assert json.loads(result.stdout)["changes"] == []
 
 
+@pytest.mark.parametrize("fail_on", ["never", "regressions"])
+def test_two_runs_without_a_common_check(tmp_path, fail_on):
+    """It exited with 0, which a gate takes for "nothing got worse"."""
+    lines = (GOLDEN / "base.jsonl").read_text().splitlines()
+    rows = [line for line in lines if "value" in json.loads(line)]
+    for name, line in (("a", rows[0]), ("b", rows[1])):
+        (tmp_path / f"{name}.jsonl").write_text(line + "\n")
+    sides = [str(tmp_path / "a.jsonl"), str(tmp_path / "b.jsonl")]
+    result = CliRunner().invoke(main, ["compare", *sides, "--fail-on", fail_on])
+    assert result.exit_code == 4 and "no check is in both; 1 only in B; 1 not run in B" in result.stdout
+    assert CliRunner().invoke(main, ["compare", *sides, "--fail-on", "changes"]).exit_code == 1
+
+
 @pytest.mark.parametrize("content", ["not json", '{"a": 1}', "[1, 2]"])
 def test_a_file_of_something_else_is_refused_in_one_line(tmp_path, content):
     path = tmp_path / "x.jsonl"
@@ -124,7 +137,7 @@ def test_one_unit_in_the_last_place_is_nothing(tmp_path):
     before = planted(tmp_path, lambda row: {}).rename(tmp_path / "before.jsonl")
     after = planted(tmp_path, lambda row: {"value": math.nextafter(row["value"], math.inf)})
     result = CliRunner().invoke(main, ["compare", str(before), str(after)])
-    assert result.exit_code == 0 and "nothing changed" in result.stdout
+    assert result.exit_code == 0 and "in both: none changed" in result.stdout
 
 
 def test_the_head_says_runs_and_versions_and_lines_are_families(tmp_path):

@@ -357,7 +357,7 @@ def test_ends_are_written_outwards_with_the_value_between_them(findings, value, 
 def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):
     folder = findings()
     family = Family("quoted", ("a", "b"), "stack", ("drift",), 'it "slips" \\ \t by 3 µm', "its manual", "==1.*")
-    files.add_families(folder, [family])
+    files.add_entries(folder, [family])
     assert files.read("nameless", folder).families["quoted"] == family
 
 
@@ -395,10 +395,10 @@ def test_members_that_are_written_again_keep_every_digit_of_the_file(engine, tmp
 def test_families_are_appended_in_words_that_people_read(tmp_path):
     folder = tmp_path / "not" / "there yet"
     family = Family("soft", ("a", "b"), "stack", ("drift",), "sinks 3 µm \x7f", "its manual", "==1.*")
-    files.add_families(folder, [])
+    files.add_entries(folder, [])
     assert not folder.exists()
-    files.add_families(folder, [family])
-    files.add_families(folder, [replace(family, id="softer"), replace(family, id="softest")])
+    files.add_entries(folder, [family])
+    files.add_entries(folder, [replace(family, id="softer"), replace(family, id="softest")])
     blocks = (folder / files.FAMILIES).read_bytes().decode("utf-8").split("\n\n")
     assert [block.strip().splitlines() for block in blocks] == [
         ["[[family]]", f'id = "{name}"', 'profiles = ["a", "b"]', 'scene = "stack"', 'metrics = ["drift"]',

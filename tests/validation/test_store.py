@@ -55,6 +55,18 @@ def test_the_same_plan_of_other_code_is_another_run(tmp_path, monkeypatch):
     assert done == set()
 
 
+def test_runs_before_the_latest(tmp_path):
+    store = Store(tmp_path)
+    first = store.start("quick: impact", SLOTS, fresh=True)[0]
+    for title in (f"{SCATTER_TITLE}{first.id}", "bench quick: impact", "release toy==1: impact"):
+        store.start(title, SLOTS, fresh=True)
+    last = store.start("quick: bounce", SLOTS, fresh=True)[0]
+    assert [store.run(name).id for name in ("latest", "latest~0", "latest~1")] == [last.id, last.id, first.id]
+    for name in ("latest~2", "latest~", "latest~-1"):
+        with pytest.raises(StoreError, match="no run 'latest~"):
+            store.run(name)
+
+
 def test_a_run_of_moved_starts_is_the_latest_only_if_there_is_nothing_else(tmp_path):
     store = Store(tmp_path)
     first, _ = store.start("quick: impact", SLOTS)

@@ -27,6 +27,9 @@ from validation.findings.proofs import proof_of
 
 FAMILIES, MEMBERS = "families.toml", "members.csv"
 COLUMNS = ("family", "profile", "dimension", "params", "dt", "iterations", "metric", "value", "band")
+#: Fields of families and of unsupported entries, without what may be left out.
+OF_FAMILY = ("id", "profiles", "scene", "metrics", "reason", "source", "releases")
+OF_UNSUPPORTED = ("id", "profiles", "scene", "dimension", "reason", "source")
 #: Entry in the column ``value`` for a cell that ended with numbers that are not finite.
 DIVERGED = "diverged"
 #: Separator of the two ends of an asymmetric band.
@@ -105,7 +108,7 @@ def _fields(path: Path, kind: str, entry: Mapping[str, Any], names: tuple[str, .
 def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
     """Read one entry; ``proof`` may be left out."""
     told = {name: value for name, value in entry.items() if name != "proof"}
-    fields = _fields(path, "family", told, ("id", "profiles", "scene", "metrics", "reason", "source", "releases"))
+    fields = _fields(path, "family", told, OF_FAMILY)
     family, label = Family(**fields), f"{path}: family {entry['id']}"
     if "*" in family.profiles and "*" in family.metrics:
         raise FindingsError(
@@ -132,7 +135,7 @@ def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:
 def _unsupported(path: Path, entry: Mapping[str, Any]) -> Unsupported:
     """Read one entry; ``params`` may be left out."""
     told = {name: value for name, value in entry.items() if name != "params"}
-    fields = _fields(path, "unsupported", told, ("id", "profiles", "scene", "dimension", "reason", "source"))
+    fields = _fields(path, "unsupported", told, OF_UNSUPPORTED)
     params = entry.get("params", {})
     if not is_numbers(params):
         raise FindingsError(f"{path}: unsupported {entry['id']}: params must be a table of numbers")
@@ -186,8 +189,13 @@ def _member(engine: str, label: str, row: list[str], families: Mapping[str, Fami
 
 
 def write_members(folder: Path, members: Mapping[Key, Finding]) -> None:
-    """Write all members, sorted by family and row; new values to a tenth of their band, others as they were read."""
+    """Write all members, sorted by family and row; new values to a tenth of their band, others as they were read.
+
+    The first list of an engine may be empty: then each of its failures is new.
+    """
     lines = sorted(_line(key, finding) for key, finding in members.items())
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / FAMILIES).touch()
     with (folder / MEMBERS).open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
@@ -225,9 +233,9 @@ def _digits(value: float, band: float) -> str:
     return next(text for text in (f"{value:.{n}g}" for n in range(1, 18)) if abs(float(text) - value) <= 0.05 * band)
 
 
-def add_families(folder: Path, families: Iterable[Family]) -> None:
-    """Append families to the file of reasons, which people edit."""
-    text = "".join(_entry(family) for family in families)
+def add_entries(folder: Path, entries: Iterable[Family | Unsupported]) -> None:
+    """Append entries to the file of reasons, which people edit."""
+    text = "".join(map(_entry, entries))
     if text:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / FAMILIES).open("a", encoding="utf-8") as stream:
@@ -235,12 +243,12 @@ def add_families(folder: Path, families: Iterable[Family]) -> None:
         findings_of.cache_clear()
 
 
-def _entry(family: Family) -> str:
-    names = ("id", "profiles", "scene", "metrics", "reason", "source", "releases")
-    lines = [f"{name} = {_toml(getattr(family, name))}" for name in names]
-    return "\n".join(["", "[[family]]", *lines, ""])
+def _entry(entry: Family | Unsupported) -> str:
+    kind, names = ("family", OF_FAMILY) if isinstance(entry, Family) else ("unsupported", OF_UNSUPPORTED)
+    lines = [f"{name} = {_toml(getattr(entry, name))}" for name in names]
+    return "\n".join(["", f"[[{kind}]]", *lines, ""])
 
 
-def _toml(value: str | tuple[str, ...]) -> str:
-    """A string or a list of strings; TOML's basic strings are JSON's but for DEL."""
+def _toml(value: str | int | tuple[str, ...]) -> str:
+    """A number, a string or a list of strings; TOML's basic strings are JSON's but for DEL."""
     return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False).replace("\x7f", "\\u007f")

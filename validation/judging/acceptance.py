@@ -27,12 +27,12 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
-from validation.findings import Family, Finding, Findings, Key, row_key, solutions_of
+from validation.findings import Family, Finding, Findings, Key, Unsupported, row_key, solutions_of
 from validation.judging.rows import Row, predictions_of
 from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
@@ -92,13 +92,17 @@ class Change:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Changes of the list of one engine by a run, and refused rows with their reasons."""
+    """Changes of the list of one engine by a run, and refused rows with their reasons.
+
+    ``unsupported`` are entries of a first list, see `refusals`.
+    """
 
     engine: str
     changes: tuple[Change, ...]
     kept: Mapping[Key, Finding]
     refused: tuple[tuple[Row, str], ...]
     left_out: tuple[Row, ...] = ()
+    unsupported: tuple[Unsupported, ...] = ()
 
 
 #: Values of a row: of the unmoved cell, then of its moved starts.
@@ -170,10 +174,11 @@ def propose(
     Rows that ``about`` does not select stay as listed; among them, rows that must not be listed are refused too, and
     new or drifted ones are reported as left out.
     """
-    findings = findings or Findings(engine, {}, (), {})
+    rows, findings = list(rows), findings or Findings(engine, {}, (), {})
+    first = () if findings.members or findings.unsupported else tuple(refusals(rows, engine))
+    findings = replace(findings, unsupported=(*findings.unsupported, *first))
     changes: dict[str, Change] = {name: Change(family) for name, family in findings.families.items()}
     kept, refused, judged, left_out = dict(findings.members), [], set(), []
-    rows = list(rows)
     # What an engine does not realise is declared by its adapter, or mended; its effects are no known failures.
     otherwise = {slot_from_dict(row.slot) for row in rows if row.metric.startswith(REALISED)}
     for row in rows:
@@ -185,6 +190,8 @@ def propose(
             # A cell without a result does not change a finding: its entries stay.
             if row.outcome in ("invalid", "refused"):
                 refused.append((row, f"{row.outcome}: {row.reason}"))
+            if row.outcome == "unsupported" and not findings.unsupported_by(slot):
+                refused.append((row, "the engine refuses the case: write that as [[unsupported]], with its reason"))
             continue
         if slot in otherwise and row.physics == "fail":
             refused.append((row, "its property checks do not hold"))
@@ -211,7 +218,26 @@ def propose(
     for key in _no_longer_stated(kept, judged):
         finding = kept.pop(key)
         changes[finding.family.id].gone[key] = finding
-    return Proposal(engine, tuple(changes.values()), kept, tuple(refused), tuple(left_out))
+    return Proposal(engine, tuple(changes.values()), kept, tuple(refused), tuple(left_out), first)
+
+
+def refusals(rows: Iterable[Row], engine: str) -> Iterator[Unsupported]:
+    """Dimensions and scenes that the engine refuses with every profile, in its own words.
+
+    An engine without a list has none of them listed; with a list each would be new, and the run would fail.
+    """
+    asked: dict[tuple[str, int], list[Row]] = {}
+    for row in rows:
+        if row.engine == engine and is_standard(slot_from_dict(row.slot)):
+            asked.setdefault((row.scene, row.dimension), []).append(row)
+    why = {where: own[0].reason for where, own in asked.items() if {row.outcome for row in own} == {"unsupported"}}
+    whole = {d for _, d in asked if all(where in why for where in asked if where[1] == d)}
+    for d in sorted(whole):
+        said = next(why[where] for where in asked if where[1] == d)
+        yield Unsupported(f"refuses-{d}-d", ("*",), "*", d, said, "the adapter refuses these cases")
+    for (scene, d), said in why.items():
+        if d not in whole:
+            yield Unsupported(f"refuses-{scene}-{d}-d", ("*",), scene, d, said, "the adapter refuses these cases")
 
 
 def _place(change: Change, key: Key, found: Finding, kept: dict[Key, Finding], row: Row) -> None:
@@ -269,11 +295,12 @@ def _entry(row: Row, draws: Draws = ()) -> tuple[str, Entry | None]:
         return "", None
     if row.floor is None and not _is_study(row):
         return "its scatter is unknown: the case was not run from moved starts", None
-    ends = _ends(row, draws)
-    if row.physics == "pass" and max(abs(end - row.truth) for end in ends) <= row.tolerance:
+    moved = [abs(each - row.truth) for each in draws[1:]]
+    farthest = max(moved, default=abs(row.value - row.truth) + (row.floor or 0.0))
+    if row.physics == "pass" and farthest <= row.tolerance:  # it fails neither here nor from a moved start
         return "", None
     if len(draws) - 1 in STUDENT:
-        return "", (row.value, 0.0, False, ends)
+        return "", (row.value, 0.0, False, _ends(row, draws))
     return "", (row.value, _width(row, draws), False, None)
 
 

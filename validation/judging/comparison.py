@@ -67,15 +67,15 @@ class Change:
         return {**asdict(self), "kind": self.kind.value, "size": self.size if math.isfinite(self.size) else None}
 
 
-def _identity(row: Plain) -> tuple[str, str]:
-    """Rows correspond if slot and metric agree; run, versions and hashes may differ."""
-    return json.dumps(row["slot"], sort_keys=True), row["metric"]
+def checks_in(rows: Iterable[Plain]) -> dict[tuple[str, str], Plain]:
+    """Rows by slot and metric: rows of two runs correspond if these agree; run, versions and hashes may differ."""
+    return {(json.dumps(row["slot"], sort_keys=True), row["metric"]): row for row in rows if row.get("reason") != NEWER}
 
 
 @stage("comparing runs")
 def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
     """All changes of rows from ``before`` to ``after``, most serious first."""
-    a, b = ({_identity(row): row for row in rows if row.get("reason") != NEWER} for rows in (before, after))
+    a, b = checks_in(before), checks_in(after)
     changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
     changes += [_make(Kind.REMOVED, False, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
     changes += [_make(Kind.ADDED, False, b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()]
@@ -184,8 +184,7 @@ def compare_speeds(before: Iterable[Plain], after: Iterable[Plain]) -> list[Chan
     `validation.bench.agreement.ratios`), so a busier or slower machine changes both. The interval of the quotient
     follows from the bootstrap intervals of both sides.
     """
-    a = {_unit(row): row for row in before}
-    b = {_unit(row): row for row in after}
+    a, b = times_in(before), times_in(after)
     changes = []
     for key in a.keys() & b.keys():
         low = b[key]["ratio_low"] / a[key]["ratio_high"]
@@ -216,8 +215,9 @@ def compare_speeds(before: Iterable[Plain], after: Iterable[Plain]) -> list[Chan
     return sorted(changes, key=by_seriousness)
 
 
-def _unit(row: Plain) -> tuple[str, str, str]:
-    return row["purpose"], json.dumps(row["slot"], sort_keys=True), row["opponent"]
+def times_in(ratios: Iterable[Plain]) -> dict[tuple[str, str, str], Plain]:
+    """Ratios of times by what was timed, and against which opponent."""
+    return {(row["purpose"], json.dumps(row["slot"], sort_keys=True), row["opponent"]): row for row in ratios}
 
 
 #: Values of ``--fail-on``, and the changes that each selects.

@@ -36,6 +36,8 @@ PATIENCE = 30.0
 SCATTER_TITLE = "scatter of "
 #: Title of runs on another release of an engine (``release myengine==3.2.7: bounce``); never the latest run.
 RELEASE_TITLE = "release "
+#: Beginnings of the titles of runs that serve another purpose than an answer; none of them is the latest run.
+HELPERS = ("bench ", SCATTER_TITLE, RELEASE_TITLE)
 _SCHEMA = (
     """CREATE TABLE IF NOT EXISTS runs (
     id TEXT PRIMARY KEY, date TEXT NOT NULL, commit_hash TEXT NOT NULL, machine TEXT NOT NULL,
@@ -60,6 +62,8 @@ _MACHINE = ("cpu", "cores", "memory_gib", "system", "python")
 _T = TypeVar("_T")
 #: A run's id names files and folders, so an id of another store must be checked.
 _ID = re.compile(r"[0-9A-Za-z][0-9A-Za-z_-]{0,63}")
+#: The latest run, or the one of so many runs before it: ``latest~1``.
+_LATEST = re.compile(r"latest(?:~(\d{1,6}))?")
 
 
 class StoreError(RuntimeError):
@@ -243,7 +247,9 @@ class Store:
         return self._runs("1")
 
     def run(self, run_id: str = "latest") -> Run:
-        """Return one run; the latest is a benchmark or a scatter run only if there is no other.
+        """Return one run by its id, or ``latest``; ``latest~1`` is the run before it.
+
+        Runs of `HELPERS` do not count, but the latest is one of them if there is no other.
 
         Raises
         ------
@@ -252,17 +258,23 @@ class Store:
         StoreError
             If it is damaged.
         """
-        last = "1 ORDER BY title LIKE 'bench %' OR title LIKE ? OR title LIKE ?, rowid DESC"
-        apart = (f"{SCATTER_TITLE}%", f"{RELEASE_TITLE}%")
-        where, args = ("id = ?", (run_id,)) if run_id != "latest" else (last, apart)
+        latest = _LATEST.fullmatch(run_id)
+        back = int(latest[1] or 0) if latest else 0
+        helps = "(" + " OR ".join(f"title LIKE '{title}%'" for title in HELPERS) + ")"
+        order = f"(? OR NOT {helps}) ORDER BY {helps}, rowid DESC"
+        where, args = (order, (not back,)) if latest else ("id = ?", (run_id,))
         with self._guarded("read"):
             for row in self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where}", args):
                 try:
-                    return run_of(row)
+                    found = run_of(row)
                 except ValueError as error:
-                    if run_id != "latest":
+                    if not latest:
                         raise StoreError(f"run: {self.path}: {error}") from None
                     self._tell(f"{error}; it is left out")
+                    continue
+                if not back:
+                    return found
+                back -= 1
             known = self._db.execute("SELECT id FROM runs ORDER BY rowid DESC LIMIT 20").fetchall()
             said = one_line(", ".join(str(r[0]) for r in known) or "none")
             raise MissingError(f"run: there is no run {run_id!r} in {self.path}; it has {said}")

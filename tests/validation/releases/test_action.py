@@ -57,7 +57,7 @@ def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
     for name in ("junit.xml", "summary.md", "comment.md", "base.json", "results.sqlite", "report.html"):
         assert (out / name).stat().st_size > 0, name
     assert "toy 1.0.0 -> 1.3.dev" in (out / "comment.md").read_text()
-    assert "nothing changed" in (home / "step.md").read_text()
+    assert "in both: none changed" in (home / "step.md").read_text()
     assert (home / "output").read_text() == "comment=crosscheck-out/comment.md\n"
 
 
