@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from contact_crosscheck.listings import engines, scenes
     from contact_crosscheck.models import Scene
     from contact_crosscheck.studies import Bench, bench, sweep
+    from validation.records.store import StoreError
 
     __version__: str
 
@@ -37,6 +38,7 @@ __all__ = [
     "Result",
     "Scene",
     "SceneError",
+    "StoreError",
     "bench",
     "engines",
     "load",
@@ -57,10 +59,13 @@ LATE = {
     "Engine": "adapters.engine",
     "EngineError": "adapters.engine",
     "SceneError": "adapters.scene",
+    "StoreError": "validation.records.store",
 }
 #: Our packages, in the order in which they may import each other.
 PACKAGES = ("reference_solver", "adapters", "validation", "reports")
 HOME = Path(__file__).resolve().parent.parent
+#: Exit status after Ctrl-C, as in `reports.command.statuses`, which is not imported for it.
+INTERRUPTED = 130
 
 
 class ForeignPackage(ImportError):
@@ -114,8 +119,8 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Names for completion, including those that are not loaded yet."""
-    return sorted({*globals(), *LATE, "__version__"})
+    """Public names, including those that are not loaded yet."""
+    return sorted([*__all__, "__version__"])
 
 
 def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:
@@ -161,11 +166,13 @@ def main() -> None:
     """Run the command; exit with 2 and one line if the packages on the path are not ours."""
     try:
         check()
+        from reports.command import main as command
+
+        command(prog_name="crosscheck")
     except ForeignPackage as error:
         sys.exit(_refused(str(error)))
-    from reports.command import main as command
-
-    command(prog_name="crosscheck")
+    except KeyboardInterrupt:  # also while modules are loaded
+        sys.exit(INTERRUPTED)
 
 
 def pytest_addoption(parser: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -13,6 +12,7 @@ from numbers import Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 import pandas as pd
 
@@ -24,12 +24,12 @@ from adapters.plain import NAME, kind_of, one_line
 from adapters.scene import SceneError
 from adapters.trajectory import Trajectory, load_trajectory
 from contact_crosscheck.apart import apart
-from contact_crosscheck.models import Scene, scene_named
+from contact_crosscheck.models import AnyScene, scene_named
 from reports.exports import described
 from reports.findings import severity
 from reports.wording import LABELS, ROLE_WORDS, mark_of, measured, params_text, quantity, reproduce
 from validation.canonical import CanonicalScene
-from validation.catalogue import CATALOGUE
+from validation.catalogue import CATALOGUE, is_introduced
 from validation.cells import Observation, Outcome, Slot, format_dt, prepare, settings_of, slot_from_dict
 from validation.identity import commit
 from validation.judging.rows import Row, frame, rows_of
@@ -44,15 +44,17 @@ if TYPE_CHECKING:
 
 #: An engine by its name, or one that the caller has written.
 AnyEngine = str | Engine | type[Engine]
-#: Warning, once per call, if nothing protects the caller from crashes of an engine.
+#: Warning, once for each engine, if nothing protects the caller from crashes of an engine.
 UNPROTECTED = (
     "engine: {} runs in this process, without a time limit, and its crash would end Python; crosscheck new-adapter "
     "makes a package of an engine, which runs in processes of its own"
 )
+#: Engines of which the warning has been given.
+_told: WeakSet[type] = WeakSet()
 
 
 def run(
-    scene: str | os.PathLike[str] | Scene,
+    scene: AnyScene,
     *,
     engine: AnyEngine,
     profile: str | None = None,
@@ -70,7 +72,8 @@ def run(
     Parameters
     ----------
     scene
-        Name in the catalogue (`scenes`), path of a scene file or of a model, or a `Scene`.
+        Name in the catalogue (`scenes`), path of a scene file or of a model, or a `Scene`. The content of a scene file
+        as a table, or a scene that you have written in Python (a ``CanonicalScene``), run in the same way.
     engine
         Name of an installed engine (`engines`), or an engine of your own: a class or an object of `Engine`.
     profile
@@ -119,7 +122,7 @@ def run(
 def observe(slot: Slot, path: Path | None = None) -> Observation:
     """Run a slot: engines of other packages in their own process, others here; store the trajectory at ``path``."""
     entry = registry.entry(slot.engine)
-    if entry is None or registry.is_ours(entry):
+    if entry is None or registry.is_ours(entry) or is_introduced(slot.scene):
         observation = execute(slot, path)
         # An error that ends a case is its outcome, except here for Ctrl-C: it has to end the caller too.
         if observation.outcome is Outcome.CRASHED and observation.reason.startswith(KeyboardInterrupt.__name__):
@@ -225,7 +228,8 @@ class Result:
         ----------
         what
             ``checks``: the error of each check over its tolerance. Or a component of the free bodies over time:
-            ``x``, ``y``, ``z``, ``angle`` (planar), ``vx``, ``vy``, ``vz``, ``speed``.
+            ``x``, ``y``, ``z``, ``angle`` (planar), ``vx``, ``vy``, ``vz``, ``speed``. Dashed: the reference solver's
+            run of the same case, where it is certified.
 
         Raises
         ------
@@ -243,7 +247,20 @@ class Result:
 
         if what == "checks":
             return checks_chart([row.as_dict() for row in self.rows], str(self))
-        return motion_chart(self._scene(), self.trajectory, what, str(self))
+        return motion_chart(self._scene(), self.trajectory, what, str(self), self._truth)
+
+    @cached_property
+    def _truth(self) -> Trajectory | None:
+        """The motion of the reference solver in the same case; None if that is this one, or is not certified."""
+        slot, solver = self.observation.slot, registry.solver()
+        exact = registry.profile_of(solver, "solution")
+        if slot.engine == solver or exact is None:
+            return None
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "case.npz"
+            found = observe(Slot(slot.scene, slot.params, slot.dimension, solver, exact, slot.dt), path)
+            sound = found.outcome is Outcome.OK and path.exists()
+            return load_trajectory(path) if sound else None
 
     def _scene(self) -> scene_module.Scene:
         slot = self.observation.slot
@@ -293,13 +310,15 @@ def engine_named(engine: AnyEngine) -> str:
         return engine
     if not isinstance(engine, Engine | type):
         raise EngineError(f"engine: {kind_of(engine)} was given; name an engine, or give one of your own")
-    name = registry.introduce(engine)
-    warnings.warn(UNPROTECTED.format(name), stacklevel=3)
+    name, kind = registry.introduce(engine), engine if isinstance(engine, type) else type(engine)
+    if kind not in _told:
+        _told.add(kind)
+        warnings.warn(UNPROTECTED.format(name), stacklevel=3)
     return name
 
 
 def slot_of(
-    scene: str | os.PathLike[str] | Scene,
+    scene: AnyScene,
     engine: str,
     profile: str | None,
     dimension: int | None,

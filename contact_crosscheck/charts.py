@@ -13,7 +13,8 @@ from adapters.engine import Array
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Trajectory
 from reports.command.reporting import extra
-from reports.palette import colours_of, shape_of
+from reports.page.charts import error_axis, gutter, log_scale, power_axis, with_unit
+from reports.palette import HOLLOW, colours_of, dash_of, role_of, shape_of
 from validation.cells import format_dt
 from validation.metrics import free_bodies
 from validation.posed import primary_of
@@ -24,8 +25,8 @@ with extra("plot"):
 
 #: Largest number of drawn samples of a motion; a page has fewer points.
 MOST_SAMPLES = 4000
-#: Smallest error on a logarithmic axis; smaller ones are drawn there.
-EXACT = 1e-16
+#: Columns of the speed figure.
+COLUMNS = ["cost", "shown", "error", "who", "panel", "step", "end", "best", "on_front"]
 #: Smallest drawn share of a tolerance; below it, differences do not matter for the choice of an engine.
 LEAST = 1e-3
 #: Colours of checks within and beyond their tolerance, distinct in the common kinds of colour blindness.
@@ -63,8 +64,10 @@ def checks_chart(rows: Sequence[Mapping[str, Any]], title: str) -> alt.LayerChar
     return alt.layer(drawn, limit).properties(title=title, width=420)
 
 
-def motion_chart(scene: Scene, trajectory: Trajectory | None, what: str, title: str) -> alt.Chart:
-    """Draw a component of the pose or the velocity of each free body over time.
+def motion_chart(
+    scene: Scene, trajectory: Trajectory | None, what: str, title: str, truth: Trajectory | None = None
+) -> alt.Chart:
+    """Draw a component of the pose or the velocity of each free body over time, dashed of the true motion.
 
     Raises
     ------
@@ -76,18 +79,24 @@ def motion_chart(scene: Scene, trajectory: Trajectory | None, what: str, title: 
     known = components(trajectory)
     if what not in known:
         raise SceneError(f"plot: there is no {what!r}, only checks, {', '.join(known)}")
-    values, unit = known[what]
-    stride = max(1, math.ceil(len(trajectory.t) / MOST_SAMPLES))
-    records = [
-        {"t": float(t), "value": float(value), "body": scene.bodies[body].name}
-        for body in free_bodies(scene)
-        for t, value in zip(trajectory.t[::stride], values[::stride, body], strict=True)
-    ]
+    unit, records = known[what][1], []
+    for of, motion in (("engine", trajectory), ("truth", truth)):
+        if motion is None:
+            continue
+        values, stride = components(motion)[what][0], max(1, math.ceil(len(motion.t) / MOST_SAMPLES))
+        records += [
+            {"t": float(t), "value": float(value), "body": scene.bodies[body].name, "of": of}
+            for body in free_bodies(scene)
+            for t, value in zip(motion.t[::stride], values[::stride, body], strict=True)
+        ]
     lines = alt.Chart(_data(records)).mark_line(strokeWidth=1.5)
     return lines.encode(
         x=alt.X("t:Q", title="time [s]"),
         y=alt.Y("value:Q", title=f"{what} [{unit}]", scale=alt.Scale(zero=False)),
         color=alt.Color("body:N", title="body", sort=None),
+        strokeDash=alt.StrokeDash(
+            "of:N", title=None, scale=alt.Scale(domain=["engine", "truth"], range=[[1, 0], [5, 3]])
+        ),
     ).properties(title=title, width=420, height=260)
 
 
@@ -115,42 +124,52 @@ def work_chart(points: pd.DataFrame) -> alt.FacetChart:
     if len(used) == 0:
         raise SceneError("plot: no case has an error and a time")
     primary = primary_of(str(used["scene"].iloc[0]))
-    records = [
-        {
-            "who": f"{row['engine']}/{row['profile']}",
-            "dimension": f"{row['scene']} {row['dimension']}-D",
-            "cost": float(row["cost"]),
-            "error": max(float(row["error"]), EXACT),
-            "step": format_dt(float(row["dt"])) + ("" if pd.isna(row["iterations"]) else f" x{row['iterations']:.0f}"),
-            "best": bool(row["on_front"]),
-        }
-        for row in used.to_dict("records")
+    used = used.assign(shown=gutter(used["error"]), who=used["engine"] + "/" + used["profile"])
+    used["panel"] = used["scene"] + " " + used["dimension"].astype(str) + "-D"
+    used["step"] = [
+        format_dt(float(dt)) + ("" if pd.isna(count) else f" x{count:.0f}")
+        for dt, count in zip(used["dt"], used["iterations"], strict=True)
     ]
+    # As on the page: the first and the last point of the front over all engines show their step.
+    fronts = [own[own["best"]].sort_values("cost").drop_duplicates("shown") for _, own in used.groupby("panel")]
+    ends = pd.concat([own.iloc[[0, -1][: len(own)]] for own in fronts])
+    used["end"] = used["step"].where(used.index.isin(ends.index), "")
     series = list(dict.fromkeys(zip(used["engine"], used["profile"], strict=True)))
-    names, colours = [f"{engine}/{profile}" for engine, profile in series], colours_of([each for each, _ in series])
-    who = {
-        "color": alt.Color(
-            "who:N", title=None, scale=alt.Scale(domain=names, range=[colours[engine] for engine, _ in series])
-        ),
-        "shape": alt.Shape(
-            "who:N", title=None, scale=alt.Scale(domain=names, range=[shape_of(profile) for _, profile in series])
-        ),
-    }
-    unit = "" if primary.unit == "1" else f" [{primary.unit}]"
-    exact = f", {EXACT:g} where it is exact" if any(row["error"] == EXACT for row in records) else ""
-    x = alt.X("cost:Q", scale=alt.Scale(type="log"), title="CPU time per simulated second [s/s]")
-    y = alt.Y("error:Q", scale=alt.Scale(type="log"), title=f"{primary.name}{unit}{exact}")
-    base = alt.Chart().encode(x=x, y=y)
-    best = base.transform_filter("datum.best")
+    colours = colours_of([engine for engine, _ in series])
+    own_colours = [colours[engine] for engine, _ in series]
+    fills = ["white" if role_of(profile) in HOLLOW else colours[engine] for engine, profile in series]
+    shapes, patterns = ([mark(profile) for _, profile in series] for mark in (shape_of, dash_of))
+
+    def by(channel: Any, values: Sequence[Any]) -> Any:
+        """One legend of all channels: they have the same domain."""
+        domain = [f"{engine}/{profile}" for engine, profile in series]
+        legend = None if channel is alt.StrokeDash else alt.Legend(title=None, labelLimit=0, symbolLimit=0)
+        return channel("who:N", scale=alt.Scale(domain=domain, range=values), legend=legend)
+
+    colour = by(alt.Color, own_colours)
+    x_scale, ticks = log_scale([*used["cost"]], 1.3)
+    y_scale, y_axis, _ = error_axis(list(used["shown"]), with_unit(primary.name, primary.unit), 3.0)
+    x = alt.X("cost:Q", scale=x_scale, axis=power_axis("CPU time per simulated second [s/s]", ticks))
+    base = alt.Chart().encode(x=x, y=alt.Y("shown:Q", scale=y_scale, axis=y_axis))
+    fine = base.transform_filter("datum.on_front")
+    dash = by(alt.StrokeDash, [list(each) or [1, 0] for each in patterns])
     chart = alt.layer(
-        best.mark_line(strokeWidth=1.2).encode(color=who["color"]),
-        base.mark_point(filled=True, size=45).encode(tooltip=["who:N", "step:N", "error:Q", "cost:Q"], **who),
-        best.mark_text(align="left", dx=6, dy=-4, fontSize=10).encode(text="step:N", color=who["color"]),
-        data=_data(records),
+        base.transform_filter("datum.best").mark_line(interpolate="step-after", color="#d8d8d8", strokeWidth=5),
+        fine.mark_line(strokeWidth=1.2).encode(color=colour, strokeDash=dash),
+        base.mark_point(size=45, opacity=1.0).encode(
+            tooltip=["who:N", "step:N", "error:Q", "cost:Q"],
+            color=colour,
+            fill=by(alt.Fill, fills),
+            shape=by(alt.Shape, shapes),
+        ),
+        base.mark_text(align="left", dx=6, dy=-7, fontSize=10).encode(text="end:N"),
+        data=_data(
+            used[["cost", "shown", "error", "who", "panel", "step", "end", "best", "on_front"]].to_dict("records")
+        ),
     )
-    return chart.properties(width=340, height=280).facet(column=alt.Column("dimension:N", title=None))
+    return chart.properties(width=340, height=280).facet(column=alt.Column("panel:N", title=None))
 
 
-def _data(records: Sequence[Mapping[str, Any]]) -> alt.InlineData:
+def _data(records: Sequence[Mapping[Any, Any]]) -> alt.InlineData:
     """Data inside the chart, for any number of rows."""
     return alt.InlineData(values=list(records))

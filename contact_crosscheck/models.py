@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from adapters.plain import kind_of
 from adapters.scene import SceneError
 from contact_crosscheck.apart import apart
-from validation.catalogue import matching
-from validation.posed import is_file, is_known, pinned, resolve
+from validation.canonical import CanonicalScene
+from validation.catalogue import introduce, matching
+from validation.posed import is_file, is_known, pinned, resolve, written
+from validation.scenes import OURS
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,11 @@ class Scene:
         return tuple(resolve(self.name).notes)
 
 
-def scene_named(scene: str | os.PathLike[str] | Scene) -> str:
+#: A scene by its name or file, from a file, as a scene file's content, or one that the caller has written.
+AnyScene = str | os.PathLike[str] | Scene | CanonicalScene | Mapping[str, Any]
+
+
+def scene_named(scene: AnyScene) -> str:
     """Name of a scene that no later change of a file affects; a file is read.
 
     Raises
@@ -138,6 +146,12 @@ def scene_named(scene: str | os.PathLike[str] | Scene) -> str:
     """
     if isinstance(scene, Scene):
         return scene.name
+    if isinstance(scene, CanonicalScene):
+        if introduce(scene) not in OURS:
+            resolve.cache_clear()  # another scene may have had the name
+        return scene.name
+    if isinstance(scene, Mapping):
+        return written(scene)
     if not isinstance(scene, str | os.PathLike):
         raise SceneError(f"scene: {kind_of(scene)} was given; name a scene or a file, or give a Scene")
     name = os.fspath(scene)

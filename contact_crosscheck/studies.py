@@ -26,7 +26,7 @@ from contact_crosscheck.cases import (
     profile_named,
     settings_from,
 )
-from contact_crosscheck.models import Scene, scene_named
+from contact_crosscheck.models import AnyScene, scene_named
 from reports import speed
 from reports.command.benching import time_units
 from reports.exports import described
@@ -36,6 +36,7 @@ from validation.bench.lane import FULL, QUICK
 from validation.bench.sweep import Sweep, accuracy_slots, timed_units
 from validation.bench.work import certified_of
 from validation.canonical import CanonicalScene
+from validation.catalogue import is_introduced
 from validation.cells import Outcome, Slot, parse_dt
 from validation.identity import commit
 from validation.judging.rows import frame, rows_of
@@ -51,29 +52,29 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    scene: str | os.PathLike[str] | Scene,
+    scene: AnyScene,
     *,
     engine: AnyEngine | Sequence[AnyEngine],
-    profile: str | None = None,
+    profile: str | Sequence[str] | None = None,
     dimension: int | None = None,
-    dt: float | str | None = None,
-    iterations: int | None = None,
+    dt: float | str | Sequence[float | str] | None = None,
+    iterations: int | Sequence[int] | None = None,
     settings: Mapping[str, Any] | None = None,
     jobs: int = 0,
     timeout: float = TIMEOUT,
     out: str | os.PathLike[str] | None = None,
     **params: float | Sequence[float],
 ) -> pd.DataFrame:
-    """Run a scene with every combination of the values of its parameters, in worker processes.
+    """Run a scene with every combination of engines, profiles, steps and values of its parameters.
 
     Parameters
     ----------
-    scene, profile, dimension, dt, iterations, settings
+    scene, dimension, settings
         As in `run`.
-    engine
-        One engine or several.
+    engine, profile, dt, iterations
+        As in `run`, or a list of several; a profile by its role (``tuned``) may have another name on each engine.
     jobs
-        Processes; 0: one per core. An engine of your own runs in this process instead.
+        Worker processes; 0: one per core. An engine or a scene of your own runs in this process instead.
     timeout
         Time limit per case [s].
     out
@@ -91,7 +92,7 @@ def sweep(
     Raises
     ------
     SceneError, EngineError
-        As `run`, and if no parameter has several values.
+        As `run`, and if nothing has several values.
 
     Examples
     --------
@@ -99,25 +100,29 @@ def sweep(
     >>> found = cc.sweep("bounce", engine=["mujoco", "bullet"], e=[0.3, 0.5, 0.7], height=2.0)
     >>> found["off"] = (found.error / found.tolerance).abs()
     >>> found.pivot_table(index="param.e", columns="engine", values="off", aggfunc="max")
+    >>> steps = cc.sweep("slide", engine="bullet", profile=["as shipped", "tuned"], dt=[1 / 60, 1 / 240, 1 / 960])
+    >>> steps[steps.metric == "stop_distance"].pivot(index="dt", columns="profile", values="error")
     """
     crossed = {name: _values(name, value) for name, value in params.items() if _is_several(value)}
-    if not crossed:
-        raise SceneError("sweep: no parameter has several values; give one a list, or use run")
+    if not crossed and not any(map(_is_several, (engine, profile, dt, iterations))):
+        raise SceneError("sweep: nothing has several values; give a list, or use run")
     fixed = {name: number_of(name, value) for name, value in params.items() if name not in crossed}
-    own = [engine] if isinstance(engine, str) or not isinstance(engine, Sequence) else list(engine)
-    if not own:
-        raise EngineError("engine: the list is empty")
+    profiles, dts, counts = (_listed(*each) for each in (("profile", profile), ("dt", dt), ("iterations", iterations)))
+    own = list(map(engine_named, _listed("engine", engine)))
     with apart():
         name = scene_named(scene)
         canonical = resolve(name)
+        if not params:  # a parameter selects one case instead of all of the suite's
+            fixed = {each.name: each.default for each in canonical.parameters[:1]}
         slots: list[Slot] = []
-        for each in map(engine_named, own):
-            request = _request(name, canonical, each, profile, dimension, dt, iterations, settings, fixed)
+        for each in own:
+            request = _request(name, canonical, each, profiles, dimension, dts, counts, settings, fixed)
             slots += study_slots(request, Study(crossed, [{}]))
-    here = [slot for slot in slots if registry.is_introduced(slot.engine)]
+    here = [slot for slot in slots if registry.is_introduced(slot.engine) or is_introduced(slot.scene)]
     elsewhere = [slot for slot in slots if slot not in set(here)]
     if here and out is not None:
-        raise EngineError(f"out: {here[0].engine} is an engine of this process alone; its results are not kept")
+        alone = here[0].engine if registry.is_introduced(here[0].engine) else here[0].scene
+        raise EngineError(f"out: {alone} exists in this process alone; its results are not kept")
     observations = [observe(slot) for slot in here]
     run_id = ""
     if elsewhere:
@@ -134,10 +139,10 @@ def _request(
     name: str,
     canonical: CanonicalScene,
     engine: str,
-    profile: str | None,
+    profiles: Sequence[Any],
     dimension: int | None,
-    dt: float | str | None,
-    iterations: int | None,
+    dts: Sequence[Any],
+    iterations: Sequence[Any],
     settings: Mapping[str, Any] | None,
     fixed: Mapping[str, float],
 ) -> Request:
@@ -148,10 +153,10 @@ def _request(
     return Request(
         [name],
         [engine],
-        [profile_named(engine, profile, canonical)],
+        list(dict.fromkeys(profile_named(engine, each, canonical) for each in profiles or [None])),
         [wanted],
-        [] if dt is None else [parse_dt(str(dt))],
-        [] if iterations is None else [iterations],
+        [parse_dt(str(each)) for each in dts],
+        list(iterations),
         fixed,
         sets=settings_from(settings),
     )
@@ -159,6 +164,13 @@ def _request(
 
 def _is_several(value: Any) -> bool:
     return isinstance(value, Sequence | np.ndarray | pd.Series) and not isinstance(value, str | bytes)
+
+
+def _listed(name: str, value: Any) -> list[Any]:
+    """One or several values as a list; none for None."""
+    if _is_several(value) and not len(value):
+        raise (EngineError if name in ("engine", "profile") else SceneError)(f"{name}: the list is empty")
+    return list(value) if _is_several(value) else [] if value is None else [value]
 
 
 def _values(name: str, value: Any) -> list[float]:
@@ -237,9 +249,9 @@ class Bench:
 
 
 def bench(
-    scene: str | os.PathLike[str] | Scene,
+    scene: AnyScene,
     *,
-    engines: str | Sequence[str] | None = None,
+    engines: AnyEngine | Sequence[AnyEngine] | None = None,
     profiles: Sequence[str] = (),
     dimension: int | None = None,
     dts: Sequence[float | str] = (),
@@ -262,7 +274,8 @@ def bench(
         A scene with a headline error, or one from a file; see `run`. The error of a scene from a file is its distance
         from the certified run of our own solver at the end.
     engines
-        Names of engines; by default all that are installed and not optional.
+        One engine or several, by name or of your own; by default all that are installed and not optional. One of your
+        own is timed in this process, the others in one of their own.
     profiles
         Names of profiles; by default all that are ranked.
     dimension
@@ -284,8 +297,7 @@ def bench(
         For a scene without a headline error, one from a file without a certified run, an unknown parameter, or if no
         case has a result.
     EngineError
-        For an unknown engine or profile, one that is not installed, or one of your own: the timing process can load
-        only engines that are in a package.
+        For an unknown engine or profile, or one that is not installed.
 
     Examples
     --------
@@ -293,14 +305,13 @@ def bench(
     >>> measured = cc.bench("stack", engines=["mujoco", "bullet"], dimension=3)
     >>> measured.plot()
     """
-    named = [engines] if isinstance(engines, str) else engines
+    named = None if engines is None else list(map(engine_named, _listed("engines", engines)))
     with apart():
         name = scene_named(scene)
-        for each in named or ():
-            if not isinstance(each, str) or registry.is_introduced(each):
-                raise EngineError("engines: an engine is timed in a process of its own, so it must be in a package; "
-                                  "crosscheck new-adapter makes one")  # fmt: skip
-            engine_named(each)
+        if is_introduced(name):
+            raise SceneError(
+                f"scene: {name} exists in this process alone; a bench needs a scene of a package or a file"
+            )
         request = Request(
             [name],
             list(registry.usual() if named is None else named),
@@ -317,7 +328,13 @@ def bench(
             raise SceneError("bench: no case fits these engines, profiles and dimension")
         console = terminal(stderr=True)
         with _store(out) as store:
-            run = run_plan(store, f"bench: {name}", slots, console, jobs, timeout, finish=False, recorded=False)
+            here = [slot for slot in slots if registry.is_introduced(slot.engine)]
+            if here and out is not None:
+                raise EngineError(f"out: {here[0].engine} exists in this process alone; its results are not kept")
+            asked = [slot for slot in slots if slot not in set(here)]
+            run = run_plan(store, f"bench {name}", asked, console, jobs, timeout, finish=False, recorded=False)
+            for slot in here:
+                store.add(run, observe(slot))
             observations = store.observations(run)
             if not any(each.outcome is Outcome.OK for each in observations):
                 raise SceneError(f"bench: no case has a result: {observations[0].reason}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import inspect
 import json
 import re
 import textwrap
@@ -11,6 +13,7 @@ from typing import Any
 
 import jinja2
 import pandas as pd
+import worked
 
 from adapters import registry
 from reports.cures import recorded_fixes, recorded_paste, recorded_text
@@ -18,6 +21,7 @@ from reports.listing import describe
 from reports.symptoms.published import passed
 from reports.tables import unset_text
 from reports.wording import first_of, markdown, number, setting_text, word_of
+from validation import bounds
 from validation.catalogue import CATALOGUE
 
 
@@ -30,15 +34,19 @@ def write(folder: Path) -> None:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "md": lambda text: markdown(str(text)).replace("\n", " ").replace("*", "\\*"),
+        "md": lambda text: markdown(str(text)).replace("\n", " "),
         "number": number,
         "unset": unset_text,
+        "law": law,
+        "prose": prose,
     }
     environment.globals["word_of"] = word_of
     passes = passed()
     for name, values in made(passes):
         template = name.split("/")[0] if "index" not in name else name.replace("/", "-")
         _keep(folder / f"{name}.md", environment.get_template(f"{template}.md.j2").render(values))
+    for name, picture in worked.pictures().items():
+        _keep(folder / name, picture)
     for source in sorted((folder / "notebooks").glob("*.py")):
         text = source.read_text(encoding="utf-8")
         _keep(source.with_suffix(".ipynb"), notebook(text))
@@ -81,6 +89,12 @@ def page(text: str, name: str) -> str:
     return "\n\n".join([title, links, *rest]) + "\n"
 
 
+def prose(text: str) -> str:
+    """Text of a docstring: what stands between backticks is code."""
+    parts = re.split(r"`+([^`]+)`+", " ".join(text.split()))
+    return "".join(f"`{part}`" if k % 2 else markdown(part) for k, part in enumerate(parts))
+
+
 def plain(text: object) -> str:
     """Text that Markdown shows as it is, on one line."""
     return markdown(str(text)).replace("\n", " ").replace("*", "\\*").replace("_", "\\_")
@@ -107,18 +121,79 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
         more = {"symptoms": scene.symptoms, "passes": own.to_dict("records"), "fixes": fixes(scene.name)}
         yield f"scenes/{scene.name}", describe(scene.name) | more | {"figure": parts(scene.figure)}
     yield "scenes/index", {"groups": groups}
-    engines = [name for name in registry.names() if registry.find(name).engine is not None]
+    engines = [name for name in registry.names() if registry.adapter(name) is not None]
     for name in engines:
         told = describe(name, measure=True)
         yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
-    yield (
-        "engines/index",
-        {
-            "engines": {name: registry.facts(name) for name in engines},
-            "others": {name: registry.facts(name) for name in registry.names() if name not in engines},
-        },
-    )
+    yield "engines/index", {"engines": {name: registry.facts(name) for name in engines}}
+    yield "tolerances", {"introduction": inspect.getdoc(bounds), "sections": tolerances(), "reasons": reasons()}
+    yield "references", references()
+    yield "worked-example", worked.example()
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
+
+
+def tolerances() -> list[tuple[str, list[dict[str, str]]]]:
+    """Sections of `validation.bounds`, and of each function in them its name, formula and derivation."""
+    found: list[tuple[str, list[dict[str, str]]]] = []
+    for line in inspect.getsource(bounds).splitlines():
+        if line.startswith("# ----"):
+            found.append((line.strip("# -"), []))
+        elif found and (name := re.match(r"def ([a-z]\w*)", line)):
+            function = getattr(bounds, name[1])
+            because = re.search(r'because = (?:\(\n\s*)?f?"([^"]+)"', inspect.getsource(function))
+            told = {"name": name[1], "text": inspect.getdoc(function) or "", "because": because[1] if because else ""}
+            found[-1][1].append(told)
+    return found
+
+
+def reasons() -> list[dict[str, Any]]:
+    """Reasons of all tolerances at the defaults, with the checks that have them."""
+    found: dict[str, list[str]] = {}
+    for name in CATALOGUE:
+        for check in describe(name)["checks_at_defaults"]:
+            found.setdefault(check["because"], []).append(f"{name}/{check['metric']}")
+    return [{"because": because, "checks": checks} for because, checks in found.items()]
+
+
+#: A work that a scene's text cites, in brackets and with its year.
+CITED = re.compile(r"\[([^\[\]]*?\b(?:18|19|20)\d\d\b[^\[\]]*)\]")
+
+
+def references() -> dict[str, Any]:
+    """Where the truth of each scene comes from, and the works that are cited, each once."""
+    works: dict[str, list[str]] = {}
+    for name, scene in CATALOGUE.items():
+        for work in CITED.findall(" ".join(scene.figure.split())):
+            for each in re.split(r"; (?=[A-Z]\. )", work.rstrip(".")):
+                works.setdefault(each.partition(": ")[0] if each.count(": ") > 1 else each, []).append(name)
+    order = sorted(works, key=lambda work: re.sub(r"^(?:[A-Z]\. )+", "", work))
+    number_of = {work: k for k, work in enumerate(order, 1)}
+    sources = {
+        name: {
+            "sources": list(dict.fromkeys(check["source"] for check in describe(name)["checks_at_defaults"])),
+            "works": [number_of[work] for work in order if name in works[work]],
+        }
+        for name in CATALOGUE
+    }
+    return {"works": [(number_of[work], work, works[work]) for work in order], "scenes": sources}
+
+
+#: Names of letters, and signs, as they are typeset.
+SIGNS = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "theta": "θ", "phi": "φ", "mu": "μ", "rho": "ρ", "eta": "η", "pi": "π",
+    "<=": "≤", ">=": "≥", "sqrt": "√", "infinity": "∞",
+}  # fmt: skip
+
+
+def law(text: str) -> str:
+    """A law as HTML: powers raised, indices lowered, Greek letters and signs in place of their names."""
+    text = html.escape(text, quote=False).replace("&lt;=", "<=").replace("&gt;=", ">=")
+    for name, sign in SIGNS.items():
+        text = re.sub(rf"(?<![A-Za-z]){re.escape(name)}(?![A-Za-z])", sign, text)
+    text = re.sub(r"\^(\([^()]*\)|-?\w+)", lambda power: f"<sup>{power[1].strip('()')}</sup>", text)
+    text = re.sub(r"_(\(([^()]*)\)|\w+)", lambda index: f"<sub>{index[2] or index[1]}</sub>", text)
+    text = re.sub(r"\b([A-Za-z]\w?)([+-])(?= |,|;|$|/|\))", r"\1<sup>\2</sup>", text)  # before and after a blow
+    return text.replace("'", "′").replace("*", "·").replace("  ", " &ensp;")
 
 
 def fixes(scene: str) -> list[dict[str, Any]]:

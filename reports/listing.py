@@ -133,10 +133,11 @@ def _describe_engine(name: str, measure: bool) -> dict[str, Any]:
     try:
         settable = found.engine.settable() if found.engine else {}
     except ImportError:  # some ask the engine, which is listed and cannot be imported
-        found = registry.find(name)
-    if found.engine is None:
+        found, settable = registry.find(name), {}
+    engine = found.engine or registry.adapter(name)  # most of it is known without the engine
+    if engine is None:
         return {**out, "status": "not installed", "reason": found.reason}
-    engine, facts = found.engine, found.engine.facts
+    facts = engine.facts
     wanted = {scene.name: needs(scene.scene(scene.dimensions[-1])) for scene in CATALOGUE.values()}
     profiles = {
         profile: {name: [asdict(s) for s in engine.settings(profile, own, QUICK_DT)] for name, own in wanted.items()}
@@ -144,7 +145,8 @@ def _describe_engine(name: str, measure: bool) -> dict[str, Any]:
     }
     return {
         **out,
-        "status": "installed",
+        "status": "installed" if found.engine else "not installed",
+        "reason": found.reason,
         "title": facts.title,
         "package": facts.package,
         "dimensions": sorted(facts.dimensions),

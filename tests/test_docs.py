@@ -1,14 +1,20 @@
 """The documentation builds offline without a warning, with a page for each scene."""
 
 import importlib
+import inspect
 import re
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from adapters import registry
+from reports import listing
+from reports.wording import number
+from validation import bounds
 from validation.catalogue import CATALOGUE
 
 ROOT = Path(__file__).parents[1]
@@ -30,6 +36,68 @@ def test_pages_give_lines_to_paste_for_fixes_that_are_recommended_alone(monkeypa
     weak = [fix for fix in told if fix["cure"].helps and not fix["cure"].recommended]
     assert weak and all("the best settings found fix" in fix["text"] and not fix["paste"] for fix in weak)
     assert any(fix["paste"] for fix in told)
+
+
+@pytest.fixture
+def pages(monkeypatch):
+    """The module that makes pages of what the project knows."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    return importlib.import_module("pages")
+
+
+def test_pages_of_engines_that_are_not_installed(monkeypatch):
+    """Seven of eleven engines had no page where the documentation was built."""
+    monkeypatch.setattr(listing.registry, "listed", lambda name: SimpleNamespace(version="", engine=None, reason="no"))
+    for name in registry.names():
+        told = listing.describe(name)
+        assert told["status"] == "not installed" and told["quirks"] is not None
+        assert all(settings for scenes in told["profiles"].values() for settings in scenes.values()), name
+        assert set(told["profiles"]) == set(registry.facts(name).roles) | set(registry.adapter(name).profiles)
+
+
+@pytest.mark.parametrize(
+    ("text", "typeset"),
+    [
+        ("h_n = e^(2n) h0", "h<sub>n</sub> = e<sup>2n</sup> h0"),
+        ("v+ = -e v-,  J = m (1 + e) v", "v<sup>+</sup> = -e v<sup>-</sup>, &ensp;J = m (1 + e) v"),
+        ("sticks if tan(theta) <= mu", "sticks if tan(θ) ≤ μ"),
+        ("w+ = eta w-, v1' = v_(n+1)", "w<sup>+</sup> = η w<sup>-</sup>, v1′ = v<sub>n+1</sub>"),
+        ("sqrt(2 h0/g), dimension", "√(2 h0/g), dimension"),
+    ],
+)
+def test_a_typeset_law(pages, text, typeset):
+    assert pages.law(text) == typeset
+
+
+def test_every_shared_tolerance_is_derived_on_its_page(pages):
+    told = {entry["name"]: entry for _, entries in pages.tolerances() for entry in entries}
+    own = {
+        name
+        for name, value in vars(bounds).items()
+        if inspect.isfunction(value) and value.__module__ == bounds.__name__
+    }
+    assert {name for name in own if not name.startswith("_")} == set(told) and all(e["text"] for e in told.values())
+    assert told["landed"]["because"].startswith("the impact is found up to one step late, v dt deep")
+    listed = [check for reason in pages.reasons() for check in reason["checks"]]
+    assert len(listed) == len(set(listed)) == sum(len(listing.describe(n)["checks_at_defaults"]) for n in CATALOGUE)
+
+
+def test_each_cited_work_stands_once_in_the_bibliography(pages):
+    found = pages.references()
+    works = [work for _, work, _ in found["works"]]
+    assert set(found["scenes"]) == set(CATALOGUE) and len(works) == len(set(works)) >= 6
+    assert [n for n, _, _ in found["works"]] == list(range(1, len(works) + 1))
+    assert any(work.startswith("G. W. Housner") for work in works)
+    (number,) = found["scenes"]["rocking_block"]["works"]
+    assert works[number - 1].startswith("G. W. Housner") and len(found["scenes"]["painleve"]["works"]) == 2
+
+
+def test_numbers_of_the_worked_example(pages):
+    told = pages.worked.example()
+    assert [told[name] for name in ("speed", "after", "apex", "late")] == ["4.43", "3.54", "0.64", "0.0185"]
+    checks = pages.worked.results()[told["rows"][0]["who"]].frame().set_index("metric")
+    assert told["tolerance"] == number(checks.loc["apex[1]"].tolerance, 3)
+    assert {row["verdict"] for row in told["rows"]} == {"PASS", "FAIL"}
 
 
 def written_by_hand():

@@ -1,9 +1,11 @@
 """``import contact_crosscheck as cc``: the same bits and verdicts as the command, errors of one line, two notebooks."""
 
+import dataclasses
 import os
 import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +20,10 @@ from adapters.conformance.toy import ToyEngine
 from adapters.engine import EngineError, EngineFacts, Scheme
 from adapters.extras import install
 from adapters.scene import SceneError
+from contact_crosscheck import cases
 from reports.command import main
+from validation import catalogue
+from validation.catalogue import CATALOGUE
 from validation.records.store import MissingError
 
 ROOT = Path(__file__).parents[1]
@@ -41,6 +46,8 @@ pose = [0.0, 1.0, 0.0]
 def own(monkeypatch):
     """Engines that a test introduces are gone after it."""
     monkeypatch.setattr(registry, "_introduced", {})
+    monkeypatch.setattr(cases, "_told", set())
+    monkeypatch.setattr(catalogue, "_introduced", {})
     yield
     registry.forget()
 
@@ -195,7 +202,8 @@ def test_what_a_result_does_not_have_is_named(engine):
         cc.load("/nowhere")
     with pytest.raises(AttributeError, match="has no attribute 'nope'"):
         cc.nope  # noqa: B018
-    assert {"run", "Scene", "__version__"} <= set(dir(cc)) and cc.__version__[0].isdigit()
+    assert dir(cc) == sorted([*cc.__all__, "__version__"]) and cc.__version__[0].isdigit()
+    assert issubclass(MissingError, cc.StoreError)
 
 
 # ---- charts ----------------------------------------------------------------------------------------------------------
@@ -204,7 +212,11 @@ def test_what_a_result_does_not_have_is_named(engine):
 def test_charts_show_the_checks_and_the_motion(tmp_path, engine):
     pytest.importorskip("altair")
     result = cc.run("bounce", engine=engine("chipmunk"), e=0.5)
-    assert [row["value"] for row in drawn(result.plot("y"))] == list(result.trajectory.pose[:, 1, 1])
+    parts = {of: [row["value"] for row in drawn(result.plot("y")) if row["of"] == of] for of in ("engine", "truth")}
+    assert parts["engine"] == list(result.trajectory.pose[:, 1, 1])
+    exact = cc.run("bounce", engine="reference", e=0.5)
+    assert parts["truth"] == list(exact.trajectory.pose[:, 1, 1])
+    assert {row["of"] for row in drawn(exact.plot("y"))} == {"engine"}, "it is the truth itself"
     points = drawn(result.plot())
     rows = result.frame()
     judged = rows[rows.physics.notna()]
@@ -218,7 +230,7 @@ def test_a_long_motion_is_thinned_for_the_chart(engine):
     pytest.importorskip("altair")
     result = cc.run("bounce", engine=engine("chipmunk"), dt=1 / 4000)
     assert len(result.trajectory.t) > 8000
-    assert 2000 <= len(drawn(result.plot("y"))) <= 4000
+    assert 2000 <= sum(row["of"] == "engine" for row in drawn(result.plot("y"))) <= 4000
 
 
 def test_without_the_libraries_a_chart_says_what_to_install(monkeypatch, engine):
@@ -252,11 +264,11 @@ def test_names_from_files_and_engines_are_text_in_html(tmp_path, monkeypatch, ow
 
 
 def test_an_engine_of_one_s_own_is_asked_like_any_other_and_warns_once(own):
-    for given in (ToyEngine, ToyEngine()):
-        with pytest.warns(UserWarning) as warned:
-            result = cc.run("bounce", engine=given, e=0.5)
-        assert len(warned) == 1 and "without a time limit" in str(warned[0].message)
-        assert warned[0].filename == __file__
+    with pytest.warns(UserWarning) as warned:
+        results = [cc.run("bounce", engine=given, e=0.5) for given in (ToyEngine, ToyEngine(), ToyEngine)]
+    assert len(warned) == 1 and "without a time limit" in str(warned[0].message)
+    assert warned[0].filename == __file__
+    for result in results[1:]:
         assert result.observation.slot.engine == "toy" and (result.frame().physics != "fail").all()
         assert "in this process only" in result.explain()
 
@@ -343,7 +355,9 @@ def test_a_sweep_that_is_kept_is_loaded_again(tmp_path, engine):
 @pytest.mark.parametrize(
     ("said", "given"),
     [
-        ("sweep: no parameter has several values", {"e": 0.5}),
+        ("sweep: nothing has several values", {"e": 0.5}),
+        ("dt: the list is empty", {"dt": []}),
+        ("profile: chipmunk has no profile 'tund', only", {"profile": ["tuned", "tund"]}),
         ("e: the list is empty", {"e": []}),
         ("e: 'x' is not a number", {"e": [0.5, "x"]}),
         ("bounce.e: 2 must lie in", {"e": [0.5, 2]}),
@@ -358,12 +372,29 @@ def test_a_wrong_sweep_is_one_line(said, given):
     assert str(caught.value).startswith(said)
 
 
-def test_engines_of_one_s_own_are_neither_kept_nor_timed(tmp_path, own):
-    with pytest.warns(UserWarning), pytest.raises(EngineError, match="out: toy is an engine of this process alone"):
+def test_results_of_engines_of_one_s_own_are_not_kept(tmp_path, own):
+    with pytest.warns(UserWarning), pytest.raises(EngineError, match="out: toy exists in this process alone"):
         cc.sweep("bounce", engine=ToyEngine, e=[0.5], out=tmp_path)
-    for given in (ToyEngine, "toy"):
-        with pytest.raises(EngineError, match="timed in a process of its own"):
-            cc.bench("bounce", engines=[given])
+    with pytest.raises(EngineError, match="out: toy exists in this process alone"):
+        cc.bench("bounce", engines=[ToyEngine], dts=["1/60"], out=tmp_path)
+
+
+def test_a_sweep_over_steps_and_profiles(engine):
+    """Error against step is the first figure of a paper; only parameters could have several values."""
+    found = cc.sweep("impact", engine=engine("chipmunk"), profile=["as shipped", "tuned"], dt=[1 / 60, "1/240"], jobs=1)
+    assert set(found.profile) == {"default", "tuned"} and set(found.dt) == {1 / 60, 1 / 240}
+    assert len(found.groupby(["profile", "dt"]).state_hash.unique()) == 4, "one case of the scene, at its defaults"
+    one = cc.run("impact", engine="chipmunk", profile="tuned", dt=1 / 60).frame()
+    same = found[(found.profile == "tuned") & (found.dt == 1 / 60)]
+    assert list(same.value) == list(one.value)
+
+
+@pytest.mark.long
+def test_a_bench_of_an_engine_of_one_s_own(own):
+    with pytest.warns(UserWarning, match="toy runs in this process"):
+        found = cc.bench("impact", engines=[ToyEngine, "reference"], dimension=3, dts=["1/240"])
+    points = found.frame()
+    assert set(points.engine) == {"toy", "reference"} and (points.cost > 0.0).all() and points.error.notna().all()
 
 
 @pytest.mark.long
@@ -375,7 +406,36 @@ def test_a_bench_measures_errors_and_times_and_draws_them(engine):
     assert "work points" in repr(found)
 
 
-# ---- scenes and listings ---------------------------------------------------------------------------------------------
+# ---- scenes and listings --------------------------------------------------------------------------------------------
+
+
+def test_a_scene_as_a_table(tmp_path, engine):
+    table = tomllib.loads(FREE_BALL.replace("NAME", "ball"))
+    (tmp_path / "drop.toml").write_text(FREE_BALL.replace("NAME", "ball"))
+    here, there = (cc.run(each, engine=engine("chipmunk")) for each in (table, tmp_path / "drop.toml"))
+    assert here.observation.state_hash == there.observation.state_hash
+    assert set(cc.sweep(table, engine="chipmunk", dt=[1 / 60, 1 / 120], jobs=1).dt) == {1 / 60, 1 / 120}
+    for wrong, said in (({"name": "x"}, "dimension: is missing"), ({1: {2, 3}}, "scene: is not what a scene file")):
+        with pytest.raises(SceneError, match=said):
+            cc.run(wrong, engine="chipmunk")
+
+
+def test_a_scene_that_the_caller_has_written(own, engine):
+    """As `drop.SCENE` of CONTRIBUTING: it had to be in an installed package."""
+    written = dataclasses.replace(CATALOGUE["impact"], name="mine")
+    found = cc.run(written, engine=engine("chipmunk"), e=0.5)
+    assert list(found.frame().value) == list(cc.run("impact", engine="chipmunk", e=0.5).frame().value)
+    assert set(cc.sweep(written, engine="chipmunk", e=[0.2, 0.5]).scene) == {"mine"}
+    anew = dataclasses.replace(written, title="Another", rule=lambda scene, dt, truth: [])
+    assert set(cc.run(anew, engine="chipmunk").frame().metric) == set()
+    assert str(cc.run(CATALOGUE["impact"], engine="chipmunk")).startswith("impact 2-D")
+    names = {"bounce": "is the name of an installed scene", "My scene": "is not a name of small letters"}
+    for name, said in names.items():
+        wrong = dataclasses.replace(written, name=name)
+        with pytest.raises(SceneError, match=said):
+            cc.run(wrong, engine="chipmunk")
+    with pytest.raises(SceneError, match="mine exists in this process alone"):
+        cc.bench(written, engines="chipmunk")
 
 
 def test_a_model_is_a_scene(engine):

@@ -28,6 +28,38 @@ GROUP = "contact_crosscheck.scenes"
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
+#: Scenes that the caller of this process has written, by name.
+_introduced: dict[str, CanonicalScene] = {}
+
+
+def introduce(scene: CanonicalScene) -> str:
+    """Make a scene known in this process under its own name, until another of that name is introduced.
+
+    Worker processes cannot load it.
+
+    Raises
+    ------
+    SceneError
+        If it has the name of another scene of the catalogue.
+    """
+    if scene.name in (*OURS, *_entries()):
+        if _loaded(scene.name) is not scene:
+            raise SceneError(f"scene: {one_line(scene.name, NAME)!r} is the name of an installed scene; choose another")
+    elif not _NAME.fullmatch(scene.name):
+        raise SceneError(
+            f"scene: {one_line(scene.name, NAME)!r} is not a name of small letters, digits and underscores"
+        )
+    elif _introduced.get(scene.name) is not scene:
+        _introduced[scene.name] = scene
+        _loaded.cache_clear()
+    return scene.name
+
+
+def is_introduced(name: str) -> bool:
+    """Whether a scene exists in this process only."""
+    return name in _introduced
+
+
 @cache
 def _entries() -> dict[str, EntryPoint]:
     """Entry points of other packages by scene, without those that use the name of one of ours."""
@@ -40,6 +72,8 @@ def _loaded(name: str) -> CanonicalScene | SceneError:
     if name in OURS:
         ours: CanonicalScene = import_module(f"validation.scenes.{name}").SCENE
         return ours
+    if name in _introduced:
+        return _introduced[name]
     entry = _entries()[name]
     where = f"scene: {one_line(name, NAME)} of {one_line(entry.value, NAME)}"
     if not _NAME.fullmatch(name) or len(name) > NAME:
@@ -55,11 +89,13 @@ def _loaded(name: str) -> CanonicalScene | SceneError:
 
 def _names() -> list[str]:
     """Names of all scenes in their order, with those of other packages that cannot be loaded."""
-    return [*OURS, *_entries()]
+    return [*OURS, *_entries(), *_introduced]
 
 
 def module_of(name: str) -> str:
     """Module that a scene comes from."""
+    if name in _introduced:  # its source may not be a file; its cells are not stored
+        return "validation.canonical"
     return f"validation.scenes.{name}" if name in OURS else _entries()[name].module
 
 
@@ -79,7 +115,7 @@ class _Catalogue(Mapping[str, CanonicalScene]):
     """Scenes by name: ours in their order, then those of others by name."""
 
     def __getitem__(self, name: str) -> CanonicalScene:
-        if name not in OURS and name not in _entries():
+        if name not in _names():
             raise KeyError(name)
         found = _loaded(name)
         if isinstance(found, SceneError):

@@ -8,6 +8,7 @@ changes.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -105,6 +106,24 @@ def remember(texts: Mapping[str, str]) -> None:
         if found is None or found["digest"] != _digest(text):
             raise SceneError(f"scene: the stored text of {name} is not that of the file")
         _texts[name] = text
+
+
+def written(scene: Mapping[str, Any]) -> str:
+    """Pinned name of the content of a scene file, given as plain data.
+
+    Raises
+    ------
+    SceneError
+        If it is not what a JSON file could hold, or not a valid scene.
+    """
+    try:
+        text = json.dumps(scene, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise SceneError(f"scene: is not what a scene file could hold: {one_line(error)}") from None
+    name = f"{one_line(scene.get('name', 'scene'), 40).replace('/', '-')}.json@{_digest(text)}"
+    remember({name: text})
+    resolve(name)
+    return name
 
 
 def stated_of(scenes: Iterable[str]) -> dict[str, dict[str, Any]]:
