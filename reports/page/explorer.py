@@ -6,12 +6,13 @@ Scenes declare which of their metrics show a restitution (`validation.canonical.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import altair as alt
+import numpy as np
 import pandas as pd
 
 from reports.page.charts import POINT, dashes, dodged, named, styled, svg
@@ -21,6 +22,7 @@ from reports.page.source import Plain, Source
 from reports.palette import HOLLOW, colours_of, role_of, shape_of
 from reports.wording import number
 from validation.canonical import Restitution
+from validation.catalogue import CATALOGUE
 
 #: Familiar materials, with the coefficient that is usually quoted for them.
 PRESETS = (("rubber", 0.8), ("billiard ball", 0.95), ("clay", 0.0))
@@ -28,8 +30,8 @@ FAINT = (0.9, 0.5)
 #: Width of a panel of restitution [px], and the distance from the diagonal below which a point counts as on it
 #: [restitution].
 MAP, BAND = 300, 0.02
-#: Height of a line of text in it [restitution].
-LINE = 0.065
+#: Height of a line of text in it, and width of a letter [restitution].
+LINE, LETTER = 0.065, 0.026
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ def explorer(source: Source) -> Explorer | None:
     measured = sorted({float(e) for entry in series for e in entry["heights"]})
     apexes = bounced[1].heights if bounced else 0
     data = {"presets": PRESETS, "faint": FAINT, "apexes": apexes, "measured": measured, "series": series}
-    scene = struck[0] if struck else ""
-    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene), scene)
+    scene, scale = (struck[0], struck[1].scale) if struck else ("", "")
+    return Explorer(data, own, _picture(heights, 0.8), _maps(rebounds, scene, scale), scene)
 
 
 def _heights(source: Source, scene: str, shown: Restitution) -> dict[tuple[str, str], dict[float, list[float]]]:
@@ -111,32 +113,34 @@ def _picture(heights: Mapping[tuple[str, str], Mapping[float, Sequence[float]]],
     y = alt.Y("h:Q", axis=alt.Axis(title="apex height h_n / h0"), scale=alt.Scale(domain=[0, 1]))
     curves = alt.Chart(law).mark_line(color="currentColor", point=False, aria=False)
     opacity = alt.condition(f"datum.e == {e}", alt.value(0.8), alt.value(0.22))
-    layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity)]
+    names = pd.DataFrame([{"n": 2.1, "h": c**4.2 + 0.03, "text": f"e = {c:g}"} for c in (e, *FAINT)])
+    texts = alt.Chart(names).mark_text(align="left", color="currentColor", opacity=0.7, aria=False)
+    layers = [curves.encode(x=x, y=y, detail="e:N", opacity=opacity), texts.encode(x=x, y=y, text="text:N")]
     if rows:
         table = dodged(pd.DataFrame(rows), "n", "h", logarithmic=False)
         points = alt.Chart(table).mark_point(strokeWidth=POINT, size=60)
         layers.append(points.encode(x=x, y=y, description="label:N", **styled(table)))
     title = f"Apex heights for e = {e:g}"
     picture = svg(alt.layer(*layers).properties(width=620, height=320), title)
-    said = (
-        "Line: h_n = e^(2n) h0. Faint: e = 0.9 and e = 0.5. Points: measured; those that coincide stand side by side."
-    )
+    said = "Lines: h_n = e^(2n) h0. Points: measured; those that coincide stand side by side."
     return Figure("fig-explorer", title, said, picture)
 
 
-def _maps(rebounds: Sequence[Plain], scene: str) -> list[Figure]:
+def _maps(rebounds: Sequence[Plain], scene: str, scale: str) -> list[Figure]:
     """Measured over set restitution, one panel per approach speed, in 2-D if it ran; the most informative one first.
 
-    That is the one in which most engines leave the diagonal; of equals the one with most points, then the fastest.
+    That is the one in which most engines leave the diagonal; of equals the one with most points, then the one of most
+    cases of the quick suite, so that reports of all suites begin with the same.
     """
     if not rebounds:
         return []
+    quick = Counter(CATALOGUE[scene].complete(each.params).get(scale) for each in CATALOGUE[scene].quick)
     dimension = min(row["dimension"] for row in rebounds)
     panels: dict[float, list[Plain]] = defaultdict(list)
     for row in rebounds:
         if row["dimension"] == dimension:
             panels[row["speed"]].append(row)
-    first = max(panels, key=lambda v: (len(_leaving(panels[v])), len(panels[v]), v))
+    first = max(panels, key=lambda v: (len(_leaving(panels[v])), len(panels[v]), quick[v]))
     return [_map(panels[v], v, scene) for v in [first, *sorted(panels.keys() - {first})]]
 
 
@@ -196,16 +200,40 @@ def _labels(places: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colo
 
 
 def _end_labels(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:
-    """Names of lines above their right ends, one line of text above the other, with their colours."""
+    """Names of lines above or below them, as near to their right ends as no other line or name is in the way."""
+    tracks = {who: own.sort_values("asked") for who, own in left.groupby("who", sort=False)}
     ends = left.sort_values("asked").drop_duplicates("who", keep="last").sort_values("got")
     found: list[tuple[list[tuple[float, float, str]], str]] = []
-    height = -math.inf
-    colours = colours_of(list(ends["engine"]))
+    colours, taken = colours_of(list(ends["engine"])), list[tuple[float, float]]()
     for end in ends.to_dict("records"):
-        height = max(end["got"] + LINE, height + LINE)
-        text = f"{called(end['engine'])} {word_of(end['profile'])}"
-        found.append(([(1.02, height, text)], colours[end["engine"]]))
+        text, own = f"{called(end['engine'])} {word_of(end['profile'])}", tracks[end["who"]]
+        x, y = _free_place(
+            own, len(text) * LETTER, [(0.0, 1.0), *taken], [tracks[who] for who in tracks if who != end["who"]]
+        )
+        taken.append((x, y))
+        found.append(([(x, y, text)], colours[end["engine"]]))
     return found
+
+
+def _free_place(
+    own: pd.DataFrame, wide: float, taken: Sequence[tuple[float, float]], others: Sequence[pd.DataFrame]
+) -> tuple[float, float]:
+    """Where a name of this width may end: beside its line, away from other lines, the diagonal and other names."""
+
+    def is_free(x: float, y: float) -> bool:
+        along = np.linspace(x - wide, x, 25)
+        tracks = [along, *(np.interp(along, other["asked"], other["got"]) for other in others)]
+        names = any(abs(y - high) < LINE and abs(x - right) < wide for right, high in taken)
+        return not names and y > 0.0 and all(np.abs(track - y).min() > 0.6 * LINE for track in tracks)
+
+    top = float(own["got"].iloc[-1])
+    stacked = (1.02, max([top, *(high for _, high in taken)]) + LINE)
+    beside = [
+        (x, float(np.interp(x, own["asked"], own["got"])) + side * LINE)
+        for x in (0.9, 0.8, 0.7, 0.6) for side in (1, -1)
+    ]  # fmt: skip
+    places = [(1.02, top + LINE), (1.02, top - LINE), stacked, *beside]
+    return next((place for place in places if is_free(*place)), stacked)
 
 
 def _diagonal_label(on: pd.DataFrame, off: Sequence[tuple[str, str]]) -> list[tuple[float, float, str]]:

@@ -3,6 +3,7 @@
 import re
 from itertools import pairwise, product
 
+import numpy as np
 import pytest
 
 from adapters import registry
@@ -127,6 +128,24 @@ def test_the_picture_is_of_the_speed_at_which_most_engines_leave():
     assert "everybody else" not in found[0].picture and "as it should be" in found[0].picture
     assert "1 engines" not in found[1].picture and "Bullet as shipped" in found[1].picture
     assert "every engine" in found[2].picture
+
+
+def test_a_name_that_another_line_would_cross():
+    """ "MuJoCo as shipped", above its own level line, was crossed by Bullet's at 6 m/s."""
+    laws = {("mujoco", "default"): lambda e: 0.105, ("bullet", "default"): lambda e: max(0.0, 0.58 * (e - 0.5))}
+    (figure,) = explorer(made(laws)).maps
+    words, points = drawn(figure)
+    ((right, level),) = [(float(x), float(y)) for x, y, _, text in words if text == "MuJoCo as shipped"]
+    line = sorted((float(x), float(y)) for text, x, y in points if text.startswith("bullet/default"))
+    along = np.linspace(right - 7.5 * len("MuJoCo as shipped"), right, 50)
+    assert np.abs(np.interp(along, *zip(*line, strict=True)) - level).min() > 8.0, "a line of text is 13 px high"
+
+
+def test_reports_of_all_suites_begin_with_the_same_speed():
+    """The standard suite began with 50 m/s, the quick one with 6."""
+    rows = [row("mujoco", "default", e, 0.0, speed) for speed in (0.1, 1.0, 6.0, 50.0) for e in ASKED]
+    found = explorer(Source(Run("r", "2026-01-01", "c", {}, "t", (), True), rows, [])).maps
+    assert found[0].id == "fig-map-6"
 
 
 def test_names_of_lines_that_end_together_stand_above_each_other():

@@ -326,6 +326,18 @@ def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, 
     heights = [float(y) for y in re.findall(r'<text x="[^"]*" y="([^"]*)" fill', saved)]
     assert len(heights) >= 3 and all(low < y < low + high for y in heights), "what is said lies in the picture"
     assert "Restitution that was set and measured" in picture and "bullet/default</text>" not in picture
+    # Every name stands beside its mark, and ends before the next one or the edge; names of three fixed columns did not.
+    key = [
+        (float(x), float(y), text)
+        for x, y, text in re.findall(
+            r'<text x="([^"]*)" y="([^"]*)" fill="[^"]*" font-size="12" font-weight="400"[^>]*>([^<]*)<', saved
+        )
+    ]
+    left, across = (float(v) for v in re.search(r'viewBox="(\S+) \S+ (\S+) \S+"', saved).groups())
+    for x, y, text in key:
+        assert f'transform="translate({x - 10:g},{y - 4:g})"' in saved, text
+        right = min([left + across, *(other for other, line, _ in key if line == y and other > x)])
+        assert x + 6.2 * len(text) < right, text
 
 
 def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file, page_source):

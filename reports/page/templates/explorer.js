@@ -24,6 +24,7 @@
   function curve(e, opacity, width) {
     const points = Array.from({ length: bounces + 1 }, (_, n) => `${x(n)},${y(e ** (2 * n))}`);
     put("polyline", { points: points.join(" "), fill: "none", stroke: "currentColor", "stroke-opacity": opacity, "stroke-width": width });
+    put("text", { x: x(2.1), y: y(e ** 4.2) - 8, fill: "currentColor", "fill-opacity": 0.7, "font-size": 12 }, `e = ${e}`);
   }
   const shapes = {
     circle: "M-4.5,0a4.5,4.5 0 1,0 9,0a4.5,4.5 0 1,0 -9,0", square: "M-4,-4h8v8h-8z", diamond: "M0,-6 6,0 0,6 -6,0z",

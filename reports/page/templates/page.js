@@ -162,22 +162,32 @@ function standalone(svg) {
   /* A picture that is taken away says what it is: its title above it, and engines and profiles below it. */
   const [left, top, width, height] = svg.getAttribute("viewBox").split(/[\s,]+/).map(Number);
   const key = svg.closest("section, .shot")?.querySelector(".key");
-  const say = (text, x, y, colour, weight = 400) => {
+  const say = (text, x, y, weight = 400) => {
     const made = document.createElementNS("http://www.w3.org/2000/svg", "text");
-    for (const [name, value] of Object.entries({ x, y, fill: colour, "font-size": 12, "font-weight": weight })) made.setAttribute(name, value);
+    for (const [name, value] of Object.entries({ x, y, fill: "currentColor", "font-size": 12, "font-weight": weight })) made.setAttribute(name, value);
     made.textContent = text;
     copy.append(made);
   };
-  const names = new Set($$("[data-is]", svg).map((mark) => mark.dataset.is.split(/[,:]/)[0]));
+  const marks = $$("[data-is]", svg), names = new Set(marks.map((mark) => mark.dataset.is.split(/[,:]/)[0]));
   const shown = svg.closest(".talk") ? [] : $$("li", key ?? svg).map((item) => item.textContent.trim()).filter((name) => names.has(name));
+  /* As many columns as fit: a letter is at most 7 wide, and its mark stands before each name. */
+  const wide = 26 + 7 * Math.max(0, ...shown.map((name) => name.length)), columns = Math.max(1, Math.floor(width / wide));
   shown.forEach((name, k) => {
-    const mark = $$("[data-is]", svg).find((one) => one.dataset.is.startsWith(name)), colour = mark.getAttribute("stroke") ?? mark.getAttribute("fill");
-    say(name, left + 6 + (k % 3) * (width / 3), top + height + 16 + 16 * Math.floor(k / 3), colour);
+    const x = left + 12 + (k % columns) * wide, y = top + height + 16 + 16 * Math.floor(k / columns);
+    const mark = marks.find((one) => one.dataset.is.startsWith(name + ",") && one.hasAttribute("transform")) ?? marks.find((one) => one.dataset.is.startsWith(name));
+    const point = mark.cloneNode();
+    if (point.hasAttribute("transform")) point.setAttribute("transform", `translate(${x},${y - 4})`);
+    else point.setAttribute("d", `M${x - 6},${y - 4}h12`);
+    point.removeAttribute("data-is");
+    if (!point.hasAttribute("fill")) point.setAttribute("fill", "none");
+    copy.append(point);
+    say(name, x + 10, y);
   });
-  say(svg.getAttribute("aria-label"), left + 6, top - 8, "currentColor", 600);
-  const tall = height + 32 + 16 * Math.ceil(shown.length / 3);
-  copy.setAttribute("viewBox", [left, top - 24, width, tall].join(" "));
-  copy.setAttribute("width", width);
+  say(svg.getAttribute("aria-label"), left + 6, top - 8, 600);
+  const tall = height + 32 + 16 * Math.ceil(shown.length / columns);
+  const across = Math.max(width, wide, 20 + 7 * svg.getAttribute("aria-label").length);
+  copy.setAttribute("viewBox", [left, top - 24, across, tall].join(" "));
+  copy.setAttribute("width", across);
   copy.setAttribute("height", tall);
   for (const [name, value] of [["x", left], ["y", top - 24]]) paper.setAttribute(name, value);
   return new XMLSerializer().serializeToString(copy);
