@@ -22,7 +22,7 @@ import struct
 import sys
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, cast
@@ -78,7 +78,8 @@ class Child:
             self.connection, theirs = context.Pipe()
             self.log, writing = context.Pipe(duplex=False)
             self._process = context.Process(target=_main, args=(serve, theirs, writing, os.getpid(), memory))
-            self._process.start()
+            with _ctrl_c_held_back():
+                self._process.start()
         except (OSError, MemoryError) as error:
             raise IsolationError(f"process: cannot start one: {one_line(error) or type(error).__name__}") from None
         theirs.close()
@@ -191,6 +192,20 @@ class Child:
             return self.connection.poll()
         except OSError:
             return True
+
+
+@contextlib.contextmanager
+def _ctrl_c_held_back() -> Iterator[None]:
+    """Ctrl-C waits until a process is started, and never reaches it: its imports would end with a traceback."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # which lets Ctrl-C through when it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _main(

@@ -18,7 +18,7 @@ from rich.text import Text
 from adapters.engine import ROLES
 from adapters.registry import facts, is_ranked
 from reports.findings import ALARMING
-from reports.wording import FEW, LABELS, MARKS, STATUS, mark_of, word_of
+from reports.wording import FEW, LABELS, MARKS, STATUS, called, mark_of, word_of
 from validation.cells import ALONE
 from validation.judging.verdicts import NOT_JUDGED
 from validation.metrics import NEWER, OUT_OF_PLANE
@@ -163,14 +163,15 @@ def tables_of(matrix: Matrix, versions: Mapping[str, str], width: int, roles: bo
     ``roles`` the role of a profile follows its first line, unless its name says it.
     """
     scenes = list(dict.fromkeys(scene for scene, _ in matrix.lines))
+    names = list(called(scenes).values())
     body = list(_body(matrix, scenes, versions, roles))
-    texts, wide = _texts(scenes, body, short=False)
+    texts, wide = _texts(names, body, short=False)
     if max((len(label) for label, _ in body), default=0) + sum(wide) + GAP * len(wide) > width:
-        texts, wide = _texts(scenes, body, short=True)
+        texts, wide = _texts(names, body, short=True)
     most = width - max(wide, default=0) - GAP
     body = [(label if len(label) <= most else label.replace("+", "\n    +"), fields) for label, fields in body]
     first = max((len(line) for label, _ in body for line in label.splitlines()), default=0)
-    return [_table(scenes, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
+    return [_table(names, chosen, body, texts, first) for chosen in _chunks(wide, width - first)]
 
 
 def _texts(scenes: Sequence[str], body: Sequence[Line], short: bool) -> tuple[list[list[Text]], list[int]]:

@@ -36,7 +36,7 @@ from reports.matrix import (
     unranked,
     versions_of,
 )
-from reports.wording import at, plural, roles_line
+from reports.wording import at, called, plural, roles_line
 
 Plain = Mapping[str, Any]
 #: Largest number of alarm families in the list; `crosscheck findings --new` lists all.
@@ -178,9 +178,10 @@ def _choices(rows: Sequence[Plain], console: Console, costs: Costs | None) -> No
     order = ", cheapest first" if costs else ""
     _heading(f"Best engine per scene (passes every check{order})", console)
     found = choices(rows, costs)
-    wide = max((len(choice.scene) for choice in found), default=0)
+    names = called(choice.scene for choice in found)
+    wide = max(map(len, names.values()), default=0)
     for choice in found:
-        console.print(_folded(f"{choice.scene:<{wide}}  {choice.line}", console))
+        console.print(_folded(f"{names[choice.scene]:<{wide}}  {choice.line}", console))
 
 
 def _answers(rows: Sequence[Plain], console: Console) -> None:
@@ -216,18 +217,12 @@ def _where(
     place: str,
     more: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    found = families(rows)
-    failing = sum(len(family.rows) for family in found)
+    failing = sum(len(family.rows) for family in families(rows))
     _heading("Next", console)
-    engine = found[0].engine if found else ""
     commands = [*more.items(), ("crosscheck report --open", "one HTML page")]
-    if found:
-        commands = [
-            ("crosscheck findings", f"{plural(failing, 'failed check')} by cause"),
-            (f"crosscheck findings --engine {engine}", "of one engine"),
-            ("crosscheck explain ID", "one check: cause and fix"),
-            *commands,
-        ]
+    if failing:
+        one = [] if more else [("crosscheck explain ID", "one check: cause and fix")]
+        commands = [("crosscheck findings", f"{plural(failing, 'failed check')} by cause"), *one, *commands]
     whole = [(command + place, what) for command, what in commands]
     wide = max(len(command) for command, _ in whole)
     for command, what in whole:

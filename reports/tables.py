@@ -25,6 +25,8 @@ AFTERWARDS = (
     "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
     "agreement is no test. The conditions in the reason of a contradiction were found afterwards too."
 )
+#: Below this width [columns] a listing has a paragraph for each entry, since columns would be a few letters wide.
+NARROW = 60
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
@@ -57,6 +59,7 @@ def _heading(text: str, console: Console) -> None:
 def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool = False) -> None:
     """Print a listing of scenes, engines, checks or runs; of checks with their reasons on demand."""
     columns = [(heading, name) for heading, name in LISTINGS[what] if reasons or name != "because"]
+    narrow = console.width < NARROW
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
@@ -64,7 +67,13 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
         if "because" in shown:  # equal reasons are printed once
             shown["because"], last = "as above" if shown["because"] == last else shown["because"], shown["because"]
         table.add_row(*map(Text, shown.values()))
-    console.print(table)
+        if narrow:
+            first, *others = zip((heading for heading, _ in columns), shown.values(), strict=True)
+            console.print(Text(first[1], style="bold"))
+            told = "; ".join(f"{heading} {value}" for heading, value in others if value)
+            console.print(Padding(Text(told), (0, 0, 0, 2)))
+    if not narrow:
+        console.print(table)
     if what == "engines" and (line := roles_line((e["name"], name) for e in entries for name in e["profiles"])):
         console.print(Text(line))
     if what == "suites":

@@ -14,16 +14,9 @@ from rich.text import Text
 from reports.wording import roles_line
 
 
-class _Terminal(Console):
-    def on_broken_pipe(self) -> None:
-        """Raise, so that the command chooses the exit status: rich would end with 1, which is a verdict."""
-        self.quiet = True
-        raise  # the BrokenPipeError that is being handled
-
-
 def terminal(stderr: bool = False, width: int | None = None) -> Console:
     """Return a console on stdout, or on stderr, that reads no markup and no emoji codes in any text."""
-    return _Terminal(stderr=stderr, width=width, markup=False, emoji=False)
+    return Console(stderr=stderr, width=width, markup=False, emoji=False)
 
 
 def print_roles(columns: Iterable[tuple[str, str]], console: Console) -> None:

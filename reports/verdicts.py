@@ -12,7 +12,7 @@ from rich.text import Text
 
 from reports.findings import ALARMING
 from reports.matrix import ALARM, STYLES, Field, matrix_of
-from reports.wording import MARKS
+from reports.wording import MARKS, called
 from validation.cells import Observation, Slot
 from validation.judging.rows import Row, in_order, rows_of
 from validation.records.store import Run
@@ -39,7 +39,9 @@ class Verdicts:
         self._found: dict[tuple[str, str], dict[Slot, Observation | None]] = {}
         for slot in plan:
             self._found.setdefault(_key(slot), {})[slot] = None
-        self._wide = [max(map(len, names)) + 2 for names in zip(HEAD, *self._found, strict=True)]
+        self._names = called(slot.scene for slot in plan)
+        shown = ((engine, self._names[scene]) for engine, scene in self._found)
+        self._wide = [max(map(len, names)) + 2 for names in zip(HEAD, *shown, strict=True)]
         self._rows: list[Row] = []
 
     def add(self, run: Run, observation: Observation) -> None:
@@ -65,7 +67,9 @@ class Verdicts:
         if self._shown and first:
             self._console.print(self._line(HEAD) + Text("checks by profile"), style="dim")
         if self._shown and fields:
-            self._console.print(self._line(key) + self._counts(fields), soft_wrap=True, highlight=False)
+            self._console.print(
+                self._line((key[0], self._names[key[1]])) + self._counts(fields), soft_wrap=True, highlight=False
+            )
 
     def _line(self, names: Sequence[str]) -> Text:
         return Text("".join(f"{name:<{wide}}" for name, wide in zip(names, self._wide, strict=True)))

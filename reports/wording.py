@@ -6,15 +6,17 @@ import hashlib
 import json
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adapters.registry import facts
 from adapters.settings import text_of
+from validation.catalogue import CATALOGUE
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
 from validation.metrics import NEVER as NEVER
-from validation.posed import resolve
+from validation.posed import is_file, resolve
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,6 +221,14 @@ def markdown(text: str) -> str:
 def params_text(params: Mapping[str, float]) -> str:
     """``e=0.8 height=1.03``."""
     return " ".join(f"{name}={value:g}" for name, value in params.items())
+
+
+def called(scenes: Iterable[str]) -> dict[str, str]:
+    """Names of scenes in tables: a file of the user by its stem, if no other of these scenes is called that."""
+    names = dict.fromkeys(scenes)
+    stems = {name: Path(name.rpartition("@")[0]).stem if is_file(name) else name for name in names}
+    counts = Counter([*stems.values(), *(stem for stem in CATALOGUE if stem not in names)])
+    return {name: stem if counts[stem] == 1 else name for name, stem in stems.items()}
 
 
 def first_of(names: Sequence[str]) -> str:

@@ -469,7 +469,7 @@ class CanonicalScene:
         for name in params:
             if name not in known:
                 close = difflib.get_close_matches(name, known, n=1)
-                hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(known)}"
+                hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(known) or 'none'}"
                 raise SceneError(f"{self.name}.{name}: there is no such parameter, {hint}")
         return {name: p.check(self.name, params.get(name, p.default)) for name, p in known.items()}
 

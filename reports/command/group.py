@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 import warnings
@@ -106,9 +107,6 @@ class _Group(click.Group):
                 sys.stdout.flush()  # a full disk must raise here, not at the end of the interpreter
         except ModuleNotFoundError as error:
             _leave(f"{error.name or error}: is not installed here; crosscheck doctor says what is", statuses.INCOMPLETE)
-        except BrokenPipeError:
-            _silence_stdout()
-            sys.exit(statuses.RESULTS)
         except OSError as error:
             _silence_stdout()
             _leave(f"{error.filename or 'the output'}: {error.strerror or error}", statuses.RESULTS)
@@ -132,9 +130,6 @@ class _Group(click.Group):
             return super().invoke(ctx)
         except KeyboardInterrupt:
             ctx.exit(statuses.INTERRUPTED)
-        except BrokenPipeError:  # click would end with 1, which is a verdict
-            _silence_stdout()  # the reader of our output has closed it early
-            ctx.exit(statuses.RESULTS)
 
 
 def _status_of(error: Exception) -> int | None:
@@ -154,8 +149,23 @@ def _status_of(error: Exception) -> int | None:
     return statuses.RESULTS if isinstance(error, StoreError) else None
 
 
+class _Output(io.FileIO):
+    """Standard output; what its reader does not want any more (``| head``) goes to the null device.
+
+    The command goes on and ends with its own status, which a pipe with ``pipefail`` shows.
+    """
+
+    def write(self, data: Any, /) -> int:
+        """Write, and count what is left out as written."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            _silence(self.fileno())
+            return len(data)
+
+
 def _open_streams() -> None:
-    """Open standard streams that the caller has closed (``>&-``) on the null device.
+    """Open standard streams that the caller has closed (``>&-``) on the null device, and let output be cut short.
 
     Python has no file for a closed stream, and the next opened file would get its number: the output of an engine would
     be written into that file.
@@ -166,6 +176,10 @@ def _open_streams() -> None:
             if null == descriptor:
                 os.set_inheritable(null, True)
             setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
+    out: Any = sys.stdout
+    if out is sys.__stdout__:  # not that of a test runner
+        cut = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
+        sys.stdout = io.TextIOWrapper(cut, out.encoding, out.errors, line_buffering=out.isatty())
 
 
 def _print_warning(told: set[str], message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
@@ -193,9 +207,12 @@ def _leave(line: str, status: int) -> NoReturn:
 def _silence_stdout() -> None:
     """Point stdout at the null device: the rest of its buffer would raise again at the end of the interpreter."""
     try:
-        descriptor = sys.stdout.fileno()
+        _silence(sys.stdout.fileno())
     except (OSError, ValueError):  # no file, as under a test runner
         return
+
+
+def _silence(descriptor: int) -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, descriptor)
     os.close(null)

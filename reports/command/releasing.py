@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -187,7 +188,7 @@ def bisect_(
     asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
     known = dict.fromkeys(metric for slot in wanted for metric in _metrics(slot))
     if not any(is_meant(metric, check) for metric in known):
-        kinds = ", ".join(dict.fromkeys(metric.partition("[")[0] for metric in known))
+        kinds = ", ".join(dict.fromkeys(re.sub(r"\[\d+\]", "", metric) for metric in known))
         raise SceneError(f"check: {scene} has no check {one_line(check, 60)!r}; it has {kinds}")
     store = Store(out)
     try:

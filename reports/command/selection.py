@@ -134,7 +134,7 @@ def request_from(options: dict[str, Any]) -> Request:
         iterations=list(options["iterations"]),
         params=fixed(options["param"]),
         suite=suite,
-        ulps=tuple(options["ulp"]) or (0,),
+        ulps=tuple(dict.fromkeys((0, *options["ulp"]))),  # a moved start says how far the unmoved one scatters
         floors=suite == "full" and not options["ulp"],
         sets=given(options["set"]),
     )
@@ -190,7 +190,7 @@ def selection(command: Callable[..., None]) -> Callable[..., None]:
             "--ulp",
             multiple=True,
             type=click.IntRange(-MOST_ULPS, MOST_ULPS),
-            help="Move the initial positions by this many units in the last place.",
+            help="Also move the initial positions by this many units in the last place.",
         ),
         *(click.option(f"--{suite}", is_flag=True, help=WHAT_SUITES_ARE[suite]) for suite in SUITES),
     )

@@ -33,6 +33,7 @@ from reports.terminal import print_roles, terminal
 from reports.wording import (
     LABELS,
     at,
+    called,
     first_of,
     mark_of,
     measured,
@@ -52,7 +53,8 @@ from validation.judging.rows import is_alarming
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file
 from validation.questions.nulls import skill_of
-from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Run, Store
+from validation.records.store import HELPERS, Run, Store
+from validation.releases.bisection import is_meant
 from validation.running.plan import Request, slots
 
 Plain = Mapping[str, Any]
@@ -103,9 +105,8 @@ class Which:
 
 def which(store: Store, chosen: Run, asked: str) -> Which:
     """The run of a store that ``asked`` has chosen."""
-    apart = (SCATTER_TITLE, RELEASE_TITLE, "bench ")
     others = [run for run in store.runs() if run.id != chosen.id]
-    larger = [run.id for run in others if len(run.plan) > len(chosen.plan) and not run.title.startswith(apart)]
+    larger = [run.id for run in others if len(run.plan) > len(chosen.plan) and not run.title.startswith(HELPERS)]
     title = title_of(chosen.title)
     return Which(chosen.id, title, len(chosen.plan), asked == "latest", len(others), "".join(larger[-1:]))
 
@@ -264,6 +265,7 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str, pla
     if not found:
         console.print(nothing)
         return
+    names = called(family.scene for family in found)
     for mark in dict.fromkeys(family.mark for family in found):
         own = [family for family in found if family.mark == mark]
         console.print()
@@ -272,7 +274,7 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str, pla
         table = _grid("id", "engine, scene", "worst check", "checks")
         table.columns[0].no_wrap = True
         for family in own:
-            who = f"{family.engine}/{family.profile} {family.scene}"
+            who = f"{family.engine}/{family.profile} {names[family.scene]}"
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
         console.print(table, highlight=False)
     console.print()
@@ -297,9 +299,9 @@ def _ratio(row: Plain) -> str:
 
 
 def _print_rows(rows: Sequence[Plain], console: Console) -> None:
-    table = _grid("id", "status", "engine, scene", "check")
+    table, names = _grid("id", "status", "engine, scene", "check"), called(row["scene"] for row in rows)
     for row in rows:
-        who = f"{row['engine']}/{row['profile']} {row['scene']}"
+        who = f"{row['engine']}/{row['profile']} {names[row['scene']]}"
         table.add_row(row_id(row), LABELS[mark_of(row)], who, _worst(row))
     console.print(table, highlight=False)
     print_roles(((row["engine"], row["profile"]) for row in rows), console)
@@ -436,15 +438,23 @@ def find_row(rows: Sequence[Plain], name: str) -> Plain:
         metric = named.pop("metric", "")
         fits = [row for row in rows if all(row[key] == value for key, value in named.items())]
         if metric:
-            fits = [row for row in fits if metric in (row["metric"], row["metric"].partition("[")[0])]
+            fits = [row for row in fits if is_meant(row["metric"], metric)]
         if not fits:
-            raise SceneError(f"check: this run has no check {name!r}; crosscheck findings lists what fails")
+            raise SceneError(f"check: this run has no check {name!r}{_near(rows, name)}")
         return max(fits, key=severity)
     found = [row for row in rows if row_id(row).startswith(name.lower())]
     if len(found) != 1:
         many = f"the ids of {len(found)} checks begin" if found else "no id of this run begins"
         raise SceneError(f"check: {many} with {name!r}; crosscheck findings lists ids; or name it ENGINE/PROFILE/SCENE")
     return found[0]
+
+
+def _near(rows: Sequence[Plain], name: str) -> str:
+    """The existing name that is most like one that does not exist; without one, where names are listed."""
+    names = [f"{row['engine']}/{row['profile']}/{row['scene']}" for row in rows]
+    known = [*names, *(f"{who}/{row['metric']}" for who, row in zip(names, rows, strict=True))]
+    close = difflib.get_close_matches(name, dict.fromkeys(known), n=1)
+    return f", did you mean {close[0]!r}?" if close else "; crosscheck findings lists what fails"
 
 
 def _cure(rows: Sequence[Plain], observations: Sequence[Observation], row: Plain) -> tuple[str, str, str, list[Change]]:

@@ -299,6 +299,13 @@ def test_a_child_has_a_session_no_input_and_no_ear_for_an_interrupt_of_its_own(c
     assert asked(child, "os.kill(os.getpid(), signal.SIGINT); answer('goes on')") == "goes on"
 
 
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="this system cannot hold signals back")
+def test_ctrl_c_while_a_child_starts(child):
+    """A child that loads its modules has not ignored it yet: it wrote a traceback on the terminal."""
+    assert asked(child, "answer(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))") == "True"
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
 ROOM = "answer(*resource.getrlimit(resource.RLIMIT_AS), *resource.getrlimit(resource.RLIMIT_CORE))"
 
 

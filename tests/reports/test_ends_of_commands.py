@@ -15,6 +15,7 @@ import click
 import pandas as pd
 import pytest
 
+import contact_crosscheck
 from adapters.engine import EngineError
 from adapters.isolation import IsolationError
 from adapters.model import ReaderMissing
@@ -70,14 +71,19 @@ def test_what_goes_wrong_is_a_line_and_a_status(capsys, monkeypatch, raised, sta
     assert ended(capsys, raised) == (status, f"crosscheck: {line}\n")
 
 
-@pytest.mark.parametrize(
-    ("raised", "status"), [(KeyboardInterrupt(), statuses.INTERRUPTED), (BrokenPipeError(), statuses.RESULTS)]
-)
-def test_who_breaks_off_or_stops_reading_is_told_nothing_more(capsys, monkeypatch, raised, status):
-    silenced = []
-    monkeypatch.setattr(group, "_silence_stdout", lambda: silenced.append(1))
-    assert ended(capsys, raised) == (status, "")
-    assert bool(silenced) is isinstance(raised, BrokenPipeError)
+def test_ctrl_c_in_a_command(capsys):
+    assert ended(capsys, KeyboardInterrupt()) == (statuses.INTERRUPTED, "")
+
+
+def test_ctrl_c_while_modules_are_loaded(capsys, monkeypatch):
+    def stopped():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(contact_crosscheck, "foreign", stopped)
+    with pytest.raises(SystemExit) as end:
+        contact_crosscheck.main()
+    assert end.value.code == contact_crosscheck.INTERRUPTED == statuses.INTERRUPTED
+    assert capsys.readouterr() == ("", "")
 
 
 def test_a_line_is_one_line_and_not_longer_than_a_page(capsys):

@@ -374,3 +374,14 @@ def test_a_page_says_how_it_is_cited_and_made_again(monkeypatch, title, again):
     lines.insert(2, "crosscheck bench impact --dim 2 --quick --out again")
     changed_since = "git checkout abc123   # plus changes that were not committed"
     assert found["commands"].splitlines() == [changed_since, *lines]
+
+
+def test_listings_in_a_narrow_window():
+    """Columns of three letters could not be read."""
+    entry = {"name": "bounce", "title": "Dropped ball, from the first bounce to rest", "dimensions": [2, 3], "law": ""}
+    printed = io.StringIO()
+    tables.listed("scenes", [entry], Console(file=printed, width=40))
+    told = printed.getvalue().splitlines()
+    assert [line.rstrip() for line in told] == [
+        "bounce", "  what Dropped ball, from the first", "  bounce to rest; dim. 2, 3"
+    ]  # fmt: skip

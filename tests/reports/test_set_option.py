@@ -140,6 +140,17 @@ def test_the_same_command_resumes_and_another_value_is_another_run(ran, tmp_path
     assert {o.state_hash for o in kept}.isdisjoint({row["state_hash"] for row in rows})
 
 
+def test_a_setting_given_as_a_formula(tmp_path):
+    """`describe` and fixes write 3*g*dt^2, which `--set` refused."""
+    path = tmp_path / "falling.toml"
+    path.write_text(FALLING)
+    asked = ["run", path, "--engine", "chipmunk", "--dt", "1/200", "--json", "--out", tmp_path / "out"]
+    rows = json.loads(call(*asked, "--set", "collision_slop=3*g*dt^2", status=0).stdout)
+    assert {row["profile"] for row in rows} == {"default+collision_slop=0.00075"}  # 3 * 10 / 200^2
+    refused = call(*asked, "--set", "collision_slop=3*f*dt^2", status=2)
+    assert "set: collision_slop=3*f*dt^2: must be a number" in refused.output
+
+
 def test_a_scene_file_runs_with_settings(tmp_path):
     path = tmp_path / "falling.toml"
     path.write_text(FALLING)

@@ -586,6 +586,20 @@ def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
     found = call("findings", "--scene", str(path), "--out", out)
     assert (found.exit_code, found.stdout) == (0, found.stdout)
     assert found.stdout.endswith("(1 case).\nno such check fails\n")
+    matrix = call("show", "--out", out).stdout
+    assert re.search(r"^engine, profile +a b *$", matrix, re.M) and re.search(
+        r"^  a b  chipmunk/tuned *$", matrix, re.M
+    )
+
+
+def test_a_check_whose_name_is_not_quite_right():
+    rows = [{"engine": "toy", "profile": "tuned", "scene": "bounce", "metric": f"apex[{n}]"} for n in (1, 2)]
+    for asked, meant in (
+        ("toy/tuned/bounc", "toy/tuned/bounce"),
+        ("toy/tund/bounce/apex[1]", "toy/tuned/bounce/apex[1]"),
+    ):
+        with pytest.raises(SceneError, match=rf"did you mean '{re.escape(meant)}'\?"):
+            showing.find_row(rows, asked)
 
 
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])

@@ -75,8 +75,8 @@ def folder(tmp_path_factory):
     [
         (("list", "runs"), [NAME]),
         (("show",), [FILE_NAME]),
-        (("findings",), [FILE_NAME, f"{BODY}.vy"]),
-        (("findings", "--all"), [FILE_NAME, f"{BODY}.vy"]),
+        (("findings",), [FILE_NAME.removesuffix(".toml"), f"{BODY}.vy"]),
+        (("findings", "--all"), [FILE_NAME.removesuffix(".toml"), f"{BODY}.vy"]),
         (("explain", "ROW"), [FILE_NAME, f"{BODY}.vy", BECAUSE]),
     ],
 )

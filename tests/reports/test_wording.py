@@ -11,6 +11,7 @@ from markdown_it.common.utils import escapeHtml
 from adapters import registry
 from reports.wording import (
     ROLE_WORDS,
+    called,
     cell,
     first_of,
     mark_of,
@@ -179,3 +180,11 @@ def test_a_line_says_what_profiles_are_where_their_names_do_not():
                ("mujoco", "default+cone=elliptic")]  # fmt: skip
     assert roles_line(columns) == "Profiles: default: as shipped; one: compromise."
     assert roles_line([("mujoco", "tuned"), ("nobody", "x")]) == ""
+
+
+def test_own_files_in_tables():
+    """The path and the hash of its text told nothing, and pushed the counts into a further table."""
+    one, other, named = "/my/ball.toml@0123abcd", "/your/ball.json@89abcdef", "/my/bounce.toml@11111111"
+    assert called(["bounce", one]) == {"bounce": "bounce", one: "ball"}
+    assert called([one, other]) == {one: one, other: other}
+    assert called([named]) == {named: named}, "a scene of the catalogue has the name"

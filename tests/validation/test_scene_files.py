@@ -18,6 +18,7 @@ from validation.files.scene_files import canonical_from_file, json_schema, load_
 from validation.files.scene_text import read_text
 from validation.files.stated import stated_from_dict
 from validation.judging.rows import rows_of
+from validation.posed import pinned, resolve
 
 GOOD = """
 name = "drop"
@@ -371,3 +372,33 @@ def pairs_notes(tmp_path, pairs):
 )  # fmt: skip
 def test_friction_and_restitution_that_a_file_leaves_out_are_said(tmp_path, pairs, said):
     assert pairs_notes(tmp_path, pairs) == said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('shape = { type = "disk", radius = 1.0 }', "bodies.0.shape: there is no type 'disk', only 'disc', "),
+        ("shape = { radius = 1.0 }", 'bodies.0.shape: needs a type, such as type = "box"'),
+        ('shape = { type = "disc" }', "bodies.0.shape.disc.radius: is missing"),
+        ('shape = { type = "disc", radius = true }', "bodies.0.shape.disc.radius: must be a number"),
+        ('motion = "static"', "bodies.0.motion: must be 'free', 'fixed' or 'prescribed'"),
+        ("colour = 3", "bodies.0.colour: there is no such field"),
+        ("course = 3", "bodies.0.course: must be a table"),
+    ],
+)
+def test_a_wrong_field_in_words_of_the_format(tmp_path, line, said):
+    """pydantic's sentences speak of tags, discriminators and inputs."""
+    path = tmp_path / "wrong.toml"
+    path.write_text(
+        f'name = "w"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 1.0\n[[bodies]]\nname = "a"\n{line}\n'
+    )
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert said in str(caught.value), caught.value
+
+
+def test_an_unknown_parameter_of_a_file_without_any(tmp_path):
+    path = tmp_path / "free.toml"
+    path.write_text(GOOD)
+    with pytest.raises(SceneError, match=r"there is no such parameter, it has none$"):
+        resolve(pinned(str(path))).complete({"e": 0.5})

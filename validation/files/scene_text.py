@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,12 +83,37 @@ def parsed(text: str, path: Path) -> Any:
 
 def said(errors: ValidationError) -> str:
     """All wrong fields in one line, or the first few."""
-    found = errors.errors(include_url=False, include_context=False, include_input=False)
+    found = errors.errors(include_url=False, include_input=False)
     # A number or a formula: pydantic has an error for each of both types, with the type as the last part of the place.
     formulas = [e for e in found if e["type"] == "string_type" and e["loc"][-1:] == ("str",)]
     either = {e["loc"][:-1] for e in formulas}
     places = [(e["loc"][:-1] if e["loc"][:-1] in either else e["loc"], e) for e in found if e not in formulas]
-    return listed([one_line(f"{'.'.join(map(str, place)) or 'file'}: {e['msg']}") for place, e in places])
+    return listed([one_line(f"{'.'.join(map(str, place)) or 'file'}: {_in_words(e)}") for place, e in places])
+
+
+def _in_words(error: Mapping[str, Any]) -> str:
+    """What is wrong with a field, for somebody who knows the file and not pydantic."""
+    told = error.get("ctx", {})
+    words = {
+        "missing": "is missing",
+        "extra_forbidden": "there is no such field",
+        "float_type": "must be a number",
+        "int_type": "must be a whole number",
+        "string_type": "must be a text",
+        "finite_number": "must be a finite number",
+        "greater_than": f"must be greater than {told.get('gt', 0):g}",
+        "greater_than_equal": f"must be at least {told.get('ge', 0):g}",
+        "tuple_type": "must be a list",
+        "dict_type": "must be a table",
+        "model_type": "must be a table",
+        "literal_error": f"must be {told.get('expected')}",
+        "too_short": f"needs at least {told.get('min_length')}, not {told.get('actual_length')}",
+        "too_long": f"has more than {told.get('max_length')}",
+        "string_too_short": "must not be empty",
+        "union_tag_invalid": f"there is no type {told.get('tag')!r}, only {told.get('expected_tags')}",
+        "union_tag_not_found": 'needs a type, such as type = "box"',
+    }
+    return words.get(error["type"], str(error["msg"]).removeprefix("Value error, "))
 
 
 def listed(wrong: list[str]) -> str:

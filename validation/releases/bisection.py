@@ -87,9 +87,13 @@ def _key(row: dict[str, Any]) -> str:
 
 
 def is_meant(metric: str, asked: str) -> bool:
-    """``apex`` means all of a series, ``apex[1]`` or ``bounce/apex[1]`` one of it."""
-    asked = asked.rpartition("/")[2]
-    return metric == asked or metric.partition("[")[0] == asked
+    """``apex`` means all of a series, ``apex[1]`` or ``bounce/apex[1]`` one of it.
+
+    A check of a scene file is also meant by the file's word for its quantity: ``ball.y`` is ``final[ball.y]``.
+    """
+    kind, _, index = metric.removesuffix("]").partition("[")
+    words = (metric, kind, index) if "." in index else (metric, kind)
+    return asked in words or asked.rpartition("/")[2] in words
 
 
 def bisect(count: int, cells: Sequence[Slot], metric: str, ask: Ask, every: bool = False) -> Found | Unchanged:

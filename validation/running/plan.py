@@ -12,6 +12,7 @@ full
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ from adapters.stages import stage
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, check_size, settings_of
+from validation.files.expressions import FormulaError, value_of
 from validation.posed import pinned, resolve
 
 QUICK_DT = 1.0 / 240.0
@@ -138,10 +140,24 @@ def _say_if_large(engine: Engine | None, canonical: CanonicalScene, scene: Scene
 def _own(request: Request, engine: Engine | None, slot: Slot, scene: Scene) -> tuple[tuple[str, Any], ...]:
     """A user's settings in the engine's form; unchanged where it is not installed."""
     # A request from another process has lists instead of tuples.
-    sets = tuple((str(name), tuple(value) if isinstance(value, list) else value) for name, value in request.sets)
+    sets = tuple((str(name), _worked_out(value, slot.dt, scene)) for name, value in request.sets)
     if request.iterations and any(name == "iterations" for name, _ in sets):
         raise EngineError("set: --iterations sets iterations as well")
     return sets if engine is None or not sets else own(engine, sets, settings_of(engine, slot, scene))
+
+
+def _worked_out(value: Any, dt: float, scene: Scene) -> Any:
+    """A value of a user's setting: formulas in g [m/s^2], dt [s] and e, if all pairs have one, become numbers."""
+    if isinstance(value, list | tuple):
+        return tuple(_worked_out(each, dt, scene) for each in value)
+    if not isinstance(value, str):
+        return value
+    bounces = {restitution for restitution, _ in scene.materials()}
+    names = {"g": math.hypot(*scene.gravity), "dt": dt} | ({"e": bounces.pop()} if len(bounces) == 1 else {})
+    try:
+        return value_of(value.replace("^", "**"), names)
+    except FormulaError:  # a word, or nothing that the engine takes
+        return value
 
 
 def knowing(request: Request) -> list[str]:
@@ -153,7 +169,8 @@ def knowing(request: Request) -> list[str]:
         If there is none: which engine has which setting, a similar name, or why the value is refused.
     """
     canonical = resolve(pinned(request.scenes[0]))
-    wanted = needs(canonical.scene(canonical.dimensions[-1]))
+    scene = canonical.scene(canonical.dimensions[-1])
+    wanted, sets = needs(scene), [(name, _worked_out(value, QUICK_DT, scene)) for name, value in request.sets]
     here = {name: engine for name in request.engines if (engine := find(name).engine) is not None}
     profiles = {name: engine.settings(_one_profile(name), wanted, QUICK_DT) for name, engine in here.items()}
     known = {name: set(kinds_of(engine, profiles[name])) for name, engine in here.items()}
@@ -161,7 +178,7 @@ def knowing(request: Request) -> list[str]:
     found, refused = [], []
     for name in (name for name, names in known.items() if names.issuperset(asked)):
         try:
-            own(here[name], request.sets, profiles[name])
+            own(here[name], sets, profiles[name])
         except EngineError as error:
             refused.append(error)
         else:

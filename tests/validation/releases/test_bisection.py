@@ -111,6 +111,9 @@ def test_a_check_is_meant_by_its_name_its_series_or_its_place_in_it(asked, meant
 
     assert [metric for metric in ("apex[1]", "apex[2]", "rest[1][2]") if is_meant(metric, asked)] == meant
     assert not is_meant("rest[1][2]", "rest[1]") and is_meant("rest[1][2]", "rest")
+    for word, found in (("ball.y", True), ("floor/ball.fy", False), ("ball", False), ("1", False)):
+        assert is_meant("final[ball.y]", word) == found, "the file's own words for its check"
+    assert is_meant("mean[floor/ball.fy]", "floor/ball.fy") and not is_meant("apex[1]", "1")
 
 
 def test_who_was_asked_is_said_in_order_and_only_the_cell_that_is_followed_is_asked_between_the_ends():
