@@ -312,7 +312,7 @@ def test_whoever_interrupts_a_case_interrupts_all_of_it(own):
 
     with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
         cc.run("bounce", engine=Interrupted)
-    with pytest.warns(UserWarning), pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt):
         cc.sweep("bounce", engine=Interrupted, e=[0.3, 0.5])
 
 

@@ -177,7 +177,7 @@ def _open_streams() -> None:
                 os.set_inheritable(null, True)
             setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
     out: Any = sys.stdout
-    if out is sys.__stdout__:  # not that of a test runner
+    if sys.__stdout__ is not None and out is sys.__stdout__:  # not that of a test runner
         cut = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
         sys.stdout = io.TextIOWrapper(cut, out.encoding, out.errors, line_buffering=out.isatty())
 

@@ -223,7 +223,7 @@ def _free_place(
     def is_free(x: float, y: float) -> bool:
         along = np.linspace(x - wide, x, 25)
         tracks = [along, *(np.interp(along, other["asked"], other["got"]) for other in others)]
-        names = any(abs(y - high) < LINE and abs(x - right) < wide for right, high in taken)
+        names = any(abs(y - high) < 0.99 * LINE and abs(x - right) < wide for right, high in taken)
         return not names and y > 0.0 and all(np.abs(track - y).min() > 0.6 * LINE for track in tracks)
 
     top = float(own["got"].iloc[-1])

@@ -21,6 +21,8 @@ from adapters.shapes import Capsule, Hull
 from adapters.stepping import posed_for, run
 from validation import metrics
 from validation.catalogue import CATALOGUE
+from validation.cells import Slot
+from validation.running.warming import missing
 from validation.scenes import card_tent
 from validation.truths import leaning
 
@@ -614,3 +616,13 @@ def test_half_the_load_of_starved_balls_is_told_as_two_bodies_make_a_mean_of_it(
     assert abs(said - 0.5) < stopped and abs(found - 0.5) < stopped
     whole, _, _ = both_ways("starved", 2, {}, profile, "load_error", iterations=4, weighted=False)
     assert check.bound < whole < stopped < 0.1
+
+
+def test_kernels_of_a_run_that_has_none(tmp_path, monkeypatch):
+    """They were compiled in the first case: three minutes of its time limit, and its time in all tables."""
+    warp, _ = imported()
+    monkeypatch.setattr(warp.config, "kernel_cache_dir", str(tmp_path))
+    (part,) = missing([Slot("stack", (("n", 2.0),), 3, "newton", "default", 1 / 240)])
+    assert part.mark.parent.parent == tmp_path and str(part) == "newton/default 3-D"
+    part.keep()
+    assert missing(part.slots) == []

@@ -62,6 +62,8 @@ def test_there_are_commands_in_the_readme_and_every_command_has_help():
     assert all(main.get_command(None, name).help for name in main.list_commands(None))
 
 
+#: The suite of an engine, on one scene.
+STANDARD = "run impact --standard --engine chipmunk --profile tuned --out elsewhere"
 #: Command of the README -> the calls that stand for it, placeholders filled in. They run one after the other, on one
 #: folder of results.
 RUN = {
@@ -84,7 +86,7 @@ RUN = {
         f"list {what}" for what in ("scenes", "suites", "engines", "checks", "runs")
     ],
     "crosscheck check-adapter myengine": ["check-adapter chipmunk"],
-    "crosscheck run --standard --engine myengine": ["run impact --standard --engine chipmunk --profile tuned --dim 2"],
+    "crosscheck run --standard --engine myengine": [STANDARD],
     "crosscheck tune myengine": ["tune chipmunk"],
     "crosscheck tune myengine --decisive": ["tune chipmunk --decisive"],
     "crosscheck describe bounce": ["describe bounce", "describe bullet"],
@@ -106,6 +108,7 @@ SAID = {
     "run my-scene.toml --engine chipmunk --profile tuned --out elsewhere": "box.mass: 2 kg, its density times its area",
     "ask grip slips mujoco": 'cone="elliptic"',
     "ask my ball does not bounce": "bounce: Dropped ball",
+    STANDARD: "Every check passes",
     "show": "default 2-D (as shipped)",
     "findings --engine mujoco": "mujoco/default bounce",
     "findings --scene bounce --profile default": "mujoco/default bounce",

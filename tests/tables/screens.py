@@ -55,7 +55,7 @@ def explained() -> str:
 def ran() -> str:
     """A small run of one engine, without lines of progress, which tell times, and its version."""
     with TemporaryDirectory(prefix="crosscheck-run-") as where:
-        text = printed(Path(where), "run", "bounce", "slide", "--engine", "chipmunk")
+        text = printed(Path(where), "run", "bounce", "slide", "--engine", "chipmunk", "--jobs", "1")
     return re.sub(r"(?m)^\d+ cases: .*\n", "", text).replace(load("chipmunk").version(), "VERSION")
 
 
