@@ -178,8 +178,11 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(null, "w" if descriptor else "r", encoding="utf-8", closefd=False))
     out: Any = sys.stdout
     if sys.__stdout__ is not None and out is sys.__stdout__:  # not that of a test runner
-        cut = io.BufferedWriter(_Output(out.fileno(), "w", closefd=False))
-        sys.stdout = io.TextIOWrapper(cut, out.encoding, out.errors, line_buffering=out.isatty())
+        raw: Any = _Output(out.fileno(), "w", closefd=False)
+        cut = raw if out.write_through else io.BufferedWriter(raw)  # without a buffer under ``python -u``
+        sys.stdout = io.TextIOWrapper(
+            cut, out.encoding, out.errors, line_buffering=out.isatty(), write_through=out.write_through
+        )
 
 
 def _print_warning(told: set[str], message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
