@@ -73,7 +73,6 @@ RUN = {
     ],
     "crosscheck run my-scene.toml": ["run my-scene.toml --engine chipmunk --profile tuned --out elsewhere"],
     "crosscheck ask grip slips": ["ask grip slips mujoco"],
-    "crosscheck ask my ball does not bounce": ["ask my ball does not bounce"],
     "crosscheck show": ["show"],
     "crosscheck findings --engine mujoco": [
         "findings --engine mujoco", "findings --scene bounce --profile default", "findings --profile shipped",
@@ -107,7 +106,6 @@ RUN = {
 SAID = {
     "run my-scene.toml --engine chipmunk --profile tuned --out elsewhere": "box.mass: 2 kg, its density times its area",
     "ask grip slips mujoco": 'cone="elliptic"',
-    "ask my ball does not bounce": "bounce: Dropped ball",
     STANDARD: "Every check passes",
     "show": "default 2-D (as shipped)",
     "findings --engine mujoco": "mujoco/default bounce",
