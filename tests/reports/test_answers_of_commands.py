@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from adapters import registry
 from adapters.scene import SceneError
 from reports import speed
-from reports.command import accepting, asking, benching, curing, driving, main, selection, statuses, weighing
+from reports.command import accepting, benching, curing, driving, fielding, main, selection, statuses, weighing
 from reports.cures import cure_paste
 from reports.spread import spread_lines
 from reports.wording import reproduce
@@ -206,14 +206,14 @@ def test_public_questions_are_asked_and_one_that_is_no_longer_so_is_an_alarm(mon
         return [field.Finding(note, note.said if true else "not seen", Reading(note.slot, check, 0.5, ""), None)
                 for note in chosen]  # fmt: skip
 
-    monkeypatch.setattr(asking, "ask", ask)
+    monkeypatch.setattr(fielding, "ask", ask)
     count = len(field.matching(["chipmunk"]))
     status, out, _ = said("field", "chipmunk", "--json", "--jobs", "2")
     assert (status, asked) == (0, [(count, 2)])
     assert [each["now"] == each["said"] and each["as_said"] for each in json.loads(out)] == [True] * count
     assert "--commands prints" in said("field", "chipmunk")[1]
     assert said("field", "chipmunk", "--commands")[1].count("crosscheck run") >= count
-    monkeypatch.setattr(asking, "ask", lambda chosen, jobs: ask(chosen, jobs, true=len(chosen) == 0))
+    monkeypatch.setattr(fielding, "ask", lambda chosen, jobs: ask(chosen, jobs, true=len(chosen) == 0))
     assert said("field", "chipmunk")[0] == 1
     status, out, err = said("field", "nothing", "at-all")
     assert status == 2 and "no known report has nothing or at-all" in " ".join(err)
