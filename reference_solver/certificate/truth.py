@@ -46,6 +46,7 @@ from reference_solver.certificate.audit import (
     first_without_order,
     grazes,
     shared_loads,
+    slips_taken_out,
 )
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
@@ -218,8 +219,9 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
         reasons.append("the run at half the step is no numbers")
-    # A difference of two motions that obey the laws grows as that disturbance does.
-    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * apart + grazed)
+    # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
+    slips = slips_taken_out(model, record, settings.dt)
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
     made = (

@@ -151,6 +151,18 @@ def ends_of_series(model: Model, record: Record, dt: float) -> tuple[np.ndarray,
     return run.pieces.begin[which], sums[0], sums[1]
 
 
+def slips_taken_out(model: Model, record: Record, dt: float) -> np.ndarray:
+    """Return how far (s,) a recorded run is off where slips end within pieces that stick all along [m].
+
+    The sum of all pieces that have begun (`contact.slips_taken_out`). Raises ValueError if the record has no pieces.
+    """
+    run = _run_of(model, record, dt)
+    ways = contact.slips_taken_out(run)
+    off = np.flatnonzero(ways)
+    first = np.searchsorted(record.t, run.pieces.begin[run.contact_owner[off]])
+    return np.bincount(first, ways[off], len(record.t) + 1)[: len(record.t)].cumsum()
+
+
 def first_without_order(model: Model, record: Record, dt: float) -> int | None:
     """Return the first piece of a recorded run at which the motion hangs on round-off (`chains`, `order`), if any.
 

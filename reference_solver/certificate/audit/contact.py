@@ -12,7 +12,7 @@ from reference_solver.certificate.audit.run import Run, cross, twist_of
 from reference_solver.certificate.audit.turning import SOLVED, turned_contacts, turns_beside
 from reference_solver.geometry import nearest
 from reference_solver.model import Array
-from reference_solver.pieces import ROCKING
+from reference_solver.pieces import FROZEN, ROCKING
 from reference_solver.shapes import Disc, Sphere
 
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
@@ -24,6 +24,8 @@ PARTS, LEFT, LIES = 1e-5, 2e-11, 1e-9
 SOFT_STEPS = 2.0
 #: How many times as fast as until the next sample bodies may go apart at first.
 APART = 4.0
+#: Share of mu p_n by which friction is within its cone for certain: ten times what a solve leaves of it.
+WITHIN = 1e-8
 #: Units in the last place of the largest impulse of a piece that its other impulses are known to: what is summed over
 #: the contacts of a body is rounded at that size.
 UNITS = 4.0
@@ -84,6 +86,27 @@ def left_out_by_series(run: Run, ends: NDArray[np.bool_]) -> tuple[Array, Array]
     far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
     way *= 1.0 + np.maximum(far[a], far[b])
     return rubs * way / (1.0 + e), np.maximum(*spins) * way
+
+
+def slips_taken_out(run: Run) -> Array:
+    """How far (c,) each contact is off where a slip ends within its piece, and the piece sticks all along [m].
+
+    A rebound that is held may leave a slip that loads end long before the piece ends (E22). On rows that stand still
+    the piece takes it out evenly: the slip u of its start moves the contact by half of u times the length of the piece,
+    and not by what little it slips. Friction is within its cone in such a piece. Runs whose pieces end at the same time
+    are off by the same. A point a reach r from a centre moves up to ``1 + m r^2/I`` times as far.
+    """
+    pieces, owner, n = run.pieces, run.contact_owner, run.pieces.normal
+    both = (run.meeting_velocity(after) for after in (False, True))
+    slip, left = (np.linalg.norm(u - (u * n).sum(axis=1)[:, None] * n, axis=1) for u in both)
+    pressed = (pieces.impulse * n).sum(axis=1)
+    rubs = np.linalg.norm(pieces.impulse - pressed[:, None] * n, axis=1)
+    limit = run.model.friction[pieces.body_a, pieces.body_b] * pressed
+    frozen = run.is_forces[owner] & (pieces.scheme == FROZEN)[owner]
+    ends = frozen & (left < 0.5 * slip) & (rubs < (1.0 - WITHIN) * limit)
+    far = np.where(run.free, run.mass * run.reach**2 / run.moments.min(axis=1), 0.0)
+    gain = 1.0 + np.maximum(far[pieces.body_a], far[pieces.body_b])
+    return np.where(ends, 0.5 * slip * pieces.length[owner] * gain, 0.0)
 
 
 def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]:

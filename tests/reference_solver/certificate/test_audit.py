@@ -518,3 +518,26 @@ def test_a_corner_that_slides_off_its_face_carries_nothing_there(dimension, beyo
     record = Simulation(with_table(1e-3), Settings.reference(dt)).record(steps, pieces=True)
     assert not [finding for finding in audit(with_table(1e-3), record, dt) if not finding.holds]
     assert [finding.name for finding in audit(with_table(0.0), record, dt) if not finding.holds] == ["stays"]
+
+
+@pytest.mark.parametrize(("dimension", "speed"), [(2, 0.37), (2, 5.0), (3, 1.3), (3, 5.0)])
+def test_a_ball_that_rolls_over_the_seam_of_two_boxes(dimension, speed):
+    """A corner passes below it: a millionth of a radius before it, the gap is round-off and the normal leans."""
+    r, table, across = 0.1, 2.0, (0.5,) * (dimension - 1)
+    pose = lambda x, y: (x, y, 0.0) if dimension == 2 else (x, 0.0, y, *UPRIGHT)  # noqa: E731
+    boxes = [Body(Box((table, *across)), pose=pose(x, -0.5), motion="fixed") for x in (-table, table)]
+    steps = 30
+    spin = (-speed / r,) if dimension == 2 else (0.0, speed / r, 0.0)
+    twist = (speed,) + (0.0,) * (dimension - 1) + spin
+    inertia = 0.5 * r**2 if dimension == 2 else (0.4 * r**2,) * 3
+    ball = Body(Disc(r) if dimension == 2 else Sphere(r), 1.0, inertia, pose(-speed * 20.3 * DT, r), twist)
+    model = Model(dimension, [*boxes, ball], (0.0,) * (dimension - 1) + (-G,), 0.0, 0.5)
+    record = Simulation(model, Settings.reference(DT)).record(steps, pieces=True)
+    assert not [finding for finding in audit(model, record, DT) if not finding.holds]
+    assert np.abs(record.pose[:, 2, dimension - 1] - r).max() < 1e-12
+    pieces = record.pieces
+    for tilt, seen in ((1e-8, True), (0.0, False)):
+        normal = pieces.normal.copy()
+        normal[:, 0] += tilt
+        told = audit(model, replace(record, pieces=replace(pieces, normal=normal)), DT)
+        assert ("direction" in {finding.name for finding in told if not finding.holds}) is seen
