@@ -15,6 +15,7 @@ from reports.matrix import ALARM, STYLES, Field, matrix_of
 from reports.wording import MARKS, called
 from validation.cells import Observation, Slot
 from validation.judging.rows import Row, in_order, rows_of
+from validation.posed import is_file
 from validation.records.store import Run
 
 #: Columns of a terminal that has room for three profiles below each other.
@@ -48,28 +49,34 @@ class Verdicts:
         """Take the result of a case of the plan."""
         key = _key(observation.slot)
         self._found[key][observation.slot] = observation
-        if None not in self._found[key].values():
-            self._judge(run, key)
+        keys = self._together(key)
+        if not any(None in self._found[each].values() for each in keys):
+            self._judge(run, keys)
 
     def rows(self, run: Run) -> list[Row]:
         """Rows of all cases, in the order of the plan; cases without a result are missing."""
-        for key in list(self._found):
-            self._judge(run, key)
+        while self._found:
+            self._judge(run, self._together(next(iter(self._found))))
         return in_order(self._rows, self._plan)
 
-    def _judge(self, run: Run, key: tuple[str, str]) -> None:
-        found = self._found.pop(key)
-        first = not self._rows
-        rows = rows_of(run.id, [each for each in found.values() if each is not None], found)
-        self._rows += rows
-        matrix = matrix_of({**vars(row), "dimension": 0} for row in rows)
-        fields = {profile: field for (_, (_, profile)), field in matrix.fields.items() if field.mark in MARKS}
-        if self._shown and first:
-            self._console.print(self._line(HEAD) + Text("checks by profile"), style="dim")
-        if self._shown and fields:
-            self._console.print(
-                self._line((key[0], self._names[key[1]])) + self._counts(fields), soft_wrap=True, highlight=False
-            )
+    def _together(self, key: tuple[str, str]) -> list[tuple[str, str]]:
+        """What is judged together: our own run of a scene from a file says of all engines what has two answers."""
+        return [each for each in self._found if each[1] == key[1]] if is_file(key[1]) else [key]
+
+    def _judge(self, run: Run, keys: Sequence[tuple[str, str]]) -> None:
+        found = {slot: each for key in keys for slot, each in self._found.pop(key).items()}
+        judged = rows_of(run.id, [each for each in found.values() if each is not None], found)
+        for key in keys:
+            first = not self._rows
+            rows = [row for row in judged if (row.engine, row.scene) == key]
+            self._rows += rows
+            matrix = matrix_of({**vars(row), "dimension": 0} for row in rows)
+            fields = {profile: field for (_, (_, profile)), field in matrix.fields.items() if field.mark in MARKS}
+            if self._shown and first:
+                self._console.print(self._line(HEAD) + Text("checks by profile"), style="dim")
+            if self._shown and fields:
+                line = self._line((key[0], self._names[key[1]])) + self._counts(fields)
+                self._console.print(line, soft_wrap=True, highlight=False)
 
     def _line(self, names: Sequence[str]) -> Text:
         return Text("".join(f"{name:<{wide}}" for name, wide in zip(names, self._wide, strict=True)))

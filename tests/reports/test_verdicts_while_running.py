@@ -1,12 +1,15 @@
 """Scenes are judged and shown as their cases end, with the same rows as a run that is judged as a whole."""
 
 import io
+import json
 import random
 
 import kept_run
 import pytest
+from click.testing import CliRunner
 from rich.console import Console
 
+from reports.command import main
 from reports.verdicts import Verdicts
 from validation.judging.rows import rows_of
 from validation.records.store import Store
@@ -94,3 +97,55 @@ def test_missing_cases_are_shown_with_the_rows(kept):
     assert "impact" not in text.getvalue()
     verdicts.rows(run)
     assert "missing" in text.getvalue()
+
+
+SLOT = """
+name = "rod in a slot"
+dimension = 2
+gravity = [0.0, {pull}]
+duration = 0.05
+[[bodies]]
+name = "left"
+shape = {{ type = "half_space", normal = [1.0, 0.0], offset = -0.5400332889206209 }}
+motion = "prescribed"
+twist = {slot}
+[[bodies]]
+name = "right"
+shape = {{ type = "half_space", normal = [-1.0, 0.0], offset = -0.5400332889206209 }}
+motion = "prescribed"
+twist = {slot}
+[[bodies]]
+name = "rod"
+shape = {{ type = "capsule", half_length = 0.5, radius = 0.05 }}
+mass = 1.0
+pose = [0.0, {y}, 0.2]
+twist = {rod}
+[[pairs]]
+friction = 1.0
+[[checks]]
+quantity = "rod.vy"
+value = {value}
+tolerance = 1e-4
+because = "forces within the cones hold it"
+"""
+SLOTS = {
+    "rises": {"pull": -9.81, "slot": [0.0, 1.0, 0.0], "rod": [0.0, 1.0, 0.0], "y": 0.0, "value": 1.0},
+    "turns": {"pull": 0.0, "slot": [0.0, 0.0, 2.0], "rod": [3.0, 0.0, 2.0], "y": -1.5, "value": '"3 * sin(2 * t)"'},
+}
+
+
+@pytest.mark.parametrize(("slot", "engines"), [("rises", ["chipmunk"]), ("turns", [])])
+def test_a_file_with_two_answers(tmp_path, slot, engines):
+    """Held by friction, or not: our own run and engines fall, the file states the other answer."""
+    file = tmp_path / "slot.toml"
+    file.write_text(SLOT.format(**SLOTS[slot]))
+    names = [word for engine in ["reference", *engines] for word in ("--engine", engine)]
+    done = CliRunner().invoke(main, ["run", str(file), *names, "--out", str(tmp_path / "out"), "--json", "--jobs", "1"])
+    rows = [json.loads(line) for line in (tmp_path / "out" / "rows.jsonl").read_text().splitlines()]
+    stated = [row for row in rows if row["metric"] == "final[rod.vy]"]
+    told = "two motions obey the laws from 0 s: bodies 0 and 2 may slip, or stick"
+    assert {row["engine"] for row in stated} == {"reference", *engines}
+    assert all(row["physics"] is None and row["reason"] == f"not judged: {told}" for row in stated)
+    text = " ".join(done.stderr.split())
+    assert f"How far from our own solution: {file}" in text and told in text.split("How far from our own solution")[1]
+    assert "FAIL" not in text

@@ -109,6 +109,20 @@ def test_a_slot_that_moves_wedges_a_rod_as_one_at_rest(twist):
     assert np.isinf(searched(replace(model, friction=0.1), 4).begin)
 
 
+@pytest.mark.parametrize("frame", [(0.0, 0.0), (-3.0, 20.0)])
+@pytest.mark.parametrize("spin", [-2.0, 0.5])
+def test_a_slot_that_turns_wedges_a_rod(spin, frame):
+    """About a point 1.5 m up the slot: forces within the cones hold the rod on its circle, or none press it."""
+    half, up = HALF * math.cos(0.2) + RADIUS, 1.5
+    twist = (*frame, spin)
+    walls = [
+        Body(HalfSpace((x, 0.0), -half), pose=(0.0, up, 0.0), motion="prescribed", twist=twist) for x in (1.0, -1.0)
+    ]
+    rod = Body(Capsule(HALF, RADIUS), 1.0, 0.1, (0.0, 0.0, 0.2), (frame[0] + spin * up, frame[1], spin))
+    for friction, two in ((1.0, True), (0.1, False)):
+        assert (searched(Model(2, [*walls, rod], (0.0, 0.0), 0.0, friction)).begin == 0.0) is two
+
+
 @pytest.mark.parametrize(
     ("angle", "mu", "v", "w"), [(0.9, 3.0, 1.0, 4.0), (0.9, 2.0, 1.0, 5.0), (1.0, 1.6, 2.0, 5.0), (1.05, 1.5, 2.0, 5.0)]
 )
