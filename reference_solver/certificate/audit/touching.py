@@ -59,7 +59,8 @@ def _touching(run: Run) -> list[float]:
         off = np.zeros(len(rows))
         radius = _radius(shape_a) + _radius(shape_b)
         if radius > 0.0:  # a normal's error is of second order in the gap along it, its tilt of the impulse is not
-            off = np.minimum(_off(n, found.normal), _off(n, _line(found, radius))) - noise / radius
+            either = (np.linalg.norm(n - m, axis=1) for m in (found.normal, _line(found, radius)))
+            off = np.minimum(*either) - noise / radius
         sooner, cornered = 0.0, is_cornered((shape_a, shape_b))
         if cornered:
             off = strayed(n, (shape_a, shape_b), (pose_a, pose_b), found)
@@ -90,10 +91,6 @@ def _line(found: Nearest, radius: float) -> Array:
     line = found.point_b - found.point_a + radius * found.normal
     length = np.linalg.norm(line, axis=1, keepdims=True)
     return np.asarray(np.where(length > 0.0, line / np.where(length > 0.0, length, 1.0), found.normal))
-
-
-def _off(one: Array, other: Array) -> Array:
-    return np.asarray(np.linalg.norm(one - other, axis=1))
 
 
 def _opened(
