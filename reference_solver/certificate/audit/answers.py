@@ -273,21 +273,23 @@ def all_answers(problem: Problem) -> list[Array]:
         _enter(found, _fitting(problem, impulse[sure], closed[sure], sticks[sure], slip[sure]))
     else:
         _enter(found, _newton(problem, np.concatenate([impulse[~redundant], problem.given[None]])))
-    # Redundant contacts that slip fit also with less of them closed. Those that stick need not: they can be wedged.
-    redundant &= sticks.any(axis=1) & (sticks | ~closed | ~chooses).all(axis=1)
+    # Redundant contacts that all slip fit also with less of them closed, or as one of them begins to stick. Those that
+    # stick need not: they can be wedged.
+    redundant &= sticks.any(axis=1)
     if not _is_linear(problem):
-        redundant &= closed.all(axis=1)
+        redundant &= closed.all(axis=1) & (sticks | ~chooses).all(axis=1)
     for k in np.flatnonzero(redundant):
-        if not any(_is_of_mode(u, closed[k], sticks[k]) for u in found):
+        if not any(_is_of_mode(u, closed[k], sticks[k], slip[k]) for u in found):
             _enter(found, _of_redundant(problem, closed[k], sticks[k], slip[k]))
     return found
 
 
-def _is_of_mode(u: Array, closed: NDArray[np.bool_], sticks: NDArray[np.bool_]) -> bool:
-    """Whether an answer (c, d) is one of a mode without slip of a chosen direction: another one is no second."""
+def _is_of_mode(u: Array, closed: NDArray[np.bool_], sticks: NDArray[np.bool_], slip: Array) -> bool:
+    """Whether an answer (c, d) is one of a redundant mode in which a contact sticks: another one is no second."""
     size = TWO * max(1.0, float(np.abs(u).max()))
     stays = np.where(closed, u[:, 0] <= SAME * size, u[:, 0] > size)
-    return bool(stays.all() and np.abs(u[sticks, 1:]).max(initial=0.0) <= SAME * size)
+    moves = (u[:, 1:] * slip).sum(axis=1)[slip.any(axis=1)]
+    return bool(stays.all() and np.abs(u[sticks, 1:]).max(initial=0.0) <= SAME * size and (moves > size).all())
 
 
 def _enter(found: list[Array], velocities: Array) -> None:

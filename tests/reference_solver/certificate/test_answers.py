@@ -9,6 +9,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
 from reference_solver.certificate.audit import Answers, answers
@@ -137,6 +138,41 @@ def test_a_sliding_end_that_lifts_off_or_jams(angle, mu, v, w):
     found = searched(model)
     assert found.begin == 0.0 and found.told == "bodies 0 and 1 may part, or stay in contact"
     assert np.isinf(searched(replace(model, friction=0.5)).begin)
+
+
+def struck_by_walls(seed):
+    """A disc that three walls strike at once, e = .5, and at how many of them impulses by Coulomb may stop its slip.
+
+    Three normals in a plane share their impulses in more than one way. The disc leaves with -e v; its spin hangs on
+    where it sticks. A linear program asks for impulses: those of the others rub against their slips.
+    """
+    rng, r, m, inertia, e = np.random.default_rng(seed), 0.25, 2.0, 0.05, 0.5
+    normals = [np.array([math.cos(a), math.sin(a)]) for a in rng.uniform(-math.pi, math.pi, 3)]
+    friction, (vx, vy, w) = rng.uniform(0.2, 1.2, 3), rng.uniform(-1.0, 1.0, 3) * (2.0, 2.0, 6.0)
+    v, across = np.array([vx, vy]), np.array([axes(n)[1] for n in normals])
+    if any(v @ n > -0.1 for n in normals):
+        return None
+    stops = 0
+    after = -e * across @ v
+    for i in range(3):
+        spin = after[i] / r  # the point of contact moves along a tangent with v.t - r w
+        ways = np.sign(after - r * spin)
+        rubs = [[0.0] if j == i else [-friction[j] * ways[j]] for j in range(3)]
+        rubs[i] = [friction[i], -friction[i]]  # edges of its cone, of which any sum
+        edges = [(*(normals[j] + rub * across[j]), -r * rub) for j in range(3) for rub in rubs[j]]
+        change = (*(-(1.0 + e) * m * v), inertia * (spin - w))
+        done = linprog(np.ones(4), A_eq=np.array(edges).T, b_eq=change, bounds=(1e-3, None))
+        stops += done.status == 0
+    table = np.zeros((4, 4))
+    table[3, :3] = table[:3, 3] = friction
+    walls = [Body(HalfSpace(tuple(n), -r), motion="fixed") for n in normals]
+    disc = Body(Disc(r), m, inertia, (0.0, 0.0, 0.0), (vx, vy, w))
+    return stops, Model(2, [*walls, disc], (0.0, 0.0), e, table)
+
+
+def test_discs_that_stop_spinning_at_one_of_several_walls():
+    found = [searched(drawn[1]).begin for seed in range(700, 1300) if (drawn := struck_by_walls(seed)) and drawn[0] > 1]
+    assert len(found) > 8 and not any(found)
 
 
 def test_a_random_scene_whose_blow_has_three_answers():
