@@ -275,13 +275,22 @@ def all_answers(problem: Problem) -> list[Array]:
         _enter(found, _newton(problem, np.concatenate([impulse[~redundant], problem.given[None]])))
     # Redundant contacts that all slip fit also with less of them closed, or as one of them begins to stick. Those that
     # stick need not: they can be wedged.
-    redundant &= sticks.any(axis=1)
+    redundant &= sticks.any(axis=1) & _agree(problem, closed, sticks, slip)
     if not _is_linear(problem):
         redundant &= closed.all(axis=1) & (sticks | ~chooses).all(axis=1)
     for k in np.flatnonzero(redundant):
         if not any(_is_of_mode(u, closed[k], sticks[k], slip[k]) for u in found):
             _enter(found, _of_redundant(problem, closed[k], sticks[k], slip[k]))
     return found
+
+
+def _agree(problem: Problem, closed: NDArray[np.bool_], sticks: NDArray[np.bool_], slip: Array) -> NDArray[np.bool_]:
+    """Whether (m,) closed contacts with one velocity along their tangents, as of one face, do the same."""
+    rows = np.concatenate([problem.matrix[:, 1].reshape(len(problem.mu), -1), problem.free[:, 1:2]], axis=1)
+    rows /= np.linalg.norm(rows, axis=1)[:, None]
+    i, j = np.nonzero(np.triu(np.abs(rows[:, None] - rows).max(axis=2) <= ALIKE, 1))
+    differs = (sticks[:, i] != sticks[:, j]) | (slip[:, i] != slip[:, j]).any(axis=2)
+    return np.asarray(~(differs & closed[:, i] & closed[:, j]).any(axis=1))
 
 
 def _is_of_mode(u: Array, closed: NDArray[np.bool_], sticks: NDArray[np.bool_], slip: Array) -> bool:
