@@ -28,7 +28,7 @@ njit: Any = numba.njit
 
 
 #: What stands beside the solver and holds no kernel: an edit there compiles nothing anew.
-WITHOUT_KERNELS = ("certificate", "verification", "geometry.py", "piles.py")
+WITHOUT_KERNELS = ("certificate", "exact", "verification", "geometry.py", "piles.py")
 #: The one folder in there whose functions are compiled.
 WITH_KERNELS = ("verification", "event_driven")
 
@@ -46,7 +46,7 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _base_folder() -> Path:
+def base_folder() -> Path:
     """Folder for caches: ``NUMBA_CACHE_DIR`` where set, else the user's cache folder."""
     if config.CACHE_DIR:
         return Path(config.CACHE_DIR)
@@ -58,7 +58,7 @@ def _base_folder() -> Path:
 def cache_folder() -> Path | None:
     """Return the folder for this state of the sources, created and proved writable; None if there is none."""
     try:
-        folder = _base_folder() / f"kernels-{source_hash()}"
+        folder = base_folder() / f"kernels-{source_hash()}"
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
-Scheme = Literal["fixed", "located", "midpoint"]
+Scheme = Literal["fixed", "located", "midpoint", "exact"]
 
 #: Difference of both orders of a phase, as a share of the motion in it: mostly 50 to 1000 times the error that is made.
 ACCURACY = 1e-8
+#: Error that a step of the event loop may make where contacts turn, as a share of the motion in it.
+TOLERANCE = 1e-11
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,11 @@ class Settings:
     scheme
         ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
         steps are cut where bodies meet and where a slide ends (E19 to E24). ``midpoint``: located impacts, and phases
-        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28).
+        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28). ``exact``: the loop
+        of events of `reference_solver.exact`, in which ``dt`` only says when to look.
     accuracy
-        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35).
+        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35);
+        with ``exact`` the tolerance of the Runge-Kutta method there.
 
     Raises
     ------
@@ -87,9 +91,7 @@ class Settings:
         _require("beta", self.beta, 0.0 < self.beta <= 1.0, "in (0, 1]")
         _require("slop", self.slop, math.isfinite(self.slop) and self.slop >= 0.0, "a length of at least 0")
         _require("solver", self.solver, self.solver in ("scalar", "block"), "'scalar' or 'block'")
-        _require(
-            "scheme", self.scheme, self.scheme in ("fixed", "located", "midpoint"), "'fixed', 'located' or 'midpoint'"
-        )
+        _require("scheme", self.scheme, self.scheme in get_args(Scheme), f"one of {', '.join(get_args(Scheme))}")
         if self.scheme != "fixed":
             allowed = ("split", "none")
             _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
@@ -126,6 +128,11 @@ class Settings:
     def reference(cls, dt: float) -> Settings:
         """Return contact problems solved to round-off, in steps that are cut where bodies meet and slides end."""
         return replace(cls.fixed_step(dt), scheme="located")
+
+    @classmethod
+    def exact(cls, dt: float, tolerance: float = TOLERANCE) -> Settings:
+        """Return the loop of events, which will be `reference`; ``dt`` only says when to look."""
+        return replace(cls.fixed_step(dt), scheme="exact", accuracy=tolerance)
 
     @classmethod
     def fixed_step(cls, dt: float) -> Settings:

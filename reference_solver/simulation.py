@@ -64,8 +64,9 @@ STEPS_PER_JOURNAL = 64
 #: What is counted of a run that is not certified.
 UNCERTIFIED = ("sweeps", "worst_sweeps", "projected")
 
-#: Package of each dimension, imported when first used: loading kernels costs time.
+#: Package of each dimension, imported when first used: loading kernels costs time. The event loop serves both.
 WORLDS = {2: "reference_solver.planar", 3: "reference_solver.spatial"}
+EVENT_LOOP = "reference_solver.exact"
 
 
 class Simulation:
@@ -88,7 +89,7 @@ class Simulation:
         self.model = model
         self.settings = settings
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
-        package = import_module(WORLDS[model.dimension])
+        package = import_module(EVENT_LOOP if settings.scheme == "exact" else WORLDS[model.dimension])
         self._certified = certified or settings.residual is not None or settings.scheme != "fixed"
         self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0

@@ -63,7 +63,8 @@ def test_what_the_hash_leaves_out_compiles_nothing():
         assert found
         for path in found:
             if path.relative_to(folder).parts[:2] != compilation.WITH_KERNELS:
-                assert "reference_solver.compilation" not in path.read_text(), path
+                text = path.read_text().replace("from reference_solver.compilation import base_folder\n", "")
+                assert "reference_solver.compilation" not in text, path  # the event loop has folders of its own
 
 
 def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):

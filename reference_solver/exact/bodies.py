@@ -1,0 +1,214 @@
+"""Bodies as arrays shaped by the dimension, and the state that the loop changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.exact.rotation import GENERATORS, turned
+from reference_solver.exact.shapes import Core, core
+from reference_solver.geometry import rotation
+from reference_solver.model import Array, Model
+from reference_solver.pieces import Indices
+from reference_solver.shapes import smallest_extent
+
+
+class Bodies(NamedTuple):
+    """What does not change: n bodies in d dimensions with s spins each, as kernels read them.
+
+    Features are told in body axes. Rows beyond a body's own number of points, faces or lines are zeros.
+
+    Parameters
+    ----------
+    point, points
+        (n, p, d) corners of the cores, and how many there are (n,).
+    normal, offset, faces
+        (n, f, d) and (n, f): a core lies in ``normal . x <= offset`` of all its faces (n,).
+    side, limit, sides
+        (n, f, k, d) and (n, f, k): a place is over a face where ``side . x <= limit`` for all sides (n, f).
+    line, lines
+        (n, l, 2) numbers of the points that edges join, and how many there are (n,).
+    radius, reach
+        (n,) what cores are grown by; distance of the farthest point of a core from its centre [m].
+    free
+        (n,) whether loads and contacts move a body.
+    inverse_mass, moment
+        (n,) [1/kg] and (n, s) principal moments [kg m^2]; zero and infinite unless free.
+    load
+        (n, d + s) acceleration by gravity, force and torque in world axes; a torque in space is divided later.
+    torque
+        (n, s) in world axes [N m].
+    generator
+        (s, d, d): under a spin w a point r has the velocity ``sum_k w_k E_k r``.
+    """
+
+    point: Array
+    points: Indices
+    normal: Array
+    offset: Array
+    faces: Indices
+    side: Array
+    limit: Array
+    sides: Indices
+    line: Indices
+    lines: Indices
+    radius: Array
+    reach: Array
+    free: Indices
+    inverse_mass: Array
+    moment: Array
+    load: Array
+    torque: Array
+    generator: Array
+
+
+@dataclass
+class State:
+    """Where bodies are and how they move, at the time ``t`` [s].
+
+    Parameters
+    ----------
+    place, orientation
+        (n, d) [m] and (n, 1 | 4).
+    velocity
+        (n, d + s) twists in world axes.
+    """
+
+    t: float
+    place: Array
+    orientation: Array
+    velocity: Array
+
+    def __post_init__(self) -> None:
+        self._axes: Array | None = None
+
+    @property
+    def axes(self) -> Array:
+        """(n, d, d): columns are the body axes."""
+        if self._axes is None:
+            self._axes = np.ascontiguousarray(rotation(self.pose))
+        return self._axes
+
+    @property
+    def pose(self) -> Array:
+        """(n, 3 | 7)."""
+        return np.concatenate([self.place, self.orientation], axis=1)
+
+    def moved(self, way: Array) -> State:
+        """Return the state after displacements and turns (n, d + s)."""
+        d = self.place.shape[1]
+        return State(self.t, self.place + way[:, :d], turned(self.orientation, way[:, d:]), self.velocity)
+
+
+@dataclass(frozen=True)
+class World:
+    """A model as the loop reads it: its bodies, the laws of their pairs, and lengths that round-off is measured by.
+
+    Parameters
+    ----------
+    restitution, friction
+        (n, n).
+    size
+        Smallest half width of a body [m].
+    weight
+        Largest acceleration by loads [m/s^2, rad/s^2], and 1e-3 at least.
+    """
+
+    bodies: Bodies
+    restitution: Array
+    friction: Array
+    size: float
+    weight: float
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.bodies.generator.shape[1]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Bodies, and numbers of a twist."""
+        n, q = self.bodies.load.shape
+        return n, q
+
+
+def world_of(model: Model) -> World:
+    """Return a model as arrays."""
+    d = model.dimension
+    generator = GENERATORS[d]
+    n, s = len(model.bodies), len(generator)
+    cores = [core(body.shape, d) for body in model.bodies]
+    free = [body.motion == "free" for body in model.bodies]
+    load, torque = np.zeros((n, d + s)), np.zeros((n, s))
+    moment = np.full((n, s), np.inf)
+    for i, body in enumerate(model.bodies):
+        if free[i]:
+            moment[i] = body.inertia
+            load[i, :d] = np.array(model.gravity) + np.array(body.force if body.force is not None else 0.0) / body.mass
+            torque[i] = body.torque if body.torque is not None else 0.0
+    if s == 1:
+        load[:, d:] = torque / moment
+    extents = [smallest_extent(body.shape) for body in model.bodies]
+    size = min((each for each in extents if np.isfinite(each)), default=1.0)
+    side, limit, sides = _sides(cores, d)
+    bodies = Bodies(
+        _table([c.points for c in cores], d),
+        _counts([c.points for c in cores]),
+        _table([c.normals for c in cores], d),
+        _table([c.offsets for c in cores], None),
+        _counts([c.offsets for c in cores]),
+        side,
+        limit,
+        sides,
+        _table([c.lines for c in cores], 2).astype(np.int64),
+        _counts([c.lines for c in cores]),
+        np.array([c.radius for c in cores]),
+        np.array([c.reach for c in cores]),
+        np.array(free, np.int64),
+        np.array([1.0 / body.mass if body.motion == "free" else 0.0 for body in model.bodies]),
+        moment,
+        load,
+        torque,
+        generator,
+    )
+    weight = max(1e-3, float(np.abs(load).max()), float(np.abs(torque / moment).max()))
+    return World(bodies, np.array(model.restitution), np.array(model.friction), size, weight)
+
+
+def start_of(model: Model) -> State:
+    """Return the state at the start."""
+    d = model.dimension
+    pose = np.array([body.pose for body in model.bodies], float)
+    s = len(GENERATORS[d])
+    twist = [body.twist if body.twist is not None else (0.0,) * (d + s) for body in model.bodies]
+    return State(0.0, pose[:, :d], pose[:, d:], np.array(twist, float))
+
+
+def _table(rows: Sequence[NDArray[Any]], width: int | None) -> Array:
+    """Rows of every body in one table, zeros behind them."""
+    most = max([1, *(len(each) for each in rows)])
+    table = np.zeros((len(rows), most) if width is None else (len(rows), most, width))
+    for own, each in zip(table, rows, strict=True):
+        own[: len(each)] = each
+    return table
+
+
+def _counts(rows: Sequence[NDArray[Any]]) -> Indices:
+    return np.array([len(each) for each in rows])
+
+
+def _sides(cores: Sequence[Core], d: int) -> tuple[Array, Array, Indices]:
+    most = max([1, *(len(c.sides[f]) for c in cores for f in range(len(c.normals)))])
+    faces = max([1, *(len(c.normals) for c in cores)])
+    side, limit = np.zeros((len(cores), faces, most, d)), np.zeros((len(cores), faces, most))
+    count = np.zeros((len(cores), faces), np.int64)
+    for i, each in enumerate(cores):
+        for f in range(len(each.normals)):
+            for k, (normal, end) in enumerate(each.sides[f]):
+                side[i, f, k], limit[i, f, k] = normal, end
+            count[i, f] = len(each.sides[f])
+    return side, limit, count

@@ -1,0 +1,141 @@
+"""Which contacts hold, stick and slip: by complementary pivots in the plane, by sweeps over cones in space."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from reference_solver.exact.kernels.cones import JAMMED, UNCONVERGED, sweep
+from reference_solver.exact.refusals import Refused, Unconverged
+from reference_solver.model import Array
+
+
+class NoSolution(Refused):
+    """No forces or impulses exist; whoever asked knows what that means."""
+
+    sentence = "a contact problem has no solution"
+
+
+class Cone(ABC):
+    """How friction limits forces: an interval of each load in the plane, a disc in space."""
+
+    @staticmethod
+    def of(dimension: int) -> Cone:
+        """Return that of a dimension."""
+        return PlanarCone() if dimension == 2 else SpatialCone()
+
+    @abstractmethod
+    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
+        """Return forces p (m d,) that obey the laws of ``u = yields @ p + free``, to about 1e-9.
+
+        Parameters
+        ----------
+        slips
+            (m, d - 1) directions of contacts that slip already, zeros elsewhere.
+
+        Raises
+        ------
+        NoSolution, Unconverged
+            If there are none, or none is found.
+        """
+
+
+class PlanarCone(Cone):
+    """Friction in two directions of either sign: a linear complementarity problem (Stewart and Trinkle, E45)."""
+
+    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
+        """See `Cone.solved`."""
+        m, slip = len(friction), slips[:, 0]
+        # Every contact as stiff as any: ties of pivots are then told from round-off.
+        stiff = np.maximum(np.diag(yields)[::2], np.diag(yields)[1::2])
+        scale = np.repeat(1.0 / np.sqrt(stiff), 2)
+        matrix, wanted = scale[:, None] * yields * scale, scale * free
+        size = max(float(np.abs(wanted).max()), 1e-300)
+        rubs = np.flatnonzero((slip == 0.0) & (friction > 0.0))
+        n, k = 2 * np.arange(m), len(rubs)
+        # Forces by unknowns: loads, with the friction of slips; friction onward and backward of what may stick.
+        by = np.zeros((2 * m, m + 2 * k))
+        by[n, np.arange(m)] = 1.0
+        by[n + 1, np.arange(m)] = -friction * slip
+        by[2 * rubs + 1, m + np.arange(k)], by[2 * rubs + 1, m + k + np.arange(k)] = 1.0, -1.0
+        speeds = np.concatenate([n, 2 * rubs + 1])
+        rates = matrix[speeds] @ by
+        total = m + 3 * k
+        table, right = np.zeros((total, total)), np.zeros(total)
+        table[: m + k, : m + 2 * k], right[: m + k] = rates, wanted[speeds] / size
+        table[m + k : m + 2 * k, : m + 2 * k], right[m + k : m + 2 * k] = -rates[m:], -wanted[2 * rubs + 1] / size
+        slip_rows = np.arange(k)
+        table[m + slip_rows, m + 2 * k + slip_rows] = table[m + k + slip_rows, m + 2 * k + slip_rows] = 1.0
+        table[m + 2 * k + slip_rows, rubs] = friction[rubs]
+        table[m + 2 * k + slip_rows, m + slip_rows] = table[m + 2 * k + slip_rows, m + k + slip_rows] = -1.0
+        for attempt in range(6):  # pivots that round-off spoils: by another way
+            cover = np.asarray(1.0 + attempt * (0.37 + 0.61 * np.arange(total)) % 1.7, np.float64)
+            found = complementary(table, right, cover)
+            if found is not None and _solves(table, right, found):
+                return np.asarray(scale * (by @ found[: m + 2 * k]) * size)
+        raise NoSolution
+
+
+def _solves(table: Array, right: Array, found: Array) -> bool:
+    slack = table @ found + right
+    least = min(found.min(), slack.min())
+    return bool(least > -1e-9 and np.abs(found * slack).max() < 1e-9 * max(1.0, found.max() ** 2))
+
+
+def complementary(table: Array, right: Array, cover: Array) -> Array | None:
+    """Return z >= 0 with ``w = table @ z + right >= 0`` and ``z . w = 0``; None where a ray is found.
+
+    C. Lemke, *Management Science* 11, 1965, with the artificial column ``cover``; ties are broken in lexicographic
+    order (B. Eaves, *Management Science* 17, 1971), so that no basis comes again.
+    """
+    n = len(right)
+    if right.min() >= 0.0:
+        return np.zeros(n)
+    tableau = np.column_stack([np.eye(n), -table, -cover, right])
+    basis = np.arange(n)
+    row, enters = int(np.argmin(right / cover)), 2 * n
+    for _ in range(50 * n + 50):
+        leaves = int(basis[row])
+        tableau[row] /= tableau[row, enters]
+        others = tableau[:, enters].copy()
+        others[row] = 0.0
+        tableau -= np.outer(others, tableau[row])
+        basis[row] = enters
+        if leaves == 2 * n:
+            found = np.zeros(2 * n)
+            found[basis] = tableau[:, -1]
+            return found[n:]
+        enters = leaves + n if leaves < n else leaves - n
+        column = tableau[:, enters]
+        may = np.flatnonzero(column > 1e-11 * np.abs(column).max())
+        if not len(may):
+            return None
+        ratios = tableau[may, -1] / column[may]
+        tied = may[ratios <= ratios.min() + 1e-13]
+        artificial = tied[basis[tied] == 2 * n]
+        if len(artificial):
+            row = int(artificial[0])
+            continue
+        rows = tableau[tied, :n] / column[tied, None]
+        k = 0
+        while len(tied) > 1 and k < n:
+            least = rows[:, k] <= rows[:, k].min() + 1e-13
+            tied, rows, k = tied[least], rows[least], k + 1
+        row = int(tied[0])
+    return None
+
+
+class SpatialCone(Cone):
+    """Friction within a disc: contacts are solved one after the other until none changes (Gauss-Seidel, E11)."""
+
+    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
+        """See `Cone.solved`."""
+        size = max(float(np.abs(free).max()), 1e-300)
+        found = np.zeros(len(free))
+        ended = sweep(yields, free / size, friction, slips, found)
+        if ended == UNCONVERGED:
+            raise Unconverged(count=len(friction))
+        if ended == JAMMED:
+            raise NoSolution
+        return size * found

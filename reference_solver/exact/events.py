@@ -1,0 +1,155 @@
+"""The first event of a piece: a contact ends, or bodies meet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from reference_solver.exact.bodies import World
+from reference_solver.exact.features import margins, width_of_margins
+from reference_solver.exact.forces import NONE, SLIPPING
+from reference_solver.exact.meeting import next_meeting
+from reference_solver.exact.motion import Piece, free_acceleration
+from reference_solver.exact.problem import OPEN, SLIP, STICK
+from reference_solver.model import Array
+
+#: Shares at which monitors are looked at: of a step, and of a piece of any length, whose beginning counts.
+OF_STEP, OF_CONSTANT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1e-6, *np.linspace(0.125, 1.0, 8))
+#: Margins and speeds that are round-off, as a share of the smallest half width, and in m/s.
+MARGIN, SPEED = 1e-12, 1e-12
+
+
+class Kind(Enum):
+    """What happens at the end of a piece."""
+
+    LOOK = "nothing: it is as long as it may be"
+    FEATURE = "a contact comes to the end of a feature"
+    SLIDE = "a slide ends"
+    LIFT = "a load ends"
+    SLIP = "friction has no more to give"
+    MEET = "bodies meet"
+
+
+@dataclass(frozen=True)
+class Event:
+    """The end of a piece.
+
+    Parameters
+    ----------
+    kind
+        What happens.
+    share
+        At which share of the piece.
+    contact
+        Number of the contact that it happens to, -1 for none.
+    left
+        Contacts whose feature ends where the piece begins.
+    modes
+        By number of contact: modes that end where the piece begins, and what they become.
+    """
+
+    kind: Kind
+    share: float
+    contact: int = -1
+    left: frozenset[tuple[int, ...]] = frozenset()
+    modes: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def at_start(self) -> bool:
+        """Whether the piece cannot begin like this."""
+        return bool(self.left or self.modes)
+
+
+class Monitors:
+    """What must not fall below zero while a piece lasts: margins of features, slips onward, loads, friction left."""
+
+    def __init__(self, world: World, piece: Piece) -> None:
+        self._world, self._piece, self._contacts, self._answer = world, piece, piece.held.contacts, piece.held.answer
+        self.width = width_of_margins(world)
+        modes, directions = self._answer.modes, self._answer.directions
+        self._slips = (modes == SLIP) & (np.abs(directions).max(axis=1, initial=0.0) > 0.0)
+        # A slip that may turn ends where hardly anything is left of it; one that begins may have less.
+        begun = np.linalg.norm(self._contacts.at_state(piece.start).rows.speed[:, 1:], axis=1)
+        self._ended = np.minimum(SLIPPING, 0.5 * begun)
+        count = len(modes)
+        self.noise = np.full((count, self.width + 3), MARGIN * world.size)
+        self.noise[:, self.width] = SPEED
+        self.noise[:, self.width + 1 :] = NONE * (1e-3 + np.abs(self._answer.forces[:, :1]).max(initial=0.0))
+
+    def __call__(self, share: float) -> Array:
+        """Return the monitors (m, width + 3) at a share of the piece."""
+        place, axes, velocity = self._piece.at(share)
+        held, answer = self._piece.held, self._answer
+        if self._piece.turns:
+            held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
+            forces = held.forces
+            load = forces[:, 0]
+            left = self._contacts.friction * load - np.linalg.norm(forces[:, 1:], axis=1)
+            grip = np.where(answer.modes == STICK, left, np.inf)
+        else:  # forces do not change
+            self._contacts.at(place, axes, velocity)
+            load = grip = np.full(len(answer.modes), np.inf)
+        slip = self._contacts.rows.speed[:, 1:]
+        if self._piece.turns and slip.shape[1] > 1:
+            slip = np.linalg.norm(slip, axis=1) - self._ended
+        else:
+            slip = (slip * answer.directions).sum(axis=1)
+        ends = margins(self._world, place, axes, self._contacts.features)
+        return np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
+
+    def kind(self, column: int) -> Kind:
+        """Return what happens where a column falls below zero."""
+        return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
+
+
+def first_event(world: World, piece: Piece) -> Event:
+    """Return the first event of a piece; where something ends as the piece begins, that alone."""
+    event = Event(Kind.LOOK, 1.0)
+    if len(piece.held.contacts):
+        event = _first_end(piece, Monitors(world, piece))
+        piece.held.contacts.at_state(piece.start)
+    if event.at_start:
+        return event
+    meeting = next_meeting(world, piece, piece.held.contacts)
+    if meeting.share < event.share:
+        return Event(Kind.LOOK if meeting.stopped else Kind.MEET, meeting.share)
+    return event
+
+
+def _first_end(piece: Piece, monitors: Monitors) -> Event:
+    shares = OF_STEP if piece.turns else OF_CONSTANT
+    event, left, modes = Event(Kind.LOOK, 1.0), set(), {}
+    before = monitors(shares[0])
+    for last, now in pairwise(shares):
+        values = monitors(now)
+        for k, column in np.argwhere(values < -monitors.noise).tolist():
+            kind = monitors.kind(column)
+            if before[k, column] > monitors.noise[k, column]:
+                share = brentq(_component(monitors, k, column), last, now, xtol=1e-16, rtol=1e-15)
+            elif last > 0.0:
+                share = last
+            else:  # it is at its end from the beginning
+                if kind is Kind.FEATURE:
+                    left.add(tuple(piece.held.contacts.features[k].tolist()))
+                elif kind is not Kind.SLIDE:
+                    modes[k] = OPEN if kind is Kind.LIFT else SLIP
+                elif values[k, column] < -1e-9:
+                    modes.setdefault(k, STICK)
+                continue
+            if share < event.share:
+                event = Event(kind, share, k)
+        if left or modes:
+            return Event(event.kind, event.share, event.contact, frozenset(left), tuple(modes.items()))
+        if event.kind is not Kind.LOOK:
+            return event
+        before = values
+    return event
+
+
+def _component(monitors: Monitors, k: int, column: int) -> Callable[[float], float]:
+    return lambda share: float(monitors(share)[k, column])

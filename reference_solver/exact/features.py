@@ -1,0 +1,70 @@
+"""What touches: pairs of features, one of each body, and how far each pair is from its ends.
+
+A contact is a row (a, b, kind on a, number, kind on b, number) with a < b. A kind is `POINT`, `LINE` or `FACE`; of two
+features one is a point, or both are lines. Cores that touch have a common supporting plane. So a pair of features
+touches where its gap is none, its place lies within both features, and no other point of either body lies beyond the
+feature along the normal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.kernels.features import place_features, touching, write_margins
+from reference_solver.model import Array
+from reference_solver.pieces import Indices
+
+#: Gaps below this share of the smallest half width are closed, and places as near to an end are at it (E8). A contact
+#: that is projected has 1e-15.
+TOUCH = 1e-11
+#: Cores may be this deep in each other along a face that touches; along other faces they are far deeper.
+DEEP = 1e-3
+#: Room for the contacts of a world.
+MOST_CONTACTS = 2048
+
+
+def width_of_margins(world: World) -> int:
+    """Return how many margins a contact can have."""
+    return max(world.bodies.side.shape[2], 4 + 2 * world.bodies.point.shape[1])
+
+
+def features_of(world: World, place: Array, axes: Array) -> tuple[Array, Array]:
+    """Return points (n, p, d) and face normals (n, f, d) in world axes."""
+    point, normal = np.zeros(world.bodies.point.shape), np.zeros(world.bodies.normal.shape)
+    place_features(world.bodies, place, axes, point, normal)
+    return point, normal
+
+
+def margins(world: World, place: Array, axes: Array, features: Indices) -> Array:
+    """Return how far contacts are from the ends of their features (m, width) [m]."""
+    out = np.zeros((len(features), width_of_margins(world)))
+    write_margins(world.bodies, place, axes, features_of(world, place, axes), features, out)
+    return out
+
+
+def find(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Indices:
+    """Return the contacts (m, 6) of a state: each place once, without features that are left at once.
+
+    Parameters
+    ----------
+    left
+        Contacts whose features are known to end here.
+    """
+    tol = TOUCH * world.size
+    found = np.zeros((MOST_CONTACTS, 6), np.int64)
+    placed = features_of(world, state.place, state.axes)
+    count = touching(world.bodies, state.place, state.axes, placed, found, np.array([tol, DEEP * world.size]))
+    found = found[:count]
+    if not count:
+        return found
+    out = np.array([tuple(each) in left for each in found.tolist()])
+    margin = margins(world, state.place, state.axes, found)
+    at_end = margin < tol
+    if at_end.any():
+        # A place at an end that moves out: seen after a moment in which it moves by 1e-7 of a half width at most.
+        moment = 1e-7 * world.size / (1e-9 + np.abs(state.velocity).max())
+        later = state.moved(moment * state.velocity)
+        falls = margins(world, later.place, later.axes, found) < margin - 1e-12 * world.size
+        out |= (at_end & falls).any(axis=1)
+    return found[~out]

@@ -1,0 +1,163 @@
+"""Forces at an instant: which contacts hold, stick and slip, and what bodies do under them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.problem import OPEN, SLIP, STICK, Answer, Problem, nothing
+from reference_solver.exact.rows import Contacts
+from reference_solver.model import Array
+
+#: Speeds below this are none [m/s], and slips below this have no direction.
+STILL, SLIPPING = 1e-10, 1e-9
+#: Share of the largest load or acceleration that is round-off where a mode ends, and one that is a breach of a law.
+NONE = 1e-9
+
+
+@dataclass
+class Held:
+    """Closed contacts with their modes and forces, and how bodies accelerate under them.
+
+    Parameters
+    ----------
+    contacts
+        All of them closed.
+    answer
+        Modes, directions of slips and forces.
+    acceleration
+        (n, q) of all bodies.
+    """
+
+    contacts: Contacts
+    answer: Answer
+    acceleration: Array
+
+    @property
+    def pressure(self) -> Array:
+        """(n, q): how much forces of contacts accelerate bodies along any axis, added up without their signs."""
+        if not len(self.contacts):
+            return np.zeros(self.acceleration.shape)
+        d = self.contacts.world.dimension
+        added = np.abs(self.contacts.matrices[1]) @ np.abs(self.answer.forces.ravel())
+        found = added.reshape(self.acceleration.shape)
+        found[:, :d], found[:, d:] = (part.max(axis=1, keepdims=True) for part in (found[:, :d], found[:, d:]))
+        return np.asarray(found)
+
+    def follow(self, place: Array, axes: Array, velocity: Array, free: Array) -> Array:
+        """Return accelerations (n, q) with the modes held at another state, and keep the forces there."""
+        if not len(self.contacts):
+            return free
+        contacts = self.contacts.at(place, axes, velocity)
+        self.forces = self._solved(contacts, free)
+        return free + (contacts.matrices[1] @ self.forces.ravel()).reshape(free.shape)
+
+    def at(self, state: State, free: Array) -> Held:
+        """Return the same contacts and modes with forces and accelerations at another state."""
+        acceleration = self.follow(state.place, state.axes, state.velocity, free)
+        found = Held(self.contacts, replace(self.answer, forces=self.forces), acceleration)
+        return found
+
+    def _solved(self, contacts: Contacts, free: Array) -> Array:
+        answer, d = self.answer, contacts.world.dimension
+        directions = answer.directions
+        if d == 3:
+            slip = contacts.rows.speed[:, 1:]
+            speed = np.linalg.norm(slip, axis=1)
+            turns = (answer.modes == SLIP) & (speed > SLIPPING)
+            directions = np.where(turns[:, None], slip / np.where(turns, speed, 1.0)[:, None], directions)
+        problem = Problem.of(contacts, contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel(), directions)
+        rows, columns = problem.equations(answer.modes, directions)
+        matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]
+        if self._is_redundant(matrix):
+            found = problem.with_modes(answer.modes, directions, answer.forces)
+            return answer.forces if found is None else found.forces
+        return problem.spread(answer.modes, directions, rows, np.asarray(np.linalg.solve(matrix, wanted), np.float64))
+
+    def _is_redundant(self, matrix: Array) -> bool:
+        """Whether loads can be shared: asked once for all of a piece."""
+        if not hasattr(self, "_redundant"):
+            values = np.linalg.svd(matrix, compute_uv=False)
+            self._redundant = bool(values[-1] < 1e-9 * values[0])
+        return self._redundant
+
+
+def accelerations(contacts: Contacts, free: Array) -> Array:
+    """Return what contacts would do (m d,) under accelerations (n, q) [m/s^2]."""
+    return np.asarray(contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel())
+
+
+def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
+    """Return the contacts that stay closed, and accelerations under their forces."""
+    stays = answer.modes != OPEN
+    if not stays.any():
+        return Held(contacts.chosen(stays), answer.chosen(stays), free)
+    acceleration = free + (contacts.matrices[1] @ answer.forces.ravel()).reshape(free.shape)
+    if stays.all():
+        return Held(contacts, answer, acceleration)
+    return Held(contacts.chosen(stays), answer.chosen(stays), acceleration)
+
+
+def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
+    """Return which of the contacts that do not part stay closed, and how.
+
+    Raises
+    ------
+    NoSolution
+        If no forces obey the laws (E54).
+    Refused
+        See `Problem.solved`.
+    """
+    contacts = contacts.chosen(contacts.rows.speed[:, 0] < STILL)
+    if not len(contacts):
+        return Held(contacts, nothing(0, world.dimension), free)
+    slip = contacts.rows.speed[:, 1:]
+    speed = np.linalg.norm(slip, axis=1)
+    slips = speed > SLIPPING
+    directions = np.where(slips[:, None], slip / np.where(slips, speed, 1.0)[:, None], 0.0)
+    if world.dimension == 3 and slips.any():
+        # Frames take up the slip, so that its rows are along and across it.
+        tangents = np.einsum("mk,mkp->mp", directions, contacts.rows.frame[:, 1:])
+        contacts.along = np.where(slips[:, None], tangents, contacts.along)
+        contacts.at_state(state)
+        directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
+    return held_by(contacts, Problem.of(contacts, accelerations(contacts, free), directions).solved(state.t), free)
+
+
+def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:
+    """Return the contacts with some modes changed, their forces nearest to those now; None if that breaks a law (E38).
+
+    Parameters
+    ----------
+    modes
+        By the number of a contact: `OPEN` where its load ends, `SLIP` where its friction does, `STICK` where its slip
+        would turn back.
+    free
+        (n, q) accelerations without contacts.
+    strictly
+        Whether the laws are looked at: what ends is known to be round-off where a mode ends as soon as it begins.
+    """
+    contacts, answer = held.contacts, held.answer
+    now, directions = answer.modes.copy(), answer.directions.copy()
+    for k, mode in modes.items():
+        now[k] = mode
+        if mode == SLIP:
+            friction = answer.forces[k, 1:]
+            directions[k] = -friction / max(float(np.linalg.norm(friction)), 1e-300)
+    problem = Problem.of(contacts, accelerations(contacts, free), np.where((now == SLIP)[:, None], directions, 0.0))
+    found = problem.with_modes(now, directions, answer.forces)
+    if found is None:
+        return None
+    if not strictly:
+        return held_by(contacts, found, free)
+    after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
+    force, load = np.abs(found.forces).max(), found.forces[:, 0]
+    least = -NONE * (1e-3 + force)
+    small = -NONE * (contacts.world.weight + np.abs(after).max())
+    friction = np.linalg.norm(found.forces[:, 1:], axis=1)
+    holds = load.min() >= least and after[:, 0].min() >= small
+    holds &= not ((now == STICK) & (friction > contacts.friction * load - least)).any()
+    holds &= all((after[k, 1:] * directions[k]).sum() >= small for k, mode in modes.items() if mode == SLIP)
+    return held_by(contacts, found, free) if holds else None

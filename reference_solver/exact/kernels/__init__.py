@@ -1,0 +1,1 @@
+"""Flat kernels: arrays in, arrays out, and at most three levels of calls."""

@@ -1,0 +1,261 @@
+"""Pairs of features that touch, and how far contacts are from the ends of their features (`exact.features`)."""
+
+import numpy as np
+
+from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.rotation import dot
+
+POINT, LINE, FACE = 0, 1, 2
+
+
+@kernel
+def place_features(bodies, place, axes, point, normal):
+    """Write points (n, p, d) and face normals (n, f, d) in world axes."""
+    n, d = place.shape
+    for i in range(n):
+        for k in range(bodies.points[i]):
+            for p in range(d):
+                s = place[i, p]
+                for q in range(d):
+                    s += axes[i, p, q] * bodies.point[i, k, q]
+                point[i, k, p] = s
+        for k in range(bodies.faces[i]):
+            for p in range(d):
+                s = 0.0
+                for q in range(d):
+                    s += axes[i, p, q] * bodies.normal[i, k, q]
+                normal[i, k, p] = s
+
+
+@kernel
+def beyond(bodies, point, i, kind, number, direction):
+    """Return how far the farthest other point of body i lies beyond a point or line along ``direction`` (d,) [m]."""
+    d = len(direction)
+    first, second = number, number
+    if kind == LINE:
+        first, second = bodies.line[i, number, 0], bodies.line[i, number, 1]
+    most = -1e300
+    for k in range(bodies.points[i]):
+        if k == first or k == second:
+            continue
+        s = 0.0
+        for p in range(d):
+            s += direction[p] * (point[i, k, p] - point[i, first, p])
+        most = max(most, s)
+    return most
+
+
+@kernel
+def within(bodies, axes, place, o, face, where):
+    """Return how far a place (d,) is from the nearest side of a face of body o, < 0 outside [m]."""
+    d = len(where)
+    least = 1e300
+    for k in range(bodies.sides[o, face]):
+        s = bodies.limit[o, face, k]
+        for p in range(d):
+            for q in range(d):
+                s -= bodies.side[o, face, k, q] * axes[o, p, q] * (where[p] - place[o, p])
+        least = min(least, s)
+    return least
+
+
+@kernel
+def nearest_on_lines(start, along, other_start, other_along, share):
+    """Write where two lines (d,) are nearest, as shares of their lengths (2,); return sin^2 of their angle."""
+    aa, bb, ab, aw, bw = 0.0, 0.0, 0.0, 0.0, 0.0
+    for p in range(len(start)):
+        w = other_start[p] - start[p]
+        aa += along[p] * along[p]
+        bb += other_along[p] * other_along[p]
+        ab += along[p] * other_along[p]
+        aw += along[p] * w
+        bw += other_along[p] * w
+    spread = aa * bb - ab * ab
+    if spread > 1e-12 * aa * bb:
+        share[0] = (bb * aw - ab * bw) / spread
+        share[1] = (ab * aw - aa * bw) / spread
+    return spread / (aa * bb)
+
+
+@kernel
+def touching_faces(bodies, place, axes, world, pair, found, tol):
+    """Write contacts of faces of body a or b with points of the other from row ``pair[2]`` on; return the next row."""
+    point, normal = world
+    d = place.shape[1]
+    count, deep = pair[2], tol[1]
+    foot = np.zeros(d)
+    for turn in range(2):
+        o, w = pair[turn], pair[1 - turn]
+        for f in range(bodies.faces[o]):
+            level, least = bodies.offset[o, f] + bodies.radius[o] + bodies.radius[w], 1e300
+            for p in range(d):
+                level += normal[o, f, p] * place[o, p]
+            for k in range(bodies.points[w]):
+                h = -level
+                for p in range(d):
+                    h += normal[o, f, p] * point[w, k, p]
+                least = min(least, h)
+            if least > tol[0] or least < -deep:
+                continue
+            for k in range(bodies.points[w]):
+                h = -level
+                for p in range(d):
+                    h += normal[o, f, p] * point[w, k, p]
+                for p in range(d):
+                    foot[p] = point[w, k, p]
+                if h > tol[0] or within(bodies, axes, place, o, f, foot) < -tol[0]:
+                    continue
+                if count < len(found):
+                    found[count, 0], found[count, 1] = pair[0], pair[1]
+                    found[count, 2 + 2 * turn], found[count, 3 + 2 * turn] = FACE, f
+                    found[count, 4 - 2 * turn], found[count, 5 - 2 * turn] = POINT, k
+                count += 1
+    return count
+
+
+@kernel
+def touching_points(bodies, world, pair, found, tol):
+    """Write contacts of points or lines with points, and of lines that cross, as `touching_faces` does.
+
+    In the plane lines are faces, and sharp points are on faces: there only points of round bodies are left.
+    """
+    point = world[0]
+    d = point.shape[2]
+    a, b, count = pair[0], pair[1], pair[2]
+    r = bodies.radius[a] + bodies.radius[b]
+    lines_a = bodies.lines[a] if d == 3 else 0
+    lines_b = bodies.lines[b] if d == 3 else 0
+    n, share = np.zeros(d), np.zeros(2)
+    for i in range(bodies.points[a] + lines_a):
+        kind_a = POINT if i < bodies.points[a] else LINE
+        ia = i if kind_a == POINT else i - bodies.points[a]
+        for j in range(bodies.points[b] + lines_b):
+            kind_b = POINT if j < bodies.points[b] else LINE
+            jb = j if kind_b == POINT else j - bodies.points[b]
+            if r == 0.0 and (kind_a == POINT or kind_b == POINT):
+                continue
+            first = point[a, ia] if kind_a == POINT else point[a, bodies.line[a, ia, 0]]
+            second = point[b, jb] if kind_b == POINT else point[b, bodies.line[b, jb, 0]]
+            along = first - first if kind_a == POINT else point[a, bodies.line[a, ia, 1]] - first
+            other = second - second if kind_b == POINT else point[b, bodies.line[b, jb, 1]] - second
+            share[0] = share[1] = 0.0
+            long_a, long_b = np.sqrt(dot(along, along)), np.sqrt(dot(other, other))
+            if kind_a == LINE and kind_b == LINE:
+                if nearest_on_lines(first, along, second, other, share) < 1e-12:
+                    continue  # parallel: their ends are points on lines
+            elif kind_a == LINE:
+                share[0] = dot(second - first, along) / long_a**2
+            elif kind_b == LINE:
+                share[1] = dot(first - second, other) / long_b**2
+            # At an end the point is nearer, or as near.
+            if kind_a == LINE and (share[0] * long_a < tol[0] or (1.0 - share[0]) * long_a < tol[0]):
+                continue
+            if kind_b == LINE and (share[1] * long_b < tol[0] or (1.0 - share[1]) * long_b < tol[0]):
+                continue
+            for p in range(d):
+                n[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]
+            gap = np.sqrt(dot(n, n))
+            if kind_a == LINE and kind_b == LINE and r == 0.0:
+                n[0] = along[1] * other[2] - along[2] * other[1]
+                n[1] = along[2] * other[0] - along[0] * other[2]
+                n[2] = along[0] * other[1] - along[1] * other[0]
+                size = np.sqrt(dot(n, n))
+                if beyond(bodies, point, a, LINE, ia, n) > tol[0] * size:
+                    n *= -1.0
+                n /= size
+            elif gap == 0.0:
+                continue
+            else:
+                n /= gap
+            if gap - r > tol[0]:
+                continue
+            if beyond(bodies, point, a, kind_a, ia, n) > tol[0] or beyond(bodies, point, b, kind_b, jb, -n) > tol[0]:
+                continue
+            if count < len(found):
+                found[count, 0], found[count, 1] = a, b
+                found[count, 2], found[count, 3], found[count, 4], found[count, 5] = kind_a, ia, kind_b, jb
+            count += 1
+    return count
+
+
+@kernel
+def touching(bodies, place, axes, world, found, tol):
+    """Write the contacts of all pairs into ``found`` (m, 6), faces first; return how many there are."""
+    n, d = place.shape
+    count = 0
+    for a in range(n):
+        for b in range(a + 1, n):
+            if bodies.free[a] == 0 and bodies.free[b] == 0:
+                continue
+            apart = 0.0
+            for p in range(d):
+                apart += (place[a, p] - place[b, p]) ** 2
+            if np.sqrt(apart) > bodies.reach[a] + bodies.reach[b] + bodies.radius[a] + bodies.radius[b] + tol[0]:
+                continue
+            count = touching_faces(bodies, place, axes, world, (a, b, count), found, tol)
+            count = touching_points(bodies, world, (a, b, count), found, tol)
+    return count
+
+
+@kernel
+def write_margins(bodies, place, axes, world, features, out):
+    """Write how far contacts (m,) are from the ends of their features into ``out`` (m, width) [m]; 1e300 where none.
+
+    Of a face: the distances of the point from its sides. Of a line: from both ends. Of a point or line whose
+    other feature is no face: how far each other point of its body lies behind it along the normal.
+    """
+    point = world[0]
+    d = place.shape[1]
+    n, share = np.zeros(d), np.zeros(2)
+    for k in range(len(features)):
+        out[k] = 1e300
+        a, b = features[k, 0], features[k, 1]
+        kind_a, ia, kind_b, jb = features[k, 2], features[k, 3], features[k, 4], features[k, 5]
+        column = 0
+        if kind_a == FACE or kind_b == FACE:
+            o, f, w, j = (a, ia, b, jb) if kind_a == FACE else (b, jb, a, ia)
+            for e in range(bodies.sides[o, f]):
+                s = bodies.limit[o, f, e]
+                for p in range(d):
+                    for q in range(d):
+                        s -= bodies.side[o, f, e, q] * axes[o, p, q] * (point[w, j, p] - place[o, p])
+                out[k, column] = s
+                column += 1
+            continue
+        first = point[a, ia] if kind_a == POINT else point[a, bodies.line[a, ia, 0]]
+        second = point[b, jb] if kind_b == POINT else point[b, bodies.line[b, jb, 0]]
+        along = first - first if kind_a == POINT else point[a, bodies.line[a, ia, 1]] - first
+        other = second - second if kind_b == POINT else point[b, bodies.line[b, jb, 1]] - second
+        share[0] = share[1] = 0.0
+        long_a, long_b = np.sqrt(dot(along, along)), np.sqrt(dot(other, other))
+        if kind_a == LINE and kind_b == LINE:
+            nearest_on_lines(first, along, second, other, share)
+        elif kind_a == LINE:
+            share[0] = dot(second - first, along) / long_a**2
+        elif kind_b == LINE:
+            share[1] = dot(first - second, other) / long_b**2
+        if kind_a == LINE:
+            out[k, 0], out[k, 1] = share[0] * long_a, (1.0 - share[0]) * long_a
+        if kind_b == LINE:
+            out[k, 2], out[k, 3] = share[1] * long_b, (1.0 - share[1]) * long_b
+        for p in range(d):
+            n[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]
+        if kind_a == LINE and kind_b == LINE and bodies.radius[a] + bodies.radius[b] == 0.0:
+            n[0] = along[1] * other[2] - along[2] * other[1]
+            n[1] = along[2] * other[0] - along[0] * other[2]
+            n[2] = along[0] * other[1] - along[1] * other[0]
+            if dot(n, place[b] - place[a]) < 0.0:
+                n *= -1.0
+        n /= np.sqrt(dot(n, n))
+        column = 4
+        for turn in range(2):
+            i, kind, number, sign = (a, kind_a, ia, 1.0) if turn == 0 else (b, kind_b, jb, -1.0)
+            e0 = number if kind == POINT else bodies.line[i, number, 0]
+            e1 = number if kind == POINT else bodies.line[i, number, 1]
+            for e in range(bodies.points[i]):
+                if e != e0 and e != e1:
+                    s = 0.0
+                    for p in range(d):
+                        s += sign * n[p] * (point[i, e0, p] - point[i, e, p])
+                    out[k, column] = s
+                    column += 1

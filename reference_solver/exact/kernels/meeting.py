@@ -1,0 +1,508 @@
+"""Until when points, and pairs of bodies, stay clear of each other (`exact.meeting`)."""
+
+import numpy as np
+
+from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.rotation import dot, turn_axes
+
+#: A share that no piece has.
+NEVER = 2.0
+#: Steps after which a search stops: the piece is cut there, and the search goes on from its end.
+MOST_STEPS = 400
+
+
+@kernel
+def safe(h, h1, h2, third, ahead):
+    """Return for how long, up to ``ahead``, a gap stays above zero for certain."""
+    best = 0.0
+    for _ in range(40):
+        bend = h2 - third * ahead / 3.0
+        root = 1e300  # of h + h1 s + bend s^2 / 2
+        if h1 < 0.0:
+            square = h1 * h1 - 2.0 * bend * h
+            if square >= 0.0:
+                root = 2.0 * h / (np.sqrt(square) - h1)
+        elif bend < 0.0:
+            root = (h1 + np.sqrt(h1 * h1 - 2.0 * bend * h)) / -bend
+        if root >= ahead:
+            return max(best, ahead)
+        best = max(best, root)
+        if third == 0.0 or ahead <= 2.0 * best:
+            return best
+        ahead = max(2.0 * best, 0.2 * ahead)
+    return best
+
+
+@kernel
+def write_seen(course, generator, who, point, s, seen):
+    """Write a point of body ``who[1]`` in the axes of body ``who[0]``, and its first two derivatives by s (3, d).
+
+    Without the owner's turn where ``who[2]``. With rho = R' D and the owner's spin matrix W, rho' = R'(D' - W D) and
+    rho'' = R'(D'' - 2 W D' - W' D + W W D).
+    """
+    d, q, powers = course.place.shape[1], course.way.shape[1], course.way.shape[2]
+    axes, turn = np.zeros((d, d)), np.zeros(q - d)
+    apart, spin, change = np.zeros((3, d)), np.zeros((d, d)), np.zeros((d, d))
+    arm, once, twice = np.zeros(d), np.zeros(d), np.zeros(d)
+    for side in range(2):
+        i, sign = who[1 - side], 1.0 - 2.0 * side
+        for e in range(q):
+            way, way1, way2 = 0.0, 0.0, 0.0
+            for j in range(powers - 1, 0, -1):
+                way = (way + course.way[i, e, j]) * s
+                way1 = way1 * s + j * course.way[i, e, j]
+                if j > 1:
+                    way2 = way2 * s + j * (j - 1) * course.way[i, e, j]
+            if e >= d:
+                turn[e - d] = way
+            else:
+                apart[0, e] += sign * (course.place[i, e] + way)
+                apart[1, e] += sign * way1
+                apart[2, e] += sign * way2
+        spin[:] = 0.0
+        change[:] = 0.0
+        for e in range(q - d):
+            w, w1 = 0.0, 0.0
+            for j in range(course.spin.shape[2] - 1, -1, -1):
+                w = w * s + course.spin[i, e, j]
+                if j > 0:
+                    w1 = w1 * s + j * course.spin[i, e, j]
+            for p in range(d):
+                for k in range(d):
+                    spin[p, k] += generator[e, p, k] * w
+                    change[p, k] += generator[e, p, k] * w1
+        turn_axes(course.axes[i], turn, axes)
+        if side == 1 and who[2] == 1:
+            for p in range(d):
+                for k in range(d):
+                    axes[p, k] = 1.0 if p == k else 0.0
+            spin[:] = 0.0
+            change[:] = 0.0
+        if side == 0:
+            for p in range(d):
+                arm[p] = once[p] = twice[p] = 0.0
+                for k in range(d):
+                    arm[p] += axes[p, k] * point[k]
+            for p in range(d):
+                for k in range(d):
+                    once[p] += spin[p, k] * arm[k]
+            for p in range(d):
+                for k in range(d):
+                    twice[p] += spin[p, k] * once[k] + change[p, k] * arm[k]
+                apart[0, p] += arm[p]
+                apart[1, p] += once[p]
+                apart[2, p] += twice[p]
+    for p in range(d):
+        once[p] = twice[p] = 0.0
+        for k in range(d):
+            once[p] += spin[p, k] * apart[0, k]
+    for p in range(d):
+        for k in range(d):
+            twice[p] += spin[p, k] * (once[k] - 2.0 * apart[1, k]) - change[p, k] * apart[0, k]
+    for p in range(d):
+        seen[0, p] = seen[1, p] = seen[2, p] = 0.0
+        for k in range(d):
+            seen[0, p] += axes[k, p] * apart[0, k]
+            seen[1, p] += axes[k, p] * (apart[1, k] - once[k])
+            seen[2, p] += axes[k, p] * (apart[2, k] + twice[k])
+
+
+@kernel
+def holds_all(bodies, course, who, s, normal):
+    """Return whether no point of body ``who[1]`` lies deeper along a normal (d,) in axes of ``who[0]`` than the first.
+
+    ``normal`` has the level and what counts as none in the two numbers behind it.
+    """
+    d = course.place.shape[1]
+    seen = np.zeros((3, d))
+    for k in range(bodies.points[who[1]]):
+        write_seen(course, bodies.generator, who, bodies.point[who[1], k], s, seen)
+        if dot(normal[:d], seen[0]) < normal[d] - normal[d + 1]:
+            return False
+    return True
+
+
+@kernel
+def clear(bodies, course, who, s, seen, bounds):
+    """Return the gap of a point from body ``who[0]`` grown by both radii, and how far it stays clear.
+
+    ``bounds``: a lift that is added to the gap, the least rate of gaps that count, T, how far to look, and the gap
+    below which a half-space counts only if it holds all of the point's body as well: else the point runs along it, as
+    a corner of a box does along the side of another that stands on the same floor.
+    """
+    d, o = seen.shape[1], who[0]
+    r = bodies.radius[who[0]] + bodies.radius[who[1]]
+    lift, slow, third, ahead, noise = bounds
+    wall = np.zeros(d + 2)
+    gap, far = -1e300, 0.0
+    n = np.zeros(d)
+    for f in range(bodies.faces[o] + 1):
+        if f < bodies.faces[o]:
+            h = -bodies.offset[o, f] - r
+            for p in range(d):
+                n[p] = bodies.normal[o, f, p]
+                h += n[p] * seen[0, p]
+        else:  # from the nearest place of the core
+            if r == 0.0 or bodies.points[o] == 0:
+                continue
+            near = 1e300
+            for e in range(max(1, bodies.lines[o])):
+                i, j = (0, 0) if bodies.lines[o] == 0 else (bodies.line[o, e, 0], bodies.line[o, e, 1])
+                along, long = 0.0, 0.0
+                for p in range(d):
+                    edge = bodies.point[o, j, p] - bodies.point[o, i, p]
+                    along += edge * (seen[0, p] - bodies.point[o, i, p])
+                    long += edge * edge
+                share = 0.0
+                if along > 0.0:
+                    share = along / long if along < long else 1.0
+                square = 0.0
+                for p in range(d):
+                    edge = bodies.point[o, j, p] - bodies.point[o, i, p]
+                    square += (seen[0, p] - bodies.point[o, i, p] - share * edge) ** 2
+                if square < near:
+                    near = square
+                    for p in range(d):
+                        edge = bodies.point[o, j, p] - bodies.point[o, i, p]
+                        n[p] = seen[0, p] - bodies.point[o, i, p] - share * edge
+            if near == 0.0:
+                continue
+            h, level = 0.0, -1e300
+            for k in range(bodies.points[o]):
+                reach = 0.0
+                for p in range(d):
+                    reach += n[p] * bodies.point[o, k, p]
+                level = max(level, reach)
+            for p in range(d):
+                h += n[p] * seen[0, p]
+            h = (h - level) / np.sqrt(near) - r
+            for p in range(d):
+                n[p] /= np.sqrt(near)
+        gap = max(gap, h)
+        if h + lift >= 0.0 and ahead > 0.0:
+            if h <= noise:
+                wall[:d], wall[d], wall[d + 1] = n, dot(n, seen[0]), noise + lift
+                if not holds_all(bodies, course, who, s, wall):
+                    continue
+            h1, h2 = dot(n, seen[1]), dot(n, seen[2])
+            if h1 > slow:
+                far = max(far, safe(h + lift, h1, h2, third, ahead))
+    return gap, far
+
+
+@kernel
+def write_bounds(course, bounds):
+    """Write bounds of the first three derivatives by s of every body's place and orientation (n, 2, 3)."""
+    n, d = course.place.shape
+    for i in range(n):
+        bounds[i] = 0.0
+        for e in range(d):
+            for j in range(1, course.way.shape[2]):
+                size = abs(course.way[i, e, j])
+                bounds[i, 0, 0] += j * size
+                bounds[i, 0, 1] += j * (j - 1) * size
+                bounds[i, 0, 2] += j * (j - 1) * (j - 2) * size
+        w, w1, w2 = 0.0, 0.0, 0.0
+        for e in range(course.spin.shape[1]):
+            for j in range(course.spin.shape[2]):
+                size = abs(course.spin[i, e, j])
+                w += size
+                w1 += j * size
+                w2 += j * (j - 1) * size
+        bounds[i, 1, 0], bounds[i, 1, 1], bounds[i, 1, 2] = w, w1 + w * w, w2 + 3.0 * w * w1 + w * w * w
+
+
+@kernel
+def third_derivative(bounds, o, w, arm, apart):
+    """Return bounds of |rho'''| and |rho'| of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
+    d0 = apart + bounds[o, 0, 0] + bounds[w, 0, 0] + arm
+    d1 = bounds[o, 0, 0] + bounds[w, 0, 0] + arm * bounds[w, 1, 0]
+    d2 = bounds[o, 0, 1] + bounds[w, 0, 1] + arm * bounds[w, 1, 1]
+    d3 = bounds[o, 0, 2] + bounds[w, 0, 2] + arm * bounds[w, 1, 2]
+    return d0 * bounds[o, 1, 2] + 3.0 * d1 * bounds[o, 1, 1] + 3.0 * d2 * bounds[o, 1, 0] + d3, d1
+
+
+@kernel
+def meeting_of_point(bodies, course, who, k, limits):
+    """Return the first share below ``limits[0]`` at which point k of body ``who[1]`` meets body ``who[0]``, or `NEVER`.
+
+    ``limits``: the share to look up to, T, noise [m], speed of what leaves [m], round-off of gaps [m]. The second
+    number tells whether the search stopped there before anything met.
+    """
+    w = who[1]
+    until, third, noise, slow, least = limits
+    d = course.place.shape[1]
+    seen = np.zeros((3, d))
+    point = bodies.point[w, k]
+    s, lift, leaves, before, runs = 0.0, 0.0, True, 0.0, noise
+    for step in range(MOST_STEPS):
+        ahead = until - s
+        write_seen(course, bodies.generator, who, point, s, seen)
+        gap, far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))
+        if step == 0 and gap <= noise:  # it touches, and leaves with a speed
+            lift, runs = max(0.0, -gap), -1e300
+            far = clear(bodies, course, who, s, seen, (lift, slow, third, ahead, runs))[1]
+            if far == 0.0:  # or without one: no contact until it is deeper than now by the noise
+                lift, leaves = noise + lift, False
+                far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))[1]
+        elif not leaves and gap > noise:
+            lift, leaves = 0.0, True
+            far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))[1]
+        if s > 0.0 and gap + lift <= least:
+            low, high = before, s
+            while gap + lift < 0.0:  # passed by round-off
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                write_seen(course, bodies.generator, who, point, middle, seen)
+                if clear(bodies, course, who, middle, seen, (0.0, 0.0, 0.0, 0.0, runs))[0] + lift > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            return (high if gap + lift >= 0.0 else low), 0
+        if far >= ahead:
+            return NEVER, 0
+        if s + far <= s:
+            return s, 0
+        before = s
+        s += far
+    return s, 1
+
+
+@kernel
+def first_meeting(bodies, course, held, pairs, scales, found):
+    """Return the first share of a piece at which points that are not held meet another body, or `NEVER`.
+
+    Parameters
+    ----------
+    held
+        (n, n, p): by owner, other body and point, whether a contact holds the point.
+    pairs
+        (n, n): whether the pair is followed here.
+    scales
+        Noise of gaps [m], speed of what leaves, as a way in the piece [m].
+    found
+        (3,): the bodies that meet, and whether the search stopped instead.
+    """
+    n, d = course.place.shape
+    bounds = np.zeros((n, 2, 3))
+    write_bounds(course, bounds)
+    first = NEVER
+    for o in range(n):
+        for w in range(n):
+            if o == w or pairs[o, w] == 0 or bodies.points[w] == 0 or (bodies.free[o] == 0 and bodies.free[w] == 0):
+                continue
+            if bodies.points[o] == 1 and (bodies.points[w] > 1 or o > w):
+                continue  # what is round meets corners where they meet it
+            fixed = 1 if bodies.points[o] == 1 else 0
+            apart = 0.0
+            for p in range(d):
+                apart += (course.place[o, p] - course.place[w, p]) ** 2
+            apart = np.sqrt(apart)
+            r = bodies.radius[o] + bodies.radius[w]
+            if (
+                bodies.points[o] > 0
+                and apart - bodies.reach[o] - bodies.reach[w] - r > bounds[o, 0, 0] + bounds[w, 0, 0]
+            ):
+                continue
+            size = apart + bodies.reach[w] + r + (bodies.reach[o] if bodies.points[o] > 0 else 0.0)
+            for k in range(bodies.points[w]):
+                if held[o, w, k]:
+                    continue
+                arm = 0.0
+                for p in range(d):
+                    arm += bodies.point[w, k, p] ** 2
+                if fixed == 1:
+                    own = bounds[o, 1].copy()
+                    bounds[o, 1] = 0.0
+                    third, moves = third_derivative(bounds, o, w, np.sqrt(arm), apart)
+                    bounds[o, 1] = own
+                else:
+                    third, moves = third_derivative(bounds, o, w, np.sqrt(arm), apart)
+                if moves == 0.0 and third == 0.0 and (fixed == 1 or bounds[o, 1, 0] == 0.0):
+                    continue
+                limits = (min(first, 1.0), third, scales[0], scales[1], 1e-16 * size)
+                s, stopped = meeting_of_point(bodies, course, (o, w, fixed), k, limits)
+                if s < first:
+                    first = s
+                    found[0], found[1], found[2] = o, w, stopped
+    return first
+
+
+@kernel
+def write_directions(bodies, o, w, seen, out):
+    """Write directions (m, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
+
+    Normals of faces of o; of planes through edges of both; towards each other at the nearest places of lines and
+    points. Return their number.
+    """
+    d = seen.shape[2]
+    count = 0
+    for f in range(bodies.faces[o]):
+        out[count] = bodies.normal[o, f]
+        count += 1
+    lines_o, lines_w = bodies.lines[o], bodies.lines[w]
+    share = np.zeros(2)
+    for i in range(max(1, lines_o)):
+        a0, a1 = (bodies.line[o, i, 0], bodies.line[o, i, 1]) if lines_o > 0 else (0, 0)
+        for j in range(max(1, lines_w)):
+            b0, b1 = (bodies.line[w, j, 0], bodies.line[w, j, 1]) if lines_w > 0 else (0, 0)
+            aa, bb, ab, aw, bw = 0.0, 0.0, 0.0, 0.0, 0.0
+            for p in range(d):
+                u, v = bodies.point[o, a1, p] - bodies.point[o, a0, p], seen[b1, 0, p] - seen[b0, 0, p]
+                z = seen[b0, 0, p] - bodies.point[o, a0, p]
+                aa += u * u
+                bb += v * v
+                ab += u * v
+                aw += u * z
+                bw += v * z
+            spread = aa * bb - ab * ab
+            inside = False
+            if spread > 1e-12 * aa * bb and aa > 0.0 and bb > 0.0:
+                share[0], share[1] = (bb * aw - ab * bw) / spread, (ab * aw - aa * bw) / spread
+                inside = 0.0 < share[0] < 1.0 and 0.0 < share[1] < 1.0
+            if inside and d == 3:
+                for p in range(3):
+                    q, t = (p + 1) % 3, (p + 2) % 3
+                    uq, ut = (
+                        bodies.point[o, a1, q] - bodies.point[o, a0, q],
+                        bodies.point[o, a1, t] - bodies.point[o, a0, t],
+                    )
+                    vq, vt = seen[b1, 0, q] - seen[b0, 0, q], seen[b1, 0, t] - seen[b0, 0, t]
+                    out[count, p] = uq * vt - ut * vq
+            else:  # one is nearest with an end
+                best = 1e300
+                for end in range(4):
+                    u0 = float(end) if end < 2 else 0.0
+                    v0 = float(end - 2) if end >= 2 else 0.0
+                    if end < 2 and bb > 0.0:
+                        v0 = (u0 * ab - bw) / bb
+                        v0 = 0.0 if v0 < 0.0 else (1.0 if v0 > 1.0 else v0)
+                    if end >= 2 and aa > 0.0:
+                        u0 = (v0 * ab + aw) / aa
+                        u0 = 0.0 if u0 < 0.0 else (1.0 if u0 > 1.0 else u0)
+                    square = aa * u0 * u0 + bb * v0 * v0 - 2.0 * ab * u0 * v0 - 2.0 * aw * u0 + 2.0 * bw * v0
+                    if square < best:
+                        best = square
+                        for p in range(d):
+                            u, v = bodies.point[o, a1, p] - bodies.point[o, a0, p], seen[b1, 0, p] - seen[b0, 0, p]
+                            z = seen[b0, 0, p] - bodies.point[o, a0, p]
+                            out[count, p] = z + v0 * v - u0 * u
+            size, way = 0.0, 0.0
+            for p in range(d):
+                size += out[count, p] ** 2
+                way += out[count, p] * (seen[b0, 0, p] - bodies.point[o, a0, p])
+            if size > 1e-30:
+                for p in range(d):
+                    out[count, p] *= (1.0 if way > 0.0 else -1.0) / np.sqrt(size)
+                count += 1
+    return count
+
+
+@kernel
+def clear_of_pair(bodies, course, who, s, bounds, room):
+    """Return the gap of two bodies at a share s, and how far they stay clear of each other.
+
+    ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and T of points of
+    either body. Half-spaces of either body hold it.
+    """
+    lift, slow, ahead = bounds[0], bounds[1], bounds[2]
+    seen, directions = room
+    gap, best = -1e300, 0.0
+    for side in range(2):
+        o, w = who[side], who[1 - side]
+        if bodies.points[w] == 0:
+            continue
+        r = bodies.radius[o] + bodies.radius[w]
+        for k in range(bodies.points[w]):
+            write_seen(course, bodies.generator, (o, w, 0), bodies.point[w, k], s, seen[k])
+        count = write_directions(bodies, o, w, seen, directions)
+        for m in range(count):
+            level, low = -1e300, 1e300
+            for k in range(bodies.points[o]):
+                level = max(level, dot(directions[m], bodies.point[o, k]))
+            if bodies.points[o] == 0:
+                level = bodies.offset[o, m]
+            for k in range(bodies.points[w]):
+                low = min(low, dot(directions[m], seen[k, 0]) - level - r)
+            gap = max(gap, low)
+            if low + lift < 0.0 or ahead <= best:
+                continue
+            far = ahead
+            for k in range(bodies.points[w]):
+                h, h1 = dot(directions[m], seen[k, 0]) - level - r + lift, dot(directions[m], seen[k, 1])
+                # What touches counts only where it leaves, but for points that are away.
+                far = 0.0 if h <= lift + bounds[5] and h1 <= slow else far
+                far = min(far, safe(h, h1, dot(directions[m], seen[k, 2]), bounds[3 + side], far))
+            best = max(best, far)
+    return gap, best
+
+
+@kernel
+def meeting_of_pair(bodies, course, who, limits, room):
+    """Return the first share at which bodies meet, edges included, or `NEVER`; see `meeting_of_point`.
+
+    ``limits``: the share to look up to, T of points of either body, noise [m], speed of what leaves [m], round-off of
+    gaps [m].
+    """
+    until, third, other, noise, slow, least = limits
+    s, lift, leaves, before = 0.0, 0.0, True, 0.0
+    for step in range(MOST_STEPS):
+        ahead = until - s
+        gap, far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)
+        if step == 0 and gap <= noise:
+            lift = max(0.0, -gap)
+            far = clear_of_pair(bodies, course, who, s, (lift, slow, ahead, third, other, noise), room)[1]
+            if far == 0.0:
+                lift, leaves = noise + lift, False
+                far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)[1]
+        elif not leaves and gap > noise:
+            lift, leaves = 0.0, True
+            far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)[1]
+        if s > 0.0 and gap + lift <= least:
+            low, high = before, s
+            while gap + lift < 0.0:  # passed by round-off
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                passed = clear_of_pair(bodies, course, who, middle, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), room)[0]
+                if passed + lift > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            return (high if gap + lift >= 0.0 else low), 0
+        if far >= ahead:
+            return NEVER, 0
+        if s + far <= s:
+            return s, 0
+        before = s
+        s += far
+    return s, 1
+
+
+@kernel
+def first_meeting_of_pairs(bodies, course, pairs, scales, found):
+    """Return the first share of a piece at which pairs that no contact holds meet, or `NEVER`; see `first_meeting`."""
+    n, d = course.place.shape
+    bounds = np.zeros((n, 2, 3))
+    write_bounds(course, bounds)
+    lines = bodies.line.shape[1]
+    room = np.zeros((bodies.point.shape[1], 3, d)), np.zeros((bodies.normal.shape[1] + lines * lines + 1, d))
+    first = NEVER
+    for o in range(n):
+        for w in range(o + 1, n):
+            if pairs[o, w] == 0 or (bodies.free[o] == 0 and bodies.free[w] == 0):
+                continue
+            apart = np.sqrt(dot(course.place[o] - course.place[w], course.place[o] - course.place[w]))
+            way, r = bounds[o, 0, 0] + bounds[w, 0, 0], bodies.radius[o] + bodies.radius[w]
+            if apart - bodies.reach[o] - bodies.reach[w] - r > way or way + bounds[o, 1, 0] + bounds[w, 1, 0] == 0.0:
+                continue
+            reach_o, reach_w = min(bodies.reach[o], 1e300), min(bodies.reach[w], 1e300)
+            third = third_derivative(bounds, o, w, reach_w, apart)[0]
+            other = third_derivative(bounds, w, o, reach_o, apart)[0] if bodies.points[o] > 0 else 0.0
+            limits = (min(first, 1.0), third, other, scales[0], scales[1], 1e-15 * (apart + r))
+            s, stopped = meeting_of_pair(bodies, course, (o, w), limits, room)
+            if s < first:
+                first = s
+                found[0], found[1], found[2] = o, w, stopped
+    return first

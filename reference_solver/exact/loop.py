@@ -1,0 +1,170 @@
+"""The loop: find what touches, strike, decide forces, move to the next event."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.checks import check
+from reference_solver.exact.cones import NoSolution
+from reference_solver.exact.events import Event, Kind, first_event
+from reference_solver.exact.forces import Held, changed, decide
+from reference_solver.exact.impacts import jam, strike
+from reference_solver.exact.motion import Piece, Turning, constant, free_acceleration
+from reference_solver.exact.problem import OPEN, SLIP, STICK
+from reference_solver.exact.projection import projected
+from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
+from reference_solver.exact.rows import Contacts, touching_contacts
+
+#: Pieces of a run, events that may follow each other without progress, and progress [s].
+MOST_PIECES, MOST_AT_ONCE, PROGRESS = 20_000, 50, 1e-12
+#: An instant in which impulses do what no forces can (E54) [s].
+INSTANT = 4e-11
+#: First step of a motion that turns, in the time that the smallest half width falls through.
+FIRST_STEP = 0.1
+#: Modes that end while others go on: forces do not jump there.
+GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
+#: Speeds that are round-off [m/s].
+NO_SPEED = 1e-14
+
+
+@dataclass
+class Loop:
+    """A world being moved from event to event.
+
+    Parameters
+    ----------
+    world
+        What moves.
+    state
+        Where the next piece begins.
+    tolerance
+        Error of a step of `Turning`.
+    longest
+        Longest piece [s]: longer ones would be the same.
+    """
+
+    world: World
+    state: State
+    tolerance: float
+    longest: float
+    step: float = 0.0
+    pieces: int = 0
+    at_once: int = 0
+    held: Held | None = None  # what goes on from the piece before
+    left: frozenset[tuple[int, ...]] = frozenset()  # contacts at the end of a feature
+
+    def next_piece(self) -> Piece:
+        """Return the motion up to the next event, and move the world to its end.
+
+        Raises
+        ------
+        Refused
+            Where the loop has no answer.
+        """
+        while True:
+            held = self.held or self._found()
+            if held is None:
+                continue
+            piece = self._piece(held)
+            event = first_event(self.world, piece)
+            if event.at_start:
+                self._count(event)
+                self.left, self.held = self.left | event.left, self._revised(held, event)
+                continue
+            piece = self._cut(piece, event)
+            check(self.world, piece)
+            self.held = self._entered(piece, event)
+            return piece
+
+    def _found(self) -> Held | None:
+        """Find what touches, strike it, and decide forces; None where a jam changed velocities instead."""
+        contacts = touching_contacts(self.world, self.state, self.left)
+        struck = strike(self.world, self.state, contacts)
+        if struck is not self.state:
+            velocity = np.where(np.abs(struck.velocity) < NO_SPEED, 0.0, struck.velocity)
+            self.state = replace(struck, velocity=velocity)
+            contacts = touching_contacts(self.world, self.state, self.left)
+        free = free_acceleration(self.world, self.state.axes, self.state.velocity)
+        try:
+            held = decide(self.world, self.state, contacts, free)
+        except NoSolution:
+            self._jam(contacts)
+            return None
+        self.step = 0.0
+        self.state = projected(self.world, self.state, held)
+        return held
+
+    def _jam(self, contacts: Contacts) -> None:
+        try:
+            self.state = jam(self.world, self.state, contacts, INSTANT)
+        except NoSolution:
+            raise NoForces(t=self.state.t) from None
+        self._count("a jam")
+
+    def _piece(self, held: Held) -> Piece:
+        """Return the piece from here on: exact where accelerations are constant, else a step."""
+        if self.step == 0.0:
+            piece = constant(self.world, self.state, held, self.longest)
+            if piece is not None:
+                return piece
+            self.step = FIRST_STEP * float(np.sqrt(self.world.size / self.world.weight))
+        piece, self.step = Turning(self.world, self.state, held, self.tolerance).step(min(self.step, self.longest))
+        return piece
+
+    def _cut(self, piece: Piece, event: Event) -> Piece:
+        """Return the piece up to its event: a step is made anew with that length, so that its end is exact."""
+        if event.share >= 1.0:
+            return piece
+        if piece.turns and event.share > 0.0:
+            shorter, _ = Turning(self.world, piece.start, piece.held, self.tolerance).step(event.share * piece.length)
+            return shorter
+        return piece.cut(event.share)
+
+    def _entered(self, piece: Piece, event: Event) -> Held | None:
+        """Move the world to the end of a piece; return the contacts that go on, if forces do not jump there."""
+        self.pieces += 1
+        if self.pieces > MOST_PIECES:
+            raise TooManyPieces(count=MOST_PIECES, t=self.state.t)
+        if piece.length > PROGRESS:
+            self.at_once, self.left = 0, frozenset()
+        else:
+            self._count(event)
+        self.state = piece.state(1.0)
+        if not piece.turns:
+            self.step = 0.0
+            return None
+        held = self._here(piece.held)
+        if event.kind is Kind.LOOK:
+            return held
+        if event.kind in GO_ON:
+            free = free_acceleration(self.world, self.state.axes, self.state.velocity)
+            return changed(held, {event.contact: GO_ON[event.kind]}, free)
+        return None
+
+    def _here(self, held: Held) -> Held:
+        """Return contacts that stay closed, with their forces where the world is now."""
+        if not len(held.contacts):
+            return replace(held, acceleration=free_acceleration(self.world, self.state.axes, self.state.velocity))
+        self.state = projected(self.world, self.state, held)
+        return held.at(self.state, free_acceleration(self.world, self.state.axes, self.state.velocity))
+
+    def _revised(self, held: Held, event: Event) -> Held | None:
+        """Return contacts whose modes that end at once have changed; None where all are to be found anew."""
+        if event.left:
+            return None
+        free = free_acceleration(self.world, self.state.axes, self.state.velocity)
+        modes = dict(event.modes)
+        found = changed(held, modes, free)
+        if found is None and STICK in modes.values():  # no forces hold it, and none let it go
+            self._jam(held.contacts)
+            return None
+        return found or changed(held, modes, free, strictly=False)
+
+    def _count(self, event: object) -> None:
+        self.at_once += 1
+        if self.at_once > MOST_AT_ONCE:
+            last = event.kind.value if isinstance(event, Event) else event
+            raise NoProgress(count=MOST_AT_ONCE, t=self.state.t, last=last)

@@ -1,0 +1,85 @@
+"""When bodies meet next: points followed in the axes of the other body, as far as they stay clear of it for certain.
+
+Two convex cores that are apart meet first with a point of one on the boundary of the other, grown by both radii, or, in
+space, with two edges that cross. Seen from the other body, its *owner*, a point moves along a smooth curve rho(s). It
+is clear of the owner for as long as it is clear of one half-space ``n . rho <= c + r`` that holds the owner. Such a
+half-space stands still in these axes, however the owner turns. With h, h', h'' of the gap ``n . rho - c - r`` now, and
+T >= |rho'''| over all the piece,
+
+    h + h' s + (h'' - T S / 3) s^2 / 2 > 0   for all s <= S    means    clear for all s <= S.
+
+Both bodies are clear of each other as long as all points of one are clear of one half-space of the other. That serves
+pairs in space that may meet with their edges: of all half-spaces the one is taken that stays clear longest. Near the
+meeting it is the plane between the edges, whose direction matters in second order only, so that steps converge fast.
+
+A contact holds its own point; all other points of its bodies are followed like any. One that touches and is not held
+leaves: with a speed, or without one, and then it must first rise over the noise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from reference_solver.exact.bodies import World
+from reference_solver.exact.kernels.features import POINT
+from reference_solver.exact.kernels.meeting import first_meeting, first_meeting_of_pairs
+from reference_solver.exact.motion import Piece
+from reference_solver.exact.rows import Contacts
+from reference_solver.model import Array
+
+#: Gaps below this share of the smallest half width touch; with a speed below this a point leaves without one [m/s].
+NOISE, SLOW = 1e-12, 1e-10
+
+
+class Course(NamedTuple):
+    """A piece as kernels read it: places (n, d), axes (n, d, d), ways (n, q, k), spins (n, s, k) by its share."""
+
+    place: Array
+    axes: Array
+    way: Array
+    spin: Array
+
+
+def course_of(piece: Piece) -> Course:
+    """Return a piece as kernels read it."""
+    d = piece.start.place.shape[1]
+    if d == 2:
+        spin = piece.way[:, d:, 1:] * np.arange(1, piece.way.shape[2])
+    else:
+        spin = piece.length * piece.velocity[:, d:]
+    return Course(piece.start.place, piece.start.axes, piece.way, np.ascontiguousarray(spin))
+
+
+class Meeting(NamedTuple):
+    """What a search found: the share of the piece, the bodies, and whether it was given up there and goes on."""
+
+    share: float
+    bodies: tuple[int, int]
+    stopped: bool
+
+
+def next_meeting(world: World, piece: Piece, contacts: Contacts) -> Meeting:
+    """Return the first meeting in a piece in which contacts stay closed; its share is `NEVER` if there is none."""
+    bodies, n = world.bodies, len(world.bodies.free)
+    held = np.zeros((n, n, bodies.point.shape[1]), np.bool_)
+    touch = np.zeros((n, n), np.bool_)
+    for a, b, kind_a, i, kind_b, j in contacts.features.tolist():
+        touch[a, b] = touch[b, a] = True
+        if kind_b == POINT:
+            held[a, b, j] = True
+        if kind_a == POINT:
+            held[b, a, i] = True
+    course, found = course_of(piece), np.zeros(3, np.int64)
+    # In the plane, and where a body is round, points are all that meets.
+    round_ = (bodies.points == 1) | (bodies.points == 0)
+    edges = ~(round_[:, None] | round_[None, :]) & ~touch if world.dimension == 3 else np.zeros((n, n), np.bool_)
+    scales = np.array([NOISE * world.size, SLOW * piece.length])
+    share = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales, found)
+    bodies_met, stopped = (int(found[0]), int(found[1])), bool(found[2])
+    if edges.any():
+        of_edges = first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales, found)
+        if of_edges < share:
+            share, bodies_met, stopped = of_edges, (int(found[0]), int(found[1])), bool(found[2])
+    return Meeting(float(share), bodies_met, stopped)

@@ -1,0 +1,197 @@
+"""Pieces of motion between two events, as polynomials in the share of the piece that is over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.forces import Held, accelerations
+from reference_solver.exact.kernels.motion import write_free_acceleration, write_moved
+from reference_solver.exact.problem import ROUND_OFF, SLIP
+from reference_solver.exact.rotation import turned
+from reference_solver.model import Array
+
+#: Changes of rows below this share of their size are round-off, and so are accelerations below this share of what
+#: forces of contacts make one by one.
+STEADY, REST = 1e-13, 1e-12
+#: How much shorter or longer than the last a step may be, and what is left to safety.
+SHORTER, LONGER, SAFE = 0.2, 5.0, 0.9
+
+
+def free_acceleration(world: World, axes: Array, velocity: Array) -> Array:
+    """Return accelerations (n, q) without contacts."""
+    out = np.zeros(velocity.shape)
+    write_free_acceleration(world.bodies, axes, velocity, out)
+    return out
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Motion of all bodies from a state on, for ``length`` [s].
+
+    Parameters
+    ----------
+    start
+        State at the beginning.
+    way, velocity
+        (n, q, k): coefficients of displacements and turns since the start, and of twists, by powers of the share s of
+        the piece, 0 <= s <= 1.
+    held
+        Contacts that stay closed in it, with their forces at the beginning.
+    turns
+        Whether rows of contacts turn, so that forces follow.
+    """
+
+    start: State
+    length: float
+    way: Array
+    velocity: Array
+    held: Held
+    turns: bool
+
+    def at(self, s: float) -> tuple[Array, Array, Array]:
+        """Return places, axes and twists at a share."""
+        way = self.way @ s ** np.arange(self.way.shape[2])
+        moved = np.empty(self.start.place.shape), np.empty(self.start.axes.shape), np.empty(way.shape)
+        velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])
+        write_moved(self.start.place, self.start.axes, way, velocity, moved)
+        return moved[0], moved[1], velocity
+
+    def state(self, s: float) -> State:
+        """Return the state at a share."""
+        d = self.start.place.shape[1]
+        way = self.way @ s ** np.arange(self.way.shape[2])
+        velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])
+        place, orientation = self.start.place + way[:, :d], turned(self.start.orientation, way[:, d:])
+        return State(self.start.t + s * self.length, place, orientation, velocity)
+
+    def cut(self, share: float) -> Piece:
+        """Return the piece up to a share."""
+        way = self.way * share ** np.arange(self.way.shape[2])
+        velocity = self.velocity * share ** np.arange(self.velocity.shape[2])
+        return replace(self, length=share * self.length, way=way, velocity=velocity)
+
+
+def constant(world: World, state: State, held: Held, length: float) -> Piece | None:
+    """Return the piece under constant accelerations, exact whatever its length; None where they are not constant.
+
+    They are if no body precesses, no slip turns, and no row of a free body does: neither now (gamma, E36), nor
+    half-way, nor at the end.
+    """
+    d = world.dimension
+    # A heavy body goes along with what round-off makes of a light one that it presses on.
+    noise = np.maximum(REST * held.pressure, ROUND_OFF * held.pressure.max(axis=0))
+    acceleration = np.where(np.abs(held.acceleration) < noise, 0.0, held.acceleration)
+    n, q = acceleration.shape
+    way, velocity = np.zeros((n, q, 3)), np.zeros((n, q, 2))
+    way[..., 1], way[..., 2] = length * state.velocity, 0.5 * length**2 * acceleration
+    velocity[..., 0], velocity[..., 1] = state.velocity, length * acceleration
+    if d == 3 and not _turns_steadily(world, state, acceleration):
+        return None
+    piece = Piece(state, length, way, velocity, held, turns=False)
+    if not len(held.contacts):
+        return piece
+    rows = held.contacts.rows
+    if np.abs(rows.rate).max() > STEADY * world.weight or not _slips_straight(held):
+        return None
+    before, contacts = rows.yields.copy(), held.contacts
+    turns = False
+    for s in (0.5, 1.0):
+        now = contacts.at(*piece.at(s)).rows.yields
+        turns |= bool(np.abs(now - before).max() > STEADY * np.abs(before).max())
+    contacts.at_state(state)
+    return None if turns else piece
+
+
+def _slips_straight(held: Held) -> bool:
+    """Whether slips with friction keep their directions: planar ones do, those in space under a pull along them."""
+    answer, contacts = held.answer, held.contacts
+    rubs = (answer.modes == SLIP) & (contacts.friction > 0.0)
+    change = accelerations(contacts, held.acceleration).reshape(answer.forces.shape)[:, 1:]
+    along = (change * answer.directions).sum(axis=1, keepdims=True)
+    return not (np.abs(change - along * answer.directions).max(axis=1)[rubs] > REST * contacts.world.weight).any()
+
+
+def _turns_steadily(world: World, state: State, acceleration: Array) -> bool:
+    """Whether spins keep their directions, and those of bodies with different moments are none."""
+    spin, change, moment = state.velocity[:, 3:], acceleration[:, 3:], world.bodies.moment
+    free = world.bodies.free == 1
+    bent = np.abs(np.cross(spin, change)).max() > 1e-14 * (1.0 + np.abs(spin).max())
+    torque = (world.bodies.torque[free] != 0.0).any()
+    unequal = free & (np.ptp(np.where(free[:, None], moment, 1.0), axis=1) > 0.0)
+    return not bent and not torque and not (spin[unequal] != 0.0).any() and not (change[unequal] != 0.0).any()
+
+
+class Turning:
+    """Motion while rows of contacts turn: accelerations are solved for anew wherever they are asked for.
+
+    Parameters
+    ----------
+    tolerance
+        Error of a step, as a share of the smallest half width or of the speeds and ways in it.
+    """
+
+    def __init__(self, world: World, state: State, held: Held, tolerance: float) -> None:
+        self._world, self._state, self._held, self._tolerance = world, state, held, tolerance
+        n, d = state.place.shape
+        self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
+
+    def _rates(self, y: Array) -> Array:
+        """Rates (2 N,) of ways and twists."""
+        shape = self._state.velocity.shape
+        way, velocity = y.reshape(2, *shape)
+        write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
+        place, axes, rate = self._moved
+        acceleration = self._held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
+        return np.concatenate([rate.ravel(), acceleration.ravel()])
+
+    def step(self, length: float) -> tuple[Piece, float]:
+        """Return a piece of at most a length [s], as long as the error stays below the tolerance, and the next length.
+
+        E. Hairer, S. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 1993, II.10: order 8, with an
+        interpolant of order 7.
+        """
+        size = self._world.size
+        count = self._state.velocity.size
+        start = np.concatenate([np.zeros(count), self._state.velocity.ravel()])
+        least = np.concatenate([np.full(count, size), 1e-2 + np.abs(start[count:])])
+        rates = np.zeros((16, 2 * count))
+        rates[0] = self._rates(start)
+        while True:
+            for k in range(1, 12):
+                rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
+            change = length * (DOP853.B @ rates[:12])
+            rates[12] = self._rates(start + change)
+            scale = self._tolerance * (least + np.abs(change))
+            fifth = ((DOP853.E5 @ rates[:13] / scale) ** 2).sum()
+            third = ((DOP853.E3 @ rates[:13] / scale) ** 2).sum()
+            error = length * fifth / np.sqrt((fifth + 0.01 * third) * len(scale)) if fifth > 0.0 else 0.0
+            factor = min(LONGER, SAFE * error**-0.125) if error > 0.0 else LONGER
+            if error <= 1.0:
+                break
+            length *= max(SHORTER, factor)
+        for k, row in enumerate(DOP853.A_EXTRA, 13):
+            rates[k] = self._rates(start + length * (row[:k] @ rates[:k]))
+        dense = np.zeros((7, 2 * count))
+        dense[0] = change
+        dense[1] = length * rates[0] - change
+        dense[2] = 2.0 * change - length * (rates[12] + rates[0])
+        dense[3:] = length * (DOP853.D @ rates)
+        way, velocity = (dense.T @ POWERS).reshape(2, *self._state.velocity.shape, 8)
+        velocity[..., 0] = self._state.velocity
+        return Piece(self._state, length, way, velocity, self._held, turns=True), factor * length
+
+
+def _powers() -> Array:
+    """Terms s, s (1 - s), s^2 (1 - s), ... of the interpolant as polynomials (7, 8), lowest power first."""
+    term, out = np.ones(1), np.zeros((7, 8))
+    for k in range(7):
+        term = np.convolve(term, (0.0, 1.0) if k % 2 == 0 else (1.0, -1.0))
+        out[k, : len(term)] = term
+    return out
+
+
+POWERS = _powers()

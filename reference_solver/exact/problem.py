@@ -1,0 +1,226 @@
+"""The contact problem, which impacts and forces share: u = W p + q, W = G M^-1 G'.
+
+Of each contact, with the friction mu and the direction d of its slip,
+
+    open     p = 0,            u_n >= 0
+    sticks   u = 0,            p_n >= 0,  |p_t| <= mu p_n
+    slips    u_n = 0, p_n >= 0,  p_t = -mu p_n d,  and d is the direction of u_t, or is given.
+
+In an impact u and p are velocities and impulses, otherwise accelerations and forces, and contacts that slip already
+have a given d. First everything that may is held; if that breaks a law, a method for cones finds which contacts hold,
+stick and slip (`cones`), and the equations of these modes are solved once more, so that round-off is all that is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.exact.cones import Cone
+from reference_solver.exact.refusals import Undecided, Unlawful
+from reference_solver.exact.rows import Contacts
+from reference_solver.model import Array
+from reference_solver.pieces import Indices
+
+OPEN, STICK, SLIP = 0, 1, 2
+#: Shares of the largest number of their kind below which forces, and velocities or accelerations, are none; what a
+#: solution may break the laws by; singular values that are round-off; what equations may leave.
+NONE, BROKEN, SINGULAR, ROUND_OFF = 1e-9, 1e-6, 1e-11, 1e-15
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Modes (m,), directions of slips (m, d - 1), forces or impulses (m, d) along the frames."""
+
+    modes: Indices
+    directions: Array
+    forces: Array
+
+    def chosen(self, which: NDArray[Any]) -> Answer:
+        """Return the answer for some contacts, by numbers or by a mask."""
+        return Answer(self.modes[which], self.directions[which], self.forces[which])
+
+
+def nothing(count: int, d: int) -> Answer:
+    """Return the answer of contacts that are open."""
+    return Answer(np.zeros(count, np.int64), np.zeros((count, d - 1)), np.zeros((count, d)))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One contact problem.
+
+    Parameters
+    ----------
+    rows, yields
+        G (m d, N) and M^-1 G' (N, m d).
+    free
+        q (m d,): what contacts would do without forces.
+    friction
+        (m,)
+    slips
+        (m, d - 1) directions of contacts that slip already; zeros where friction may do anything within its cone.
+    """
+
+    rows: Array
+    yields: Array
+    free: Array
+    friction: Array
+    slips: Array
+
+    @classmethod
+    def of(cls, contacts: Contacts, free: Array, slips: Array | None = None) -> Problem:
+        """Return the problem of contacts; ``free`` (m d,)."""
+        d = contacts.world.dimension
+        none = np.zeros((len(contacts), d - 1))
+        return cls(*contacts.matrices, free, contacts.friction, none if slips is None else slips)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.slips.shape[1] + 1
+
+    @property
+    def slipping(self) -> NDArray[np.bool_]:
+        """(m,) whether a contact slips already."""
+        return np.asarray(np.abs(self.slips).max(axis=1) > 0.0)
+
+    def solved(self, t: float) -> Answer:
+        """Return the answer.
+
+        Raises
+        ------
+        NoSolution
+            If no forces exist (see `cones`).
+        Undecided, Unlawful
+            If none are found that obey the laws to `BROKEN`.
+        """
+        guess = self.with_modes(*self._held())
+        if guess is not None and self.broken(guess) < NONE:
+            return guess
+        found = Cone.of(self.dimension).solved(self.rows @ self.yields, self.free, self.friction, self.slips)
+        answer = self._polished(found.reshape(-1, self.dimension), t)
+        broken = self.broken(answer)
+        if broken > BROKEN:
+            raise Unlawful(t=t, share=broken)
+        return answer
+
+    def _held(self) -> tuple[Indices, Array]:
+        """Modes and directions where every contact is held and sticks, but for what slips or has no friction."""
+        sticks = (self.friction > 0.0) & ~self.slipping
+        return np.where(sticks, STICK, SLIP), self.slips
+
+    def _shown(self, forces: Array) -> tuple[Indices, Array]:
+        """Modes and directions that forces (m, d) show."""
+        u = (self.rows @ (self.yields @ forces.ravel()) + self.free).reshape(forces.shape)
+        still = NONE * np.abs(self.free).max()
+        speed = np.linalg.norm(u[:, 1:], axis=1)
+        slides = speed > still
+        given = self.slipping
+        # Friction is known to more places than what it leaves of a slip.
+        friction = np.linalg.norm(forces[:, 1:], axis=1)
+        rubs = friction > 0.0
+        directions = np.where(
+            rubs[:, None],
+            -forces[:, 1:] / np.where(rubs, friction, 1.0)[:, None],
+            u[:, 1:] / np.where(slides, speed, 1.0)[:, None],
+        )
+        directions = np.where(slides[:, None], directions, 0.0)
+        directions = np.where(given[:, None], self.slips, directions)
+        modes = np.where(given | slides | (self.friction == 0.0), SLIP, STICK)
+        return np.where(u[:, 0] > still, OPEN, modes), directions
+
+    def equations(self, modes: Indices, directions: Array) -> tuple[Indices, Array]:
+        """Numbers (r,) of the rows that modes keep at zero, and how forces on them move bodies (N, r)."""
+        d = self.dimension
+        held, sticks = np.flatnonzero(modes != OPEN), np.flatnonzero(modes == STICK)
+        tangents = (sticks[:, None] * d + np.arange(1, d)).ravel()
+        blocks = self.yields.reshape(len(self.yields), -1, d)
+        rubs = np.where(modes == SLIP, self.friction, 0.0)
+        normals = blocks[:, :, 0] - (rubs * (blocks[:, :, 1:] * directions).sum(axis=2))
+        return np.concatenate([held * d, tangents]), np.concatenate(
+            [normals[:, held], self.yields[:, tangents]], axis=1
+        )
+
+    def spread(self, modes: Indices, directions: Array, rows: Indices, forces: Array) -> Array:
+        """Return forces (m, d) from those on the rows of `equations` (r,): slips rub as their loads have it."""
+        flat = np.zeros(len(modes) * self.dimension)
+        flat[rows] = forces
+        out = flat.reshape(len(modes), -1)
+        slips = modes == SLIP
+        out[slips, 1:] = -(self.friction * out[:, 0])[slips, None] * directions[slips]
+        return out
+
+    def with_modes(self, modes: Indices, directions: Array, near: Array | None = None) -> Answer | None:
+        """Return the forces of given modes, None if there are none.
+
+        Where loads are redundant: the forces nearest to ``near`` (m, d), each change weighed by what is carried there
+        (E37); without, the least.
+        """
+        if not (modes != OPEN).any():
+            return nothing(len(modes), self.dimension)
+        rows, columns = self.equations(modes, directions)
+        matrix, wanted = self.rows[rows] @ columns, -self.free[rows]
+        scale, start = np.ones(len(rows)), np.zeros(len(rows))
+        if near is not None:
+            bears = np.maximum(near[:, :1], 1e-12 * max(1e-300, near[:, 0].max()))
+            share = np.concatenate(
+                [np.ones((len(modes), 1)), np.repeat(self.friction[:, None], near.shape[1] - 1, 1)], 1
+            )
+            scale, start = np.sqrt(bears * share).ravel()[rows], near.ravel()[rows]
+        found = start
+        for _ in range(3):  # each round leaves of the last one's remainder what round-off does
+            remainder = wanted - matrix @ found
+            if np.abs(remainder).max() <= ROUND_OFF * np.abs(wanted).max():
+                break
+            found = found + scale * np.linalg.lstsq(matrix * scale, remainder, rcond=SINGULAR)[0]
+        if np.abs(matrix @ found - wanted).max() > NONE * max(np.abs(self.free).max(), 1e-300):
+            return None
+        return Answer(modes, directions, self.spread(modes, directions, rows, found))
+
+    def broken(self, answer: Answer) -> float:
+        """Share of their size by which velocities or forces break a law."""
+        p = answer.forces
+        u = (self.rows @ (self.yields @ p.ravel()) + self.free).reshape(p.shape)
+        size_u, size_p = max(np.abs(self.free).max(), 1e-300), max(np.abs(p).max(), 1e-300)
+        speed, friction = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
+        limit = self.friction * p[:, 0]
+        loaded = p[:, 0] > NONE * size_p
+        # Friction opposes the slip as much as it can: p_t . u_t = -mu p_n |u_t|.
+        along = np.where(self.slipping | ~loaded, 0.0, (p[:, 1:] * u[:, 1:]).sum(axis=1) + limit * speed)
+        shares = (
+            (-u[:, 0]).max() / size_u,
+            (-p[:, 0]).max() / size_p,
+            (friction - limit).max() / size_p,
+            np.where(loaded, np.abs(u[:, 0]), 0.0).max() / size_u,
+            along.max() / size_u / size_p,
+        )
+        return float(max(shares))
+
+    def _polished(self, start: Array, t: float) -> Answer:
+        """Solve the equations of the modes that forces (m, d) show; what would pull is opened."""
+        modes, directions = self._shown(start)
+        for _ in range(len(modes) + 1):
+            for near in (None, start):
+                found = self.with_modes(modes, directions, near)
+                if found is not None and self.broken(found) < NONE:
+                    return _pressing(found)
+            nearest = found
+            if nearest is None:
+                break
+            least = nearest.forces[:, 0].argmin()
+            if nearest.forces[least, 0] > -BROKEN * np.abs(nearest.forces).max():
+                return _pressing(nearest)
+            modes = modes.copy()
+            modes[least] = OPEN
+        raise Undecided(t=t)
+
+
+def _pressing(answer: Answer) -> Answer:
+    """Return the answer with loads that round-off made negative as zeros."""
+    forces = answer.forces.copy()
+    forces[:, 0] = np.maximum(forces[:, 0], 0.0)
+    return Answer(answer.modes, answer.directions, forces)

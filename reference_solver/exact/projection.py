@@ -1,0 +1,48 @@
+"""Round-off of gaps and speeds is taken off where contacts are held (E39)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.forces import Held
+from reference_solver.exact.problem import SINGULAR, STICK
+from reference_solver.model import Array
+
+#: Gaps that are left alone, as a share of the smallest half width, and speeds [m/s].
+GAP, SPEED = 1e-14, 1e-13
+
+
+def projected(world: World, state: State, held: Held) -> State:
+    """Return the state with gaps of held contacts closed, and speeds taken off along rows that are held.
+
+    Ways and changes of velocity are those of the least kinetic energy: M^-1 G'.
+    """
+    contacts, d = held.contacts, world.dimension
+    if not len(contacts):
+        return state
+    rows = contacts.at_state(state).rows
+    normal = np.arange(len(contacts)) * d
+    if np.abs(rows.gap).max() > GAP * world.size:
+        for _ in range(2):
+            state = state.moved(_least(contacts.matrices, normal, -contacts.rows.gap).reshape(state.velocity.shape))
+            contacts.at_state(state)
+    sticks = np.flatnonzero(held.answer.modes == STICK)
+    keeps = np.concatenate([normal, (sticks[:, None] * d + np.arange(1, d)).ravel()])
+    speed = contacts.rows.speed.ravel()[keeps]
+    if np.abs(speed).max() > SPEED:
+        change = _least(contacts.matrices, keeps, -speed).reshape(state.velocity.shape)
+        state = replace(state, velocity=state.velocity + change)
+        contacts.at_state(state)
+    return state
+
+
+def _least(matrices: tuple[Array, Array], rows: NDArray[Any], wanted: Array) -> Array:
+    """Return the way (N,) of the least energy that changes rows by what is wanted (r,)."""
+    row, yields = matrices
+    found = np.linalg.lstsq(row[rows] @ yields[:, rows], wanted, rcond=SINGULAR)[0]
+    return np.asarray(yields[:, rows] @ found)

@@ -1,0 +1,78 @@
+"""What the loop cannot tell: every reason, in one sentence each."""
+
+from __future__ import annotations
+
+
+class Refused(Exception):
+    """The loop has no answer; the text says why.
+
+    Parameters
+    ----------
+    facts
+        What stands in the braces of `sentence`.
+    """
+
+    sentence = ""
+
+    def __init__(self, **facts: object) -> None:
+        super().__init__(self.sentence.format(**facts))
+
+
+class NoImpulses(Refused):
+    """Bodies that meet cannot part: what is moved crushes something."""
+
+    sentence = "no impulses part the bodies that meet at {t:.9g} s: something is crushed by what is moved"
+
+
+class Unconverged(Refused):
+    """Friction of several contacts in space is not found."""
+
+    sentence = "friction of {count} contacts is not found: sweeps over them do not converge"
+
+
+class NoForces(Refused):
+    """Neither forces nor impulses obey the laws."""
+
+    sentence = "no forces exist at {t:.9g} s, and no impulses that would change that"
+
+
+class Undecided(Refused):
+    """A solution is known by its signs alone, and the equations of these signs have none."""
+
+    sentence = "it is not decided at {t:.9g} s which contacts hold, stick and slip"
+
+
+class Unlawful(Refused):
+    """What was solved for breaks a law by more than round-off."""
+
+    sentence = "forces or impulses break the laws of contact at {t:.9g} s by {share:.0e} of their size"
+
+
+class NoProgress(Refused):
+    """Events follow each other in no time."""
+
+    sentence = "{count} events follow each other at {t:.9g} s and time does not go on; the last: {last}"
+
+
+class TooManyImpacts(Refused):
+    """Impacts of one instant that do not end."""
+
+    sentence = "more than {count} impacts follow each other at {t:.9g} s"
+
+
+class TooManyPieces(Refused):
+    """More events than a run may have."""
+
+    sentence = "more than {count} pieces of motion up to {t:.9g} s"
+
+
+class Overlap(Refused):
+    """Bodies are in each other: a meeting was missed, or the world starts so."""
+
+    sentence = "bodies {a} and {b} overlap by {depth:.1e} m at {t:.9g} s"
+
+
+class EnergyGrows(Refused):
+    """Contacts create energy."""
+
+    sentence = "energy grows by {amount:.1e} J in a piece from {t:.9g} s"

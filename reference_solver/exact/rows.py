@@ -1,0 +1,146 @@
+"""Gaps, rows and their rates for contacts of any kind (E1, E2, E36), and contacts with what was found of them.
+
+The normal n leads from A to B. The place of contact moves along both bodies; its lever r on either has the rate r'.
+With the spin matrices O the points of both bodies there have the relative velocity
+``u = v_B + O_B r_B - v_A - O_A r_A``, and its components ``n.u``, ``t.u`` change by
+
+    d(n.u)/dt = G_n a + n.beta + n'.u,    d(t.u)/dt = G_t a + t.beta - (t.n') (n.u),
+    beta = O_B r_B' - O_A r_A',
+
+where G a collects the accelerations a of the bodies. A kind of contact tells n, n', the place and its velocity alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.features import find
+from reference_solver.exact.kernels.rows import write_rows
+from reference_solver.model import Array
+from reference_solver.pieces import Indices
+
+
+class Rows(NamedTuple):
+    """What is known of m contacts at a state, in d dimensions, for twists of q numbers.
+
+    Parameters
+    ----------
+    gap
+        (m,) [m].
+    frame
+        (m, d, d): normal, then tangents. In space ``frame[:, 1]`` comes in as the tangent that is wished.
+    place
+        (m, d) places of contact, world axes [m].
+    row
+        (m, d, 2, q): G of each direction for bodies a and b.
+    yields
+        (m, d, 2, q): M^-1 G'.
+    speed
+        (m, d): u along the frame.
+    rate
+        (m, d): its acceleration without that of bodies, gamma.
+    """
+
+    gap: Array
+    frame: Array
+    place: Array
+    row: Array
+    yields: Array
+    speed: Array
+    rate: Array
+
+
+def empty_rows(count: int, d: int, q: int) -> Rows:
+    """Return room for ``count`` contacts."""
+    shapes = ((), (d, d), (d,), (d, 2, q), (d, 2, q), (d,), (d,))
+    return Rows(*(np.zeros((count, *shape)) for shape in shapes))
+
+
+@dataclass
+class Contacts:
+    """Features that touch, the laws of their pairs, and their rows at the state they were last brought to.
+
+    Parameters
+    ----------
+    world
+        What they belong to.
+    features
+        (m, 6), see `features`.
+    along
+        (m, d) tangents that frames take up, in world axes; zeros where any will do.
+    """
+
+    world: World
+    features: Indices
+    along: Array
+    rows: Rows = field(init=False)
+
+    def __post_init__(self) -> None:
+        d, q = self.world.dimension, self.world.shape[1]
+        self.rows = empty_rows(len(self.features), d, q)
+        a, b = self.features[:, 0], self.features[:, 1]
+        self.friction, self.restitution = self.world.friction[a, b], self.world.restitution[a, b]
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+    def at(self, place: Array, axes: Array, velocity: Array) -> Contacts:
+        """Bring rows to a state; return itself."""
+        if len(self):
+            self.rows.frame[:, 1] = self.along
+            write_rows(self.world.bodies, (place, axes, velocity), self.features, self.rows)
+        return self
+
+    def at_state(self, state: State) -> Contacts:
+        """Bring rows to a state; return itself."""
+        return self.at(state.place, state.axes, state.velocity)
+
+    def chosen(self, which: NDArray[Any]) -> Contacts:
+        """Return some of the contacts, by numbers or by a mask, with their rows."""
+        part = Contacts(self.world, self.features[which], self.along[which])
+        part.rows = Rows(*(each[which] for each in self.rows))
+        return part
+
+    @property
+    def names(self) -> list[tuple[int, ...]]:
+        """Features as tuples, to look contacts up by."""
+        return [tuple(row) for row in self.features.tolist()]
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Bodies of each contact."""
+        return [(a, b) for a, b in self.features[:, :2].tolist()]
+
+    def spread(self, blocks: Array) -> Array:
+        """Return rows (m, d, 2, q) as a matrix (m d, n q)."""
+        m, d, _, q = blocks.shape
+        n = self.world.shape[0]
+        out = np.zeros((m, d, n, q))
+        which = np.arange(m)
+        for turn in range(2):
+            out[which, :, self.features[:, turn]] += blocks[:, :, turn]
+        return out.reshape(m * d, n * q)
+
+    @property
+    def matrices(self) -> tuple[Array, Array]:
+        """G (m d, n q) and H = M^-1 G' (n q, m d)."""
+        return self.spread(self.rows.row), np.ascontiguousarray(self.spread(self.rows.yields).T)
+
+
+def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
+    """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it."""
+    features = find(world, state, left)
+    contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
+    keep: list[int] = []
+    pair, place = features[:, :2], contacts.rows.place
+    # Places differ by as much as two gaps and two distances from ends may be off.
+    tol = 2e-10 * world.size
+    for k in range(len(features)):
+        if not any((pair[j] == pair[k]).all() and np.abs(place[j] - place[k]).max() < tol for j in keep):
+            keep.append(k)
+    return contacts if len(keep) == len(features) else contacts.chosen(np.array(keep))

@@ -1,0 +1,70 @@
+"""Ends of series of rebounds: what bounces or rocks too low to be followed is summed up (E22).
+
+A contact that leaves with the speed u under an acceleration -g towards each other rises by u^2 / (2 g). All its
+rebounds together leave it closed, with the velocities of an impact without restitution. That is taken as soon as the
+rise is less than round-off of a gap can tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.cones import NoSolution
+from reference_solver.exact.forces import STILL, accelerations, decide
+from reference_solver.exact.motion import free_acceleration
+from reference_solver.exact.problem import OPEN, SLIP, STICK, Problem
+from reference_solver.exact.refusals import Refused
+from reference_solver.exact.rows import Contacts
+
+#: Rebounds no higher than this share of the smallest half width are summed.
+LOW = 1e-13
+
+
+def _low(world: World, state: State, contacts: Contacts) -> tuple[NDArray[np.bool_], set[tuple[int, ...]]]:
+    """Which contacts (m,) part so slowly that they rise by less than `LOW`, and the names of those that stay closed."""
+    contacts.at_state(state)
+    none: set[tuple[int, ...]] = set()
+    parts = contacts.rows.speed[:, 0]
+    if not (parts > STILL).any():
+        return np.zeros(len(contacts), bool), none
+    free = free_acceleration(world, state.axes, state.velocity)
+    try:
+        held = decide(world, state, contacts, free)
+    except (NoSolution, Refused):
+        return np.zeros(len(contacts), bool), none
+    falls = -accelerations(contacts.at_state(state), held.acceleration)[:: world.dimension]
+    low = (parts > STILL) & (falls > 0.0) & (parts**2 < 2.0 * falls * LOW * world.size)
+    return low, set(held.contacts.names)
+
+
+def too_low(world: World, state: State, contacts: Contacts) -> set[tuple[int, int]]:
+    """Return the pairs with restitution that part too slowly to be followed."""
+    if not (contacts.restitution > 0.0).any():
+        return set()
+    low, _ = _low(world, state, contacts)
+    return {
+        pair for pair, is_low, e in zip(contacts.pairs, low, contacts.restitution, strict=True) if is_low and e > 0.0
+    }
+
+
+def settled(world: World, state: State, contacts: Contacts) -> State:
+    """Return the state with contacts closed that rock or rebound too low to be followed."""
+    low, stay = _low(world, state, contacts)
+    if not low.any():
+        return state
+    closed = low | np.array([name in stay for name in contacts.names])
+    slip = contacts.rows.speed[:, 1:]
+    speed = np.linalg.norm(slip, axis=1)
+    slides = speed > STILL
+    modes = np.where(closed, np.where(slides | low, SLIP, STICK), OPEN)
+    directions = np.where(slides[:, None], slip / np.where(slides, speed, 1.0)[:, None], 0.0)
+    found = Problem.of(contacts, contacts.rows.speed.ravel()).with_modes(modes, directions)
+    if found is None:
+        return state
+    change = (contacts.matrices[1] @ found.forces.ravel()).reshape(state.velocity.shape)
+    after = replace(state, velocity=state.velocity + change)
+    return after if contacts.at_state(after).rows.speed[:, 0].min() > -STILL else state

@@ -1,0 +1,56 @@
+"""The event loop against stored answers of the reference solver; `compare` looks at all of them."""
+
+import numpy as np
+import pytest
+from compare import compared
+from oracle import KEPT, SEEDED, Answer, stored, world_of
+
+from reference_solver.exact import loop
+from reference_solver.exact.refusals import NoForces
+
+#: Worlds of each kind that are looked at here, and the CPU that one may take [s].
+COUNT, LIMIT = 6, 60.0
+ANSWERS = {known.key: known for known in stored()}
+#: Kinds that the loop answers like the reference solver, spatial random worlds apart.
+LIKE = ("random", "fuzz2", "chains2")
+CHOSEN = [f"{kind} {seed}" for kind in LIKE for seed in range(COUNT)]
+
+
+def test_store_has_every_kind_of_world():
+    kinds = {key.partition(" ")[0] for key in ANSWERS}
+    assert kinds == {*SEEDED, "standard"}
+    assert KEPT.stat().st_size < 2_000_000
+    assert sum(known.holds for known in ANSWERS.values()) > 0.9 * len(ANSWERS)
+
+
+@pytest.mark.parametrize("key", CHOSEN)
+def test_random_world_is_the_same_within_both_bounds(key):
+    assert compared(ANSWERS[key], LIMIT).word in ("same", "unknown", "refused by both")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("key", [key for key in ANSWERS if key.startswith("standard")])
+def test_cell_of_the_standard_suite_is_the_same_or_refused(key):
+    assert compared(ANSWERS[key], LIMIT).word != "different"
+
+
+def moved(known, way):
+    """The same answer, but for its last pose."""
+    pose = np.array(known.pose)
+    pose[-1, -1, 0] += way
+    return Answer(**{**vars(known), "pose": pose.tolist()})
+
+
+def test_other_answer_is_seen():
+    known = ANSWERS["random 0"]
+    assert compared(known, LIMIT).word == "same"
+    assert compared(moved(known, 1e-6), LIMIT).word == "different"
+
+
+def test_refused_world_is_no_different_one(monkeypatch):
+    def refused(self):
+        raise NoForces(t=0.0)
+
+    monkeypatch.setattr(loop.Loop, "next_piece", refused)
+    assert compared(ANSWERS["random 0"], LIMIT).word == "refused"
+    assert world_of("random 0").samples == len(ANSWERS["random 0"].t) - 1

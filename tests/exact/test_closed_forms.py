@@ -1,0 +1,177 @@
+"""The event loop against motions that are known in closed form, to 1e-10."""
+
+import math
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+
+G, DT = 9.81, 1.0 / 240.0
+SMALL = 1e-10
+#: Orientation without a turn, by dimension.
+UPRIGHT = {2: (0.0,), 3: (1.0, 0.0, 0.0, 0.0)}
+SPINS = {2: 1, 3: 3}
+
+
+def up(d, height=1.0):
+    return (0.0,) * (d - 1) + (height,)
+
+
+def ground(d, lean=0.0):
+    normal = (math.sin(lean),) + (0.0,) * (d - 2) + (math.cos(lean),)
+    return Body(HalfSpace(normal), motion="fixed", pose=(*(0.0,) * d, *UPRIGHT[d]))
+
+
+def ball(d, place, velocity=None, mass=1.0, radius=0.5, spin=None):
+    shape, inertia = (Disc(radius), 0.5) if d == 2 else (Sphere(radius), 0.4)
+    moment = inertia * mass * radius**2
+    velocity = (0.0,) * d if velocity is None else velocity
+    spin = (0.0,) * SPINS[d] if spin is None else spin
+    return Body(shape, mass, moment if d == 2 else (moment,) * 3, (*place, *UPRIGHT[d]), (*velocity, *spin))
+
+
+def box(d, half, place, velocity=None, mass=1.0):
+    square = [h * h for h in half]
+    moments = [mass / 3.0 * (sum(square) - s) for s in square]
+    inertia = mass / 3.0 * sum(square) if d == 2 else tuple(moments)
+    velocity = (0.0,) * d if velocity is None else velocity
+    return Body(Box(half), mass, inertia, (*place, *UPRIGHT[d]), (*velocity, *(0.0,) * SPINS[d]))
+
+
+def record(model, time, stride=1):
+    return Simulation(model, Settings.exact(DT)).record(round(time / DT), stride)
+
+
+def height_of_bounce(t, height, e):
+    """Height of a point that falls from rest and rebounds with e."""
+    begin, duration, speed = 0.0, math.sqrt(2.0 * height / G), 0.0
+    if t <= duration:
+        return height - 0.5 * G * t * t
+    begin, speed = duration, e * math.sqrt(2.0 * G * height)
+    while speed > 1e-12:
+        if t <= begin + 2.0 * speed / G:
+            return speed * (t - begin) - 0.5 * G * (t - begin) ** 2
+        begin, speed = begin + 2.0 * speed / G, e * speed
+    return 0.0
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.9, 1.0])
+def test_bounce_down_to_rest(d, e):
+    found = record(Model(d, [ground(d), ball(d, up(d, 1.5))], up(d, -G), e, 0.0), 3.0)
+    truth = [0.5 + height_of_bounce(t, 1.0, e) for t in found.t]
+    assert np.abs(found.pose[:, 1, d - 1] - truth).max() < SMALL
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4])
+@pytest.mark.parametrize("d", [2, 3])
+def test_slide_of_a_box_until_it_stops(d, heading):
+    speed, mu = 3.0, 0.4
+    velocity = (speed, 0.0) if d == 2 else (speed * math.cos(heading), speed * math.sin(heading), 0.0)
+    half = (0.5, 0.25) if d == 2 else (0.5, 0.5, 0.25)
+    found = record(Model(d, [ground(d), box(d, half, up(d, 0.25), velocity)], up(d, -G), 0.0, mu), 2.0)
+    t = np.minimum(found.t, speed / (mu * G))
+    way = speed * t - 0.5 * mu * G * t * t
+    truth = way[:, None] * np.array(velocity) / speed + up(d, 0.25)
+    assert np.abs(found.pose[:, 1, :d] - truth).max() < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_rest_of_a_stack_to_the_bit(d):
+    half = (0.5,) * d
+    bodies = [ground(d), *(box(d, half, up(d, 0.5 + k)) for k in range(3))]
+    found = record(Model(d, bodies, up(d, -G), 0.0, 0.5), 5.0, 240)
+    assert np.array_equal(found.pose, np.broadcast_to(found.pose[0], found.pose.shape))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("ratio", [0.5, 1.5])
+def test_ball_on_a_slope_rolls_or_slips(d, ratio):
+    """Without slip if tan(lean) <= (1 + m r^2 / I) mu."""
+    lean, share = 0.3, 0.5 if d == 2 else 0.4
+    mu = ratio * math.tan(lean) / (1.0 + 1.0 / share)
+    start = 0.5 * np.array((math.sin(lean),) + (0.0,) * (d - 2) + (math.cos(lean),))
+    found = record(Model(d, [ground(d, lean), ball(d, start)], up(d, -G), 0.0, mu), 1.0)
+    pull = G * math.sin(lean)
+    acceleration = pull / (1.0 + share) if ratio > 1.0 else pull - mu * G * math.cos(lean)
+    way = np.linalg.norm(found.pose[:, 1, :d] - start, axis=1)
+    assert np.abs(way - 0.5 * acceleration * found.t**2).max() < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_blows_between_two_balls_and_a_wall_count_pi(d):
+    """Of masses 1 : 100 there are 31 blows (G. Galperin, *Regular and Chaotic Dynamics* 8, 2003)."""
+    wall = Body(HalfSpace((1.0,) + (0.0,) * (d - 1)), motion="fixed", pose=(*(0.0,) * d, *UPRIGHT[d]))
+    aside = (0.0,) * (d - 1)
+    light, heavy = ball(d, (1.0, *aside)), ball(d, (3.0, *aside), (-1.0, *aside), 100.0)
+    simulation = Simulation(Model(d, [wall, light, heavy], (0.0,) * d, 1.0, 0.0), Settings.exact(DT))
+    found = simulation.record(960)
+    velocity = found.twist[:, 1:, 0]
+    assert simulation._world._loop.pieces == 31 + 1  # every blow ends a piece
+    assert np.abs(velocity**2 @ (1.0, 100.0) - 100.0).max() < SMALL
+    # Each of 16 blows between the balls turns (10 v_heavy, v_light) by twice atan(1/10); the wall mirrors v_light.
+    turned = math.pi - 2.0 * 16 * math.atan(0.1)
+    assert abs(velocity[-1, 1] - math.cos(turned)) < SMALL
+    assert abs(velocity[-1, 0] + 10.0 * math.sin(turned)) < SMALL
+
+
+def test_box_tips_over_its_corner_without_slip():
+    """Energy of the turn about the corner: I_c w^2 / 2 + m g y = constant, the corner at rest."""
+    half, tilt = (0.3, 0.6), 0.5  # beyond the balance, at atan(1/2)
+    c, s = math.cos(tilt), math.sin(tilt)
+    arm = math.hypot(*half)
+    place = (half[0] * c - half[1] * s, half[0] * s + half[1] * c)  # its lower left corner in the origin
+    moment = (half[0] ** 2 + half[1] ** 2) / 3.0
+    body = Body(Box(half), 1.0, moment, (place[0], place[1], tilt), (0.0, 0.0, 0.0))
+    found = record(Model(2, [ground(2), body], (0.0, -G), 0.0, 2.0), 0.4)
+    x, y, turned = found.pose[:, 1].T
+    c, s = np.cos(turned), np.sin(turned)
+    corner = np.stack([x - half[0] * c + half[1] * s, y - half[0] * s - half[1] * c])
+    assert np.abs(corner).max() < SMALL
+    energy = 0.5 * (moment + arm**2) * found.twist[:, 1, 2] ** 2 + G * y
+    assert np.abs(energy - energy[0]).max() < SMALL
+    assert np.abs(found.twist[-1, 1, 2]) > 0.1
+
+
+def test_capsule_rolls_over_its_round_end():
+    """A rod that stands on its end falls: it rolls without slip, and keeps its energy."""
+    half, radius, lean = 0.4, 0.1, 0.1
+    angle = 0.5 * math.pi + lean
+    place = (half * math.cos(angle), radius + half * math.sin(angle), angle)
+    moment = 0.06
+    body = Body(Capsule(half, radius), 1.0, moment, place, (0.0, 0.0, 0.0))
+    found = record(Model(2, [ground(2), body], (0.0, -G), 0.0, 3.0), 0.4)
+    x, y, turned = found.pose[:, 1].T
+    centre = np.stack([x - half * np.cos(turned), y - half * np.sin(turned)])
+    assert np.abs(centre[1] - radius).max() < SMALL
+    assert np.abs(centre[0] - centre[0, 0] + radius * (turned - angle)).max() < SMALL
+    energy = 0.5 * (found.twist[:, 1, :2] ** 2).sum(axis=1) + 0.5 * moment * found.twist[:, 1, 2] ** 2 + G * y
+    assert np.abs(energy - energy[0]).max() < SMALL
+    assert abs(turned[-1] - angle) > 0.1
+
+
+def test_symmetric_top_precesses():
+    """Without torque its axis goes round its momentum L at |L| / I_1 (Euler)."""
+    moments, spin = (0.2, 0.2, 0.1), (0.5, 0.0, 3.0)
+    body = Body(Box((0.5, 0.5, 0.1)), 1.0, moments, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, *spin))
+    found = record(Model(3, [body], (0.0, 0.0, 0.0), 0.0, 0.0), 4.0, 48)
+    momentum = np.array(moments) * spin
+    rate = np.linalg.norm(momentum) / moments[0]
+    along = momentum / np.linalg.norm(momentum)
+    w, x, y, z = found.pose[:, 0, 3:].T
+    axis = np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
+    start = np.array([0.0, 0.0, 1.0])
+    kept = (start @ along) * along
+    across, beside = start - kept, np.cross(along, start)
+    turn = (rate * found.t)[:, None]
+    assert np.abs(axis - kept - np.cos(turn) * across - np.sin(turn) * beside).max() < SMALL
+
+
+def test_boxes_of_one_height_meet_on_a_floor():
+    """Their corners run along each other's sides until their faces meet; both have gaps of zero there."""
+    left, right = box(2, (0.25, 0.25), (0.0, 0.25), (1.0, 0.0)), box(2, (0.25, 0.25), (0.6, 0.25), (0.0, 0.0))
+    found = record(Model(2, [ground(2), left, right], (0.0, -G), 1.0, 0.0), 0.5)
+    begin = 0.1  # the gap over the speed
+    truth = np.minimum(found.t, begin), 0.6 + np.maximum(found.t - begin, 0.0)
+    assert np.abs(found.pose[:, 1:, 0].T - truth).max() < SMALL

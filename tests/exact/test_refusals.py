@@ -1,0 +1,124 @@
+"""What the loop cannot tell it refuses, in one sentence that names it."""
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver.exact import cones, forces, impacts, loop, problem, refusals
+from reference_solver.exact.bodies import start_of, world_of
+from reference_solver.exact.checks import check
+from reference_solver.exact.kernels.cones import CONVERGED, JAMMED, UNCONVERGED
+from reference_solver.exact.motion import Piece, free_acceleration
+from reference_solver.exact.problem import Answer, Problem
+from reference_solver.exact.rows import touching_contacts
+
+G = 9.81
+FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+
+
+def ball(height, speed=0.0, mass=1.0, aside=0.0):
+    return Body(Disc(0.5), mass, 0.125 * mass, (aside, height, 0.0), (0.0, speed, 0.0))
+
+
+def advance(bodies, e=0.5, mu=0.0, steps=240, gravity=G):
+    Simulation(Model(2, bodies, (0.0, -gravity), e, mu), Settings.exact(1 / 240)).advance(steps)
+
+
+def test_ball_between_closing_walls_is_crushed():
+    lid = Body(HalfSpace((0.0, -1.0)), pose=(0.0, 2.0, 0.0), twist=(0.0, -1.0, 0.0), motion="prescribed")
+    with pytest.raises(refusals.Refused) as said:
+        advance([FLOOR, lid, ball(0.5)], e=0.0, steps=480)
+    assert isinstance(said.value, refusals.NoImpulses)
+    assert "crushed" in str(said.value) and "1" in str(said.value)
+
+
+def test_overlap_at_the_start():
+    with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
+        advance([FLOOR, Body(Box((0.5, 0.5)), 1.0, 0.2, (0.0, 0.4, 0.0))])
+
+
+def test_impacts_of_an_instant_that_do_not_end(monkeypatch):
+    monkeypatch.setattr(impacts, "MOST", 1)
+    with pytest.raises(refusals.TooManyImpacts, match="more than 1 impacts"):
+        advance([FLOOR, ball(1.0)], e=1.0)
+
+
+def test_too_many_pieces(monkeypatch):
+    monkeypatch.setattr(loop, "MOST_PIECES", 3)
+    with pytest.raises(refusals.TooManyPieces, match="more than 3 pieces of motion"):
+        advance([FLOOR, ball(1.0)], e=1.0, steps=2400)
+
+
+def test_events_without_progress(monkeypatch):
+    monkeypatch.setattr(loop, "PROGRESS", 10.0)  # no piece is as long
+    with pytest.raises(refusals.NoProgress, match="50 events follow each other"):
+        advance([FLOOR, ball(1.0)], e=1.0, steps=24_000)
+
+
+def test_contacts_that_create_energy():
+    """A piece in which a body without load becomes faster."""
+    model = Model(2, [ball(1.0)], (0.0, 0.0), 0.0, 0.0)
+    world, state = world_of(model), start_of(model)
+    held = forces.decide(world, state, touching_contacts(world, state), np.zeros((1, 3)))
+    way, velocity = np.zeros((1, 3, 3)), np.zeros((1, 3, 2))
+    way[0, 0, 2], velocity[0, 0, 1] = 0.5, 1.0
+    with pytest.raises(refusals.EnergyGrows, match="energy grows by"):
+        check(world, Piece(state, 1.0, way, velocity, held, turns=False))
+
+
+def posed(model):
+    """Contact problem of forces of a model at its start."""
+    world, state = world_of(model), start_of(model)
+    contacts = touching_contacts(world, state)
+    free = free_acceleration(world, state.axes, state.velocity)
+    return Problem.of(contacts, forces.accelerations(contacts, free))
+
+
+def test_solution_that_breaks_a_law(monkeypatch):
+    """A planted fault: loads that are right, but for a tenth of each."""
+    monkeypatch.setattr(Problem, "_held", lambda self: (np.zeros(1, np.int64), np.zeros((1, 1))))
+    monkeypatch.setattr(
+        Problem, "_polished", lambda self, start, t: Answer(np.ones(1, np.int64), start[:, 1:], 0.9 * start)
+    )
+    with pytest.raises(refusals.Unlawful, match="break the laws of contact at 2 s by 1e-01"):
+        posed(Model(2, [FLOOR, ball(0.5)], (0.0, -G), 0.0, 0.5)).solved(2.0)
+
+
+def test_modes_without_forces(monkeypatch):
+    monkeypatch.setattr(Problem, "with_modes", lambda self, *_: None)
+    with pytest.raises(refusals.Undecided, match="not decided at 2 s"):
+        posed(Model(2, [FLOOR, ball(0.5)], (0.0, -G), 0.0, 0.5)).solved(2.0)
+
+
+def test_neither_forces_nor_impulses(monkeypatch):
+    def none(*_):
+        raise problem_without_solution
+
+    problem_without_solution = loop.NoSolution()
+    monkeypatch.setattr(loop, "decide", none)
+    monkeypatch.setattr(loop, "jam", none)
+    with pytest.raises(refusals.NoForces, match="no forces exist at 0 s"):
+        advance([FLOOR, ball(0.5)], e=0.0)
+
+
+@pytest.mark.parametrize(
+    ("ended", "kind"), [(UNCONVERGED, refusals.Unconverged), (JAMMED, cones.NoSolution), (CONVERGED, None)]
+)
+def test_sweeps_in_space_that_end_otherwise(monkeypatch, ended, kind):
+    monkeypatch.setattr(cones, "sweep", lambda *_: ended)
+    asked = np.eye(3), np.ones(3), np.ones(1), np.zeros((1, 2))
+    if kind is None:
+        assert np.array_equal(cones.SpatialCone().solved(*asked), np.zeros(3))
+    else:
+        with pytest.raises(kind):
+            cones.SpatialCone().solved(*asked)
+
+
+def test_every_refusal_is_one_sentence():
+    kinds = refusals.Refused.__subclasses__()
+    assert len(kinds) == 11
+    facts = {"t": 0.5, "share": 1e-3, "count": 50, "last": "bodies meet", "a": 1, "b": 2, "depth": 1e-3, "amount": 1e-3}
+    for kind in kinds:
+        said = str(kind(**facts))
+        assert "{" not in said and "\n" not in said and len(said) < 160
+    assert problem.BROKEN > problem.NONE

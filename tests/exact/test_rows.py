@@ -1,0 +1,79 @@
+"""Rows and their rates against differences of gaps and velocities along a motion."""
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Sphere
+from reference_solver.exact.bodies import State, start_of, world_of
+from reference_solver.exact.kernels.features import FACE, LINE, POINT
+from reference_solver.exact.rows import Contacts
+
+#: Half the difference of times [s]: errors of differences are its square, and round-off over it.
+STEP = 1e-4
+
+BOX, PILL, BALL = Box((0.5, 0.4, 0.3)), Capsule(0.4, 0.2), Sphere(0.3)
+FLAT_BOX, FLAT_PILL, DISC = Box((0.5, 0.4)), Capsule(0.4, 0.2), Disc(0.3)
+#: Shapes and features (kind, number) of either body.
+PAIRS = {
+    "corner on half-space": (HalfSpace((0.6, 0.8)), FLAT_BOX, (FACE, 0), (POINT, 1)),
+    "corner on edge": (FLAT_BOX, FLAT_BOX, (FACE, 2), (POINT, 3)),
+    "edge on corner": (FLAT_BOX, FLAT_BOX, (POINT, 1), (FACE, 0)),
+    "disc on edge": (FLAT_BOX, DISC, (FACE, 1), (POINT, 0)),
+    "end of capsule on its other's side": (FLAT_PILL, FLAT_PILL, (FACE, 1), (POINT, 0)),
+    "disc on corner": (FLAT_BOX, DISC, (POINT, 2), (POINT, 0)),
+    "corner in space on half-space": (HalfSpace((0.0, 0.6, 0.8)), BOX, (FACE, 0), (POINT, 5)),
+    "corner on face": (BOX, BOX, (FACE, 4), (POINT, 2)),
+    "face on end of capsule": (PILL, BOX, (POINT, 1), (FACE, 1)),
+    "ball on corner": (BOX, BALL, (POINT, 7), (POINT, 0)),
+    "ball on edge": (BOX, BALL, (LINE, 3), (POINT, 0)),
+    "end of capsule on edge": (PILL, BOX, (POINT, 0), (LINE, 6)),
+    "edges that cross": (BOX, BOX, (LINE, 0), (LINE, 7)),
+    "capsules that cross": (PILL, PILL, (LINE, 0), (LINE, 0)),
+}
+
+
+def moving(shapes, seed):
+    """World of two bodies in any places, and their state."""
+    rng = np.random.default_rng(seed)
+    d = 2 if shapes[1] in (FLAT_BOX, FLAT_PILL, DISC) and len(getattr(shapes[0], "normal", (0, 0))) == 2 else 3
+    d = 3 if any(shape in (BOX, BALL) for shape in shapes) or shapes == (PILL, PILL) else d
+    bodies = []
+    for k, shape in enumerate(shapes):
+        place = rng.uniform(-1.0, 1.0, d) + 2.0 * k
+        turn = rng.normal(size=4 if d == 3 else 1)
+        turn /= np.linalg.norm(turn) if d == 3 else 1.0
+        motion = "prescribed" if isinstance(shape, HalfSpace) else "free"
+        twist = rng.uniform(-1.0, 1.0, 6 if d == 3 else 3)
+        inertia = tuple(rng.uniform(0.8, 1.0, 3)) if d == 3 else 0.9
+        bodies.append(Body(shape, 1.3, inertia, (*place, *turn), tuple(twist), motion))
+    model = Model(d, bodies, (0.0,) * d, 0.0, 0.5)
+    return world_of(model), start_of(model), rng
+
+
+def after(state, acceleration, t):
+    """State after a time under constant accelerations of places and of spins, to second order in it."""
+    moved = state.moved(t * state.velocity + 0.5 * t * t * acceleration)
+    return State(t, moved.place, moved.orientation, state.velocity + t * acceleration)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize("seed", range(3))
+def test_rates_of_gap_and_slip_are_those_of_differences(name, seed):
+    first, second, feature_a, feature_b = PAIRS[name]
+    world, state, rng = moving((first, second), seed)
+    contacts = Contacts(world, np.array([[0, 1, *feature_a, *feature_b]]), np.zeros((1, world.dimension)))
+    acceleration = rng.uniform(-1.0, 1.0, state.velocity.shape)
+    rows = contacts.at_state(state).rows
+    speed, rate = rows.speed[0].copy(), rows.rate[0] + contacts.matrices[0] @ acceleration.ravel()
+    frame = rows.frame[0].copy()
+    # The slip is u less its normal part; tangents turn about the normal as they like, so those of the start are kept.
+    gap, slip = [], []
+    for t in (-STEP, STEP):
+        rows = contacts.at_state(after(state, acceleration, t)).rows
+        gap.append((rows.gap[0], rows.speed[0, 0]))
+        across = rows.speed[0, 1:] @ rows.frame[0, 1:]
+        slip.append(frame[1:] @ across)
+    (gap_before, speed_before), (gap_after, speed_after) = gap
+    assert (gap_after - gap_before) / (2.0 * STEP) == pytest.approx(speed[0], abs=1e-6)
+    assert (speed_after - speed_before) / (2.0 * STEP) == pytest.approx(rate[0], abs=1e-5)
+    assert (slip[1] - slip[0]) / (2.0 * STEP) == pytest.approx(rate[1:], abs=1e-5)
