@@ -207,9 +207,8 @@ def _end_labels(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]]
     colours, taken = colours_of(list(ends["engine"])), list[tuple[float, float]]()
     for end in ends.to_dict("records"):
         text, own = f"{called(end['engine'])} {word_of(end['profile'])}", tracks[end["who"]]
-        x, y = _free_place(
-            own, len(text) * LETTER, [(0.0, 1.0), *taken], [tracks[who] for who in tracks if who != end["who"]]
-        )
+        others = [track for who, track in tracks.items() if who != end["who"]]
+        x, y = _free_place(own, len(text) * LETTER, taken, others)
         taken.append((x, y))
         found.append(([(x, y, text)], colours[end["engine"]]))
     return found
@@ -222,7 +221,7 @@ def _free_place(
 
     def is_free(x: float, y: float) -> bool:
         along = np.linspace(x - wide, x, 25)
-        tracks = [along, *(np.interp(along, other["asked"], other["got"]) for other in others)]
+        tracks = [along, *(np.interp(along, each["asked"], each["got"]) for each in (own, *others))]
         names = any(abs(y - high) < 0.99 * LINE and abs(x - right) < wide for right, high in taken)
         return not names and y > 0.0 and all(np.abs(track - y).min() > 0.6 * LINE for track in tracks)
 

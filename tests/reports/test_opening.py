@@ -139,6 +139,8 @@ def test_a_name_that_another_line_would_cross():
     line = sorted((float(x), float(y)) for text, x, y in points if text.startswith("bullet/default"))
     along = np.linspace(right - 7.5 * len("MuJoCo as shipped"), right, 50)
     assert np.abs(np.interp(along, *zip(*line, strict=True)) - level).min() > 8.0, "a line of text is 13 px high"
+    own = {float(y) for text, x, y in points if text.startswith("mujoco/default")}
+    assert len(own) == 1 and 8.0 < abs(own.pop() - level) < 25.0, "it stands beside its own line"
 
 
 def test_reports_of_all_suites_begin_with_the_same_speed():
