@@ -161,7 +161,7 @@ def test_a_scene_file_runs_with_settings(tmp_path):
     # Half of the speed is lost in a second: v = -g (1 - 2^-t)/ln 2.
     (stated,) = [row for row in rows if "ball.vy" in row["check"]]
     assert (stated["physics"], stated["standing"]) == ("fail", "new")
-    assert "linear_damping asked 0, measured 0.5" in stated["reason"]
+    assert "realised linear_damping = 0.5 of 0" in stated["reason"]
     speed = stated["value"]
     assert speed == pytest.approx(-10.0 * (1.0 - 0.5**0.25) / math.log(2.0), abs=10.0 / 240.0)
     # Without the number nothing is listed that could be new: shown, and no alarm.
