@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
-from adapters.bullet.profiles import BODY, KINDS, PROFILES, WORLD, checked, law_of
+from adapters.bullet.profiles import BODY, KINDS, PROFILES, SOFT, WORLD, checked, law_of
 from adapters.bullet.releases import RELEASES
 from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE, WARM_STARTING
@@ -21,7 +21,7 @@ from adapters.bullet.translation import factors, moments
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.meeting import meeting_pairs
-from adapters.needs import Needs
+from adapters.needs import Needs, needs
 from adapters.probes import (
     MOST_FRICTION,
     REBOUND_LEAD,
@@ -156,9 +156,13 @@ class BulletEngine(CheckedEngine):
             )
         if settings.get("enableSAT") and "enableSAT" in names:
             lines.append("p.loadURDF(..., flags=p.URDF_INITIALIZE_SAT_FEATURES)  # each box and hull")
-        body = [f"{n}={settings[n]!r}" for n in names if n in BODY]
+        soft = [f"{n}={settings[n]!r}" for n in names if n in SOFT]
+        body = [f"{n}={settings[n]!r}" for n in names if n in BODY - SOFT]
         if body:
             lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})  # each body")
+        if soft:
+            which = "that rebounds" if needs(scene).restitution > 0.0 else "that it is about"
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(soft)})  # each body {which} alone")
         return "\n".join(["# p: pybullet", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:

@@ -54,6 +54,8 @@ BODY = frozenset(
         "spinningFriction",
     }
 )
+#: Settings of a body that replace the correction of overlaps of its contacts.
+SOFT = frozenset({"contactDamping", "contactStiffness"})
 #: Integer settings of PyBullet.
 WHOLE = frozenset(
     {

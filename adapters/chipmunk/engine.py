@@ -123,7 +123,7 @@ class ChipmunkEngine(CheckedEngine):
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
         """Chipmunk has no setting for the start overlap."""
         deep = settings["start_overlap"]
-        is_share = deep > 0.0 and deep == START_SHARE * (needs(scene).pull * dt * dt)
+        is_share = deep > 0.0 and math.isclose(deep, START_SHARE * (needs(scene).pull * dt * dt))
         said = f"{START_SHARE:g}*g*dt^2" if is_share else deep
         return {"start_overlap": ("overlap of touching bodies at the start", said)}
 

@@ -45,9 +45,9 @@ FALL = "*g*dt^2"
 Checks = dict[tuple[str, str], list[tuple[Reading, Reading]]]
 _seen: dict[Slot, Observation] = {}
 _FILES = Path(__file__).parent / "scenes"
-#: Cases of other groups: words, and a scene of the catalogue with parameters or a file beside this module.
+#: Cases of other groups: words, a scene of the catalogue with parameters or a file beside this module, and a step [s].
 OTHERS = tuple(
-    (case["words"], case["scene"], params_of(case.get("params", {})))
+    (case["words"], case["scene"], params_of(case.get("params", {})), float(case.get("dt", QUICK_DT)))
     for case in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["case"]
 )
 
@@ -105,13 +105,13 @@ def other_cases(engine: str, profile: str) -> tuple[tuple[str, Slot], ...]:
     known = facts(engine)
     dimensions = known.dimensions if known else frozenset({2})
     found = []
-    for words, name, params in OTHERS:
+    for words, name, params, dt in OTHERS:
         scene = pinned(str(_FILES / name)) if name.endswith(".toml") else name
         fits = [d for d in resolve(scene).dimensions if d in dimensions]
         if fits:
             cell = {name: value for name, value in params.items() if max(fits) == 3 or name != "heading"}
             minimal = resolve(scene).minimal(cell)
-            found.append((words, Slot(scene, minimal, max(fits), engine, profile, QUICK_DT)))
+            found.append((words, Slot(scene, minimal, max(fits), engine, profile, dt)))
     return tuple(found)
 
 
