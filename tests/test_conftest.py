@@ -64,7 +64,7 @@ FINE = [
 ]
 
 
-def test_what_is_swallowed_is_told_by_its_test_and_what_is_as_it_should_be_is_not(pytester):
+def test_swallowed_exceptions_reported_by_their_test(pytester):
     result = planted(pytester, [*SWALLOWED, *FINE])
     result.assert_outcomes(passed=len(SWALLOWED) + len(FINE) + 1, errors=len(SWALLOWED))
     result.stdout.fnmatch_lines([f"*{told}*" for told in SWALLOWED.values()])
@@ -95,9 +95,7 @@ def shared():
         ("", ("reports/test_many.py::test_many",), 6),
     ],
 )
-def test_long_tests_and_most_cases_of_many_run_when_all_do_or_when_they_are_named(
-    pytester, monkeypatch, every, asked, passed
-):
+def test_long_tests_and_samples_of_many_cases(pytester, monkeypatch, every, asked, passed):
     monkeypatch.setenv("CROSSCHECK_ALL", every)
     monkeypatch.delenv("CROSSCHECK_REQUIRE_ENGINES", raising=False)
     pytester.makeconftest((HERE / "conftest.py").read_text(encoding="utf-8"))

@@ -108,7 +108,7 @@ def written_by_hand():
     return [ROOT / name for name in tracked.stdout.split() if not name.startswith(apart)]
 
 
-def test_pages_that_are_written_by_hand_have_at_most_twelve_thousand_words():
+def test_word_limit_of_handwritten_pages():
     words = {
         path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").split()) for path in written_by_hand()
     }

@@ -142,7 +142,7 @@ def test_only_an_engine_s_own_folder_imports_it():
 
 
 @pytest.mark.parametrize("engine", FOLDERS)
-def test_an_engine_s_folder_imports_the_shared_vocabulary_and_no_other_engine(engine):
+def test_engine_folder_imports_the_vocabulary_alone(engine):
     """What a new engine's folder may lean on is what every other one may; ours uses its solver as well."""
     for path in FOLDERS[engine].rglob("*.py"):
         named = set(re.findall(r"^\s*(?:from|import) (adapters\.\w+)", path.read_text(), re.MULTILINE))
@@ -251,7 +251,7 @@ def scenes_named(path, names):
     return {value for value in found if isinstance(value, str) and value in names}
 
 
-def test_a_scene_is_named_only_in_its_own_file_and_in_the_folders_of_engines():
+def test_scene_named_only_in_its_file_and_engine_folders():
     """Whoever adds a scene opens no other file; `validation/scenes/__init__.py` registers ours."""
     names, found = set(CATALOGUE), {}
     for package in (*LINE[1:], FRONT):
@@ -306,7 +306,7 @@ def solver_functions():
 LONG_CALLS: dict[tuple[str, str], str] = {}
 
 
-def test_no_argument_list_of_the_solver_is_longer_than_nine_without_a_reason():
+def test_argument_lists_of_the_solver_within_nine():
     counts = [
         ((str(path), node.name), len(node.args.posonlyargs + node.args.args + node.args.kwonlyargs))
         for path, node in solver_functions()
@@ -405,7 +405,7 @@ def test_the_rooms_of_the_solver_grow_only_where_somebody_says_so():
     assert not loose, "a room that shrank gets a smaller limit"
 
 
-def test_what_is_measured_is_not_compared_by_a_max_that_passes_over_no_numbers():
+def test_comparisons_by_max_that_ignore_nan():
     """Python's max(0.0, nan) is 0.0, which passes: `validation.metrics.largest` is NaN, which has no value."""
     found = []
     for path in sorted((ROOT / "validation").rglob("*.py")):

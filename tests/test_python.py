@@ -132,7 +132,7 @@ def test_a_result_has_its_motion_its_table_and_its_explanation(engine):
     assert repr(result) == "<bounce 3-D on mujoco/default, dt 1/240 s, e=0.7: 6 of 8 checks fail>"
 
 
-def test_profiles_are_given_by_name_or_role_and_steps_as_numbers_or_fractions(engine):
+def test_profiles_by_name_or_role_and_steps_as_fractions(engine):
     name = engine("chipmunk")
     shipped, tuned = registry.profile_of(name, "shipped"), registry.profile_of(name, "tuned")
     asked = {None: shipped, "as shipped": shipped, "tuned": tuned, shipped: shipped}
@@ -143,7 +143,7 @@ def test_profiles_are_given_by_name_or_role_and_steps_as_numbers_or_fractions(en
     assert cc.run("impact", engine=name, e=np.float64(0.5), v=3).observation.slot.params == (("e", 0.5), ("v", 3.0))
 
 
-def test_our_solver_is_exact_by_default_and_a_planar_engine_gets_the_plane(engine):
+def test_exact_solver_by_default_and_planar_engine_in_the_plane(engine):
     result = cc.run("impact", engine="reference")
     assert result.observation.slot.profile == registry.profile_of("reference", "solution")
     assert cc.run("impact", engine=engine("chipmunk")).observation.slot.dimension == 2

@@ -46,7 +46,7 @@ def scenes():
 
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
-def test_each_scene_starts_in_the_same_bits_beside_another_client_s_world_which_stays_as_it_is(profile, request):
+def test_initial_bits_beside_another_client_s_world(profile, request):
     alone = {}
     for scene in scenes():
         try:

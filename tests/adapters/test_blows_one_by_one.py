@@ -26,7 +26,7 @@ def meeting(*bodies, **given):
     return singles._Flight(space(*bodies, **given), EXACT)._meeting(0, 1)
 
 
-def test_a_blow_at_the_beginning_of_a_step_is_recorded_in_that_step_and_in_no_other():
+def test_step_of_a_blow_at_the_beginning_of_a_step():
     """Two equal balls, 1 m/s, half a metre apart: a blow after exactly 0.5 s, when the 33rd of these steps begins."""
     dt = 1 / 64
     scene = space(ball("left", (0.0, 2.0, 0.0), (1.0, 0.0, 0.0)), ball("right", (1.5, 2.0, 0.0), (0.0, 0.0, 0.0)))
@@ -61,7 +61,7 @@ def test_a_ball_meets_a_face_of_a_box_where_it_comes_down_on_it():
     assert contact.arms[0] == pytest.approx((-1.0, 0.25, 0.125)) and contact.arms[1] == pytest.approx((0.25, 0, 0))
 
 
-def test_a_plane_is_met_where_it_lies_by_balls_at_their_lowest_point_and_boxes_flat():
+def test_meeting_of_balls_and_flat_boxes_with_a_tilted_plane():
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.5), motion="fixed")
     wait, contact = meeting(ball("ball", (3.0, 1.0, 1.25), (1.0, 0.0, -0.5), 0.25), floor)
     assert wait == pytest.approx(1.0) and (contact.a, contact.b) == (1, 0)
@@ -140,7 +140,7 @@ def test_the_ends_of_what_singles_hold_have_a_place(value):
         assert singles.without_a_place(space(body)) is None
 
 
-def test_the_first_moment_that_singles_cannot_hold_is_named_and_none_of_what_does_not_move():
+def test_first_moment_beyond_single_precision():
     body, other = ball("first", (0, 0, 0), (0, 0, 0)), ball("ball", (0, 0, 0), (0, 0, 0))
     for value in (math.nextafter(SMALLEST, 0.0), math.nextafter(LARGEST, math.inf)):
         for k in range(3):

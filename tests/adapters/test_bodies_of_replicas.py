@@ -46,7 +46,7 @@ def twice(inner, joint="<freejoint/>", more="", after=""):
         (twice(SPHERE.replace("/>", ' condim="6"/>')), "geom: g1: with b0: condim 6"),
     ],
 )  # fmt: skip
-def test_what_has_no_place_in_a_scene_is_said_by_name_where_it_has_no_line(text, said):
+def test_name_of_an_unplaceable_element_without_a_line(text, said):
     with pytest.raises(SceneError) as refused:
         reading.read(text, False)
     assert str(refused.value).startswith(f"model: {said}"), str(refused.value)

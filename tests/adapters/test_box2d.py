@@ -55,7 +55,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
 
-def test_a_missing_setting_and_a_mass_without_a_single_number_are_refused():
+def test_refusal_of_a_missing_setting_or_a_mass_per_body():
     chosen = settings(resting())
     del chosen["skin"]
     with pytest.raises(EngineError, match=r"^skin: "):
@@ -63,7 +63,7 @@ def test_a_missing_setting_and_a_mass_without_a_single_number_are_refused():
     assert ENGINE.refuses(resting(mass=1e-40), "tuned").startswith("box.mass: ")
 
 
-def test_the_unit_is_finest_where_nothing_is_cut_and_never_coarser_than_a_metre():
+def test_length_unit_at_most_a_metre():
     slow = needs(Scene("slow", 1, 2, (FLOOR, Body("ball", Disc(0.5))), (Pair(),), (0.0, 0.0), 1.0))
     assert units(slow, DT) == FINEST
     assert units(replace(slow, top_speed=100.0), DT) == 2.0
@@ -71,7 +71,7 @@ def test_the_unit_is_finest_where_nothing_is_cut_and_never_coarser_than_a_metre(
     assert units(replace(slow, regime="impact", top_speed=10.0, mass_ratio=400.0), DT) == 2.0
 
 
-def test_boxes_as_shipped_rest_by_their_skins_above_the_floor_and_tuned_ones_on_it():
+def test_rest_height_of_boxes_shipped_and_tuned():
     for profile, low, high in (("default", 0.0148, 0.0201), ("tuned", -2e-5, 2e-4)):
         assert low < drive(resting(), profile).pose[-1, 1, 1] - 0.25 < high
 
@@ -116,7 +116,7 @@ def textbook(e, speed):
 
 
 @pytest.mark.parametrize("name", BLOWS)
-def test_the_law_predicts_the_truth_of_the_scene_with_a_band_of_single_precision(name):
+def test_law_band_of_single_precision(name):
     """Its motion is computed here, the truth by the scene: independent of each other."""
     canonical, spoken = CATALOGUE[name], 0
     for variation in canonical.variations("standard"):
@@ -132,7 +132,7 @@ def test_the_law_predicts_the_truth_of_the_scene_with_a_band_of_single_precision
     assert spoken
 
 
-def test_the_law_is_silent_about_loads_and_blows_that_follow_each_other_at_once():
+def test_law_silent_about_loads_and_successive_blows():
     falling = CATALOGUE["bounce"].scene(2)
     assert rounded_law("rest_time", Method(textbook))(falling, DT, CATALOGUE["bounce"].measure) is None
     cradle = CATALOGUE["cradle"].scene(2, {"n": 4.0, "apart": 0.05})

@@ -74,7 +74,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
 
-def test_what_has_no_single_number_and_tables_without_factors_are_refused():
+def test_refusal_of_values_per_body_and_tables_without_factors():
     assert ENGINE.refuses(resting(mass=1e-40), "tuned").startswith("box.mass: ")
     bodies = tuple(
         Body(name, Disc(0.5), pose=(2.0 * k, 0.0, 0.0), twist=(1.0, 0.0, 0.0)) for k, name in enumerate("abc")
@@ -154,7 +154,7 @@ def cells(names):
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize(("canonical", "scene"), cells(("oblique", "galperin", "closing_wall", "edge_drop")))
-def test_a_law_is_the_engine_s_value_and_a_hundredth_less_restitution_is_not(canonical, scene, profile):
+def test_law_against_a_restitution_off_by_a_hundredth(canonical, scene, profile):
     spoken = 0
     sampling = canonical.sampling(scene)
     measured = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), sampling))

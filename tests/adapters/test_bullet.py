@@ -68,7 +68,7 @@ def hit(gap, v, e, **kwargs):
 # ---- the engine stays outside until it is asked, and is quiet ----------------------------------------------------
 
 
-def test_importing_the_adapter_imports_no_engine_and_building_prints_nothing():
+def test_import_of_the_adapter_without_engine_or_output():
     code = (
         "import sys, adapters, adapters.bullet as b\n"
         "assert 'pybullet' not in sys.modules\n"
@@ -98,7 +98,7 @@ def test_a_profile_s_law_has_the_numbers_of_its_settings(profile, e, gravity, la
     assert law_of(profile, needs(scene), DT) == law
 
 
-def test_what_settings_do_not_name_is_as_shipped_and_each_reaches_the_law():
+def test_unnamed_settings_as_shipped_and_settings_in_the_law():
     assert ContactLaw.of({}) == DEFAULT and ContactLaw.of({"useMaximalCoordinates": 1}).split_depth == 0.04
     named = {"linearDamping": 0.5, "contactERP": 0.3, "contactSlop": 0.002, "restitutionVelocityThreshold": 0.7,
              "contactProcessingThreshold": 0.9, "contactBreakingThreshold": 0.11}  # fmt: skip
@@ -118,7 +118,7 @@ def test_tuned_rebound_is_e_to_round_off_at_any_step_and_phase(dt, v, e):
         assert end / v == pytest.approx(e, abs=1e-14)  # a handful of operations of 2e-16 each
 
 
-def test_worked_example_gives_4_8_metres_per_second_and_5_4_newton_seconds():
+def test_worked_example_speed_and_impulse():
     record = drive(hit(0.315, 6.0, 0.8))
     assert record.twist[-1, 1, 2] == pytest.approx(4.8, abs=1e-14)
     assert record.contacts.impulse_between(0, 1).sum(axis=0)[2] == pytest.approx(5.4, abs=1e-14)
@@ -131,7 +131,7 @@ def test_default_law_first_seen_apart_takes_gap_over_dt_off_the_rebound():
     assert record.twist[-1, 1, 2] == pytest.approx(e * v - (gap + 1e-5) / DT, abs=1e-11)
 
 
-def test_default_law_first_seen_overlapping_adds_baumgarte_to_the_rebound():
+def test_default_rebound_of_an_initial_overlap_with_baumgarte():
     v, e, gap = 8.0, 0.8, 0.025  # out of reach at .025, overlapping at .025 - v dt = -.0083
     record = drive(hit(gap, v, e), "default", linearDamping=0.0)
     assert record.twist[-1, 1, 2] == pytest.approx(e * v + 0.08 * (v * DT - gap - 1e-5) / DT, abs=1e-11)
@@ -178,7 +178,7 @@ def test_tilted_half_space_returns_a_ball_along_its_own_normal():
     assert np.allclose(end, velocity + (1.0 + 0.5) * 3.0 * normal, rtol=0.0, atol=1e-12)
 
 
-def test_half_spaces_are_read_back_with_the_poses_that_the_scene_gives_them():
+def test_readback_of_half_space_poses():
     """A box stands for each, turned and shifted: that is no one else's business."""
     face = Body("face", HalfSpace((0.6, 0.0, 0.8), 0.2), motion="fixed")
     record = drive(scene_of(FLOOR, face, ball(5.0), gravity=(0.0, 0.0, 0.0), duration=0.1))
@@ -191,7 +191,7 @@ def test_half_spaces_are_read_back_with_the_poses_that_the_scene_gives_them():
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("ball_first", [False, True])
-def test_impulse_acts_on_the_higher_index_along_the_normal_and_equals_m_dv(profile, ball_first):
+def test_impulse_sign_and_momentum_change(profile, ball_first):
     striker = ball(0.55, (0.0, 0.0, -6.0))
     bodies = (striker, FLOOR) if ball_first else (FLOOR, striker)
     index, sign = (0, -1.0) if ball_first else (1, 1.0)
@@ -203,7 +203,7 @@ def test_impulse_acts_on_the_higher_index_along_the_normal_and_equals_m_dv(profi
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_resting_box_is_carried_by_m_g_dt_and_its_weight_stays_counted_once(profile):
+def test_weight_on_a_resting_box_counted_once(profile):
     box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))
     record = drive(scene_of(FLOOR, box, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=1.0), profile)
     late = record.contacts.impulse_between(0, 1)[-60:, 2]
@@ -245,7 +245,7 @@ def friction_of_the_probe(e, dt, **changes):
 
 
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 960])
-def test_a_box_that_hops_within_the_slop_has_too_much_friction_where_a_step_carries_no_load(dt):
+def test_excess_friction_of_a_box_hopping_within_the_slop(dt):
     """From a slop of g dt^2/2 on, whatever the step: points hold friction without a load."""
     fall = 9.81 * dt**2
     assert friction_of_the_probe(1.0, dt, contactSlop=0.4 * fall) == pytest.approx(1.0, abs=1e-12)
@@ -256,7 +256,7 @@ def test_a_box_that_hops_within_the_slop_has_too_much_friction_where_a_step_carr
 
 
 @pytest.mark.parametrize(("e", "dt", "hops"), [(1.0, 1 / 960, True), (1.0, 1 / 480, False), (0.0, 1 / 960, False)])
-def test_friction_is_declared_wider_where_a_box_hops_within_the_slop_and_nowhere_else(e, dt, hops):
+def test_declared_friction_band_only_where_a_box_hops(e, dt, hops):
     asked = needs(
         planar(FLOOR_2D, Body("box", Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.6, 0.0)), e=e, mu=0.3, gravity=(0.0, -9.81))
     )
@@ -266,7 +266,7 @@ def test_friction_is_declared_wider_where_a_box_hops_within_the_slop_and_nowhere
     assert not [slip for slip in receipts(ENGINE, "one", asked, dt) if not slip.holds]
 
 
-def test_what_short_plates_brake_too_much_is_the_friction_of_points_without_a_load():
+def test_excess_braking_on_short_plates_by_unloaded_points():
     """Step by step: the deceleration is mu g and what points at the plates' edges hold without a load."""
     scene = CATALOGUE["seam"].scene(2, {"plate": 0.3})
     settings = {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)}
@@ -290,7 +290,7 @@ def test_what_short_plates_brake_too_much_is_the_friction_of_points_without_a_lo
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_positive_planar_torque_turns_counter_clockwise_by_the_stated_inertia(profile):
+def test_direction_and_rate_of_a_positive_planar_torque(profile):
     disc = Body("disc", Disc(0.5), 2.0, 0.7, torque=(0.3,))
     record = drive(planar(disc), profile, angularDamping=0.0, linearDamping=0.0)
     assert record.twist[-1, 0, 2] == pytest.approx(0.3 / 0.7 * record.t[-1], rel=1e-12)
@@ -308,7 +308,7 @@ def test_box_that_lands_on_a_corner_turns_away_from_it(profile, side):
     assert side * record.twist[-1, 1, 2] > 0.5
 
 
-def test_corner_strike_obeys_the_impulse_formula_with_the_stated_inertia():
+def test_corner_strike_by_the_impulse_formula():
     mass, moment, v, e, tilt = 1.3, 0.4, 2.0, 0.5, -0.3
     lowest = 0.5 * (math.cos(tilt) - math.sin(tilt))
     arm = 0.5 * (math.cos(tilt) + math.sin(tilt))  # horizontal distance of the corner right of the centre
@@ -321,7 +321,7 @@ def test_corner_strike_obeys_the_impulse_formula_with_the_stated_inertia():
     assert record.twist[-1, 1, 2] == pytest.approx(arm * j / moment, abs=1e-12)
 
 
-def test_disc_that_starts_touching_rolls_with_its_own_moment_not_the_spheres():
+def test_rolling_disc_with_its_own_moment_of_inertia():
     disc = Body("disc", Disc(0.5), 1.0, 0.125, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0))
     record = drive(planar(FLOOR_2D, disc, mu=0.5, gravity=(0.0, -9.81), duration=0.5))
     # Angular momentum about the contact line: 2/3 for a disc, 5/7 for a sphere; 1e-5 on a floor that is a box.
@@ -341,7 +341,7 @@ def test_force_torque_and_three_moments_act_as_stated(profile):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_first_step_of_a_turned_body_already_has_its_inertia_in_world_axes(profile):
+def test_inertia_of_a_turned_body_in_the_first_step(profile):
     half = math.sqrt(0.5)  # a quarter turn about z: the body's x axis points along the world's y
     pose = (0.0, 0.0, 3.0, half, 0.0, 0.0, half)
     body = Body("b", Box((0.5,) * 3), 2.5, (0.3, 0.5, 0.7), pose, torque=(0.0, 0.02, 0.0))
@@ -374,7 +374,7 @@ def test_default_drag_is_linear_and_quadratic_and_tuned_has_none():
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_prescribed_wall_keeps_its_motion_and_sends_a_ball_off_at_1_plus_e(profile):
+def test_rebound_from_a_prescribed_wall(profile):
     pose, twist = (-1.1, 0.0, 0.0, *UPRIGHT), (2.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     wall = Body("wall", Box((0.5, 2.0, 2.0)), pose=pose, twist=twist, motion="prescribed")
     scene = scene_of(wall, ball(0.0, x=0.0, mass=3.0), e=0.5, gravity=(0.0, -9.81, 0.0), duration=0.2)
@@ -445,7 +445,7 @@ def test_readback_is_what_was_asked(profile):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_two_builds_give_the_same_bits_even_if_another_client_spoilt_the_global(profile):
+def test_equal_bits_of_two_builds_despite_another_client(profile):
     import pybullet
 
     boxes = [Body(f"b{k}", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.1 * k, 0.0, 0.5 + k, *UPRIGHT)) for k in range(3)]
@@ -596,7 +596,7 @@ def test_tuned_box_sticks_below_the_cone_and_slides_above(ratio, slides):
 
 
 @pytest.mark.parametrize("profile", ["tuned", "one"])
-def test_points_that_drift_far_in_a_step_are_kept_where_a_box_slides_and_change_nothing_where_it_rests(profile):
+def test_contact_points_kept_where_a_box_slides_and_at_rest(profile):
     """Of a box at twice the angle of friction the shipped threshold loses a thousandth of the acceleration."""
 
     def measured(scene, metric, params, **changed):
@@ -625,7 +625,7 @@ def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal):
 # ---- faces that are clipped ----------------------------------------------------------------------------------------
 
 
-def test_a_box_on_a_hull_has_four_points_in_every_step_where_their_faces_are_known(tmp_path, monkeypatch):
+def test_four_contact_points_of_a_box_on_a_hull_with_known_faces(tmp_path, monkeypatch):
     """Without, from the same files, it stands on one in some of them; nothing else in the run differs."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     canonical = CATALOGUE["wedge"]
@@ -658,7 +658,7 @@ def test_a_hull_from_a_file_is_the_hull_of_its_vertices():
     assert gaps["faces"] == pytest.approx([0.0, -2e-3], abs=1e-7)
 
 
-def test_tuned_clips_faces_where_there_are_hulls_and_boxes_do_not_need_it():
+def test_tuned_face_clipping_for_hulls_and_not_for_boxes():
     """Columns, slopes and blows of boxes alone have the same bits either way: theirs is another detector."""
     wedge = CATALOGUE["wedge"].scene(2, {})
     assert {s.name: s.value for s in ENGINE.settings("tuned", needs(wedge), DT)}["enableSAT"] == 1
@@ -671,7 +671,7 @@ def test_tuned_clips_faces_where_there_are_hulls_and_boxes_do_not_need_it():
 
 @pytest.mark.parametrize(("e", "mu"), [(1.0, 0.0), (0.5, 0.3)])
 @pytest.mark.parametrize("corners", [3, 4, 6])
-def test_a_hull_that_slips_as_it_lands_flat_does_not_turn_where_its_faces_are_known(corners, e, mu):
+def test_no_spin_of_a_slipping_hull_that_lands_flat(corners, e, mu):
     """It leaves with (v - mu (1 + e) w, e w) and no spin: corners ahead are loaded more, and undo what friction turns.
 
     From vertices the blow is one corner's after another's, and turns it.
@@ -743,7 +743,7 @@ def test_a_hull_is_cut_to_its_grid_by_a_whole_cell_or_not_at_all():
 
 
 @pytest.mark.parametrize("params", [{"height": 1.09}, {"e": 0.95, "height": 1.03}], ids=str)
-def test_when_a_ball_rests_as_shipped_round_off_decides_in_the_law_as_in_bullet(params):
+def test_rest_time_of_a_shipped_ball_decided_by_round_off(params):
     """Family `bounce-interval-blurred`: the law's own recurrence, started within round-off, spreads over many steps.
 
     Bullet's answer lies in that spread, which is wide enough for the law to be silent; tuned has none of it.
@@ -761,7 +761,7 @@ def test_when_a_ball_rests_as_shipped_round_off_decides_in_the_law_as_in_bullet(
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3, 5e-3, -5e-3])
-def test_a_table_that_no_product_gives_is_refused_however_near_one_it_is(off: float) -> None:
+def test_refusal_of_a_table_near_a_product(off: float) -> None:
     """Four balls that can all meet have six pairs and four factors: one pair that is off leaves no product."""
     balls = [ball(0.5 + k, (0.0, 0.0, 3.0), name=f"b{k}") for k in range(4)]
     pairs = (Pair(friction=0.5, restitution=0.0), Pair("b0", "b3", friction=0.5 + off, restitution=0.0))

@@ -87,7 +87,7 @@ def test_a_check_builds_for_each_profile_the_worlds_that_it_says(kind, check):
     assert engine.asked - {""} == set(SWEEPS)
 
 
-def test_every_check_is_here_but_those_that_build_nothing_for_a_profile_or_in_this_process():
+def test_completeness_of_the_list_of_checks():
     """Facts and refusals are no worlds; memory is asked of one profile, and a process tells its bits alone."""
     others = {"packages", "facts", "profiles", "refusals", "bad_numbers", "memory", "process"}
     assert set(WORLDS) == set(CHECKS) - others
@@ -99,7 +99,7 @@ def test_steps_that_are_none_are_asked_of_each_profile():
     assert engine.built == [] and engine.asked - {""} == set(SWEEPS)
 
 
-def test_receipts_are_measured_of_each_profile_at_both_steps_and_no_world_stays_open():
+def test_receipts_per_profile_at_both_steps_with_worlds_closed():
     engine = Discs()
     assert [str(each) for each in receipt_findings(engine) if not each.holds] == []
     made = {(world.profile, world.dt, world.scene.dimension) for world in engine.built}

@@ -92,7 +92,7 @@ def test_tuned_follows_the_needs_and_gives_a_reason_for_each_number() -> None:
         ({"slop": 0.1}, "slop"),
     ],
 )
-def test_a_setting_that_would_abort_or_be_ignored_is_refused_in_one_line(changes: dict, field: str) -> None:
+def test_refusal_of_settings_that_abort_or_are_ignored(changes: dict, field: str) -> None:
     with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(make(FLOOR, Body("ball", Disc(0.5))), DT, settings(**changes))
 
@@ -158,7 +158,7 @@ def test_impulses_act_on_the_higher_index_and_normals_point_to_it(order: tuple[i
     assert np.allclose(gained[order.index(1)], [2.0 / 3.0 * 1.5 * 4.0, 0.0], atol=1e-14)
 
 
-def test_three_balls_on_one_floor_rebound_each_by_its_own_pair_in_scene_order() -> None:
+def test_restitution_per_pair_of_three_balls_on_one_floor() -> None:
     balls = [Body(f"b{i}", Disc(0.5), 1.0, 0.125, (3.0 * i, 0.51, 0.0), (0.0, -3.0, 0.0)) for i in range(3)]
     pairs = (*(Pair("floor", f"b{i}", e) for i, e in enumerate((0.0, 0.5, 1.0))), Pair("b1", "b2", 0.5))
     trajectory = drive(make(*balls, FLOOR, pairs=pairs, e=0.0, T=5 * DT))
@@ -222,7 +222,7 @@ def test_free_fall_lags_the_parabola_by_g_t_dt_over_two(profile: str) -> None:
     assert np.abs(trajectory.twist[:, 0, :2] - g * t[:, None]).max() < 3e-13
 
 
-def test_constant_force_and_torque_act_in_every_step_with_the_stated_mass_and_inertia() -> None:
+def test_constant_force_and_torque_in_every_step() -> None:
     body = Body("body", Box((0.5, 0.1)), 4.0, 0.7, (1.0, 2.0, 0.3), (0.5, 0.0, -1.0), "free", (2.0, -6.0), (1.4,))
     trajectory = drive(make(body, T=1.0))
     assert np.allclose(trajectory.twist[-1, 0], [0.5 + 0.5, -1.5, -1.0 + 2.0], rtol=0.0, atol=1e-12)
@@ -256,7 +256,7 @@ def test_a_half_space_may_face_any_way(angle: float) -> None:
     assert np.allclose(trajectory.twist[-1, 1, :2], 1.2 * n, atol=1e-13)
 
 
-def test_a_sliding_box_is_braked_by_mu_g_a_hundred_metres_from_the_origin() -> None:
+def test_sliding_friction_far_from_the_origin() -> None:
     box = unit_box("box", 100.0, 0.5, twist=(3.0, 0.0, 0.0))
     trajectory = drive(make(FLOOR, box, mu=0.3, gravity=(0.0, -9.81)), "tuned")
     a = (trajectory.twist[-1, 1, 0] - trajectory.twist[60, 1, 0]) / (trajectory.t[-1] - trajectory.t[60])
@@ -313,7 +313,7 @@ def column(n: int, duration: float = 1.0) -> Scene:
     return make(FLOOR, *boxes, mu=0.5, gravity=(0.0, -9.81), T=duration)
 
 
-def test_the_tuned_column_starts_inside_the_slop_at_every_interface_and_says_so() -> None:
+def test_tuned_column_starting_overlap_within_the_slop() -> None:
     trajectory = drive(column(5), "tuned")
     expected = [0.5 + i - (i + 1) * START for i in range(5)]
     assert np.allclose(trajectory.pose[0, 1:, 1], expected, rtol=0.0, atol=1e-9)
@@ -357,7 +357,7 @@ def test_discs_touching_along_a_slope_sink_along_their_own_normals() -> None:
     assert np.linalg.norm(start[2, :2] - start[1, :2]) == pytest.approx(1.0 - START, abs=1e-6)
 
 
-def test_a_box_that_exactly_fits_between_walls_stays_as_posed_and_says_so() -> None:
+def test_box_fitting_exactly_between_walls_not_moved() -> None:
     walls = (
         Body("left", HalfSpace((1.0, 0.0), -0.5), motion="fixed"),
         Body("right", HalfSpace((-1.0, 0.0), -0.5), motion="fixed"),
@@ -433,7 +433,7 @@ def test_a_flat_landing_is_iterative_and_as_wrong_as_was_measured(sweeps: int, e
     assert abs(trajectory.twist[-1, 1, 1] - 2.5) / 5.0 == pytest.approx(error, rel=0.05, abs=5e-14)
 
 
-def test_default_persistence_over_reports_impulses_of_a_settling_ball_and_tuned_does_not() -> None:
+def test_impulse_over_report_with_default_persistence_and_tuned() -> None:
     ball = Body("ball", Disc(0.5), 1.0, 0.125, (0.0, 1.6, 0.0))
     scene = make(FLOOR, ball, e=0.5, gravity=(0.0, -9.81), T=4.0)
     excess = {}
@@ -470,7 +470,7 @@ def test_receipts_of_impulses_allow_what_kept_ones_add_and_nothing_else() -> Non
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize(("params", "dt"), [({}, 1 / 120), ({"v": 200.0, "thickness": 0.2}, DT)])
-def test_what_is_found_beyond_the_middle_of_a_plate_is_predicted_to_pass(profile: str, params: dict, dt: float) -> None:
+def test_predicted_pass_beyond_the_middle_of_a_plate(profile: str, params: dict, dt: float) -> None:
     canonical = CATALOGUE["thin_wall"]
     scene = canonical.scene(2, params)
     chosen = {s.name: s.value for s in ENGINE.settings(profile, needs(scene), dt)}
@@ -484,7 +484,7 @@ def wall_laws(profile: str, metric: str) -> list:
     return [law for law in DEVIATIONS if (law.scene, law.profiles, law.metric) == ("thin_wall", (profile,), metric)]
 
 
-def test_the_law_of_what_passes_is_silent_about_what_is_found_before_the_middle() -> None:
+def test_law_of_passing_silent_before_the_middle_of_a_plate() -> None:
     canonical = CATALOGUE["thin_wall"]
     for params in ({}, {"v": 1.0}, {"v": 200.0}):  # at 1/240 s: found in time twice, never in it the third time
         said = [law.says(canonical.scene(2, params), DT, canonical.measure) for law in wall_laws("default", "beyond")]
@@ -502,7 +502,7 @@ def sunk(params: dict[str, float], profile: str, dt: float) -> float:
 
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 480, 1 / 960])
 @pytest.mark.parametrize("n", [1, 2, 4, 7])
-def test_the_tuned_column_stays_where_it_starts_and_sinks_less_than_a_step_of_fall(n: int, dt: float) -> None:
+def test_tuned_column_drift_and_sinking(n: int, dt: float) -> None:
     fall = 9.81 * dt * dt
     assert 0.3 * fall <= sunk({"n": n}, "tuned", dt) <= fall
 

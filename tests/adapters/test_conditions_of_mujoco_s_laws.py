@@ -48,7 +48,7 @@ def units(length):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_only_what_can_but_move_up_and_down_over_a_level_floor_is_vertical(dimension):
+def test_vertical_motion_condition_over_a_level_floor(dimension):
     scene = scene_of(dimension, ball_of(dimension))
     d, body = dimension, scene.bodies[1]
     assert motions.is_vertical(scene)
@@ -67,7 +67,7 @@ def test_only_what_can_but_move_up_and_down_over_a_level_floor_is_vertical(dimen
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_planar_problem_of_a_box_is_asked_where_it_is_pulled_along_x_alone(dimension):
+def test_planar_box_problem_only_when_pulled_along_x(dimension):
     scene, d = scene_of(dimension, box_of(dimension)), dimension
     body = scene.bodies[1]
 
@@ -91,7 +91,7 @@ def test_the_planar_problem_of_a_box_is_asked_where_it_is_pulled_along_x_alone(d
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_ball_on_a_face_has_the_friction_of_that_pair_and_its_own_numbers(dimension):
+def test_friction_of_the_pair_for_a_ball_on_a_face(dimension):
     scene, d = scene_of(dimension, ball_of(dimension)), dimension
     body = scene.bodies[1]
     found = ball_on_face._ball_on_face("tuned", replace(scene, gravity=(0.5, *scene.gravity[1:])), DT)
@@ -105,7 +105,7 @@ def test_a_ball_on_a_face_has_the_friction_of_that_pair_and_its_own_numbers(dime
         assert ball_on_face._ball_on_face("tuned", other, DT) is None
 
 
-def test_where_nothing_touches_the_matched_profile_is_the_tuned_one_at_the_same_step(monkeypatch):
+def test_matched_profile_without_contacts_equal_to_tuned(monkeypatch):
     asked = []
     monkeypatch.setattr(profiles, "tuned", lambda *given: (asked.append(given), ["tuned"])[1])
     free = replace(needs(scene_of(2, Disc(0.5))), regime="free")
@@ -123,7 +123,7 @@ def ball_paths(monkeypatch, values):
     monkeypatch.setattr(predictions, "_ball_metrics", lambda *asked: {"rebound_speed": (left.pop(0),)})
 
 
-def test_a_ball_s_band_grows_with_the_widest_of_its_paths_until_they_are_blurred(monkeypatch):
+def test_ball_band_grows_with_its_widest_path(monkeypatch):
     scene = replace(scene_of(3, Sphere(0.5)), params={"v": 4.0})
     law = predictions.ball_law("tuned", "rebound_speed")
 
@@ -155,7 +155,7 @@ def test_sizes_of_what_is_measured_of_a_ball():
     assert scale_of(replace(scene, params={}), "impulse") == 2.0
 
 
-def test_a_column_s_prediction_lies_between_faces_that_touch_and_that_do_not(monkeypatch):
+def test_column_prediction_between_touching_and_separate_faces(monkeypatch):
     scene = replace(scene_of(2, Box((0.5, 0.25)), up=0.25), duration=2.0)
     values = []
     monkeypatch.setattr(predictions, "column", lambda *asked: asked[-1])
@@ -187,7 +187,7 @@ def test_a_column_s_prediction_lies_between_faces_that_touch_and_that_do_not(mon
 
 
 @pytest.mark.parametrize(("metric", "column"), [("creep", 0), ("acceleration", 1)])
-def test_a_slide_is_told_over_the_second_half_until_its_paths_are_blurred(monkeypatch, metric, column):
+def test_slide_told_over_its_second_half_until_blurred(monkeypatch, metric, column):
     scene, off = scene_of(2, Box((0.5, 0.25)), up=0.25), [0.0, 0.0, 0.0]
     starts = []
 
@@ -241,7 +241,7 @@ def test_a_column_is_recorded_as_the_step_loop_does(dimension):
 
 
 @pytest.mark.parametrize("heading", [(1.0,), (-1.0,), (0.6, 0.8), (0.0, -1.0)])
-def test_a_planar_motion_along_a_heading_stays_upright_and_turns_about_the_level_axis_across_it(heading):
+def test_planar_motion_along_a_heading_stays_upright(heading):
     d = len(heading) + 1
     scene = scene_of(d, box_of(d))
     motion = np.array([[[0.0, 0.5, 0.0], [2.0, 0.0, 0.0]], [[0.25, 0.75, 0.5], [1.0, -3.0, 0.125]]])

@@ -97,7 +97,7 @@ def test_the_healthy_toy_conforms_and_every_check_is_told(toy):
 
 
 @pytest.mark.usefixtures("few_worlds")
-def test_an_engine_without_boxes_conforms_and_what_it_refuses_is_no_pass(toy_class):
+def test_conformance_of_an_engine_without_boxes(toy_class):
     class Discs(toy_class):
         def refuses(self, scene, profile):
             boxes = any(isinstance(body.shape, Box) for body in scene.bodies)

@@ -39,7 +39,7 @@ def test_conformance(item):
 
 
 @pytest.mark.parametrize(("profile", "share"), [("default", math.sqrt(2.0)), ("nsgs", 1.0), ("fbf", 1.0)])
-def test_the_cone_is_a_pyramid_as_shipped_and_exact_with_the_other_solvers(profile, share):
+def test_friction_cone_shipped_as_a_pyramid_and_exact_otherwise(profile, share):
     """Along an axis both give mu g; along the diagonal a pyramid gives sqrt(2) of it."""
     for heading, expected in ((0.0, 1.0), (math.pi / 4.0, share)):
         found = drive(sliding(heading), profile)
@@ -92,7 +92,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, fi
     ("e", "speed", "leaves"),
     [(0.2, 0.499, None), (0.2, 0.501, 0.1002), (0.5, 0.199, None), (1.0, 0.101, 0.101), (0.8, 150.0, 100.0)],
 )
-def test_the_speed_of_a_rebound_decides_whether_there_is_one_and_never_exceeds_100(profile, e, speed, leaves):
+def test_rebound_speed_between_its_threshold_and_100(profile, e, speed, leaves):
     """Not the approach: 0.2 of 0.499 m/s is no rebound, all of 0.101 m/s is one."""
     start = (0.0, 0.0, 0.5 + 2.3 * speed * DT, 1.0, 0.0, 0.0, 0.0)
     ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), start, (0.0, 0.0, -speed, 0, 0, 0))
@@ -164,7 +164,7 @@ def test_what_a_law_says_is_what_comes_out_and_a_little_more_is_not(name, dimens
         assert metrics <= seen
 
 
-def test_a_light_body_gives_way_to_a_heavy_load_faster_than_it_is_pushed_out():
+def test_light_body_under_a_heavy_load_sinks():
     """10 000 to 1: 1e-5 of the load's own speed is 4 mm/s, of which 1 mm/s is taken back."""
     told = {metric: (value, *law) for metric, value, *law in judged("heavy_on_light", 2, {"ratio": 10000.0})}
     value, predicted, band = told["penetration"]
@@ -176,7 +176,7 @@ def test_a_light_body_gives_way_to_a_heavy_load_faster_than_it_is_pushed_out():
     ("name", "params", "metric"),
     [("slide", {"heading": 22.5}, "astray"), ("slide_to_roll", {"heading": 30.0}, "astray"), ("masse", {}, "end_y")],
 )
-def test_what_fails_between_the_axes_of_a_pyramid_passes_with_the_exact_cone_alone(name, params, metric):
+def test_failure_between_pyramid_axes_cured_by_the_exact_cone(name, params, metric):
     """Dantzig's solver is switched for one that takes its own sweeps; one with a pyramid changes nothing."""
     canonical = CATALOGUE[name]
     scene = canonical.scene(3, params)

@@ -136,7 +136,7 @@ def test_a_box_slides_on_its_face_by_a_surface_and_tips_on_a_point():
      ({"angle": 60.0, "ratio": 20.0}, {})],
     ids=str,
 )  # fmt: skip
-def test_an_edge_that_slides_down_a_compliant_face_is_held_back_by_the_slant_between_them(params, changes):
+def test_sliding_edge_braked_by_the_slant_of_a_compliant_face(params, changes):
     """Pressure falls from 10 MPa half-way through a box to 0 at its face: where two are equal lies a slanted surface.
 
     Its part that approaches while the edge slides carries all, ``slant`` below the face's own normal. Newton's law:

@@ -98,7 +98,7 @@ def test_running_box_drags_along_its_top_and_does_not_push_with_its_end(engine, 
 
 
 @pytest.mark.usefixtures("bullet")
-def test_an_engine_whose_conveyor_is_a_moving_half_space_refuses_a_running_box():
+def test_refusal_of_a_running_box_on_a_moving_half_space():
     belt = Body("belt", Box((2.0, 0.5)), pose=(0.0, -0.5, 0.0), motion="fixed", surface_velocity=(1.0, 0.0))
     with pytest.raises(
         EngineError, match=r"belt\.surface_velocity: bullet supports surface velocities of fixed half-spaces only"
@@ -226,7 +226,7 @@ def test_lift_takes_drives_along_and_a_course_is_not_lowered():
     assert [ability for _, ability in asked_abilities(raised)] == ["surface velocity"]
 
 
-def test_a_face_that_turns_is_asked_of_the_adapter_and_explains_the_speed_of_what_it_meets():
+def test_speed_explained_by_a_turning_face():
     door = floor(motion="prescribed", twist=(0.0, 0.0, 1e3))
     far = Body("far", Disc(0.1), 1.0, 1.0, (5.0, 0.1, 0.0))
     scene = Scene("door", 1, 2, (door, far), (Pair(),), (0.0, 0.0), 1.0)

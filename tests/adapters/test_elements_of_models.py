@@ -78,7 +78,7 @@ def test_what_is_no_model_is_refused_in_a_line(text, said):
     assert found.startswith(said) and "\n" not in found
 
 
-def test_as_many_elements_and_levels_as_are_allowed_are_read_and_no_more(monkeypatch):
+def test_largest_number_of_elements_and_levels(monkeypatch):
     monkeypatch.setattr(markup, "MOST_ELEMENTS", 4)
     monkeypatch.setattr(markup, "MOST_LEVELS", 3)
     assert len(tags(read("<mujoco><a/><a/><a/></mujoco>"))) == 4
@@ -105,14 +105,14 @@ def test_what_only_draws_or_measures_goes_silently_and_colours_with_it():
 
 
 @pytest.mark.parametrize("tag", sorted(set(mjcf.NO_PLACE) - {"mesh"}))
-def test_what_a_scene_has_no_place_for_is_refused_with_its_reason_or_left_out_and_said(tag):
+def test_elements_without_a_place_refused_or_left_out_with_a_message(tag):
     line = f"line 1: <{tag}>: {mjcf.NO_PLACE[tag]}"
     assert refused(clean, f"<{tag}/>") == f"model: {line}"
     root, dropped = clean(f'<{tag}/><worldbody><body name="kept"/></worldbody>', drop=True)
     assert dropped == [line] and tags(root) == ["mujoco", "worldbody", "body"]
 
 
-def test_an_unknown_element_is_refused_and_a_default_of_one_is_no_matter():
+def test_unknown_element_refused_unless_in_a_default():
     assert refused(clean, "<odd/>") == "model: line 1: <odd>: a scene has no such element"
     assert clean("<odd/>", drop=True)[1] == ["line 1: <odd>: a scene has no such element"]
     root, dropped = clean(
@@ -122,7 +122,7 @@ def test_an_unknown_element_is_refused_and_a_default_of_one_is_no_matter():
 
 
 @pytest.mark.parametrize("tag", sorted(mjcf.FOREIGN))
-def test_what_reaches_outside_the_text_is_refused_even_where_all_else_is_left_out(tag):
+def test_references_outside_the_text_always_refused(tag):
     for drop in (False, True):
         assert refused(clean, f"<worldbody><{tag}/></worldbody>", drop) == (
             f"model: line 1: <{tag}>: {mjcf.FOREIGN[tag]}"
@@ -146,7 +146,7 @@ def test_a_mesh_stays_where_it_is_the_hull_of_its_vertices():
 @pytest.mark.parametrize(
     "call", [clean, lambda text: mjcf.rid_of(read(f"<mujoco>{text}</mujoco>"), False, ("body",), (), {})]
 )
-def test_a_name_may_be_as_long_as_leaves_room_for_four_letters_and_must_be_visible(call):
+def test_length_and_visibility_of_a_name(call):
     call(f'<body name="{"n" * (NAME - 4)}"/>')
     assert refused(call, f'<body name="{"n" * (NAME - 3)}"/>') == f"model: line 1: '{'n' * 36} ...' cannot be a name"
     assert refused(call, '<body name="&#8203;"/>').endswith("cannot be a name")
@@ -177,7 +177,7 @@ def test_copies_are_counted_before_they_are_made(monkeypatch):
 # ---- other languages -------------------------------------------------------------------------------------------------
 
 
-def test_of_another_language_the_kept_stay_the_silent_go_and_others_are_refused_with_a_reason():
+def test_elements_of_another_language_kept_dropped_or_refused():
     text = '<robot><link name="a"><visual/><odd/><collision><odd/></collision></link><joint/></robot>'
 
     def rid(drop):

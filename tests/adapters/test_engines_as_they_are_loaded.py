@@ -67,13 +67,13 @@ def loaded(monkeypatch, kind, name="odd", module="odd_engine", **more):
     return registry.loaded(EntryPoint(name, f"{module}:Engine", registry.GROUP), **more)
 
 
-def test_a_sound_engine_is_found_with_its_facts_and_the_first_line_of_its_version(monkeypatch):
+def test_facts_and_version_of_a_sound_engine(monkeypatch):
     found = loaded(monkeypatch, Bare)
     assert isinstance(found.engine, Bare)
     assert found == Found("odd", found.engine, "1.2", "", FACTS) and found.trace == ""
 
 
-def test_facts_that_are_known_once_it_is_made_are_taken_then_and_cleaned(monkeypatch):
+def test_facts_computed_at_construction_are_taken_and_cleaned(monkeypatch):
     found = loaded(monkeypatch, Late)
     assert found.reason == "" and found.facts is not None
     assert found.facts.name == "odd" and "\x07" not in found.facts.title and found.facts.title.startswith("Odd")
@@ -106,7 +106,7 @@ def test_a_profile_has_a_name_that_is_seen_and_fits(monkeypatch, profile, good):
     assert good or found.reason.endswith(" is not the name of a profile")
 
 
-def test_what_an_engine_of_others_lacks_is_its_own_package_or_what_registered_it(monkeypatch):
+def test_missing_package_of_an_outside_engine(monkeypatch):
     found = loaded(monkeypatch, Lacking)
     assert found.engine is None and found.facts is not None and found.trace
     assert found.reason.startswith("no libodd.so; pip install odd") and "\x07" not in found.reason
@@ -117,7 +117,7 @@ def test_what_an_engine_of_others_lacks_is_its_own_package_or_what_registered_it
         assert found.reason == f"no libodd.so; it is an engine of {who}, which must be installed with all it needs"
 
 
-def test_what_an_engine_of_ours_lacks_is_the_packages_of_its_extra_and_no_trace_of_it(monkeypatch):
+def test_missing_packages_of_our_engine_by_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "adapters.odd", ModuleType("adapters.odd"))
     listed = [
         "click>=8",

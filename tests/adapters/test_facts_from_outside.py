@@ -128,7 +128,7 @@ ANSWER = {
 }
 
 
-def test_an_engine_that_answers_has_its_facts_and_asks_its_settings_there(child):
+def test_facts_and_settings_of_an_engine_that_answers(child):
     setting = {"name": "slop", "value": 0.1, "because": "why", "source": "where"}
     own = child(ANSWER, {"settings": [setting]}, {"error": "ValueError: no such thing"}, Lost("it died"))
     found = foreign.probe(ENTRY)

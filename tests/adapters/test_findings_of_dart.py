@@ -60,7 +60,7 @@ def test_balls_that_rub_spin_or_fall_have_no_law_of_meeting():
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}, {"along": -0.3, "mu": 0.2}], ids=str)
-def test_a_sliding_edge_rubs_at_the_middle_of_its_overlap_as_its_law_says(profile, params):
+def test_friction_at_the_middle_of_the_overlap_of_a_sliding_edge(profile, params):
     """Far from the textbook's answer, and for pivoting and for splitting a hundred times nearer than that is."""
     found = measured("kane", profile, params=params)
     truth = CATALOGUE["kane"].exact(CATALOGUE["kane"].scene(2, params))
@@ -70,7 +70,7 @@ def test_a_sliding_edge_rubs_at_the_middle_of_its_overlap_as_its_law_says(profil
         assert profile in SWEEPERS or abs(said - truth[metric]) > 50.0 * band, metric
 
 
-def test_friction_of_pivoting_is_limited_by_the_load_without_friction_and_of_all_others_by_the_load():
+def test_friction_limit_of_pivoting_and_of_the_other_solvers():
     params = {"along": -0.3, "mu": 0.2}
     scene, measure = CATALOGUE["kane"].scene(2, params), CATALOGUE["kane"].measure
     once, followed = (rubbing_law("rise", profile)(scene, DT, measure) for profile in ("default", "fbf"))
@@ -91,7 +91,7 @@ def test_a_box_that_turns_or_falls_has_no_law_of_rubbing():
 
 @pytest.mark.parametrize("profile", SWEEPERS)
 @pytest.mark.parametrize("params", [{}, {"e": 1.0}, {"aspect": 4.0, "e": 0.8}], ids=str)
-def test_corners_of_a_flat_box_give_way_between_not_at_all_and_twice_as_much(profile, params):
+def test_compliance_of_the_corners_of_a_flat_box(profile, params):
     found = measured("flat_box", profile, 3, params)
     for metric in ("rebound_ratio", "impulse"):
         said, band = told("flat_box", profile, metric, 3, params)
@@ -105,7 +105,7 @@ def test_sweeps_that_are_asked_for_are_the_sweeps_that_answer():
     assert few > 0.1 and many < 2e-4
 
 
-def test_a_second_choice_that_sweeps_to_the_end_finds_what_pivoting_does_not():
+def test_complete_sweeps_as_second_choice_after_pivoting():
     params = {"n": 3.0, "apart": 0.0}
     shipped = measured("cradle", "default", 2, params)["energy_defect"]
     ended = measured("cradle", "default", 2, params, second_sweeps=5000, second_tolerance=1e-12)["energy_defect"]
@@ -122,7 +122,7 @@ def test_piles_are_refused_by_solvers_that_take_minutes_for_them(profile):
         assert ENGINE.refuses(scene, "default") is None
 
 
-def test_a_solver_that_is_asked_for_alone_brings_its_sweeps_and_leaves_those_of_a_second_choice():
+def test_sweeps_of_a_solver_asked_for_alone():
     shipped = {"solver": "dantzig", "detector": "fcl", "second_sweeps": 30, "second_tolerance": 1e-3}
     assert set(checked({**shipped, "solver": "pgs"})) == {"solver", "detector", "iterations", "tolerance"}
     assert checked({**shipped, "solver": "fbf"})["second_sweeps"] == 30
@@ -131,7 +131,7 @@ def test_a_solver_that_is_asked_for_alone_brings_its_sweeps_and_leaves_those_of_
 
 
 @pytest.mark.parametrize(("n", "sweeps"), [(5.0, None), (10.0, 10), (10.0, 4)])
-def test_a_column_leaves_its_plane_from_every_start_and_by_a_way_that_no_start_tells(n, sweeps):
+def test_column_leaves_its_plane_from_every_start(n, sweeps):
     """Why a listed value may be less than its band: the first step decides, and the last digits of places decide it.
 
     A unit in the last place more, which is not the same for all heights, parts faces that touched: what is above falls
@@ -156,9 +156,7 @@ def test_a_column_leaves_its_plane_from_every_start_and_by_a_way_that_no_start_t
      ("pyramid", {}, 3, "default", 3), ("pyramid", {"rows": 5.0}, 2, "pgs", 5), ("heavy_on_light", {}, 2, "pgs", 1)],
     ids=str,
 )  # fmt: skip
-def test_a_pile_that_starts_a_last_digit_higher_falls_for_a_step_above_its_lowest(
-    name, params, dimension, profile, lowest
-):
+def test_fall_of_a_pile_started_a_last_digit_higher(name, params, dimension, profile, lowest):
     """What the bands of piles are made of beside sweeps: as it is posed it rests, or nearly."""
     fallen = []
     for ulp in (0, 1):

@@ -13,7 +13,7 @@ pytest.importorskip("mujoco")
 
 @pytest.mark.parametrize("delay", [0.0507, 0.0525, 0.0539])
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}])
-def test_matched_strikes_a_rod_half_way_into_the_overlap_that_a_step_finds(params, delay):
+def test_matched_strike_of_a_rod_at_half_the_overlap(params, delay):
     params = params | {"delay": delay}
     found, depth = struck("mujoco", "matched", params)
     assert depth > 1e-4 and np.abs(found - textbook(params, 0.5 * depth)).max() < 1e-9
@@ -27,7 +27,7 @@ def test_tuned_strikes_there_as_well_and_falls_short_by_its_impedance():
     assert np.abs(found - textbook({})).max() > 2.5e-3
 
 
-def test_an_end_that_slips_is_lifted_by_mu_times_its_slip_with_profile_tuned():
+def test_lift_of_a_slipping_end_tuned():
     """A cone that is convex without complementarity: u_n + e u_n0 = mu |u_t|, but for the 1e-4 of the impedance."""
     params = {"e": 0.5, "mu": 0.1}
     (rise, ahead, spin), depth = struck("mujoco", "tuned", params)
@@ -37,7 +37,7 @@ def test_an_end_that_slips_is_lifted_by_mu_times_its_slip_with_profile_tuned():
     assert lifted == pytest.approx(p["mu"] * abs(slip), rel=1e-2) and lifted > 1e-2
 
 
-def test_what_a_rack_loses_with_profile_tuned_grows_with_what_its_impedance_lacks():
+def test_loss_of_a_rack_by_impedance_tuned():
     rack = Slot("rack", (), 2, "mujoco", "tuned", DT)
     lost = [
         execute(switched(rack, {"solimp": (d, d, 0.001, 0.5, 1.0)})).metrics["energy_defect"][0]

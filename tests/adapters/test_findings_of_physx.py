@@ -43,7 +43,7 @@ def test_friction_of_small_steps_is_a_cone_against_the_slip(speed, spin):
     assert pushed("tgs", speed, spin) == pytest.approx(-along, abs=2e-3)
 
 
-def test_friction_of_gauss_seidel_is_a_pyramid_along_the_way_of_the_centre():
+def test_gauss_seidel_friction_pyramid_along_the_centre_s_path():
     """A way in any direction is braked by mu g; a slip of 45 degrees against the way by mu g along and across it.
 
     While it is braked its way turns a little, and the pyramid with it, for less than the half width of 3 degrees.
@@ -68,7 +68,7 @@ def test_gauss_seidel_holds_a_ladder_that_small_steps_let_slide(changes):
 
 
 @pytest.mark.parametrize("params", [{}, {"closing": 0.1}], ids=str)
-def test_a_plate_that_is_told_where_to_be_has_the_roundings_of_its_place_for_a_speed(params):
+def test_rounded_speed_of_a_kinematic_plate(params):
     """Places between 1 and 2 are 2^-23 apart: two of them over a step, twice at each blow, and none without a plate."""
     found = measured("closing_wall", "tuned", params=params)
     truth = CATALOGUE["closing_wall"].exact(CATALOGUE["closing_wall"].scene(2, params))
@@ -95,7 +95,7 @@ def test_directions_and_centres_differ_by_roundings(profile):
         assert 1e-9 < measured("overlap", profile, params=params)["centre_moved"] < ROUNDINGS * UNIT
 
 
-def test_what_rolls_loses_a_hundredth_of_its_spin_and_what_spins_on_the_spot_none():
+def test_spin_loss_rolling_and_spinning_on_the_spot():
     for solver in ("tgs", "pgs"):
         assert measured("rolling_spin", "tuned", 3, solver=solver)["spin"] == pytest.approx(9.9, abs=0.01)
         spot = measured("rolling_spin", "tuned", 3, {"spin": 50.0, "v": 0.0}, solver=solver)["spin"]
@@ -103,7 +103,7 @@ def test_what_rolls_loses_a_hundredth_of_its_spin_and_what_spins_on_the_spot_non
 
 
 @pytest.mark.parametrize("small_steps", [1, 2, 4, 10, 50])
-def test_small_steps_throw_back_what_ends_a_step_up_to_one_small_step_before_its_touch(small_steps):
+def test_rebound_before_touch_within_one_small_step(small_steps):
     """A step's way of free fall is (v + g dt) dt; in one step, of Gauss-Seidel, only what touches is thrown back."""
     speed = 4.0
     way = (speed + 9.81 * DT) * DT

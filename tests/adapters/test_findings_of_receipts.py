@@ -54,7 +54,7 @@ def test_every_profile_is_asked_for_all_needs_at_both_steps(measured):
     assert {(each.top_speed, each.gravity) for each in needs} == {(6.0, 9.81)}
 
 
-def test_the_first_receipt_of_a_quantity_that_does_not_hold_is_told_with_where_and_why(measured):
+def test_first_failed_receipt_of_a_quantity_with_place_and_reason(measured):
     def rule(profile, needs, dt):
         wrong = profile == "second" and needs.dimension == 3 and needs.regime == "rest"
         return {"mass": slip("mass", 0.5, False, "told\nso")} if wrong else {}
@@ -71,7 +71,7 @@ def test_the_first_receipt_of_a_quantity_that_does_not_hold_is_told_with_where_a
     assert told["receipt turn"].status == "unexpected pass"
 
 
-def test_what_was_measured_nowhere_is_refused_and_what_was_somewhere_says_where_not(measured):
+def test_quantity_measured_nowhere_refused_and_partly_measured_told(measured):
     def rule(profile, needs, dt):
         never = {"size": slip("size", math.nan, True, "no boxes")}
         if profile == "second" and dt == STEPS[1]:
@@ -106,7 +106,7 @@ def test_a_probe_that_fails_is_a_finding_of_its_own_and_others_go_on(measured):
     assert {(each.status, each.message) for each in rest} == {("refused", "no probe was measured")}
 
 
-def test_the_self_test_tells_what_a_receipt_says_and_what_goes_unnoticed(monkeypatch):
+def test_self_test_output_of_receipts_and_unnoticed_faults(monkeypatch):
     wrong = {"mass": slip("mass", 0.9, False)}
     monkeypatch.setattr(self_test, "receipts", lambda *asked: [*wrong.values(), slip("turn")])
     monkeypatch.setattr(self_test, "check_adapter", lambda engine: [Finding("spin", "refused", "not today")])

@@ -23,7 +23,7 @@ def scene(*balls, e=0.5):
     return Scene("balls", 1, 3, balls, (Pair(restitution=e),), (0.0, 0.0, 0.0), 0.5, {})
 
 
-def test_a_blow_on_a_sample_belongs_to_the_step_that_begins_there_and_to_no_other():
+def test_step_of_a_blow_on_a_sample():
     motion, blows = _motion(Held(scene(ball("left", 0.0, 2.0), ball("right", 1.0, 0.0, 3.0))), DT, EXACT)
     t = motion.t
     assert blows == 1 and motion.finish == "completed" and motion.dt == DT

@@ -128,7 +128,7 @@ def test_a_child_that_takes_too_long_is_no_dead_one(child):
     assert child.receive(PATIENCE) == b"late"
 
 
-def test_a_child_whose_guardian_is_killed_is_lost_though_its_connection_is_held_open(child):
+def test_child_lost_with_its_guardian_despite_an_open_connection(child):
     """By what the child has started; nobody but its guardian could have ended that."""
     pid = int(asked(child, "answer(start(600, connection.fileno()))"))
     try:
@@ -249,7 +249,7 @@ if __name__ == "__main__":
 """
 
 
-def test_a_child_that_hangs_outlives_no_parent_that_is_killed_nor_does_what_it_has_started(serve, tmp_path):
+def test_hanging_child_ends_with_its_killed_parent(serve, tmp_path):
     """A child that serves would notice that nobody asks any more: this one never looks."""
     (tmp_path / "parent.py").write_text(PARENT)
     parent = subprocess.Popen([sys.executable, str(tmp_path / "parent.py"), str(tmp_path)], stdout=subprocess.PIPE)
@@ -264,7 +264,7 @@ def test_a_child_that_hangs_outlives_no_parent_that_is_killed_nor_does_what_it_h
             os.kill(pid, signal.SIGKILL)
 
 
-def test_the_last_lines_of_what_a_child_wrote_are_kept_and_much_of_it_blocks_nobody(child):
+def test_last_lines_of_a_child_s_long_output_kept(child):
     count = 4 * LOG_BYTES // 8  # more than a pipe holds, and than is kept
     assert asked(child, f"[print(f'{{k:07d}}') for k in range({count})]; sys.stdout.flush(); answer('done')") == "done"
     assert child.tail().split() == [f"{k:07d}" for k in range(count - LOG_LINES, count)]
@@ -293,7 +293,7 @@ def test_who_waits_for_a_child_wakes_when_it_answers_writes_or_ends(child):
     assert wait(child.sentinels, PATIENCE) and within(PATIENCE, child.ended)
 
 
-def test_a_child_has_a_session_no_input_and_no_ear_for_an_interrupt_of_its_own(child):
+def test_child_has_its_own_session_without_input_or_interrupts(child):
     session, waiting = asked(child, "answer(os.getsid(0), repr(sys.stdin.read() if sys.stdin else ''))").split()
     assert int(session) != os.getsid(0) and waiting == "''"
     assert asked(child, "os.kill(os.getpid(), signal.SIGINT); answer('goes on')") == "goes on"

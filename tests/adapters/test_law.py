@@ -22,14 +22,14 @@ def asked(scene, dt, measure, iterations):
 ONE = Deviation("toy", ("default", "tuned"), "stack", exactly("load[2]"), law, "because", "source", ("1.2", "2."))
 
 
-def test_at_its_profile_s_own_iterations_the_law_speaks_and_at_others_the_one_that_follows_sweeps():
+def test_law_at_own_and_at_requested_iterations():
     both = replace(ONE, asked=asked)
     assert both.says(SCENE, 0.01, MEASURE) == (1.0, 0.1)
     assert both.says(SCENE, 0.01, MEASURE, 7) == (7.0, 0.2)
     assert ONE.says(SCENE, 0.01, MEASURE) == (1.0, 0.1)
 
 
-def test_a_law_that_follows_no_sweeps_says_nothing_of_iterations_that_are_asked_for():
+def test_law_without_sweeps_silent_at_requested_iterations():
     assert ONE.says(SCENE, 0.01, MEASURE, 7) is None
 
 

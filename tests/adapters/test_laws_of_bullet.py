@@ -8,7 +8,7 @@ from validation.catalogue import CATALOGUE
 DT = 1 / 2000
 
 
-def test_a_plate_is_pushed_out_by_a_share_of_what_is_deep_and_beyond_the_slop():
+def test_push_out_speed_of_a_plate_deeper_than_the_slop():
     """Profile one: contactERP of the overlap less the slop, in a step; up to 4 cm by speeds, which the ball has."""
     scene = CATALOGUE["thin_wall"].scene(3, {})
     assert _split_push(scene, 1 / 240, 0.04) == 0.0 == _split_push(scene, 1 / 240, 0.0)

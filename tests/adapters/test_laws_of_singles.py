@@ -31,7 +31,7 @@ BLOWS = (
 )
 
 
-def test_the_law_of_the_corner_is_the_scene_s_own_truth_where_nothing_is_rounded():
+def test_corner_law_equal_to_the_exact_truth_without_rounding():
     for variation in CORNER.full:
         scene = CORNER.scene(2, variation.params)
         for metric in METRICS:
@@ -39,7 +39,7 @@ def test_the_law_of_the_corner_is_the_scene_s_own_truth_where_nothing_is_rounded
             assert value == pytest.approx(CORNER.exact(scene)[metric], rel=1e-12)
 
 
-def test_the_law_of_the_corner_is_silent_about_all_that_it_does_not_compute():
+def test_corner_law_silent_outside_its_case():
     def said(scene, units=1.0, skin=0.0, dt=DT):
         return corner_law("rise", lambda scene, dt: (units, skin), 1.0)(scene, dt, CORNER.measure)
 
@@ -63,7 +63,7 @@ def test_the_law_of_the_corner_is_silent_about_all_that_it_does_not_compute():
         assert said(other) is None, other
 
 
-def test_near_the_origin_and_of_other_scenes_the_law_of_places_is_silent():
+def test_position_law_silent_near_the_origin_and_on_other_scenes():
     law = standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0))
     far = FAR.scene(2)
     plate, box = far.bodies
@@ -108,7 +108,7 @@ def test_the_band_is_that_of_the_roundings_and_grows_with_their_unit():
     assert bands[1] == pytest.approx(2.0 * bands[0], rel=1e-3) and 1e-6 < bands[0] < 1e-3
 
 
-def test_restitution_of_an_engine_that_has_none_for_slow_blows_is_that_of_its_threshold():
+def test_restitution_at_the_threshold_speed():
     scene = CATALOGUE["impact"].scene(2, {"e": 0.5, "v": 2.0})
     for limit, at, rebound in ((1.0, False, 0.5), (3.0, False, 0.0), (2.0, False, 0.0), (2.0, True, 0.5)):
         value, _ = told("rebound_ratio", Method(Threshold(limit, at)), scene)
@@ -116,7 +116,7 @@ def test_restitution_of_an_engine_that_has_none_for_slow_blows_is_that_of_its_th
     assert Threshold(1.0)(0.7, 1.0) == 0.0 and Threshold(1.0)(0.7, 1.1) == 0.7
 
 
-def test_nothing_is_said_where_a_load_acts_or_blows_follow_each_other_within_a_few_steps():
+def test_law_silent_under_loads_and_quick_successive_blows():
     exact = Method(lambda e, speed: e, 200)
     scene = CATALOGUE["impact"].scene(2)
     assert told("rebound_ratio", exact, scene) is not None
@@ -164,7 +164,7 @@ def test_what_leaves_its_plane_by_more_than_roundings_is_not_explained(share, st
     assert (told.physics.value, told.standing.value) == ("fail", standing)
 
 
-def test_a_law_of_what_blows_keep_is_silent_wherever_something_else_can_take_it():
+def test_law_of_conserved_quantities_silent_under_other_losses():
     """A load of any kind, on one body alone, is enough; and so are friction, loss, a box or a ball that is held."""
     law, scene = kept_law("momentum_defect"), CATALOGUE["rack"].scene(2)
     value, band = law(scene, DT, CATALOGUE["rack"].measure)

@@ -94,7 +94,7 @@ def test_a_tilt_takes_the_outermost_point_out_of_the_plane_by_its_chord(axis: in
     assert out_of_plane(pose, np.array([0.5])) == pytest.approx(math.sin(0.5 * angle), rel=1e-12)
 
 
-def test_the_farthest_body_and_sample_tell_how_far_a_scene_has_left_its_plane() -> None:
+def test_largest_distance_from_the_plane_over_bodies_and_samples() -> None:
     pose = np.zeros((3, 2, 7))
     pose[..., 3] = 1.0
     reach = np.array([1.0, 0.25])
@@ -146,7 +146,7 @@ def test_a_lifted_scene_lowers_to_itself() -> None:
         assert replace(back, bodies=flat.bodies) == flat
 
 
-def test_a_belt_and_a_course_lift_to_the_vertical_plane_and_the_belt_comes_back() -> None:
+def test_lift_and_return_of_belts_and_courses() -> None:
     scene = replace(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pairs=(Pair(),))
     belt = replace(scene.bodies[0], surface_velocity=(0.8, 0.6))
     shaken = replace(scene.bodies[2], course=Harmonic((0.02, 0.03), 2.0))
@@ -158,7 +158,7 @@ def test_a_belt_and_a_course_lift_to_the_vertical_plane_and_the_belt_comes_back(
     assert back is not None and back.bodies[0].surface_velocity == (0.8, 0.6)
 
 
-def test_a_polygon_becomes_a_prism_as_deep_as_it_reaches_and_a_capsule_stays_what_it_is() -> None:
+def test_lift_of_a_polygon_to_a_prism_and_of_a_capsule() -> None:
     scene = replace(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), pairs=(Pair(),))
     corners = ((0.3, 0.4), (-0.3, 0.4), (-0.3, -0.4), (0.3, -0.4))
     odd = replace(scene.bodies[1], shape=Polygon(corners))

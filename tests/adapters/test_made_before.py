@@ -52,7 +52,7 @@ def call(tmp_path_factory):
 
 
 @pytest.mark.long
-def test_the_stored_run_is_shown_with_the_law_and_the_finding_of_its_engine(call):
+def test_stored_run_shown_with_law_and_finding(call):
     # Checks that scenes of ours have got since are no findings: the run has no value of them.
     found = json.loads(call("findings", "--all", "--json", "--out", "before"))
     standings = {(row["scene"], row["standing"]) for row in found}

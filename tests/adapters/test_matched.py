@@ -63,7 +63,7 @@ def settled(trajectory: Trajectory) -> bool:
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.8, 1.0])
-def test_a_ball_rebounds_with_e_whatever_the_speed_the_phase_and_the_step(e: float, dt: float) -> None:
+def test_ball_rebound_equal_to_e_at_any_speed_phase_and_step(e: float, dt: float) -> None:
     for v in (0.1, 6.0, 50.0):
         for phase in (0.05, 0.5, 0.93):
             start = ball("ball", 0.0, 0.0, 0.5 + (3.0 - phase) * v * dt, v=(0.0, 0.0, -v))
@@ -132,7 +132,7 @@ def test_a_touching_cradle_keeps_momentum_and_energy() -> None:
     assert abs(v.sum() - 1.0) <= ROUND_OFF and abs(v @ v - 1.0) <= ROUND_OFF
 
 
-def test_blows_with_friction_take_energy_and_report_the_momentum_that_they_change() -> None:
+def test_energy_loss_and_momentum_of_blows_with_friction() -> None:
     start = replace(ball("ball", 0.0, 0.0, 0.52), twist=(3.0, -1.0, -2.0, 4.0, -5.0, 6.0))
     found = drive(scene_of(FLOOR, start, e=0.7, mu=0.2, T=6 * DT))
     energy = 0.5 * (found.twist[:, 1, :3] ** 2).sum(axis=1) + 0.05 * (found.twist[:, 1, 3:] ** 2).sum(axis=1)
@@ -147,7 +147,7 @@ def test_blows_with_friction_take_energy_and_report_the_momentum_that_they_chang
 
 @pytest.mark.parametrize("heading", [0.0, 15.0, 30.0, 45.0, 67.5, 90.0])
 @pytest.mark.parametrize("mu", [0.1, 0.5, 0.9])
-def test_a_box_slides_straight_and_stops_where_coulomb_says_in_any_heading(mu: float, heading: float) -> None:
+def test_box_stopping_distance_by_coulomb_in_any_heading(mu: float, heading: float) -> None:
     """Each step takes mu g dt of the speed until less is left, all of it then; positions follow the new speed."""
     way = np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading)), 0.0])
     found = drive(scene_of(FLOOR, slab(tuple(way)), mu=mu, g=DOWN, T=1.3 / (mu * G)))
@@ -184,7 +184,7 @@ def test_a_column_carries_its_weight_without_sinking() -> None:
         assert abs(carried - (10 - k) * G) <= 10.0 * SUMS * G
 
 
-def test_an_overlap_is_taken_away_no_faster_than_a_step_falls_and_nothing_hops() -> None:
+def test_overlap_removed_without_a_hop() -> None:
     deep = replace(slab(), pose=(0.0, 0.0, 0.05, 1.0, 0.0, 0.0, 0.0))
     found = drive(scene_of(FLOOR, deep, mu=0.5, g=DOWN, T=4.0))
     assert found.twist[:, 1, 2].max() <= G * DT + SUMS
@@ -218,7 +218,7 @@ def test_a_secant_makes_few_rounds_of_many() -> None:
     assert drive(scene).certificate["rounds"] <= 10 < contraction
 
 
-def test_a_run_in_which_shifts_do_not_settle_says_so_and_is_not_certified() -> None:
+def test_run_with_unsettled_shifts_not_certified() -> None:
     scene = scene_of(FLOOR, slab((1.0, 0.0, 0.0)), mu=0.5, g=DOWN, T=0.05)
     cut = drive(scene, rounds=1)
     assert cut.certificate["certified"] is False and "do not converge" in cut.certificate["reasons"][0]
@@ -226,7 +226,7 @@ def test_a_run_in_which_shifts_do_not_settle_says_so_and_is_not_certified() -> N
 
 
 @pytest.mark.parametrize("ratio", [1e-6, 1e-5, 1e5])
-def test_what_moves_on_together_has_nothing_to_agree_about_but_roundings(ratio: float) -> None:
+def test_shared_motion_differs_only_by_round_off(ratio: float) -> None:
     """Two balls of which one weighs next to nothing: after a blow with e = 0 the contact lasts and carries nothing.
 
     All that shifts are made of is one rounding of 4 m/s over a step, and they cannot agree to a share of that.
@@ -287,7 +287,7 @@ def test_planar_scenes_run_lifted_and_stay_in_their_plane() -> None:
     assert lift(scene).dimension == 3
 
 
-def test_a_running_surface_carries_a_box_up_to_its_speed_by_coulombs_law() -> None:
+def test_running_surface_carries_a_box_to_its_speed() -> None:
     belt = replace(FLOOR, surface_velocity=(1.0, 0.0, 0.0))
     found = drive(scene_of(belt, slab(), mu=0.3, g=DOWN, T=0.5))
     speeds = np.minimum(1.0, 0.3 * G * found.t)

@@ -43,14 +43,14 @@ def test_spin_load_and_gravity_are_speed_that_contacts_may_make_of_them():
     assert met(ball("a", 0.0, torque=(3.0,)), ball("b", 10.0)) == {pair("a", "b")}
 
 
-def test_a_body_that_is_struck_hands_on_what_struck_it_and_a_light_one_goes_far():
+def test_momentum_passed_on_by_a_struck_body():
     struck = ball("a", 0.0, v=3.0), ball("b", 2.0)
     assert met(*struck, ball("c", 20.0)) == {pair("a", "b")}
     light = ball("a", 0.0, v=3.0), ball("b", 2.0, mass=0.01)
     assert met(*light, ball("c", 20.0)) == {pair("a", "b"), pair("b", "c")}
 
 
-def test_what_is_fixed_hands_nothing_on_and_what_is_driven_hands_on_everything():
+def test_momentum_passed_on_by_fixed_and_driven_bodies():
     lanes = ball("a", 0.0, v=1.0), ball("b", 50.0, v=1.0)
     assert met(FLOOR, *lanes) == {pair("a", "floor"), pair("b", "floor")}
     belt = Body("belt", HalfSpace((0.0, 1.0), 0.0), motion="fixed", surface_velocity=(1.0, 0.0))

@@ -15,7 +15,7 @@ from adapters.conformance.spoilt import Spoilt
 MEGABYTE = 2**20
 
 
-def test_memory_that_grows_once_is_asked_again_and_what_no_system_tells_is_not_asked(toy, monkeypatch):
+def test_memory_growth_measured_twice_and_only_where_available(toy, monkeypatch):
     """An allocator takes a pool once; what leaks does so again."""
 
     def growth(grown):
@@ -32,7 +32,7 @@ def test_memory_that_grows_once_is_asked_again_and_what_no_system_tells_is_not_a
         CHECKS["memory"](toy())
 
 
-def test_worlds_are_built_stepped_and_closed_of_the_first_profile_and_the_warm_ones_do_not_count(monkeypatch):
+def test_worlds_of_the_memory_check_after_warm_up(monkeypatch):
     told = []
     monkeypatch.setattr(worlds, "WARM", 2)
     monkeypatch.setattr(worlds, "BUILDS", 3)

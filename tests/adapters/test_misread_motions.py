@@ -66,7 +66,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("fault", REPORTED)
-def test_a_fault_of_a_size_changes_what_it_says_by_that_size_and_nothing_else(fault):
+def test_fault_of_a_given_size_changes_only_its_quantity(fault):
     told = dict(zip(("pose", "twist", "impulse", "after"), misread(fault), strict=True))
     healthy = {"pose": END, "twist": V, "impulse": IMPULSE, "after": np.zeros((0, 2))}
     for name, value in (healthy | WRONG[fault]).items():

@@ -77,7 +77,7 @@ def test_a_model_moves_as_mujoco_moves_its_own_file(path):
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_has_no_place_is_refused_with_its_element_or_left_out_and_said(name):
+def test_model_elements_refused_or_left_out_with_a_message(name):
     text = (MODELS / f"{name}.xml").read_text()
     with pytest.raises(SceneError) as refused:
         reading.read(text, False)
@@ -161,7 +161,7 @@ def test_the_compiler_s_complaint_names_the_line_of_the_text():
 
 @pytest.mark.parametrize("what", ["damping", "armature"])
 @pytest.mark.parametrize("bad", [0, 1, 2])
-def test_of_several_bodies_the_one_is_named_whose_joint_is_no_free_flight(what, bad):
+def test_body_with_a_joint_other_than_free_named(what, bad):
     bodies = [BALL.replace('"ball" pos="0 0 1"', f'"{name}" pos="0 0 {k + 1}"') for k, name in enumerate("abc")]
     bodies[bad] = bodies[bad].replace("<freejoint/>", f'<joint type="free" {what}="1"/>')
     with pytest.raises(SceneError, match=f"<body> '{'abc'[bad]}': .*{what}"):
@@ -231,7 +231,7 @@ def test_rods_lie_along_their_bodies_first_axis():
 
 
 @pytest.mark.parametrize(("moments", "planar"), [(".05 .05 .01", True), (".05 .04 .01", False)])
-def test_only_a_rod_that_is_round_in_its_moments_may_lie_anyhow_about_its_axis(moments, planar):
+def test_orientation_of_a_rod_with_round_moments(moments, planar):
     rod = (
         '<body pos="0 0 1" zaxis="1 0 0"><freejoint/><geom type="capsule" fromto="0 0 .2 0 0 -.2" size=".1"/>'
         f'<inertial pos="0 0 0" mass="1" diaginertia="{moments}" euler="0 0 20"/></body>'
@@ -310,7 +310,7 @@ def test_contacts_combine_as_mujoco_combines_them(first, second):
     assert found.softness[3] == pytest.approx(made.includemargin)
 
 
-def test_a_model_that_lies_in_the_plane_is_a_planar_scene_and_lifts_back():
+def test_planar_model_as_a_planar_scene_and_back():
     found = {path.stem: lowered(reading.read(path.read_text(), False).scene) for path in READ}
     assert found["capsules"] is not None  # MuJoCo's `fromto` turns the rail about its axis, out of the plane
     assert found["box_tilted"] is not None and found["ball_in_tray"] is None and found["box_spinning"] is None

@@ -24,7 +24,7 @@ def scene(dimension, count=2):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_heights_speeds_and_impulses_stand_at_the_vertical_of_their_bodies_and_the_rest_as_it_starts(dimension):
+def test_vertical_quantities_at_the_right_bodies(dimension):
     rows = np.arange(3 * 3 * 2, dtype=float).reshape(3, 3, 2)
     given = scene(dimension)
     told = as_trajectory(given, DT, rows)
@@ -42,7 +42,7 @@ def test_heights_speeds_and_impulses_stand_at_the_vertical_of_their_bodies_and_t
         assert unknown.shape == shape and np.isnan(unknown).all()
 
 
-def test_a_planar_motion_along_a_heading_turns_from_the_heading_towards_the_vertical():
+def test_planar_motion_turn_from_heading_to_vertical():
     motion = np.array([[[1.0, 2.0, 0.5], [3.0, 4.0, 5.0]], [[-1.0, 0.25, -0.5], [0.5, -2.0, 1.0]]])
     flat = along_a_heading(scene(2, 1), DT, np.array([-1.0]), motion)
     assert flat.t.tolist() == [0.0, DT] and flat.dt == DT and flat.finish == "completed" and flat.contacts is None
@@ -91,7 +91,7 @@ def law(damping=8.0, stiffness=64.0, deep=0.5, softness=1.0, margin=0.0):
     return ContactLaw(DT, damping, stiffness, Impedance.of((deep, deep, 0.001, 0.5, 1.0)), softness, margin)
 
 
-def test_a_body_falls_freely_until_it_touches_and_is_pushed_by_the_law_then():
+def test_free_fall_until_touch_then_push_by_the_law():
     free = fall(law(), 2.0, -1.0, 0.5, -1.0, 3)
     speeds = [-1.0 - k * DT for k in range(4)]
     assert free.shape == (4, 3) and free[:, 1].tolist() == speeds and free[:, 2].tolist() == [0.0] * 4
@@ -108,7 +108,7 @@ def test_a_column_of_one_is_a_body_that_falls_on_a_face_of_four_corners():
     assert one[:, 2, 0] == pytest.approx(2.0 * told[:, 2], abs=1e-14), "an impulse, not a change of speed"
 
 
-def test_boxes_that_rest_on_each_other_carry_what_is_above_and_only_neighbours_push():
+def test_loads_of_stacked_boxes_by_neighbours_only():
     masses, heights = (1.0, 3.0, 2.0), (0.49, 1.475, 2.47)
     rows = column(law(64.0, 1024.0, 0.9), heights, (1.0, 1.0, 1.0), masses, -1.0, 4000, 0.0)
     assert rows.shape == (4001, 3, 3) and rows[0, 0].tolist() == list(heights) and not rows[0, 1:].any()

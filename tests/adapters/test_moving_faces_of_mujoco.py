@@ -48,7 +48,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("side", "geom"), [(-1.0, 0), (1.0, 1)])
-def test_a_face_adds_its_velocity_along_each_row_to_the_second_body_and_takes_it_from_the_first(side, geom):
+def test_face_velocity_in_the_rows_of_both_bodies(side, geom):
     given = {geom: (FACE, NONE), 5: ((9.0, 9.0, 9.0), NONE)}
     assert entered([contact()], given, 1)[:5] == [0.0, side * 1.0, side * 2.0, side * 4.0, 0.0]
     assert entered([contact(frame=TURNED)], given, 1)[:5] == [0.0, side * 4.0, side * 1.0, side * 2.0, 0.0]
@@ -64,14 +64,14 @@ def test_a_surface_that_runs_into_itself_lifts_nothing():
     assert entered([contact()], {0: (FACE, NONE), 1: (NONE, SURFACE)}, 1)[:4] == [0.0, -1.0, 14.0, 28.0]
 
 
-def test_of_a_pyramid_each_edge_is_the_normal_and_its_tangent_by_its_friction():
+def test_pyramid_edges_from_normal_and_tangent():
     edges = [1.0 + 1.0, 1.0 - 1.0, 1.0 + 1.0, 1.0 - 1.0]
     assert entered([contact()], {1: (FACE, NONE)}, 0)[:6] == [0.0, *edges, 0.0]
     assert entered([contact(dim=4)], {1: (FACE, NONE)}, 0)[:8] == [0.0, *edges, 1.0, 1.0, 0.0]
     assert entered([contact(friction=(2.0, 1.0))], {1: (FACE, NONE)}, 0)[1:5] == [5.0, -3.0, 5.0, -3.0]
 
 
-def test_contacts_beside_each_other_have_rows_of_their_own_and_those_left_out_none():
+def test_rows_of_neighbouring_and_excluded_contacts():
     contacts = [contact(row=-1), contact(row=0, dim=1), contact(geoms=(2, 3), row=1), contact(geoms=(1, 2), row=4)]
     assert entered(contacts, {1: (FACE, NONE)}, 1)[:8] == [1.0, 0.0, 0.0, 0.0, -1.0, -2.0, -4.0, 0.0]
 
@@ -79,7 +79,7 @@ def test_contacts_beside_each_other_have_rows_of_their_own_and_those_left_out_no
 # ---- scenes ----------------------------------------------------------------------------------------------------------
 
 
-def test_faces_that_are_moved_and_surfaces_that_run_are_told_by_the_index_of_their_body():
+def test_moving_faces_and_running_surfaces_by_body_index():
     assert [is_moved_face(body) for body in (STILL, BELT, WALL, replace(BOX, motion="prescribed"))] == [
         False, False, True, False]  # fmt: skip
     given = scene(STILL, BOX, BELT, WALL)

@@ -157,7 +157,7 @@ def test_default_declares_a_rebound_that_does_not_depend_on_e() -> None:
     ("profile", "mu", "dt", "asks"),
     [("default", 2.0, 1 / 240, True), ("tuned", 2.0, 1 / 960, True), ("default", 0.8, 1 / 240, False)],
 )
-def test_friction_of_a_box_that_is_thrown_up_is_what_the_documented_law_makes_of_it(profile, mu, dt, asks) -> None:
+def test_friction_of_a_thrown_up_box_by_the_documented_law(profile, mu, dt, asks) -> None:
     """Above mu = 1 the probe's box lands on an edge, with less friction than mu of the load: predicted to round-off."""
     asked = needs(make(FLOOR, cube("box", 0.5), mu=mu, g=(1.0, 0.0, -G)))
     assert ("friction" in ENGINE.declares(profile, asked, dt)) == asks
@@ -167,7 +167,7 @@ def test_friction_of_a_box_that_is_thrown_up_is_what_the_documented_law_makes_of
 
 
 @pytest.mark.parametrize("share", [0.99, 1.01])
-def test_another_friction_than_asked_fails_the_receipt_of_a_box_that_is_thrown_up_too(share, monkeypatch) -> None:
+def test_receipt_of_a_thrown_up_box_with_wrong_friction(share, monkeypatch) -> None:
     """Planted: a model with a hundredth less or more friction, which what is declared does not follow."""
     asked = needs(make(FLOOR, cube("box", 0.5), mu=2.0, g=(1.0, 0.0, -G)))
     pair = Spec._geom_material
@@ -337,7 +337,7 @@ def test_gravity_acts_along_its_vector() -> None:
     assert trajectory.twist[-1, 0, :3] == pytest.approx(0.5 * np.array(gravity), rel=ROUND_OFF)
 
 
-def test_velocity_first_stepping_falls_half_a_step_too_far_and_rk4_does_not() -> None:
+def test_free_fall_lag_velocity_first_and_rk4() -> None:
     scene = make(ball("ball", 0.0), g=(0.0, 0.0, -G), T=0.5)
     fall = 0.5 * G * 0.25
     assert -drive(scene, "default").pose[-1, 0, 2] == pytest.approx(fall + 0.5 * G * 0.5 * DT, rel=ROUND_OFF)
@@ -570,7 +570,7 @@ def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal: tuple[f
     assert rotation(turn)[0] @ [0.0, 0.0, 1.0] == pytest.approx(normal, abs=1e-12)
 
 
-def test_friction_of_a_pair_is_softened_as_is_said_stopped_in_a_step_or_left_to_the_pair():
+def test_pair_friction_softened_stopped_or_left_as_asked():
     """Nothing said is MuJoCo's own (0, 0), "as solref"; -1/dt takes all of a slip off within a step of dt."""
     assert pair_solreffriction({"solreffriction": None}, 0.25) == (0.0, 0.0)
     assert pair_solreffriction({"solreffriction": "stick"}, 0.25) == (0.0, -4.0)
@@ -640,7 +640,7 @@ def test_a_prescribed_box_pushes_like_a_mocap_body_whose_speed_is_known(changes,
 
 @pytest.mark.parametrize("profile", ["tuned", "matched"])
 @pytest.mark.parametrize(("mass", "speed"), [(1.0, 0.1), (20.0, 0.03)])
-def test_forces_beside_a_prescribed_body_are_told_and_momentum_bears_them_out(profile, mass, speed):
+def test_forces_beside_a_prescribed_body_match_momentum(profile, mass, speed):
     """Impulses that are told are m dv less the weight's, step by step; 1e15 kg made -22 kN of 5 N."""
     scene = pushed(mass, speed)
     found = run(MujocoEngine(), scene, DT, settings(scene, profile), Sampling(contacts_from=0.0))

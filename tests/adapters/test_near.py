@@ -40,7 +40,7 @@ def moving(scene, samples, seed, speed):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("seed", "spread", "samples"), [(1, 30.0, 1), (2, 1e3, 50), (3, 3.0, 7), (4, 1e18, 3)])
-def test_every_pair_whose_balls_touch_in_a_sample_is_found_once_and_in_order(dimension, seed, spread, samples):
+def test_touching_pairs_found_once_and_in_order(dimension, seed, spread, samples):
     scene = cloud(dimension, 60, seed, spread)
     pose = moving(scene, samples, seed, spread)
     found = list(near_pairs(scene, pose))
@@ -131,7 +131,7 @@ def test_the_overlap_at_the_start_is_no_less_than_the_true_one(dimension, shapes
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.3, 2.0])
-def test_the_overlap_of_boxes_that_meet_with_a_face_and_of_solids_is_the_true_one(turn):
+def test_overlap_of_boxes_meeting_with_a_face_and_of_solids(turn):
     along, across = np.array([math.cos(turn), math.sin(turn)]), np.array([-math.sin(turn), math.cos(turn)])
     for depth in (1e-6, 0.01, -0.01):
         place = tuple(map(float, 0.1 * along + (0.5 - depth) * across))

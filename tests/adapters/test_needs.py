@@ -68,7 +68,7 @@ def test_a_box_friction_spin_or_torque_can_turn_a_body(body, pair, turns):
      ((0.0, 0.0), (0.0, 1.0), 0.0, "rest"), ((0.0, 0.0), (0.0, 0.0), 0.0, "impact"),
      ((0.0, -8.0), (0.0, 0.0), 0.5, "impact")],
 )  # fmt: skip
-def test_bodies_rest_where_a_load_presses_them_together_and_nothing_rebounds(gravity, force, e, regime):
+def test_bodies_at_rest_under_a_load_do_not_rebound(gravity, force, e, regime):
     assert needs(scene(FLOOR, ball(force=force), pair=Pair(restitution=e), gravity=gravity)).regime == regime
 
 
@@ -86,20 +86,20 @@ def test_bodies_rest_where_a_load_presses_them_together_and_nothing_rebounds(gra
         ({"twist": (1e-7, -1e6, 0.0)}, 0.25, False),  # round-off of a million
     ],
 )
-def test_something_slides_where_friction_meets_motion_or_load_along_a_face(changes, friction, slides):
+def test_sliding_by_friction_with_motion_or_a_tangential_load(changes, friction, slides):
     assert needs(scene(FLOOR, ball(**changes), pair=Pair(friction=friction))).slide is slides
 
 
 @pytest.mark.parametrize(
     "mover", [{"surface_velocity": (0.5, 0.0)}, {"motion": "prescribed", "course": Harmonic((0.02, 0.0), 2.0)}]
 )
-def test_something_slides_where_a_surface_runs_or_what_others_lie_on_is_shaken(mover):
+def test_sliding_on_running_surfaces_and_shaken_supports(mover):
     moved = replace(FLOOR, **mover)
     assert needs(scene(moved, ball(), pair=Pair(friction=0.25))).slide is True
     assert needs(scene(FLOOR, ball(), pair=Pair(friction=0.25))).slide is False
 
 
-def test_load_straight_into_a_tilted_face_is_no_slide_however_its_normal_is_rounded():
+def test_no_slide_under_a_load_normal_to_a_tilted_face():
     for k in range(1, 400):
         normal = (math.sin(0.005 * k), math.cos(0.005 * k))
         tilted = Body("ramp", HalfSpace(normal, 0.0), motion="fixed")
@@ -126,7 +126,7 @@ def test_what_moves_level_over_a_fixed_box_slides(platform, twist, gravity, slid
 
 
 @pytest.mark.parametrize(("speed", "slides"), [(1e-12, False), (1.5e-12, True)])
-def test_round_off_of_a_body_that_hardly_moves_is_that_of_one_metre_a_second(speed, slides):
+def test_round_off_of_slow_bodies_at_one_metre_a_second(speed, slides):
     assert needs(scene(FLOOR, ball(twist=(speed, 0.0, 0.0)), pair=Pair(friction=0.25))).slide is slides
 
 
@@ -202,7 +202,7 @@ def test_entries_of_both_one_and_none_are_asked_in_that_order():
     assert Materials(()).said("a", "b") == frozenset()
 
 
-def test_polygons_and_hulls_are_hulls_wherever_they_stand_and_boxes_are_none():
+def test_hull_need_of_polygons_and_not_of_boxes():
     corners = ((-0.5, -0.5), (0.5, -0.5), (0.0, 1.0))
     assert not needs(scene(FLOOR, ball(shape=Box((0.25, 0.25))))).hulls
     assert needs(scene(FLOOR, ball(shape=Polygon(corners)))).hulls

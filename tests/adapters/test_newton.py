@@ -62,7 +62,7 @@ def test_numbers_that_are_called_shipped_are_the_engine_s_own():
 
 
 @pytest.mark.parametrize("name", ["incline", "bounce"])
-def test_a_step_that_is_replayed_ends_in_the_bits_of_one_that_is_launched(name):
+def test_replayed_step_has_the_bits_of_a_launched_one(name):
     scene = posed_for(ENGINE, CATALOGUE[name].scene(3, {}))
     replayed, launched = (ENGINE.build(scene, DT, settings(scene)) for _ in range(2))
     replayed.advance(200)
@@ -114,7 +114,7 @@ def test_without_being_asked_it_does_not_rebound_at_all():
 
 
 @pytest.mark.parametrize(("share", "moves"), [(0.9, False), (1.1, True)])
-def test_what_is_slower_than_a_tenth_of_a_millimetre_a_second_is_stopped(share, moves):
+def test_rest_threshold_of_a_tenth_of_a_millimetre_a_second(share, moves):
     ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 5.0, *UPRIGHT), (share * STOPPED, 0, 0, 0, 0, 0))
     scene = Scene("slow", 1, 3, (FLOOR, ball), (Pair(),), (0.0, 0.0, 0.0), 12 * DT)
     assert (drive(scene).twist[-1, 1, 0] > 0.0) == moves
@@ -195,7 +195,7 @@ def test_another_relaxation_would_be_another_motion(monkeypatch):
     assert abs(other - said) > 10.0 * band
 
 
-def test_roundings_of_a_column_that_trembles_are_off_to_one_side_and_its_law_says_by_how_much():
+def test_one_sided_round_off_of_a_trembling_column():
     """Every draw of singles tells less than doubles: their mean belongs to what is predicted, and no scatter to it."""
     stack = CATALOGUE["stack"]
     scene, metric = stack.scene(2, {"n": 10.0}), "interface_impulse[7]"
@@ -358,7 +358,7 @@ def test_corners_that_feel_more_would_be_another_column(monkeypatch):
 
 
 @pytest.mark.parametrize(("profile", "dimension"), [("default", 2), ("tuned", 3)])
-def test_what_a_column_s_contacts_tell_is_the_mean_that_two_bodies_make_of_it(dimension, profile):
+def test_column_contacts_told_as_the_mean_of_two_bodies(dimension, profile):
     """Boxes with c contacts get 1/c of what these ask for each, so that below a box they ask for all c m g above it.
 
     Told is that by the mean number of both: 2/3 of the weight at the top, 3/4, 5/6, 7/8, and 9/10 at the floor, where a
@@ -387,7 +387,7 @@ def test_a_box_too_far_away_stays_where_it_is_while_its_speed_grows(profile):
         assert law(far.scene(3, {"far": 1e3}), DT, far.measure) is None
 
 
-def test_a_spinning_ball_on_a_box_among_fixed_ones_goes_where_the_recurrence_has_it():
+def test_spinning_ball_among_fixed_boxes_by_the_recurrence():
     """It lands on the top of a free box, off its middle, beside a fixed ball and a fixed wall; all rub.
 
     The bound is that of the column above, by the roundings of a point that is turned to a body's axes and back.
@@ -419,7 +419,7 @@ def test_a_plane_leans_as_the_engine_has_it_bit_by_bit(normal):
     assert (abs(held[2] - normal[2]) > 2.0**-25) is not level
 
 
-def test_a_line_of_blows_is_left_because_its_wall_leans_and_by_nothing_else(monkeypatch):
+def test_deviation_of_a_line_of_blows_by_a_leaning_wall(monkeypatch):
     """A planted fault: with a wall that does not lean, by 2^-24 rad, 31 blows end as the textbook has them."""
     from adapters.newton import motion
 
@@ -478,7 +478,7 @@ def both_ways(name, dimension, params, profile, metric, factor=1.0, **changes):
 
 
 @pytest.mark.parametrize(("dimension", "params"), [(2, {}), (3, {"ratio": 0.5})], ids=str)
-def test_a_box_creeps_because_friction_is_held_to_the_load_of_its_own_sweep(dimension, params):
+def test_box_creep_by_friction_limited_to_its_own_sweep(dimension, params):
     """It needs half of its friction, or nearly all, and creeps by 25 and 96 tolerances; with twice as much it is still.
 
     Fewer sweeps are worse, more change nothing: what presses nothing any more holds nothing.
@@ -490,7 +490,7 @@ def test_a_box_creeps_because_friction_is_held_to_the_load_of_its_own_sweep(dime
     assert max(both_ways("incline", dimension, params, "tuned", "creep", 2.0)[:2]) < check.bound
 
 
-def test_a_ladder_creeps_by_few_sweeps_and_by_friction_that_is_held_to_the_load_of_its_own():
+def test_ladder_creep_by_few_sweeps_and_limited_friction():
     """Either alone leaves it creeping by 20 tolerances; half as much friction again in fifty sweeps does not."""
     found, said, check = both_ways("ladder", 2, {}, "default", "moved")
     assert found == pytest.approx(said, rel=0.01) and found > 500.0 * check.bound
@@ -513,7 +513,7 @@ def tent(params, profile, factor, **changes):
     }
 
 
-def test_a_card_tent_creeps_by_few_sweeps_and_by_friction_that_is_held_to_the_load_of_its_own():
+def test_card_tent_creep_by_few_sweeps_and_limited_friction():
     """As the ladder: either alone leaves it creeping. What is left are loads: places of a smaller tent tell them.
 
     An overlap of g dt^2 is the same at any size: places of a quarter of the size round to a quarter of it.
@@ -557,7 +557,7 @@ def test_cards_that_slide_get_away_in_the_first_instant(profile, lost):
 
 
 @pytest.mark.parametrize("dt", [DT, 0.5 * DT])
-def test_a_ball_that_spins_as_it_rolls_goes_astray_by_a_seventh_of_its_spin_speed_step_and_time(dt):
+def test_drift_of_a_rolling_and_spinning_ball(dt):
     """In a step it turns by the exponential of (w n + v/r a) dt: its lowest point goes w v dt^2/2 along its axis a.
 
     Friction takes that for a slip until the point has the speed w v dt/2 the other way, 2/7 of which is the ball's.
@@ -605,7 +605,7 @@ def test_a_ball_rests_early_because_its_blows_are_late(height):
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_half_the_load_of_starved_balls_is_told_as_two_bodies_make_a_mean_of_it(profile):
+def test_half_load_of_starved_balls_by_the_mean_of_two_bodies(profile):
     """Where each contact gives a body all that it asks for its load is told, but for what stops below 0.1 mm/s.
 
     Each of four sweeps may stop each ball between a contact and the one that is pressed.

@@ -90,7 +90,7 @@ def test_a_flag_that_is_switched_on_measures_or_is_refused(flag):
     assert flag in MEASURING and found == told()
 
 
-def test_several_flags_are_told_in_order_and_of_several_wrong_ones_the_first():
+def test_several_flags_told_in_order_and_first_wrong_one_named():
     both = sorted(CARRIED & set(DISABLED))[:2]
     assert told("", " ".join(f'{flag}="disable"' for flag in both[::-1]))["disabled"] == tuple(both)
     with pytest.raises(SceneError, match=r"<option>: constraint: without it there are no contacts$"):

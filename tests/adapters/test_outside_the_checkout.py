@@ -95,7 +95,7 @@ def site(tmp_path_factory):
 
 
 @pytest.mark.timeout(1800)
-def test_an_engine_made_by_the_recipe_works_at_the_first_try_with_a_law_and_a_finding_of_its_own(site):
+def test_engine_from_the_recipe_with_a_law_and_a_finding(site):
     folder, python, pip = site
     begun, crosscheck = time.monotonic(), python.parent / "crosscheck"
     call(folder, crosscheck, "new-adapter", "lossy")

@@ -26,7 +26,7 @@ def stock(engine, profile, scene="bounce"):
      ("elliptic", "elliptic", "elliptic"), ("true", True, "true"), ("False", False, "false"), ("none", None, "none"),
      ("0.01,1", (0.01, 1.0), "0.01,1"), ("warmstart,island", ("warmstart", "island"), "warmstart,island")],
 )  # fmt: skip
-def test_a_value_reads_as_what_it_looks_like_and_is_written_as_it_is_read(text, value, again):
+def test_values_read_and_written_alike(text, value, again):
     found = read(text)
     assert found == value and type(found) is type(value)
     assert text_of(found) == again and read(again) == value
@@ -129,7 +129,7 @@ def test_every_setting_of_every_profile_can_be_set_to_what_it_is(engine):
 
 
 @pytest.mark.parametrize("engine", HERE)
-def test_every_setting_that_can_be_set_refuses_what_it_is_not_and_names_itself(engine):
+def test_refusal_of_a_wrong_value_by_every_setting(engine):
     found = registry.load(engine)
     profile = next(iter(found.profiles))
     assert set(found.settable()) >= {s.name for s in stock(engine, profile)}
@@ -147,7 +147,7 @@ def other(kind, value):
     return next((each for each in tried if not kind(each) and np.any(np.asarray(each) != np.asarray(value))), None)
 
 
-def test_every_option_of_mujoco_that_can_be_set_is_in_its_model_and_in_what_is_exported():
+def test_mujoco_options_in_the_model_and_in_the_export():
     mujoco = pytest.importorskip("mujoco")
     from adapters.mujoco.options import ASKED_OTHERWISE, ENUMERATED, own_kinds
     from adapters.mujoco.releases import Mjcf

@@ -96,7 +96,7 @@ def test_what_is_set_is_what_bodies_hold():
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_along_the_normal_only(profile):
+def test_impulses_of_smooth_and_rough_contacts(profile):
     smooth, rough = (drive(resting(mu), profile).contacts.impulse_between(0, 1)[-60:] / DT for mu in (0.0, 0.5))
     assert np.isfinite(smooth).all() and smooth[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3)
     assert rough[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3) and np.isnan(rough[:, :2]).all()
@@ -113,7 +113,7 @@ def test_no_approach_of_up_to_2_metres_a_second_rebounds_as_shipped(solver, spee
 @pytest.mark.parametrize("solver", ["tgs", "pgs"])
 @pytest.mark.parametrize("share", [0.99, 1.01])
 @pytest.mark.parametrize("length", [TOLERANCE_LENGTH, 0.5])
-def test_a_blow_has_friction_if_its_gap_is_below_a_share_of_the_size_the_engine_is_told(solver, share, length):
+def test_friction_of_a_blow_by_gap_and_length_scale(solver, share, length):
     """Slip enough that friction is mu times the blow; contacts are made ahead of both gaps."""
     gap, offset = share * FRICTION_GAP * length, 0.1
     scene = struck(0.5, 6.0, gap, 0.05, 6.0, steps=1)
@@ -240,7 +240,7 @@ def law_of(scene, profile, metric):
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "v": 1.0}, {"e": 1.0, "v": 2.0}, {"e": 0.95, "v": 0.1}], ids=str)
-def test_a_blow_is_what_its_law_says_and_a_hundred_thousandth_more_is_not(profile, params):
+def test_law_of_a_blow_against_a_fault_of_a_hundred_thousandth(profile, params):
     impact = CATALOGUE["impact"]
     scene = impact.scene(3, params)
     found = impact.measure(scene, drive(scene, profile))

@@ -118,7 +118,7 @@ class Sizeless:
         return "of no known size"
 
 
-def test_what_can_be_listed_is_a_list_unless_it_is_too_large_or_does_not_say_how_large_it_is():
+def test_list_of_a_large_or_unsized_collection():
     assert plain(Listed(2)) == [1.5, 2.5]
     assert plain(Listed(SIZE - 1)) == [1.5, 2.5]
     assert plain(Listed(SIZE)) == "too large"
@@ -153,7 +153,7 @@ def test_levels_are_counted_one_by_one_from_the_outermost(nest):
     assert bottom == text == "[1.5 2.5]"  # below the last level its text, as of anything else
 
 
-def test_of_what_is_too_large_the_beginning_is_kept_to_the_last_item_that_begins_within_it():
+def test_beginning_kept_of_a_collection_that_is_too_large():
     # A word of n characters counts for n + 1, a number for 20.
     half = "x" * 400
     many = [half] * (2 * SIZE // 401)
@@ -171,7 +171,7 @@ def test_of_what_is_too_large_the_beginning_is_kept_to_the_last_item_that_begins
     assert list(both) == ["first"]
 
 
-def test_a_long_text_is_not_read_to_its_end_before_its_first_line_is_known():
+def test_first_line_of_a_long_text_without_reading_its_end():
     assert one_line("\n" * (8 * REASON) + "late") == ""
     assert one_line("\n" * (8 * REASON - 4) + "late") == "late"
 

@@ -42,7 +42,7 @@ def test_a_step_of_its_own():
     assert said.startswith("measured ")
 
 
-def test_every_check_and_receipt_has_a_fault_and_at_least_25_have_three_sizes():
+def test_planted_faults_for_every_check_and_in_three_sizes():
     named = {fault.check for fault in FAULTS.values()}
     # Which packages lie on the path is no matter of an adapter.
     assert named == {*CHECKS, *(f"receipt {quantity}" for quantity in QUANTITIES)} - {"packages"}

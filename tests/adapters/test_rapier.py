@@ -61,7 +61,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
 
-def test_impulses_of_a_smooth_contact_are_whole_and_those_of_a_rough_one_known_along_the_normal_only():
+def test_impulses_of_smooth_and_rough_contacts():
     smooth, rough = (drive(resting(mu)).contacts.impulse_between(0, 1)[-60:] / DT for mu in (0.0, 0.5))
     assert np.isfinite(smooth).all() and smooth[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3)
     assert rough[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3) and np.isnan(rough[:, :2]).all()

@@ -41,7 +41,7 @@ def test_a_motion_that_tells_nothing_is_read_without_a_warning(name, dimension, 
 
 
 @pytest.mark.parametrize(("dimension", "faces"), [(2, "xz"), (3, "xyz")])
-def test_what_lands_is_all_at_one_height_and_each_box_on_another_face_by_the_shortest_turn(dimension, faces):
+def test_landings_at_one_height_on_different_faces(dimension, faces):
     case = Case(dimension, 0.5, 0.5, 1 / 240, 0.5)
     floor, ball, *boxes = PROBES["landing"].make(case).bodies
     for body in (ball, *boxes):

@@ -155,7 +155,7 @@ def test_a_slip_is_braked_by_the_impulse_of_compression_only():
     assert measured("oblique", 2, params)["forward_speed"] == pytest.approx(expected, rel=1e-4)
 
 
-def test_touching_balls_are_stopped_together_before_the_first_two_rebound():
+def test_stop_of_touching_balls_before_the_first_two_rebound():
     """v/3 each, then the first two at v/2 apart from that: (1 + 25 + 4)/36 of the energy is left."""
     assert measured("cradle", 2, {"n": 3.0, "apart": 0.0}, **SWEPT)["energy_defect"] == pytest.approx(1 / 6, abs=1e-6)
     assert measured("cradle", 2, {"n": 3.0, "apart": 0.0})["energy_defect"] == pytest.approx(1 / 6, abs=0.015)
@@ -203,7 +203,7 @@ def test_the_foot_of_a_domino_is_not_held_while_it_is_thrown_back():
      ("flat_box", {}, 0.01), ("flat_box", {"e": 1.0}, 0.01), ("flat_box", {"e": 0.8, "aspect": 4.0}, 0.01)],
     ids=str,
 )  # fmt: skip
-def test_points_that_are_thrown_back_one_after_the_other_turn_a_body_out_of_its_plane(name, params, within):
+def test_out_of_plane_turn_by_points_thrown_back_in_sequence(name, params, within):
     """By the spin of the blow, for as long as the flight after it; thrown back together by nothing.
 
     The flight is shorter by up to the step that finds the blow; besides, off by a share: what the body turns in the

@@ -57,7 +57,7 @@ def dragged(**declared):
     return Dragged()
 
 
-def test_rebounds_are_measured_in_impacts_and_friction_where_there_is_any(toy):
+def test_receipts_of_rebound_in_impacts_and_of_friction(toy):
     everything = [slip.quantity for slip in receipts(toy(), "default", IMPACT, DT)]
     assert everything == list(QUANTITIES)
     assert set(QUANTITIES) - set(by_quantity(receipts(toy(), "default", REST, DT))) == {"restitution"}
@@ -127,7 +127,7 @@ def test_probes_are_measured_once_per_configuration(counting):
     assert len(builds) == len(PROBES)
 
 
-def test_a_departure_that_is_declared_holds_and_one_that_is_declared_wrong_does_not():
+def test_declared_departure_right_and_wrong():
     # A rebound of 0 whatever is asked, and drag: (1 - 0.04 dt)^(1/dt) loses 0.0392 a second.
     plastic = declaring("restitution ignored", restitution=Declared(0.0, 1e-12, "no rebound"))
     assert all(slip.holds for slip in receipts(plastic, "default", IMPACT, DT))
@@ -205,7 +205,7 @@ def test_probe_balls_touch_the_floor_at_their_phase_of_a_step(dimension):
         assert steps % 1.0 == pytest.approx(phase, abs=1e-9)
 
 
-def test_few_sweeps_that_were_asked_for_widen_the_bands_of_friction_alone(toy):
+def test_friction_bands_wider_at_few_requested_sweeps(toy):
     own, starved = (by_quantity(receipts(toy(), "default", IMPACT, DT, n)) for n in (None, 2))
     widened = {quantity for quantity in own if starved[quantity].band > own[quantity].band}
     assert widened == {"friction", "friction_impulse"}
@@ -245,7 +245,7 @@ def test_impulses_that_are_not_reported_are_no_zero_and_no_failure(toy_class):
 
 @pytest.mark.parametrize("quantity", ["friction", "friction_impulse", "impulse"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
-def test_a_profile_that_declares_nothing_is_held_to_a_thousandth_of_friction_and_impulses(toy, dt, quantity):
+def test_default_receipt_band_of_a_thousandth(toy, dt, quantity):
     slip = by_quantity(receipts(toy(), "default", IMPACT, dt))[quantity]
     assert slip.band < 1e-3 * slip.asked
 
@@ -346,7 +346,7 @@ def test_sweeps_asked_for_leave_a_share_of_friction_and_two_steps_of_it(sweeps, 
     assert slips["impulse"].band == 1e-6  # of an engine that is moved by its impulses
 
 
-def test_a_sum_of_impulses_that_is_declared_is_not_told_when_the_solve_is_cut_off():
+def test_declared_impulse_sum_not_told_in_an_unfinished_solve():
     engine = declaring(impulse=Declared(0.98, 0.01, "left by its solver"))
     slip = by_quantity(receipts(engine, "default", IMPACT, DT, 5))["impulse"]
     assert (slip.asked, slip.declared, slip.band, slip.holds) == (1.0, 0.98, 1e9, True)
@@ -390,7 +390,7 @@ def test_a_sample_that_is_no_number_is_the_farthest_of_all():
     assert not math.isfinite(slip.measured) and not slip.holds
 
 
-def test_a_quantity_that_one_probe_refuses_is_told_by_the_other_and_one_that_diverges_is_not():
+def test_quantity_from_another_probe_after_refusal_or_divergence():
     class Picky(ToyEngine):
         def refuses(self, scene, profile):
             return "no corners" if scene.name == "probe_corner" else None
@@ -430,7 +430,7 @@ def test_what_is_not_told_still_says_what_was_asked_and_declared():
 # ---- what the engine is asked --------------------------------------------------------------------------------------
 
 
-def test_an_engine_is_asked_for_the_profile_the_needs_and_the_step_that_are_judged():
+def test_receipts_asked_with_the_judged_profile_needs_and_step():
     asked = []
 
     class Asked(ToyEngine):
@@ -503,7 +503,7 @@ def test_contacts_that_friction_softens_are_no_wrong_size():
 
 @pytest.mark.parametrize("friction", [0.01, 0.3, 1.0, 8.0, 40.0])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_box_slides_through_its_window_no_faster_than_a_friction_of_one_asks(friction, dimension):
+def test_box_speed_in_the_friction_window(friction, dimension):
     scene = PROBES["slide"].make(Case(dimension, 0.0, friction, DT, 1))
     speed, down = scene.bodies[1].twist[0], -scene.gravity[dimension - 1]
     assert 3.0 <= speed <= 11.6  # 2 * 9.81 m/s^2 * 0.5 s / 0.85
@@ -536,14 +536,14 @@ def test_cones_that_are_not_solved_to_their_end_break_no_measurement(asked, fric
 
 
 @pytest.mark.parametrize("profile", ["tuned", "one"])
-def test_points_that_come_and_go_under_a_box_of_much_friction_break_no_measurement(profile):
+def test_measurement_with_intermittent_points_at_high_friction(profile):
     pytest.importorskip("pybullet")
     asked = replace(REST, dimension=3, friction=10.0)
     assert all(slip.holds for slip in receipts(find("bullet").engine, profile, asked, 1 / 1000))
 
 
 @pytest.mark.parametrize(("friction", "breaks"), [(0.5, True), (1.0, True), (1.5, False), (40.0, False)])
-def test_what_a_solver_makes_of_a_friction_above_one_is_measured_and_left_to_checks(toy_class, friction, breaks):
+def test_friction_above_one_measured_and_left_to_checks(toy_class, friction, breaks):
     """A weight more than the body's own brakes it: solvers stop early there, which is a fault of theirs."""
 
     class Early(toy_class):
@@ -568,7 +568,7 @@ def test_balls_that_sink_through_soft_pyramids_break_no_measurement(friction, dt
 @pytest.mark.few(4)
 @pytest.mark.parametrize("friction", [0.0, 1e-5, 0.3])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 2000, 1 / 10000])
-def test_forces_of_stiff_friction_pyramids_are_told_to_their_round_off_at_any_step(friction, dt):
+def test_stiff_friction_pyramid_forces_to_round_off(friction, dt):
     """As shipped a pair without friction has edges of mu = 1e-5: 1e12 times as stiff as its bodies are heavy."""
     pytest.importorskip("mujoco")
     told = by_quantity(receipts(find("mujoco").engine, "default", replace(REST, dimension=3, friction=friction), dt))
@@ -597,7 +597,7 @@ def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):
     ("samples", "counts"),
     [((1.05, 0.7), 0.7), ((0.7, 1.05), 0.7), ((0.95, 1.35), 1.35), ((1.05, math.nan), None), ((math.nan, 0.0), None)],
 )
-def test_the_sample_farthest_from_what_is_declared_counts_and_none_at_all_most(samples, counts):
+def test_receipt_sample_farthest_from_the_declared_value(samples, counts):
     found = _receipt("mass", 1.0, Declared(1.0, 0.1), samples, None)
     assert not found.holds
     assert math.isnan(found.measured) if counts is None else found.measured == counts

@@ -165,7 +165,7 @@ def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) 
 
 
 @both
-def test_a_run_that_ends_elsewhere_than_the_one_that_is_certified_is_not_certified(dimension: int) -> None:
+def test_certificate_refused_for_a_run_with_another_end(dimension: int) -> None:
     """By the last place of one coordinate of a body that is free; where others are the audit knows."""
     scene = make(floor(dimension), body("ball", dimension, (0.0, 0.5), (1.0, 0.0)), g=9.81)
     settings = {s.name: s.value for s in ENGINE.settings("reference", needs(scene), DT)}
@@ -205,7 +205,7 @@ def test_every_setting_of_the_solver_has_its_reason() -> None:
     assert {s.name: s.value for s in classical}["iterations"] == 10
 
 
-def test_an_iteration_count_reaches_classical_and_is_refused_by_reference() -> None:
+def test_iteration_count_for_classical_and_refused_by_reference() -> None:
     scene = make(floor(2), body("ball", 2, (0.0, 1.0)))
     assert drive(scene, "classical", iterations=7).readback["iterations"] == 7
     with pytest.raises(EngineError, match=r"^iterations: reference/reference does not stop at an iteration count"):
@@ -223,7 +223,7 @@ def test_a_bad_setting_is_refused_in_one_line(settings: dict[str, Any], field: s
 
 @pytest.mark.parametrize("e", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("dt", [1.0 / 60.0, DT])
-def test_friction_on_fixed_sweeps_is_told_where_a_box_rocks_and_a_wrong_one_is_seen(e: float, dt: float) -> None:
+def test_friction_of_fixed_sweeps_where_a_box_rocks(e: float, dt: float) -> None:
     """At e = 1 and 1/60 s the box loses 3e-4 of mu N: more than an exact solve may, less than its corners slip aside.
 
     The band is as wide as the cosine that is lost, 1.4 % at the most of these: twice as much is a fault.
@@ -277,7 +277,7 @@ def test_nothing_that_is_a_scene_is_refused() -> None:
 
 
 @both
-def test_what_lies_too_far_to_be_certified_is_refused_before_it_runs_and_nothing_else(dimension: int) -> None:
+def test_distant_scene_refused_before_the_run(dimension: int) -> None:
     """The certificate of a run says the same: on either side of the limit of one step of numbers in half widths."""
     limit = 1e-8 * 0.5 / float(np.finfo(float).eps)
     refusal = None

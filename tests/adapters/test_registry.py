@@ -111,12 +111,12 @@ def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
     assert registry.load("healthy").version() == "1.2"
 
 
-def test_a_missing_package_of_others_comes_with_its_own_pip_line_and_no_extra_of_ours(plugins: None) -> None:
+def test_missing_package_of_an_outside_engine_with_its_pip_line(plugins: None) -> None:
     reason = registry.find("missing_package").reason
     assert reason.endswith("; pip install healthy-package") and "contact-crosscheck" not in reason
 
 
-def test_the_distribution_of_an_engine_that_cannot_be_imported_at_all_is_named(tmp_path, monkeypatch):
+def test_distribution_of_an_engine_that_cannot_be_imported(tmp_path, monkeypatch):
     (tmp_path / "hollow.py").write_text("import a_package_that_is_not_there")
     info = tmp_path / "hollow_adapter-1.dist-info"
     info.mkdir()
@@ -143,7 +143,7 @@ def test_a_missing_engine_of_ours_comes_with_our_extra(monkeypatch) -> None:
     registry.forget()
 
 
-def test_an_engine_set_apart_is_left_out_of_a_run_that_names_none_unless_it_is_there_or_required(monkeypatch):
+def test_engine_set_apart_in_a_run_without_names(monkeypatch):
     apart = [name for name in registry.names() if registry.facts(name).apart]
     usual = [name for name in registry.names() if name not in apart]
     assert apart and "chipmunk" in usual
@@ -217,7 +217,7 @@ def test_a_run_and_the_tests_fail_without_a_required_engine(monkeypatch, tmp_pat
 
 
 @pytest.mark.parametrize("name", [each for each in registry.names() if registry.find(each).engine is not None])
-def test_every_setting_has_one_name_a_reason_and_a_source_that_are_words(name: str) -> None:
+def test_name_reason_and_source_of_every_setting(name: str) -> None:
     """They are printed, compared with other runs and kept as JSON: nothing there may be missing or told twice."""
     engine = registry.find(name).engine
     assert engine is not None
@@ -255,7 +255,7 @@ def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: N
     assert registry.find("healthy").engine is not None
 
 
-def test_whatever_is_wrong_with_an_engine_it_is_found_under_its_name_and_one_without_reason_is_there(plugins) -> None:
+def test_broken_engines_listed_under_their_names(plugins) -> None:
     for found in map(registry.find, registry.names()):
         assert (found.engine is None) == bool(found.reason), found
     assert [registry.find(name).name for name in registry.names()] == registry.names()

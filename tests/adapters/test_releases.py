@@ -89,7 +89,7 @@ def older_mujoco(**changed):
     return SimpleNamespace(**names)
 
 
-def test_a_state_that_was_reset_is_refused_where_resets_cannot_be_disabled():
+def test_reset_state_refused_where_resets_cannot_be_disabled():
     from adapters.mujoco.releases import check_state
 
     mujoco = older_mujoco()

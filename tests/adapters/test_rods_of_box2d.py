@@ -13,7 +13,7 @@ PLACES = 1e-4
 @pytest.mark.optional("box2d")
 @pytest.mark.parametrize("delay", [0.0507, 0.0525, 0.0539])
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}])
-def test_box2d_strikes_a_rod_half_way_into_the_overlap_that_a_step_finds(params, delay):
+def test_box2d_strike_of_a_rod_at_half_the_overlap(params, delay):
     params = params | {"delay": delay}
     found, depth = struck("box2d", "tuned", params)
     assert np.abs(found - textbook(params, 0.5 * depth)).max() < SINGLES

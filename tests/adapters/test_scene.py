@@ -228,7 +228,7 @@ def test_needs_follow_from_the_scene() -> None:
 PINNED = "43a280c6c7e6f74a"
 
 
-def test_two_entries_that_say_different_things_of_a_pair_that_never_meets_are_named_when_it_is_asked():
+def test_contradicting_entries_of_a_pair_that_never_meets():
     wall = Body("wall", HalfSpace((1.0, 0.0), 0.0), motion="fixed")
     doubtful = (Pair("wall", "*", 0.5, 0.1), Pair("*", "floor", 0.2, 0.1), Pair("ball", "floor"), Pair("ball", "wall"))
     posed = scene(FLOOR, wall, BALL, pairs=doubtful)

@@ -30,7 +30,7 @@ def test_a_prescribed_body_is_where_and_as_fast_as_the_adapter_has_it(course):
     assert needed is (course is not None) and "import math" in script.imports(SCENE, angles=True)
 
 
-def test_materials_are_found_pair_by_pair_in_any_order_and_the_commonest_is_said_once():
+def test_materials_pair_by_pair_with_the_commonest_once():
     balls = tuple(Body(name, Disc(0.5), 1.0, 0.1, (2.0 * k, 0.0, 0.0)) for k, name in enumerate("abcd"))
     pairs = (Pair("*", "*", 0.5, 0.25), Pair("a", "b", 0.75, 0.0), Pair("c", "d", 0.125, 1.0))
     scene = Scene("four", 1, 2, balls, pairs, (0.0, 0.0), 1.0)

@@ -77,7 +77,7 @@ AS_MJCF = {
 ROUND_OFF = 1e-14
 
 
-def test_every_model_that_is_read_is_written_in_another_language_as_well():
+def test_every_readable_model_written_in_another_language():
     assert {path.name for path in READ} == {*AS_MJCF, "rollers.sdf"}
 
 
@@ -215,7 +215,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "said", "left"), REFUSED, ids=[said[:40] for _, said, _ in REFUSED])
-def test_what_has_no_place_is_refused_by_its_element_or_left_out_and_said(text, said, left):
+def test_sdf_elements_refused_or_left_out_with_a_message(text, said, left):
     with pytest.raises(SceneError) as refused:
         read(text, False)
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
@@ -276,7 +276,7 @@ def test_a_ball_s_axes_are_those_of_its_inertia():
     assert turn @ np.diag(ball.inertia) @ turn.T == pytest.approx(about, abs=1e-16)
 
 
-def test_drake_s_solvers_take_friction_in_motion_which_is_why_the_two_must_be_alike():
+def test_sliding_friction_in_drake_solvers():
     text = (MODELS / "soft_surfaces.sdf").read_text().replace("<drake:mu_static>0.4", "<drake:mu_static>0.9")
     with pytest.raises(SceneError, match=r"friction 0\.9 and 0\.4 at rest and in motion"):
         read(text, False)
@@ -361,7 +361,7 @@ print(json.dumps(made))
 """
 
 
-def test_three_hundred_broken_texts_are_one_line_each_and_none_ends_the_process(tmp_path):
+def test_three_hundred_broken_texts_refused_in_one_line(tmp_path):
     """In one process, which a radius that is no number would end: what comes out at the end counts them all."""
     seeds = [path.read_text() for path in MODELS.iterdir() if path.suffix in (".sdf", ".world")]
     (tmp_path / "seeds.json").write_text(json.dumps(sorted(seeds)))

@@ -108,7 +108,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "said", "left"), REFUSED, ids=[said[:40] for _, said, _ in REFUSED])
-def test_what_has_no_place_is_refused_in_one_line_with_its_own_or_left_out_and_said(text, said, left):
+def test_sdf_text_refused_in_one_line_or_left_out_with_a_message(text, said, left):
     with pytest.raises(SceneError) as refused:
         state(text)
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
@@ -205,7 +205,7 @@ def no_drake(monkeypatch):
 
 
 @pytest.mark.usefixtures("no_drake")
-def test_without_drake_one_line_says_what_installs_it_and_the_status_that_an_engine_is_missing(tmp_path):
+def test_message_and_status_without_drake(tmp_path):
     assert reader_of(".SDF") == reader_of(".world") == "drake"
     with pytest.raises(ReaderMissing, match=r"\.sdf is read by drake, which is not installed"):
         read("drake", ".sdf", model(), False)

@@ -38,7 +38,7 @@ def test_the_ends_of_a_range_and_each_word_belong_to_it(name, value):
         *(("solver", v, "one of PGS, Newton") for v in ("pgs", "", 1, None, ["PGS"])),
     ],
 )
-def test_another_value_is_refused_by_the_name_of_its_setting_and_what_it_must_be(name, value, wanted):
+def test_refusal_of_a_wrong_value_by_setting_and_allowed_values(name, value, wanted):
     with pytest.raises(EngineError) as refused:
         checked("toy", KINDS, GOOD | {name: value})
     assert str(refused.value) == f"{name}: {value!r} must be {wanted}"
@@ -68,7 +68,7 @@ INTS = {
 
 
 @pytest.mark.parametrize("name", INTS)
-def test_a_number_that_an_engine_cannot_hold_is_refused_by_the_name_of_its_setting(name):
+def test_refusal_of_a_number_beyond_the_engine_s_range(name):
     """What is asked from code: a number beyond an int or a double ended in the binding's own error, or in none."""
     engine = registry.find(name).engine
     if engine is None:

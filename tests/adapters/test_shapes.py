@@ -210,7 +210,7 @@ def test_engines_refuse_the_shapes_they_do_not_claim():
     assert posed_for(load("reference"), planar(RECTANGLE, 1.0, 1.0)).dimension == 2
 
 
-def test_a_star_that_goes_round_twice_is_no_polygon_and_one_with_64_corners_is():
+def test_polygons_double_winding_star_and_64_corners():
     """Every corner of a pentagram turns left by less than half a turn: only the sum tells."""
     five = [2.0 * math.pi * k / 5 for k in range(5)]
     corners = [(math.cos(a), math.sin(a)) for a in five]

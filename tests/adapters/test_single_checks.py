@@ -81,9 +81,7 @@ def test_the_floor_may_stand_last_and_the_plane_be_lifted():
 
 @pytest.mark.parametrize(("part", "wrong"), [("normal", "of length 1"), ("point", "does not fit the surfaces"),
                                              ("impulse", ""), ("gap", "")])  # fmt: skip
-def test_normals_and_places_of_contacts_are_numbers_and_what_need_not_be_told_may_be_none(
-    toy, monkeypatch, part, wrong
-):
+def test_contact_normals_and_places_are_numbers_or_absent(toy, monkeypatch, part, wrong):
     """All comparisons with NaN are false: asked whether it is too large, it was not."""
     told = Contacts.from_rows
 
@@ -108,7 +106,7 @@ def test_a_body_at_rest_that_touches_nothing_is_said():
     assert CHECKS["impulse"](Floating()).startswith("second: body b gained [2.25")
 
 
-def test_impulses_that_one_profile_does_not_tell_are_not_asked_of_it_and_others_are_asked_all_the_same():
+def test_impulse_check_only_for_profiles_that_report_them():
     class Silent(Listening):
         def build(self, scene, dt, settings):
             world = super().build(scene, dt, settings)
@@ -199,7 +197,7 @@ def test_a_fall_may_miss_its_law_by_what_a_profile_declares_and_no_more(made, de
     assert told.startswith(f"second: {said} differs from free fall") if said else told == ""
 
 
-def test_drag_takes_its_share_of_the_largest_speed_and_twice_of_the_spin():
+def test_drag_loss_of_speed_and_spin():
     """A profile that takes 10 % a second: 2 % of a speed of 3.1 m/s in 0.2 s, which may grow with its square."""
     scene = scenes.flying()
     linear, angular = mechanics.loss(
@@ -281,7 +279,7 @@ def test_a_fall_may_be_off_by_this_band_and_no_more(what, off, declared, band):
     ("check", "fault"), [("impulse", "recoil too small"), ("impulse", "impulse of the wrong body"),
                          ("sampling", "impulse of the step before")],
 )  # fmt: skip
-def test_impulses_and_momenta_agree_to_a_solver_s_tolerance_and_to_what_drag_takes(check, fault):
+def test_impulse_and_momentum_within_solver_tolerance_and_drag(check, fault):
     """The blow is of 2.25 N s; the fault takes a share of it, two of it where the impulse is of the wrong body."""
     blow = 2.25 * (2.0 if fault == "impulse of the wrong body" else 1.0)
 
@@ -295,7 +293,7 @@ def test_impulses_and_momenta_agree_to_a_solver_s_tolerance_and_to_what_drag_tak
             assert CHECKS[check](kind(fault, times * limit / blow)).startswith("second: ") is said
 
 
-def test_momentum_and_spin_may_change_by_round_off_a_gap_as_an_arm_and_what_is_declared():
+def test_allowed_change_of_momentum_and_spin():
     assert CHECKS["momentum"](Listening("momentum without a cause", 0.1)).endswith(", 1e-09 is allowed")
     plain = CHECKS["spin"](Listening("spin without a cause", 1.0))
     assert plain.startswith("second: 2-D: angular momentum changes by 0.1, ") and plain.endswith(" 0.00051 is allowed")
@@ -315,7 +313,7 @@ def turning(x, v):
     return x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]
 
 
-def test_momentum_is_counted_about_the_origin_and_may_change_by_a_gap_as_an_arm():
+def test_angular_momentum_about_the_origin_with_a_gap_as_arm():
     scene = scenes.glancing()
     found = scenes.driven(ToyEngine(), scene, "default")
     total, slack = mechanics._linear(scene, found)

@@ -30,7 +30,7 @@ def test_the_lowest_corner_is_told_from_the_centre():
         assert motions.lowest(replace(BOX, pose=(7.0, 9.0, turn))) == pytest.approx(corner)
 
 
-def test_only_a_tilted_box_that_comes_down_straight_and_smooth_lands_on_a_corner():
+def test_corner_landing_condition_of_a_tilted_box():
     assert motions._falls_on_a_corner(fall())
     for more in (1e-3 * 1.01, 0.5 * math.pi - 2e-3, -0.3):
         assert motions._falls_on_a_corner(fall(replace(BOX, pose=(1.0, 8.0, more))))
@@ -148,7 +148,7 @@ def test_what_two_bodies_keep_is_off_by_the_roundings_of_the_fastest():
         assert law(other, DT, measure) is None
 
 
-def test_a_place_is_kept_where_the_way_of_a_step_is_below_half_a_spacing():
+def test_position_kept_where_a_step_is_below_half_a_spacing():
     plate = Body("plate", Box((1.0, 1.0)), motion="fixed")
     box = Body("box", Box((0.5, 0.5)), 1.0, 1.0, (2.0**20, 1.5, 0.0), (1.0, 0.0, 0.0))
     scene = Scene("own", 1, 2, (plate, box), (), (0.0, -9.81), 2.0)

@@ -28,7 +28,7 @@ from adapters.isolation import IsolationError, Lost
         (1.0, "its own word", True), (1.0, {"a": 1}, True), (1.0, math.nan, False),
     ],
 )  # fmt: skip
-def test_what_is_read_back_is_what_was_declared_as_far_as_its_words_are_known(asked, told, same):
+def test_readback_against_the_declared_scene(asked, told, same):
     assert worlds._same(asked, told, 1e-9) is same
 
 
@@ -62,7 +62,7 @@ def test_each_thing_that_is_read_back_is_compared(change, said):
     assert told.startswith(f"second: {said}") if said else told == ""
 
 
-def test_a_start_that_was_changed_is_no_fault_where_it_is_said_and_shapes_and_speeds_are_all_the_same():
+def test_declared_change_of_a_start_is_no_fault():
     class Lifted(Listening):
         said = ("raised by a margin",)
 
@@ -131,7 +131,7 @@ def _changed(told, world, changed):
      ({"contacts": None}, "contacts"), ({"more": 1}, "ends"),
      *(({"of": name}, f"contacts' {name}") for name in worlds.CONTACT_FIELDS)],
 )  # fmt: skip
-def test_a_record_is_compared_part_by_part_and_ends_where_single_steps_do(changed, said):
+def test_record_compared_part_by_part_with_single_steps(changed, said):
     engine = record_with(**changed)
     told = CHECKS["stride"](engine)
     where = f"second: {said} recorded at once (24 of 1 steps) differ from those of single steps"
@@ -155,7 +155,7 @@ class Line:
         self.sent.append(json.loads(told))
 
 
-def test_a_child_runs_the_scene_on_the_engine_that_it_gets_or_says_why_it_has_none():
+def test_scene_in_a_child_process_or_the_reason_without_engine():
     line = Line(pickle.dumps(ToyEngine()))
     worlds.serve_hashes(line)
     assert line.sent == [worlds._hashes(ToyEngine())] and set(line.sent[0]) == {"default"}
@@ -213,7 +213,7 @@ def test_bits_of_another_process_are_compared_profile_by_profile(child, monkeypa
         assert [type(engine) for engine in heard.sent] == [ToyEngine]
 
 
-def test_a_process_that_ends_is_a_fault_and_one_that_cannot_be_is_not_asked(child, monkeypatch):
+def test_process_that_exits_and_process_that_cannot_start(child, monkeypatch):
     monkeypatch.setattr(worlds, "_hashes", lambda engine: {"default": "00"})
     heard = child(Lost("it ended with signal 11"))
     assert CHECKS["process"](ToyEngine()) == "it ended with signal 11: Segmentation fault"

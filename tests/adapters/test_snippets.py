@@ -30,7 +30,7 @@ def changed(engine, scene):
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 1.0])
-def test_mjcf_rebounds_as_asked_where_the_same_model_without_it_does_not(e):
+def test_mjcf_rebound_with_and_without_the_pasted_lines(e):
     mujoco = pytest.importorskip("mujoco")
     scene = drop(3, e)
     paste = registry.load("mujoco").snippet(*changed(registry.load("mujoco"), scene), scene, DT)
@@ -157,7 +157,7 @@ def test_each_material_of_a_scene_has_a_line_with_its_own_friction(scene):
 
 @pytest.mark.parametrize("e", [0.3, 0.8, 1.0])
 @pytest.mark.parametrize(("size", "step"), [(1.0, 1 / 500), (0.1, 1 / 500), (1.0, 1 / 90)])
-def test_a_pasted_rebound_holds_at_any_step_by_the_formula_beside_it_and_at_its_own_by_its_number(e, size, step):
+def test_pasted_rebound_by_formula_and_by_number(e, size, step):
     pytest.importorskip("mujoco")
     scene = drop(3, e, -9.81)
     paste = tuned_paste(scene)

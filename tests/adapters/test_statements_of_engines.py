@@ -87,7 +87,7 @@ def test_profiles_are_there_say_the_same_each_time_and_why():
 
 
 @pytest.mark.parametrize("kind", ["rest", "impact"])
-def test_profiles_are_asked_for_needs_of_rest_and_of_impacts_in_each_dimension(kind):
+def test_profiles_for_rest_and_impact_in_each_dimension(kind):
     for dimensions, asked in (({2, 3}, (2, 3)), ({2}, (2,))):
         engine = engine_with(dimensions=frozenset(dimensions))
         for dimension in (2, 3):
@@ -100,7 +100,7 @@ def test_profiles_are_asked_for_needs_of_rest_and_of_impacts_in_each_dimension(k
             assert bool(CHECKS["profiles"](engine)) is (dimension in asked)
 
 
-def test_needs_that_profiles_are_asked_for_are_blows_and_rest_as_they_are_on_earth():
+def test_needs_of_profiles_under_gravity_of_the_earth():
     """Elastic, plastic and rough blows at 6 m/s, rest with and without a slip."""
     asked, engine = [], Listening()
 
@@ -187,7 +187,7 @@ def test_what_is_unknown_is_refused_with_an_error_of_engines():
     assert CHECKS["refusals"](Planar()) == ""  # nobody asks an engine of the plane for space
 
 
-def test_a_dimension_that_is_not_in_the_facts_is_refused_and_what_is_refused_is_not_built():
+def test_refused_dimensions_and_scenes_not_built():
     class Planar(Listening):
         facts = replace(Listening.facts, dimensions=frozenset({2}))
         strict = False
@@ -212,7 +212,7 @@ def test_a_dimension_that_is_not_in_the_facts_is_refused_and_what_is_refused_is_
     assert CHECKS["capabilities"](Failing()) == "second: check_flying, 3-D: not refused, but stopped by no room"
 
 
-def test_a_world_that_ends_early_is_told_and_so_is_a_body_that_is_fixed_and_moves():
+def test_world_that_ends_early_and_fixed_body_that_moves():
     class Ending(Listening):
         def build(self, scene, dt, settings):
             world = super().build(scene, dt, settings)
@@ -268,7 +268,7 @@ def test_an_engine_without_boxes_is_asked_with_what_it_has(check):
     assert "Box" not in shapes and ("Disc" in shapes) is (check == "capabilities")
 
 
-def test_what_is_unknown_is_asked_for_by_names_that_nobody_has_and_of_a_box_that_rests():
+def test_unknown_settings_asked_with_unused_names():
     profiles, built = [], []
 
     class Heard(Listening):
@@ -287,7 +287,7 @@ def test_what_is_unknown_is_asked_for_by_names_that_nobody_has_and_of_a_box_that
     assert built == [("check_resting", "Box", statements.DT, own | {"no_such_setting": 1.0})]
 
 
-def test_an_engine_that_takes_any_setting_is_named_for_it_and_its_world_is_closed():
+def test_engine_that_accepts_any_setting_named_and_closed():
     class Lax(Listening):
         def build(self, scene, dt, settings):
             return super().build(scene, dt, {k: v for k, v in settings.items() if k != "no_such_setting"})

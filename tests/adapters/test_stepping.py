@@ -138,7 +138,7 @@ def test_a_bad_step_is_refused_before_anything_is_built(dt: float) -> None:
     assert toy.built == []
 
 
-def test_contacts_are_recorded_from_the_asked_time_on_and_stay_with_their_step() -> None:
+def test_contacts_recorded_from_the_requested_time() -> None:
     trajectory = run(Toy({2}), scene(), 0.1, {}, Sampling(1, 0.55))
     record = trajectory.contacts
     assert record is not None
@@ -204,7 +204,7 @@ def test_spin_torque_and_force_explain_speed_without_gravity(body: Body) -> None
     [(2, {"force": (2.0, 0.0)}, 0.25), (2, {"torque": (2.0,)}, 1.0), (3, {"torque": (0.0, 0.0, 2.0)}, 1.0)],
 )
 @pytest.mark.parametrize(("share", "finish"), [(999.0, "completed"), (1001.0, "diverged")])
-def test_what_a_load_explains_is_its_acceleration_of_the_outermost_point_times_the_duration(
+def test_speed_explained_by_a_load(
     dimension: int, load: dict[str, Any], gained: float, share: float, finish: str
 ) -> None:
     shape, moment = (Disc(0.5), 0.5) if dimension == 2 else (Sphere(0.5), (2.0, 1.0, 0.5))
@@ -214,7 +214,7 @@ def test_what_a_load_explains_is_its_acceleration_of_the_outermost_point_times_t
 
 
 @pytest.mark.parametrize(("speed", "finish"), [(4.99e3, "completed"), (5.01e3, "diverged")])
-def test_where_nothing_is_free_only_gravity_and_what_is_prescribed_explain_speed(speed: float, finish: str) -> None:
+def test_speed_explained_without_free_bodies(speed: float, finish: str) -> None:
     held = scene(bodies=(Body("a", Disc(0.5), motion="fixed"),), duration=0.5)  # 10 m/s^2 for half a second
     assert run(Toy({2}, spoiled("_twist", (0, 0), speed)), held, 0.1, {}).finish == finish
 
@@ -253,7 +253,7 @@ def test_an_engine_that_raises_is_closed_all_the_same() -> None:
     assert toy.built[0].closed == 1
 
 
-def test_a_planar_scene_is_lifted_for_a_spatial_engine_and_read_back_planar() -> None:
+def test_planar_scene_lifted_and_read_back() -> None:
     toy = Toy({3})
     flat, lifted = run(Toy({2}), scene(), 0.1, {}), run(toy, scene(), 0.1, {}, Sampling(1, 0.0))
     assert toy.built[0].scene.dimension == 3
@@ -275,7 +275,7 @@ def test_only_what_is_lifted_has_a_plane_to_leave() -> None:
     assert run(Toy({2}), scene(), 0.1, {}).out_of_plane is None
 
 
-def test_what_has_left_the_plane_is_kept_where_a_run_ends_in_what_is_no_number() -> None:
+def test_departure_from_the_plane_kept_at_a_nan() -> None:
     def sideways(flight: Flight) -> None:
         flight._pose[0, 1] = 0.125 if flight.steps == 3 else 0.0
         if flight.steps == 5:
@@ -286,7 +286,7 @@ def test_what_has_left_the_plane_is_kept_where_a_run_ends_in_what_is_no_number()
 
 
 @pytest.mark.parametrize(("name", "entry"), [("_pose", 1), ("_pose", 4), ("_twist", 1), ("_twist", 5)])
-def test_what_is_no_number_across_the_plane_of_a_lifted_scene_ends_the_run(name: str, entry: int) -> None:
+def test_nan_across_the_plane_ends_the_run(name: str, entry: int) -> None:
     """A planar scene reads nothing from there: such a run passed all of its checks."""
     trajectory = run(Toy({3}, spoiled(name, (0, entry), math.nan)), scene(), 0.1, {})
     assert trajectory.finish == "diverged" and "not finite at t = 0.4 s" in trajectory.reason
@@ -311,7 +311,7 @@ def test_a_quaternion_without_length_is_no_orientation(planar: bool) -> None:
 
 
 @pytest.mark.parametrize(("length", "is_turn"), [(0.5, True), (0.499, False)])
-def test_a_quaternion_of_half_its_length_still_says_how_a_body_is_turned(length: float, is_turn: bool) -> None:
+def test_orientation_of_an_unnormalised_quaternion(length: float, is_turn: bool) -> None:
     def short(flight: Flight) -> None:
         flight._pose[0, 3:] = (0.0, 0.0, -length, 0.0) if flight.steps == 4 else (0.0, 0.0, -1.0, 0.0)
 
@@ -348,7 +348,7 @@ def recording(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int, bool]]:
 
 
 @pytest.mark.parametrize("done", [0, 6])
-def test_samples_that_are_asked_for_at_once_all_have_contacts_or_none_has(done: int) -> None:
+def test_contacts_of_samples_read_at_once(done: int) -> None:
     """As many as possible: counted one by one, from every time that lies among them and beyond."""
     dt = 0.1
     for start, most in itertools.product(range(-1, done + 6), range(6)):
@@ -396,9 +396,7 @@ def test_what_an_engine_tells_at_once_is_what_it_tells_sample_by_sample(
 
 
 @pytest.mark.parametrize(("name", "value"), [("_pose", math.nan), ("_twist", math.inf), ("_twist", 1e5)])
-def test_a_run_that_ends_within_what_is_told_at_once_is_that_of_single_samples(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: float
-) -> None:
+def test_run_ending_within_a_batch_of_samples(monkeypatch: pytest.MonkeyPatch, name: str, value: float) -> None:
     """Its engine is asked how it went at the instant at which it diverged, in a world of its own; both are closed."""
     monkeypatch.setattr(Flight, "certificate", lambda flight: {"steps": flight.steps})
     single = run(Toy({2}, spoiled(name, (0, 1), value)), scene(), 0.1, {}, Sampling(1, 0.0))
@@ -410,7 +408,7 @@ def test_a_run_that_ends_within_what_is_told_at_once_is_that_of_single_samples(
     assert [built.closed for built in toy.built] == [1, 1]
 
 
-def test_a_run_that_just_explodes_in_the_last_of_what_is_told_at_once_has_diverged(
+def test_divergence_in_the_last_sample_of_a_batch(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def burst(flight: Flight) -> None:
@@ -491,7 +489,7 @@ def with_abilities(toy: Toy, *abilities: str) -> Toy:
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_belt_that_an_engine_has_as_a_moving_half_space_is_read_back_as_one_that_stands(dimension: int) -> None:
+def test_readback_of_a_belt_made_of_a_moving_half_space(dimension: int) -> None:
     """The half-space is carried along by its motion; the scene's own stands, and its surface runs."""
 
     def carried(flight: Flight) -> None:
@@ -507,7 +505,7 @@ def test_a_belt_that_an_engine_has_as_a_moving_half_space_is_read_back_as_one_th
     assert trajectory.contacts is not None and len(trajectory.contacts.rows.a) > 0
 
 
-def test_an_engine_that_knows_belts_gets_them_and_one_that_knows_nothing_refuses_by_the_field() -> None:
+def test_belts_on_engines_with_and_without_them() -> None:
     belt = Body("belt", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
     box = Body("top", Box((0.5, 0.5)), motion="fixed", surface_velocity=(2.0, 0.0))
     running, topped = scene(bodies=(belt, scene().bodies[0])), scene(bodies=(box, scene().bodies[0]))
@@ -524,7 +522,7 @@ def test_an_engine_that_knows_belts_gets_them_and_one_that_knows_nothing_refuses
         posed_for(with_abilities(Toy({2}), "moving half-space"), capsule)
 
 
-def test_a_run_says_its_step_how_long_it_took_and_hands_over_its_settings() -> None:
+def test_step_duration_and_settings_of_a_run() -> None:
     toy, before = Toy({2}), time.perf_counter()
     trajectory = run(toy, scene(), 0.1, {"iterations": 7})
     assert 0.0 < trajectory.wall_time <= time.perf_counter() - before and trajectory.dt == 0.1
@@ -548,7 +546,7 @@ def test_rows_turn_so_that_the_lower_index_comes_first() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_number_stands_for_a_vector_of_it_and_a_wrong_length_is_refused(count: int) -> None:
+def test_vector_given_as_one_number_and_with_a_wrong_length(count: int) -> None:
     row = (0, 1, (5.0, 6.0), (0.0, 1.0), math.nan, 0.0)
     contacts = Contacts.from_rows([row] * count, 2)
     assert contacts.impulse.shape == (count, 2) and np.isnan(contacts.impulse).all()
@@ -590,7 +588,7 @@ def test_a_trajectory_survives_its_file(tmp_path: Path) -> None:
     assert json.dumps(again.readback) == json.dumps(made.readback)
 
 
-def test_a_file_without_contacts_has_none_and_what_is_read_back_may_be_anything(tmp_path: Path) -> None:
+def test_file_without_contacts_and_arbitrary_readback(tmp_path: Path) -> None:
     made = replace(run(Toy({2}), scene(), 0.1, {}), readback={"file": tmp_path, "steps": 3})
     made.save(tmp_path / "t.npz")
     again = load_trajectory(tmp_path / "t.npz")
@@ -653,12 +651,12 @@ def parting_at(speed):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("depth", [4.9e-5, 1e-3, 0.02])
 @pytest.mark.parametrize("speed", [1e-3, 0.2, 5.0])
-def test_a_scene_at_rest_without_loads_has_an_answer_where_bodies_part_too_fast(dimension, depth, speed):
+def test_answer_of_a_scene_at_rest_without_loads(dimension, depth, speed):
     found = run(Toy({dimension}, parting_at(speed)), two_cubes(depth, dimension), 1 / 240, {})
     assert found.finish == "completed" and found.twist[-1, 1, 1] == speed
 
 
-def test_what_is_no_answer_stays_none_and_a_long_run_is_granted_its_overlap_over_a_step():
+def test_missing_answers_and_overlap_of_a_long_run():
     """A step that undoes 20 mm makes 4.8 m/s; a thousand times that is no answer, nor anything where none overlap."""
     fast = 1e3 * 0.02 * 240.0
     scene = two_cubes(0.02, duration=100.0)

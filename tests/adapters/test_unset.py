@@ -91,7 +91,7 @@ def test_what_there_is_none_of_measures_as_none(changed, measure, expected):
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_every_engine_says_what_it_does_with_nothing_set_and_where_that_is_documented(engine):
+def test_engine_defaults_with_nothing_set_and_their_source(engine):
     rows = unset_of(engine)
     assert len({row.what for row in rows}) == len(rows) >= 5
     assert all(row.documented and row.source for row in rows)
@@ -135,7 +135,7 @@ def test_the_table_says_what_was_measured_and_what_differs(monkeypatch):
     assert all(len(line.rstrip()) <= 80 for line in text.splitlines())
 
 
-def test_an_engine_that_is_not_here_shows_what_is_documented_and_that_nothing_was_measured(monkeypatch):
+def test_description_of_an_absent_engine(monkeypatch):
     missing = next((name for name in OURS if name not in HERE), None)
     if missing is None:
         pytest.skip("all engines are installed")
@@ -162,7 +162,7 @@ def test_describe_measures_when_it_is_asked_and_lists_what_can_be_set(engine):
     assert {each["name"] for each in told["settable"]} == set(registry.load(engine).settable())
 
 
-def test_kernels_that_are_not_compiled_are_not_compiled_to_describe_an_engine(monkeypatch, tmp_path):
+def test_description_without_compiling_kernels(monkeypatch, tmp_path):
     engine = registry.load("reference")
     monkeypatch.setattr(type(engine), "kernels", lambda self: tmp_path)
     assert listing._why_unmeasured("reference").endswith("crosscheck compile --engine reference")

@@ -66,7 +66,7 @@ def off(name):
 
 
 @pytest.mark.parametrize("silent", [False, True])
-def test_a_record_that_is_what_readers_tell_holds_even_where_no_impulse_is_told(silent):
+def test_record_equal_to_readers_without_impulses(silent):
     scene = sliding()
     assert worlds._recorded_otherwise(Recorder(silent=silent), scene, "first", 4, 3) == ""
 

@@ -31,7 +31,7 @@ def test_every_solver_integrator_and_cone_reads_back(name, kind):
             assert getattr(written(**{name: value})[0], name) == int(each), each
 
 
-def test_what_is_switched_off_reads_back_bit_by_bit_and_nothing_else_is_said():
+def test_disabled_options_read_back_bit_by_bit():
     bits = [int(each) for each in mujoco.mjtDisableBit.__members__.values() if int(each).bit_count() == 1]
     assert len(bits) > 10
     for flags in (*bits, bits[0] | bits[-1], sum(bits)):

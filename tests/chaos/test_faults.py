@@ -189,7 +189,7 @@ def test_plugins_that_end_their_importer_are_lines_in_a_table(faulty, tmp_path):
     assert ran.exit_code == 1 and "Traceback" not in ran.stderr
 
 
-def test_an_engine_that_can_be_loaded_here_but_not_in_its_worker_is_crashed(faulty, monkeypatch):
+def test_engine_that_loads_here_and_not_in_its_worker(faulty, monkeypatch):
     assert registry.find("faulty").engine is not None
     (faulty / "faulty_engine.py").write_text("import package_that_is_not_there\n")
     (observation,) = run_cells([faulty_slot("none", v=2.0)])

@@ -32,7 +32,7 @@ def fields_of(data):
 
 
 @pytest.mark.timeout(7200)
-def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own(dice, soak, every, tmp_path):
+def test_valid_scenes_on_every_engine_for_ten_steps(dice, soak, every, tmp_path):
     engines = [name for name in registry.names() if registry.find(name).engine is not None]
     cells, files = [], int(os.environ.get("CROSSCHECK_FILES", 500)) if soak else 25 if every else 3
     for number in range(files):
@@ -54,7 +54,7 @@ def test_valid_scenes_run_ten_steps_on_every_engine_each_in_a_process_of_its_own
     assert sum(o.outcome is Outcome.OK for o in found) > len(found) // 3
 
 
-def test_valid_scenes_parse_and_spoilt_ones_are_refused_with_the_path_of_the_field(dice, soak, tmp_path):
+def test_valid_scenes_parsed_and_spoilt_ones_refused_by_field(dice, soak, tmp_path):
     """The schema says of a valid file that it is; of every refusal the field is named."""
     checker = jsonschema.Draft202012Validator(json_schema())
     parsed = refused = 0

@@ -57,7 +57,7 @@ def undisturbed(tmp_path_factory):
     return bits(folder), time.monotonic() - started
 
 
-def test_kills_at_random_moments_lose_nothing_that_finished_and_change_no_bit(dice, soak, every, tmp_path, undisturbed):
+def test_finished_results_after_kills_at_random_moments(dice, soak, every, tmp_path, undisturbed):
     expected, seconds = undisturbed
     for _ in range(60 if soak else 5 if every else 1):
         process = subprocess.Popen([*COMMAND, "--out", str(tmp_path)], cwd=ROOT, stdout=subprocess.DEVNULL,

@@ -220,7 +220,7 @@ def many(count):
     return BASE | {"bodies": [BASE["bodies"][0], *balls]}
 
 
-def test_reading_and_planning_looks_at_each_body_a_few_times_not_at_each_pair(tmp_path, monkeypatch):
+def test_reading_cost_linear_in_bodies(tmp_path, monkeypatch):
     """Counted, not timed: the material of a pair is asked for no more often than there are bodies."""
     from adapters.scene import Scene
 
@@ -234,7 +234,7 @@ def test_reading_and_planning_looks_at_each_body_a_few_times_not_at_each_pair(tm
 
 
 @pytest.mark.parametrize("dt", ["1e-320", "1e-12", "5e-324"])
-def test_a_step_that_makes_too_many_steps_is_refused_before_anything_runs(tmp_path, dt):
+def test_too_many_steps_refused_before_the_run(tmp_path, dt):
     path = tmp_path / "scene.json"
     path.write_text(json.dumps(BASE))
     with pytest.raises(SceneError, match=r"^dt: .* steps"):

@@ -73,7 +73,7 @@ def test_without_a_terminal_nothing_is_listed_that_was_not_named(out, findings):
     assert members(findings) == []
 
 
-def test_where_nothing_was_ever_listed_and_nothing_is_accepted_no_list_is_made(out, findings):
+def test_no_list_written_without_accepted_rows(out, findings):
     """An engine with an empty list fails with every check that is new."""
     result = accept(out)
     assert result.exit_code == 1 and "chipmunk: nothing is listed" in result.stdout, result.output
@@ -100,7 +100,7 @@ def test_a_run_without_a_case_of_the_engine(findings, tmp_path):
     assert not findings.exists()
 
 
-def test_a_named_family_is_listed_with_values_and_bands_and_the_run_is_quiet_then(out, findings):
+def test_accepted_family_listed_and_run_quiet(out, findings):
     findings.mkdir()
     (findings / files.FAMILIES).write_text(FAMILY)
     result = accept(out, "--family", "starved")
@@ -139,7 +139,7 @@ def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
     assert members(findings) == []
 
 
-def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_another():
+def test_table_of_rows_per_family_aligned():
     """Listed are those that stay, those that drifted, those that are gone and those with another band."""
     counts = {"one": (111, 2, 30, 4, 5), "another": (0, 12345, 0, 0, 0)}
     changes = [
@@ -159,7 +159,7 @@ def test_the_table_counts_rows_per_family_and_its_numbers_stand_below_one_anothe
     assert ends[0] == ends[1] == ends[2]
 
 
-def test_a_band_that_hides_something_is_measured_from_further_starts_and_listed_again_once_it_is_asked(out, findings):
+def test_band_remeasured_from_further_starts_when_it_hides(out, findings):
     findings.mkdir()
     (findings / files.FAMILIES).write_text(FAMILY)
     accept(out, "--family", "starved")
@@ -285,7 +285,7 @@ def weak(tmp_path, monkeypatch):
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("fault", "cell"), [("impulse", ["impact", "--param", "v=6"]),
                                              ("friction", ["incline", "--param", "ratio=1.1"])])  # fmt: skip
-def test_a_fault_of_two_per_cent_fails_the_run_and_nothing_of_it_can_be_listed(weak, findings, tmp_path, fault, cell):
+def test_fault_of_two_per_cent_not_listable(weak, findings, tmp_path, fault, cell):
     """It became known as what the engine's ways are: 288 rows of a reason that was another's."""
     findings = findings.with_name(f"weak{fault}")
     findings.mkdir()

@@ -61,7 +61,7 @@ def searched(monkeypatch):
     return asked
 
 
-def test_cures_are_searched_scene_by_scene_and_dimension_by_dimension_and_told_as_data(searched):
+def test_cures_searched_by_scene_and_dimension_as_data(searched):
     names = list(dict.fromkeys(scene for scene, _ in KEPT))
     status, out, err = said("cure", "chipmunk", *names, "--json", "--jobs", "3")
     wanted = [("chipmunk", scene, d, 3) for scene in names for d in curing.resolve(scene).dimensions]
@@ -72,14 +72,14 @@ def test_cures_are_searched_scene_by_scene_and_dimension_by_dimension_and_told_a
     assert len(own) == len(KEPT) and json.loads(out) == json.loads(json.dumps(plain, default=str))
 
 
-def test_cures_of_one_dimension_are_searched_in_it_alone_and_no_scene_twice(searched):
+def test_cures_of_one_dimension_without_repeated_scenes(searched):
     names = list(dict.fromkeys(scene for scene, _ in KEPT))
     status, out, err = said("cure", "chipmunk", names[0], names[0], "--dim", "2")
     assert (status, searched, err) == (0, [("chipmunk", names[0], 2, 1)], [f"chipmunk {names[0]} 2-D"])
     assert out.startswith(f"chipmunk {names[0]} 2-D: ")
 
 
-def test_cures_are_kept_after_every_scene_and_those_of_other_releases_go(searched, monkeypatch, tmp_path):
+def test_cures_kept_after_every_scene_for_this_release(searched, monkeypatch, tmp_path):
     """What is listed of other scenes stays; what a new search does not find any more is gone."""
     first, second, other = list(KEPT)[:3]
     version = registry.load("chipmunk").version()
@@ -115,7 +115,7 @@ def test_an_engine_without_a_profile_as_shipped_has_nothing_to_be_cured(searched
 # ---- residuals -------------------------------------------------------------------------------------------------------
 
 
-def test_residuals_are_asked_cell_by_cell_and_told_as_data_with_their_commands(monkeypatch):
+def test_residuals_per_cell_as_data_with_commands(monkeypatch):
     asked = []
 
     def ask(slot, apart):
@@ -152,7 +152,7 @@ def test_residuals_are_asked_cell_by_cell_and_told_as_data_with_their_commands(m
 # ---- frontiers -------------------------------------------------------------------------------------------------------
 
 
-def test_frontiers_are_searched_to_the_ratio_that_is_asked_and_told_as_data(monkeypatch):
+def test_frontiers_to_the_requested_ratio_as_data(monkeypatch):
     asked = []
 
     def search(found, ratio, jobs):
@@ -197,7 +197,7 @@ def test_a_named_engine_that_is_not_here_has_a_status_of_its_own(monkeypatch):
 # ---- public questions ------------------------------------------------------------------------------------------------
 
 
-def test_public_questions_are_asked_and_one_that_is_no_longer_so_is_an_alarm(monkeypatch):
+def test_public_questions_and_an_alarm_for_a_changed_one(monkeypatch):
     check = Check("m", "m/s", 0.8, 0.1, "because", "source")
     asked = []
 
@@ -318,7 +318,7 @@ def test_a_cell_is_written_where_it_is_asked_for_and_told_as_data(monkeypatch, t
         assert said(*arguments) == (2, "", [f"crosscheck: {why}"])
 
 
-def test_a_bench_that_fits_no_cell_or_has_no_use_for_an_option_says_so_before_anything_runs(tmp_path):
+def test_bench_options_refused_before_the_run(tmp_path):
     call = ("bench", "impact", "--engine", "chipmunk", "--out", str(tmp_path / "out"))
     for more, why in (
         (("--ulp", "1"), "ulp: moves the start of a run; it has no meaning for a benchmark"),
@@ -365,7 +365,7 @@ def test_options_become_a_request_field_by_field_and_its_words():
         assert str(error.value) == why
 
 
-def test_a_line_for_each_engine_that_was_named_and_is_not_here_or_one_if_none_is(monkeypatch):
+def test_lines_for_named_engines_that_are_absent(monkeypatch):
     """Of engines that nobody named a run says nothing, as long as another answers."""
 
     def find(name):
@@ -421,7 +421,7 @@ def test_a_bench_as_data_has_its_run_its_protocol_and_every_table(tmp_path):
     assert json.loads(written[0].read_text()) == {**found, "run": head}
 
 
-def test_a_setting_of_a_level_is_told_with_its_iterations_where_it_has_some_and_a_tie_with_its_sign():
+def test_level_setting_with_iterations_and_tie():
     row = {"cost": 2.5e-3, "dt": 1 / 240, "iterations": None, "tied": True, "rank": 1}
     for changed, ranked, told in (
         ({}, False, "2.5 ms 1/240"), ({"iterations": math.nan}, False, "2.5 ms 1/240"),

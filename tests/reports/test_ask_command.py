@@ -73,7 +73,7 @@ def test_sentences_are_no_symptoms_of_scenes():
     assert not known & {frozenset(own) for own in stems([each["sentence"] for each in SENTENCES], database)}
 
 
-def test_table_of_the_package_is_made_of_what_the_scenes_and_engines_say_now():
+def test_packaged_table_equal_to_scenes_and_engines():
     assert making.text_of(making.made()) == making.TABLE.read_text(encoding="utf-8"), "make tables"
 
 

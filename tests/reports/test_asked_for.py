@@ -38,7 +38,7 @@ def shown(data):
     return console.export_text()
 
 
-def test_an_engine_is_described_with_its_habits_and_versions_that_are_bad():
+def test_engine_description_with_habits_and_bad_versions():
     data = {
         "name": "toy", "version": "1.2", "title": "Toy", "status": "installed", "package": "toy", "dimensions": [2],
         "customary_dt": "1/60", "scheme": {"order": "velocity first"}, "profiles": {},

@@ -134,7 +134,7 @@ def asked(monkeypatch):
 
 
 @pytest.mark.long
-def test_cells_that_the_last_run_answered_are_taken_from_it_and_the_same(tmp_path, asked):
+def test_bench_reuses_cells_of_the_last_run(tmp_path, asked):
     pytest.importorskip("pymunk")
     out, who = tmp_path / "out", ["--engine", "chipmunk", "--profile", "tuned", "--dim", "2"]
     assert call("run", "incline", "--quick", *who, "--out", out).exit_code == 0

@@ -84,7 +84,7 @@ def marks(text):
     return found
 
 
-def test_the_cheapest_is_marked_and_whoever_is_not_told_apart_from_it_is_a_tie(printed):
+def test_cheapest_marked_and_ties_named(printed):
     text = printed()
     cells = marks(text)
     assert [cells[name][0] for name in COSTS] == ["* 1 ms 1/240", "= 1.01 ms 1/240", "1.5 ms 1/240"]
@@ -93,7 +93,7 @@ def test_the_cheapest_is_marked_and_whoever_is_not_told_apart_from_it_is_a_tie(p
     assert "The machine was busy" not in text
 
 
-def test_who_cannot_be_asked_is_in_no_table_and_a_table_of_nothing_is_none(printed):
+def test_absent_engines_and_empty_tables(printed):
     """``unsupport...`` stood where an error belongs, and headings over nothing."""
     text = printed(planar=2)
     assert text.count("chipmunk/default") == 1 and "impact 3-D" not in text and "unsupported" not in text

@@ -61,9 +61,7 @@ def test_units_are_timed_one_by_one_and_how_it_was_done_is_kept(monkeypatch):
 @pytest.mark.parametrize(
     ("as_json", "brief", "busy", "rows"), [(False, False, "", 1), (True, False, "it was busy", 0), (False, True, "", 1)]
 )
-def test_what_a_bench_shows_ends_with_its_run_its_seed_and_where_it_is_written(
-    monkeypatch, tmp_path, as_json, brief, busy, rows
-):
+def test_bench_output_ends_with_run_seed_and_path(monkeypatch, tmp_path, as_json, brief, busy, rows):
     """A busy machine is said and ranks nobody; tables that came to nothing are left out."""
     asked = []
     points = pd.DataFrame(columns=["engine", "profile"])
@@ -115,7 +113,7 @@ def test_what_a_bench_shows_ends_with_its_run_its_seed_and_where_it_is_written(
     ]  # fmt: skip
 
 
-def test_where_the_time_of_a_step_goes_is_told_stage_by_stage_with_its_share(monkeypatch):
+def test_step_time_by_stage_with_shares(monkeypatch):
     """The median of each stage, after a warm-up, of the profile that promises a solution."""
     import reference_solver.timeline as timed
 

@@ -102,7 +102,7 @@ def made_up(monkeypatch, bench=None, scenes=()):
     return run, asked
 
 
-def test_a_bundle_lists_its_files_in_order_with_what_each_is_and_is_the_same_each_time(monkeypatch, tmp_path):
+def test_reproducible_list_of_files_in_a_bundle(monkeypatch, tmp_path):
     """Names of scene files are plain, whatever folder they came from."""
     kept = {"/a/b/drop it!.toml@1a2b3c4d": "text", "fall.toml@00000000": "other"}
     run, asked = made_up(monkeypatch, scenes=kept.items())

@@ -67,7 +67,7 @@ def row(alarming=False, **more):
     return SimpleNamespace(alarming=alarming, outcome="ok", as_dict=lambda: {"scene": "impact", **more})
 
 
-def test_a_run_hands_on_its_cells_limits_and_title_and_its_status_is_that_of_its_rows(ran, monkeypatch, tmp_path):
+def test_run_arguments_and_status_of_its_rows(ran, monkeypatch, tmp_path):
     monkeypatch.setattr(running.exports, "write_all", lambda out, plain, nulls: {"rows": out / "rows.csv"})
     monkeypatch.setattr(running.exports, "as_junit", lambda plain: f"<junit of {len(plain)}/>")
     monkeypatch.setattr(running.exports, "as_markdown", lambda plain: f"# {len(plain)} rows – so")
@@ -96,7 +96,7 @@ def test_a_run_hands_on_its_cells_limits_and_title_and_its_status_is_that_of_its
     assert said(*cells)[0] == statuses.INCOMPLETE and len(ran.kept) == before
 
 
-def test_a_scene_of_a_file_says_what_was_filled_in_and_how_far_engines_are_apart(ran, monkeypatch, tmp_path):
+def test_scene_file_defaults_and_spread_of_engines(ran, monkeypatch, tmp_path):
     monkeypatch.setattr(running.exports, "write_all", lambda out, plain, nulls: {})
     monkeypatch.setattr(running, "spread_lines", lambda apart: [f"apart: {len(apart)} [x]"])
     file = tmp_path / "drop.toml"
@@ -109,7 +109,7 @@ def test_a_scene_of_a_file_says_what_was_filled_in_and_how_far_engines_are_apart
     assert len(err) == 1 and err[0].endswith("ball.inertia: 0.125 kg m^2, of a uniform disc; none was given")
 
 
-def test_invariance_is_asked_of_the_cells_and_only_there_breaks_are_kept(monkeypatch, tmp_path):
+def test_invariance_breaks_kept_for_the_requested_cells(monkeypatch, tmp_path):
     asked = []
 
     def compare(cells, as_json, keep):
@@ -228,7 +228,7 @@ def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_p
     )  # fmt: skip
 
 
-def test_points_of_a_study_are_as_many_as_are_asked_for_and_those_of_its_seed(ran, monkeypatch, tmp_path):
+def test_study_points_by_count_and_seed(ran, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(sweeping, "study_slots", lambda request, study: asked.append(study) or [SLOT])
     call = ("sweep", "impact", "--dry-run", "--out", str(tmp_path / "out"))
@@ -246,7 +246,7 @@ def test_points_of_a_study_are_as_many_as_are_asked_for_and_those_of_its_seed(ra
 # ---- engines and machines --------------------------------------------------------------------------------------------
 
 
-def test_a_doctor_says_whose_packages_these_are_and_which_releases_are_bad(monkeypatch):
+def test_doctor_output_of_packages_and_bad_releases(monkeypatch):
     found = listing.doctor()
     parts = ["machine", "commit", "executable", "packages", "engines", "kernel_cache", "problems", "traces"]
     assert list(found) == parts
@@ -276,7 +276,7 @@ def test_a_doctor_says_whose_packages_these_are_and_which_releases_are_bad(monke
         assert listing.doctor()["kernel_cache"]["compiled"] is compiled
 
 
-def test_an_adapter_that_breaks_a_check_has_a_status_and_all_findings_are_told(monkeypatch):
+def test_adapter_with_failed_checks_status_and_findings(monkeypatch):
     good, bad = Finding("momentum", "ok", ""), Finding("spin", "FAIL", "it turns")
     for findings, status in (([good], 0), ([good, bad], 1)):
         monkeypatch.setattr("adapters.conformance.check_adapter", lambda engine, found=findings: found)
@@ -287,7 +287,7 @@ def test_an_adapter_that_breaks_a_check_has_a_status_and_all_findings_are_told(m
     assert inspecting.registry.load("chipmunk").facts.name == "chipmunk"
 
 
-def test_a_search_for_settings_is_told_as_it_goes_and_what_is_better_has_a_status(monkeypatch):
+def test_search_progress_and_status_of_a_better_setting(monkeypatch):
     asked, better = [], {}
 
     def search(engine, profile, name, jobs, dimensions, said):
@@ -335,7 +335,7 @@ def test_the_schema_is_the_same_on_the_terminal_and_in_a_file(tmp_path):
     assert said("schema", "-o", str(tmp_path / "s.json")) == (0, "", []) and (tmp_path / "s.json").read_text() == out
 
 
-def test_the_picture_of_starved_stacks_is_written_in_both_schemes_with_what_made_it(monkeypatch, tmp_path):
+def test_starved_stack_picture_in_both_schemes(monkeypatch, tmp_path):
     monkeypatch.setattr(starved, "starved", lambda: iter(["a", "row"]))
     monkeypatch.setattr(starved, "chart", lambda rows, scheme: (tuple(rows), scheme))
     monkeypatch.setattr(starved.vl_convert, "vegalite_to_png", lambda spec, scale: f"{spec} {scale}".encode())

@@ -133,7 +133,7 @@ def planted(monkeypatch, missed, flags):
     return CliRunner().invoke(main, ["certify", "--self-test", *flags])
 
 
-def test_the_self_test_says_by_what_each_corruption_is_caught_at_each_size(monkeypatch):
+def test_self_test_detections_by_corruption_and_size(monkeypatch):
     result = planted(monkeypatch, {("friction", SIZES[0])}, ["--json"])
     rows = json.loads(result.stdout)
     assert result.exit_code == 0 and len(rows) == 2 * len(SIZES)
@@ -149,7 +149,7 @@ def test_the_self_test_says_by_what_each_corruption_is_caught_at_each_size(monke
     assert f"2 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr and "missed:" not in result.stderr
 
 
-def test_the_self_test_fails_where_too_little_is_caught_at_the_size_that_is_judged(monkeypatch):
+def test_self_test_fails_below_the_detection_limit(monkeypatch):
     result = planted(monkeypatch, {("friction", JUDGED)}, [])
     assert result.exit_code == 1 and result.stdout == ""
     assert f"1 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr

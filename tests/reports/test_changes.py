@@ -83,7 +83,7 @@ def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
     assert as_text([], A, A).endswith("\n4 in both: none changed\n")
 
 
-def test_checks_of_one_side_are_a_line_for_each_profile_with_its_first_scenes_and_roles_stand_below():
+def test_one_sided_checks_by_profile_and_scene():
     scenes = ["arch", "bounce", "cradle", "domino", "edge_drop", "flat_box"]
     gone = [replace(GONE, engine="mujoco", profile="default", scene=scene, metric=m) for scene in scenes for m in "ab"]
     assert as_text(gone, A, B).splitlines()[5:] == [
@@ -299,7 +299,7 @@ def test_a_file_that_cannot_be_read_is_refused_with_its_name_and_why(tmp_path):
         ("before:latest", "run: there is no folder before; crosscheck compare --help says what a side may be"),
     ],
 )
-def test_a_side_that_is_no_id_of_a_run_is_refused_as_what_it_was_meant_to_be(tmp_path, argument, said):
+def test_wrong_run_id_refused_by_its_likely_meaning(tmp_path, argument, said):
     with pytest.raises(MissingError) as caught:
         load_side(argument, tmp_path)
     assert str(caught.value) == said
@@ -319,7 +319,7 @@ def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
     assert not (tmp_path / "not there").exists()
 
 
-def test_a_side_is_the_last_run_with_its_date_and_the_times_of_the_last_bench(page_folder, monkeypatch):
+def test_side_of_a_comparison_by_last_run_and_last_bench(page_folder, monkeypatch):
     kept = Store.run
     monkeypatch.setattr(Store, "run", lambda self, name: replace(found := kept(self, name), commit=f"at {found.id}"))
     store = Store(page_folder, create=False)

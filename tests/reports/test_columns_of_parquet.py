@@ -29,7 +29,7 @@ TOLD = Observation(FLAT, "cell-1", VERSION, "7.2.0", Outcome.OK, "", METRICS, "h
 LOST = Observation(SOLID, "cell-2", VERSION, "3.2.7", Outcome.CRASHED, "signal 11")
 
 
-def test_every_metric_is_a_line_with_its_cell_and_a_cell_without_any_is_one():
+def test_metric_lines_per_cell_and_for_a_cell_without_metrics():
     lines = list(parquet._metrics([(RUN, [TOLD, LOST]), (EARLIER, [LOST])]))
     cell = {
         "run": "20260102-030405", "date": "2026-01-02T03:04:05", "commit": "abc+", "engine": "chipmunk",
@@ -61,7 +61,7 @@ def motion(bodies, pose, twist):
     )
 
 
-def test_every_sample_of_a_body_is_a_line_and_a_plane_has_no_columns_of_space(tmp_path):
+def test_sample_lines_per_body_in_plane_and_space(tmp_path):
     motion(2, 3, 3).save(tmp_path / f"{FLAT.key()}.npz")
     motion(1, 7, 6).save(tmp_path / f"{SOLID.key()}.npz")
     path = tmp_path / "trajectories.parquet"
@@ -86,7 +86,7 @@ def test_every_sample_of_a_body_is_a_line_and_a_plane_has_no_columns_of_space(tm
     assert solid[["angle", "omega"]].isna().all(axis=None)
 
 
-def test_lists_of_a_row_are_text_and_numbers_are_numbers_even_where_none_is_known():
+def test_column_types_of_lists_and_unknown_numbers():
     judged = replace(TOLD, slot=replace(FLAT, ulp=0))
     table = parquet._rows(Judged.of(rows_of(RUN.id, [judged, LOST])).rows)
     assert len(table) and set(table["run"]) == {RUN.id}

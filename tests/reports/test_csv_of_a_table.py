@@ -28,7 +28,7 @@ def csv_of(heads, body):
     return subprocess.run(["node", "-e", program], capture_output=True, text=True, check=True, timeout=60).stdout
 
 
-def test_a_matrix_with_engines_over_their_profiles_loads_with_a_name_for_each_column():
+def test_matrix_of_engines_and_profiles_as_csv():
     heads = [[("scene", 2, 1), ("bullet", 1, 2), ("mujoco", 1, 1)], ["default", "tuned", "default"]]
     body = [[("family, one", 1, 4)], [("bounce", 2, 1), "pass 3", "1/3", "pass 3"], ["pass 1", "pass 1", 'said "so"']]
     found = pd.read_csv(io.StringIO(csv_of(heads, body)))

@@ -153,7 +153,7 @@ def test_a_file_is_no_folder_and_a_folder_is_not_empty():
     assert (files.FILE.name, files.FOLDER.name) == ("file", "folder")
 
 
-def test_a_file_is_written_into_a_folder_that_is_there_and_an_output_anywhere(tmp_path):
+def test_output_file_in_an_existing_folder(tmp_path):
     there = tmp_path / "there.txt"
     there.write_text("x")
     assert files.writable(there, "junit") == there and files.writable(tmp_path / "new", "junit") == tmp_path / "new"
@@ -188,7 +188,7 @@ def test_what_may_not_be_written_is_said(tmp_path, monkeypatch):
 # ---- tables to take away -------------------------------------------------------------------------------------------
 
 
-def test_tables_of_a_page_are_the_rows_and_the_bench_s_without_time_stamps(monkeypatch):
+def test_page_tables_equal_to_rows_and_bench(monkeypatch):
     rows = [{"a": 1, "cells": "c", "b": 0.5}, {"a": 2, "cells": "d", "b": None}]
     monkeypatch.setattr(takeaway, "flattened", lambda row: row)
     table = pd.DataFrame({"slot": ["s", "t"], "x": [1.23456789, 2.0], "n": ["one", "two"]})

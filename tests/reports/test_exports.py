@@ -40,7 +40,7 @@ def plain(*rows):
 # ---- JSON and CSV --------------------------------------------------------------------------------------------------
 
 
-def test_json_is_an_array_with_a_line_per_field_and_json_lines_have_one_per_row():
+def test_json_array_and_json_lines():
     rows = plain(ROW, PASS)
     text = exports.as_json(rows)
     assert json.loads(text) == rows
@@ -96,7 +96,7 @@ def test_markdown_of_an_engine_that_did_not_run_has_no_version():
     assert exports.as_markdown(plain(row)).startswith("| scene | another/tuned<br> |\n|---|---|\n")
 
 
-def test_markdown_says_who_is_in_no_ranking_and_who_leaves_the_plane_between_legend_and_findings():
+def test_markdown_notes_on_rankings_and_plane():
     """Each a paragraph of its own, in one line: what stands there must end no list or cell."""
     matched = replace(PASS, engine="mujoco", engine_version="3.3", profile="matched")
     out = replace(ROW, engine="mujoco", engine_version="3.3", metric="out_of_plane", value=0.25, truth=0.0,
@@ -237,7 +237,7 @@ def test_load_reads_the_last_run_of_the_usual_folder_or_any_other(two_runs, tmp_
     assert {row.run for row in exports.load_rows("crosscheck-out", first)} == {first}
 
 
-def test_load_has_the_answers_of_nulls_behind_the_rows_where_they_are_asked_for(two_runs):
+def test_null_answers_behind_rows_when_requested(two_runs):
     alone, both = exports.load(), exports.load(nulls=True)
     assert set(alone["engine"]) == {"nameless"} and set(both["engine"]) == {"nameless", "none"}
     assert both["engine"].tolist()[: len(alone)] == alone["engine"].tolist()

@@ -52,7 +52,7 @@ def moved(node):
     return np.array(found.groups(), float)
 
 
-def test_errors_over_iterations_lie_on_logarithmic_axes_and_what_is_exact_lies_in_the_gutter():
+def test_axes_and_exact_engines_of_error_over_iterations():
     _, tree = drawn(table())
     found = lines(tree)
     assert set(found) == {"chipmunk/default", "bullet/default"}
@@ -69,7 +69,7 @@ def test_errors_over_iterations_lie_on_logarithmic_axes_and_what_is_exact_lies_i
     assert one[0, 1] + decade * math.log10(0.5 / figures.EXACT) <= top + 0.5 * decade
 
 
-def test_the_axes_say_the_counts_that_were_run_and_the_quantity_and_the_caption_says_the_step():
+def test_axis_labels_and_caption_of_error_over_iterations():
     figure, tree = drawn(table(), 1 / 60)
     said = [node.text for node in tree.iter() if node.tag.endswith("text")]
     assert said[:4] == [*map(str, COUNTS), "iterations per step"] and said[-1] == "drift [m]"
@@ -96,7 +96,7 @@ def observed(who, iterations, off, dt=1 / 240):
         yield Observation(of, "c", 1, "1", Outcome.OK, metrics={"rebound_ratio": (e + off, "")})
 
 
-def test_what_was_asked_at_several_counts_is_drawn_by_engine_and_profile_and_nothing_else_is():
+def test_lines_by_engine_and_profile_at_several_iterations():
     one, other = ("chipmunk", "default"), ("bullet", "tuned")
     asked = [*observed(one, 4, 0.1), *observed(one, 40, 0.01), *observed(other, 4, 0.2), *observed(other, 40, 0.2)]
     beside = [*observed(one, None, 0.4), *observed(one, 10, 0.3, 1 / 60)]  # nobody chose a count; another step

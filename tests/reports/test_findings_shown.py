@@ -35,7 +35,7 @@ def test_a_line_says_who_what_how_far_off_why_and_how_to_see_it_again():
     assert f"tolerance 0.1 (Coulomb) | {COMMAND}" in finding_line(row(reason=""))
 
 
-def test_a_line_of_a_sweep_says_its_iterations_and_one_without_a_value_its_reason_alone():
+def test_sweep_line_with_iterations_or_reason():
     assert finding_line(row(iterations=30)).startswith("FAIL, known: mujoco/default incline 3-D ratio=0.99 at 30 iter")
     bare = row(iterations=30)
     bare["slot"] = {**bare["slot"], "params": {}}
@@ -44,7 +44,7 @@ def test_a_line_of_a_sweep_says_its_iterations_and_one_without_a_value_its_reaso
     assert finding_line(crashed) == f"CRASHED: mujoco/default incline 3-D ratio=0.99: signal 11 | {COMMAND}"
 
 
-def test_what_was_measured_has_units_and_digits_that_fit_where_it_stands():
+def test_units_and_digits_of_measured_values():
     off = row(value=0.123456789, truth=0.987654321, tolerance=0.0123456)
     assert said(off) == "creep 0.1235 m/s, truth 0.9877 m/s, tolerance 0.0123"
     assert said(off, 6) == "creep 0.123457 m/s, truth 0.987654 m/s, tolerance 0.0123"
@@ -64,7 +64,7 @@ def test_how_bad_a_row_is_counts_in_tolerances(error, tolerance, found):
     assert severity(row(error=error, tolerance=tolerance)) == found
 
 
-def test_a_family_is_one_engine_profile_scene_kind_of_metric_and_standing_its_worst_row_first():
+def test_rows_of_a_family_with_the_worst_first():
     interfaces = [row(f"impulse[{k}]", value) for k, value in ((1, 0.2), (12, -0.9), (3, 0.4))]
     others = [
         row("impulse_scatter"), row("impulse[1]", standing="new"), row("impulse[1]", profile="tuned"),
@@ -84,7 +84,7 @@ def test_a_family_is_one_engine_profile_scene_kind_of_metric_and_standing_its_wo
 
 
 @pytest.mark.parametrize("outcome", ["crashed", "timed_out", "missing"])
-def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_checks(outcome):
+def test_cell_without_an_answer_told_once(outcome):
     lost = {"outcome": outcome, "value": None, "error": None, "physics": None, "standing": None}
     names = ("impulse[1]", "impulse[2]", "drift")
     first = [row(metric, **lost | {"reason": "SIGSEGV"}) for metric in names]
@@ -94,7 +94,7 @@ def test_a_cell_without_an_answer_is_told_once_and_not_once_for_each_of_its_chec
     assert found[1].line.endswith(": SIGABRT")
 
 
-def test_a_run_that_is_not_certified_is_told_once_with_the_first_reason_of_its_certificate():
+def test_uncertified_run_told_once_with_its_reason():
     """It has values, but none that counts."""
     why = "bodies overlap at the start: 0.1, at most 1e-06; energy was gained: 2, at most 1e-09; a third"
     ended = {"outcome": "refused", "physics": None, "standing": "new"}
@@ -118,7 +118,7 @@ def test_a_family_is_told_in_one_line_and_as_plain_data():
     }  # fmt: skip
 
 
-def test_marks_come_in_the_order_of_their_weight_and_what_passes_is_none_of_them():
+def test_order_of_marks_by_weight_without_passes():
     marks = ["explained", "known", "drifted", "new", "refused", "invalid", "missing", "timed_out", "crashed"]
     ended = ("invalid", "missing", "timed_out", "crashed")
     rows = [row(standing=None if m in ended else m, outcome=m if m in ended else "ok") for m in marks if m != "refused"]
@@ -137,7 +137,7 @@ def refused(outcome="unsupported", reason="it has no boxes", **more):
     return row(value=None, error=None, physics=None, standing=None, outcome=outcome, reason=reason, **more)
 
 
-def test_scenes_of_the_catalogue_that_an_engine_cannot_run_stand_in_the_matrix_alone():
+def test_unsupported_scenes_in_the_matrix_alone():
     assert list(refusals([row(), refused(), refused("not_installed")])) == []
 
 

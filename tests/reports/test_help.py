@@ -24,7 +24,7 @@ def test_every_command_stands_in_one_section_with_a_whole_line():
     assert [line[:-1] for line in lines if line.endswith(":")][1:] == list(SECTIONS)
 
 
-def test_lines_of_help_are_the_first_of_their_commands_and_no_command_is_left_out():
+def test_help_lines_of_all_commands():
     """`SECTIONS` has them, so that a list of commands imports none of these."""
     lines = {name: line for section in SECTIONS.values() for name, (_, line) in section.items()}
     assert {name: main.get_command(None, name).help.partition("\n")[0] for name in lines} == lines

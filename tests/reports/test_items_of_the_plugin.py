@@ -29,7 +29,7 @@ def items(monkeypatch):
     return collect
 
 
-def test_every_check_that_has_a_tolerance_is_an_item_and_an_engine_in_space_owes_the_plane(items):
+def test_plugin_items_of_checks_with_a_tolerance(items):
     cells = ("toy/tuned/impact 2-D e=0.5", "toy/tuned/stack 2-D n=2 iterations=4", "toy/default/impact 3-D")
     wanted, lifted = [], []
     for slot, cell in zip(SLOTS, cells, strict=True):
@@ -60,7 +60,7 @@ def test_items_stand_behind_the_tests_that_are_there(monkeypatch):
     assert asked == [("a session", {"name": "crosscheck", "nodeid": "crosscheck", "plugin": plugin})]
 
 
-def test_a_failed_check_shows_its_report_alone_and_an_error_where_it_was_raised(monkeypatch):
+def test_report_of_a_failed_check_and_place_of_an_error(monkeypatch):
     item = SimpleNamespace(name="a cell::speed")
     assert _Check.repr_failure(item, SimpleNamespace(value=Failed("its report"))) == "its report"
     monkeypatch.setattr(pytest.Item, "repr_failure", lambda self, excinfo, style=None: f"trace of {excinfo.value}")

@@ -26,13 +26,13 @@ def asked(monkeypatch):
     return slots
 
 
-def test_each_cell_is_named_faintly_while_it_is_asked_and_a_break_that_nobody_listed_is_an_alarm(asked, capsys):
+def test_progress_line_of_a_cell_and_alarm_for_a_new_break(asked, capsys):
     assert posing.compare_and_show(SLOTS, True) is False and asked == SLOTS
     said = re.sub(r"\x1b\[([0-9;]*)m", r"{\1}", capsys.readouterr().err)
     assert said.splitlines() == [f"{{2}}{s.engine}/tuned stack {s.dimension}-D{{0}}" for s in SLOTS]
 
 
-def test_breaks_are_kept_after_every_cell_where_a_family_speaks_about_them(asked, monkeypatch, capsys, tmp_path):
+def test_breaks_kept_after_every_cell_with_a_family(asked, monkeypatch, capsys, tmp_path):
     written, families = [], {"other": [Family("f-1", ("tuned",), "stack", ("drift",), "", "", "")], "toy[1]": []}
     folders = {"other": tmp_path, "toy[1]": tmp_path}
     monkeypatch.setattr(posing, "findings_folder", folders.get)

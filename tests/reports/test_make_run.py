@@ -51,7 +51,7 @@ def make_run(tmp_path):
     return run
 
 
-def test_the_answer_is_printed_once_then_come_bench_and_report_with_its_path(make_run):
+def test_order_of_answer_bench_and_report(make_run):
     status, lines, calls = make_run()
     assert status == 0 and [call[0] for call in calls] == ["run", "bench", "report"]
     assert all(call[-2] == "--out" and call[-1] == calls[0][-1] for call in calls)
@@ -61,7 +61,7 @@ def test_the_answer_is_printed_once_then_come_bench_and_report_with_its_path(mak
     assert lines[-3:-1] == ["report:", "path on stdout"]
 
 
-def test_it_says_after_how_many_seconds_the_verdicts_stood_and_all_was_done(make_run):
+def test_seconds_until_verdicts_and_until_the_end(make_run):
     _, lines, _ = make_run()
     assert re.fullmatch(r"verdicts after \d+ s; now the benchmark and the report", lines[1])
     parts = re.match(r"done after (\d+) s: verdicts (\d+) s, benchmark (\d+) s, report (\d+) s;", lines[-1])
@@ -69,7 +69,7 @@ def test_it_says_after_how_many_seconds_the_verdicts_stood_and_all_was_done(make
     assert total == sum(stages)
 
 
-def test_bad_rows_decide_the_status_and_leave_time_and_report_to_be_made(make_run):
+def test_status_of_bad_rows_with_time_and_report_made(make_run):
     status, _, calls = make_run(run=1)
     assert status != 0 and [call[0] for call in calls] == ["run", "bench", "report"]
 

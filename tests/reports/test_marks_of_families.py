@@ -14,7 +14,7 @@ NOWHERE = {"unsupported", "not_installed"}
 
 
 @pytest.mark.parametrize("mark", sorted({*MARKS, *LABELS}))
-def test_a_mark_of_rows_of_one_kind_leads_to_them_unless_the_engine_was_not_asked(mark):
+def test_link_of_a_mark_to_its_rows(mark):
     found = family_mark(Field(Counter({mark: 3})), "there")
     judged, passing = mark not in UNJUDGED, mark == "pass"
     if mark in NOWHERE:
@@ -45,7 +45,7 @@ def judged_row(**changed):
     return {**row, **changed}
 
 
-def test_the_worst_row_of_a_column_says_where_it_is_how_far_off_and_how_many_pass():
+def test_worst_row_of_a_column_with_place_error_and_passes():
     """A cell at its scene's defaults is called so; what stands in brackets is which of the same kind it is."""
     other = judged_row(metric="apex", value=0.64, error=1e-6, physics="pass", standing=None)
     asked = judged_row(metric="apex", params={"e": 0.8}, iterations=7, error=-0.2)

@@ -76,7 +76,7 @@ def test_a_wide_terminal_shows_it_in_full():
     ]
 
 
-def test_what_a_profile_is_stands_beside_its_first_line_where_its_name_does_not_say_so():
+def test_role_of_a_profile_beside_its_first_line():
     rows = [
         ROWS[0] | {"engine": "mujoco", "profile": profile, "dimension": d, "physics": said, "standing": None}
         for profile in ("default", "tuned")
@@ -127,13 +127,13 @@ def test_nothing_is_an_empty_matrix():
     assert tables_of(matrix_of([]), {}, 80) == [] and sweeps_of(matrix_of([])) == []
 
 
-def test_an_engine_that_could_be_asked_in_one_scene_is_not_called_unable():
+def test_engine_asked_in_one_scene_not_called_unable():
     rows = [*ROWS, *times(1, "bounce", 3, "flat", "soft")]
     assert not any("every profile" in line for line in shown(rows, 120))
     assert any(line.split() == ["soft", "3-D", "-", "-", "1", "pass"] for line in shown(rows, 120))
 
 
-def test_a_field_without_rows_is_empty_and_equal_marks_in_another_order_share_a_line():
+def test_matrix_cell_without_rows_and_marks_in_another_order():
     rows = [row("impact", 2, "deep", "soft"), row("impact", 2, "deep", "soft", "known"),
             row("impact", 3, "deep", "soft", "known"), row("impact", 3, "deep", "soft")]  # fmt: skip
     assert shown(rows, 100)[3:] == ["  soft 2-D 3-D   1 of 2 fail"]
@@ -160,7 +160,7 @@ def same_dimension(dimension, mark):
     return [row("stack", dimension, "deep", "soft", mark, 4)]
 
 
-def test_a_sweep_is_said_in_a_line_of_its_own_with_dimensions_only_where_they_differ():
+def test_sweep_line_with_dimensions_only_where_they_differ():
     assert sweeps_of(matrix_of(ROWS)) == [
         "stack at 4, 30 iterations instead of the profile's own, failed checks: "
         "flat/soft 0 of 1; deep/soft 2 of 3 2-D and 0 of 3 3-D; deep/stiff 4 of 4"
@@ -189,7 +189,7 @@ def test_the_legend_explains_what_occurs():
     assert "INVALID: the measurement contradicts itself" in legend(broken) and "dash" not in legend(broken)
 
 
-def test_the_regression_status_counts_what_fails_apart_from_how_wrong_it_is():
+def test_regression_status_apart_from_the_size_of_errors():
     """Of sweeps as well: `crosscheck findings` lists them with the others."""
     assert status_of(matrix_of(ROWS)) == (
         "Regression status of what fails: 2 new, 8 known (cause on record), "
@@ -220,7 +220,7 @@ def test_cases_that_ended_a_process_which_had_run_others():
     assert repeated(many)[0].endswith("deep/soft s3 2-D and 2 more (why: explain)")
 
 
-def test_what_leaves_the_plane_is_told_by_cells_at_the_profiles_own_iterations():
+def test_departures_from_the_plane_by_cells_at_own_iterations():
     """Those that fail are told of all that were judged; without an answer there is no plane to leave."""
 
     def cell(engine, value, mark="known", scene="stack", metric="out_of_plane", **more):

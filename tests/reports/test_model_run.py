@@ -101,7 +101,7 @@ def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypat
     store.close()
 
 
-def test_the_same_command_says_how_many_cells_and_a_profile_can_be_chosen(tmp_path):
+def test_model_command_with_cell_count_and_chosen_profile(tmp_path):
     words = ("run", MODELS / "ball_on_floor.xml", "--engine", "mujoco", "--dry-run", "--out", tmp_path)
     assert call(*words).stdout == "8 cases\n"  # three profiles and the model's own, in the plane and in space
     assert call(*words, "--profile", "model").stdout == "2 cases\n"
@@ -141,7 +141,7 @@ def _said_of_models():
     return {name: cells for name, *cells in rows}
 
 
-def test_the_table_of_models_speaks_of_each_and_of_twenty_that_run_on_three_engines_and_the_reference():
+def test_table_of_models_and_twenty_on_three_engines():
     said = _said_of_models()
     assert set(said) == {path.name for path in MODELS.iterdir() if path.suffix in LANGUAGES} and len(said) >= 30
     everywhere = [name for name, cells in said.items() if len(cells) == 4
@@ -241,7 +241,7 @@ def test_momentum_that_nobody_gave_is_seen():
 
 
 @pytest.mark.parametrize(("dt", "thousands"), [(0.05, 1.0), (1 / 1000, 1.0), (1 / 4000, 4.0)])
-def test_momentum_of_free_bodies_alone_is_judged_to_round_off_of_what_they_have_and_are_given(dt, thousands):
+def test_momentum_of_free_bodies_judged_to_round_off(dt, thousands):
     """2 kg at 5 m/s and 3 kg at rest have 10 N s; 20 N, and 30 N less a force of 10 N, give them 40 N s in a second.
 
     Momenta are sums of a thousand steps' roundings each: 1e-12 of them (`validation.bounds.ROUND_OFF`).
@@ -257,7 +257,7 @@ def test_momentum_of_free_bodies_alone_is_judged_to_round_off_of_what_they_have_
     assert judge_physics(momentum_drift(*falling(kick=1e-9))[0], _momentum_check(scene, falls.dt)) is Physics.FAIL
 
 
-def test_momentum_that_a_fixed_body_may_have_taken_is_shown_and_not_judged():
+def test_momentum_beside_a_fixed_body_shown_and_not_judged():
     check = _momentum_check(falling(impulse=(0.0, 1.0))[0], 0.05)
     assert (check.metric, check.unit, check.truth, check.bound) == ("momentum_drift", "N s", None, None)
     assert check.because.startswith("shown")
@@ -298,7 +298,7 @@ def test_spread_is_read_at_the_horizon_of_the_certified_run():
     assert spreads([other], kept[1:]) == []
 
 
-def test_momentum_is_counted_whichever_of_the_two_is_fixed_and_not_between_bodies_that_move():
+def test_momentum_with_either_body_fixed():
     scene, found = falling(kick=0.5, impulse=(0.0, 1.0))
     rows = found.contacts.rows
     # The floor is listed last: the impulse on it is what the ball loses.

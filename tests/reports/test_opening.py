@@ -64,7 +64,7 @@ def test_the_headline_is_the_finding_of_the_rows(laws, said):
     assert headline(made(laws)) == said
 
 
-def test_without_a_restitution_the_headline_says_who_fails_the_most_checks():
+def test_headline_without_restitution():
     laws = {("a", "default"): dead, ("a", "tuned"): lambda e: e + 0.1 * (e == 1.0), ("b", "default"): right}
     source = made(laws, scene="incline", metric="speed")
     assert not rebounds(source)
@@ -72,7 +72,7 @@ def test_without_a_restitution_the_headline_says_who_fails_the_most_checks():
     assert headline(Source(source.run, [], [])) == "No check has a result."
 
 
-def test_the_first_matrix_has_an_engine_as_shipped_beside_tuned_whatever_else_ran():
+def test_first_matrix_with_shipped_beside_tuned():
     laws = dict.fromkeys([("a", "one"), ("a", "tuned"), ("a", "default"), ("b", "mine"), ("b", "x"), ("b", "y")], right)
     found = {engine: [(half.profile, half.word, half.place) for half in own] for engine, own in halves(made(laws))}
     assert found == {
@@ -96,7 +96,7 @@ def drawn(figure):
     return words, points
 
 
-def test_the_picture_names_the_lines_that_leave_the_diagonal_and_no_other():
+def test_names_of_lines_off_the_diagonal_in_the_picture():
     laws = {("mujoco", "default"): dead, ("mujoco", "tuned"): right, ("bullet", "default"): lambda e: 0.5 * e,
             ("bullet", "tuned"): right, ("chipmunk", "default"): right, ("chipmunk", "tuned"): right}  # fmt: skip
     (figure,) = explorer(made(laws)).maps

@@ -87,7 +87,7 @@ def test_what_passes_although_others_list_it_is_kept_for_the_end(asked):
     assert said == ["= crosscheck: fixed", "one", "two"]
 
 
-def test_cells_of_a_scene_run_once_when_the_first_of_its_checks_is_asked(monkeypatch):
+def test_scene_cells_run_once_for_all_their_checks(monkeypatch):
     other = Slot("stack", (("n", 2.0),), 2, "chipmunk", "default", 1 / 240)
     ran = []
 
@@ -110,7 +110,7 @@ def test_cells_of_a_scene_run_once_when_the_first_of_its_checks_is_asked(monkeyp
     assert ran == [([SLOT], 0), ([other], 0)]
 
 
-def test_a_report_says_what_was_measured_what_is_true_and_how_to_see_it_again():
+def test_report_of_value_truth_and_reproduction():
     plain = {"value": 1.25, "unit": "m/s", "metric": "speed", "reason": ""}
     found = SimpleNamespace(
         value=1.25, truth=2.0, tolerance=0.125, unit="m/s", because="of the step", standing="new", outcome="ok",
@@ -127,7 +127,7 @@ def test_a_report_says_what_was_measured_what_is_true_and_how_to_see_it_again():
     assert _report(found).splitlines()[::3] == ["no value   signal 11", "standing   crashed: signal 11"]
 
 
-def test_rows_that_are_offered_are_the_worst_of_each_family_and_begin_as_is_typed(monkeypatch, tmp_path):
+def test_completion_of_row_names_by_the_worst_of_each_family(monkeypatch, tmp_path):
     import reports.exports
     import reports.findings
     import reports.wording
@@ -163,7 +163,7 @@ class Config:
         return self.options[name]
 
 
-def test_the_plugin_takes_its_cells_from_words_with_commas_and_says_how_many(monkeypatch):
+def test_plugin_cells_from_a_comma_separated_list(monkeypatch):
     asked = []
     found = SimpleNamespace(engine=object(), version="7.3", reason="")
     monkeypatch.setattr(testing.registry, "find", lambda name: found if name == "chipmunk" else None)
@@ -188,7 +188,7 @@ def test_the_plugin_takes_its_cells_from_words_with_commas_and_says_how_many(mon
         ({"--scenes": "nobody"}, "crosscheck: scene: there is no scene called 'nobody'"),
     ],
 )
-def test_an_engine_that_is_not_there_and_a_scene_that_is_none_are_wrong_calls(monkeypatch, options, said):
+def test_plugin_error_for_an_absent_engine_or_unknown_scene(monkeypatch, options, said):
     found = {"absent": SimpleNamespace(engine=None, version="", reason="no wheel")}
     sound = SimpleNamespace(engine=object(), version="7.3", reason="")
     monkeypatch.setattr(testing.registry, "find", lambda name: found.get(name, sound))

@@ -54,7 +54,7 @@ def shipped_is_wrong(scene, engine, profile):
 
 
 @pytest.mark.parametrize("width", [80, 100])
-def test_the_matrix_of_the_whole_catalogue_stands_in_the_first_thirty_lines_and_the_answers_follow(width):
+def test_matrix_in_the_first_thirty_lines_of_the_catalogue(width):
     lines = shown(catalogue(shipped_is_wrong), width)
     assert max(map(len, lines)) <= width
     head, rest = "\n".join(lines[:30]), " ".join(" ".join(lines).split())
@@ -81,7 +81,7 @@ def test_the_matrix_of_the_whole_catalogue_stands_in_the_first_thirty_lines_and_
     assert "crosscheck show --all" in rest
 
 
-def test_every_scene_is_shown_where_that_is_asked_for_and_where_few_were_run():
+def test_all_scenes_shown_when_requested_or_few():
     every = shown(catalogue(), 80, every=True)
     headings = " ".join(line for line in every if line.startswith("engine, profile"))
     assert all(scene in headings.split() for scene in CATALOGUE)
@@ -95,7 +95,7 @@ def test_a_screen_too_narrow_for_families_shows_scenes():
 
 
 @pytest.mark.parametrize(("mark", "said"), [("new", " !"), ("drifted", " !"), ("fail", ""), ("known", "")])
-def test_what_fails_is_a_share_and_what_is_unexpected_has_a_mark_beside_it(mark, said):
+def test_failing_share_and_mark_of_the_unexpected(mark, said):
     rows = catalogue(lambda scene, engine, profile: mark if (scene, profile) == ("slide", "one") else "pass")
     scenes = overview.families_of(rows)["friction"]
     text = f" {overview.share(5, 10 * len(scenes))}{said}"
@@ -134,7 +134,7 @@ def test_who_comes_nearest_is_said_where_few_pass_everything():
     assert dict(overview.choices(nobody, overview.families_of(nobody)))["hard"].startswith("none passes every check; ")
 
 
-def test_the_worst_answer_of_a_family_is_of_the_scene_that_fails_most_rows():
+def test_worst_answer_of_a_family_by_failed_rows():
     def mark(scene, engine, profile):
         return "known" if (engine, profile) == ("bullet", "default") and scene in ("impact", "head_on") else "pass"
 
@@ -145,7 +145,7 @@ def test_the_worst_answer_of_a_family_is_of_the_scene_that_fails_most_rows():
     assert worst[0].cure == "profiles tuned and one fix it"
 
 
-def test_what_another_profile_makes_worse_is_not_how_an_engine_is_shipped():
+def test_worse_answer_of_another_profile_not_called_shipped():
     rows = catalogue(lambda scene, engine, profile: "known" if (scene, profile) == ("slide", "one") else "pass")
     assert overview.worst_answers(rows, answers(rows), overview.families_of(rows)) == []
 

@@ -98,7 +98,7 @@ def test_no_attribute_carries_code_or_style_or_an_address_elsewhere(elements):
             assert target is None or target.startswith(("#", "data:application/")), (tag, target[:80])
 
 
-def test_every_link_within_the_page_leads_to_the_one_element_of_its_name(elements):
+def test_links_within_the_page_to_existing_elements(elements):
     names = Counter(attributes["id"] for _, attributes in elements.tags if "id" in attributes)
     links = {a["href"][1:] for _, a in elements.tags if a.get("href", "").startswith("#")}
     assert [name for name, count in names.items() if count > 1 or name in ("", "None")] == []
@@ -115,7 +115,7 @@ def views(spec, data=None):
             yield from views(each, data)
 
 
-def test_every_channel_of_a_chart_draws_a_column_of_its_rows_and_every_axis_says_what_it_is(page_made):
+def test_chart_channels_by_column_and_axis_titles(page_made):
     """What is drawn of a column that is not there is nothing, and no error."""
     looked = Counter()
     for spec in page_made[1]:
@@ -135,7 +135,7 @@ def test_every_channel_of_a_chart_draws_a_column_of_its_rows_and_every_axis_says
     assert min(looked[name] for name in ("x", "y", "color", "description")) > 5, looked
 
 
-def test_the_policy_names_exactly_the_one_style_and_the_one_script_of_the_page(elements):
+def test_content_policy_with_one_style_and_one_script(elements):
     (content,) = [a["content"] for t, a in elements.tags if a.get("http-equiv") == "Content-Security-Policy"]
     running = [(tag, code) for (tag, attributes), code in elements.code if "type" not in attributes]
     assert [tag for tag, _ in running] == ["style", "script"]
@@ -230,7 +230,7 @@ def test_the_sentences_change_when_the_physics_of_the_data_flips():
     assert base[2] != flipped[2]
 
 
-def test_where_many_scenes_part_the_engines_each_engine_says_where_it_has_no_clean_profile():
+def test_engines_without_a_clean_profile_in_many_scenes():
     clean = next(row for row in golden("base").rows if row["physics"] == "pass")
     rows = []
     for k in range(6):
@@ -252,7 +252,7 @@ def test_a_sentence_names_few_scenes_and_counts_many():
 
 
 @pytest.mark.usefixtures("bullet")
-def test_of_many_things_that_are_wrong_the_worst_of_each_engine_and_family_come_first(page_source, monkeypatch):
+def test_worst_of_each_engine_and_family_first(page_source, monkeypatch):
     wrong = answers(page_source.rows)
     assert first_answers(page_source, wrong) == wrong
     monkeypatch.setattr(page, "SEEN", 2)
@@ -271,7 +271,7 @@ def test_of_many_things_that_are_wrong_the_worst_of_each_engine_and_family_come_
     assert all(answer.wrong.replace("&", "&amp;") in table for answer in wrong if "<" not in answer.wrong)
 
 
-def test_settings_that_leave_most_checks_failing_are_counted_and_not_given_to_paste(page_source, monkeypatch):
+def test_settings_with_mostly_failed_checks_counted_only(page_source, monkeypatch):
     wrong = answers(page_source.rows)
     mended = [each.answer for each in fixing.wrongs(page_source, wrong) if each.fixes]
     listed = reports.cures.cures_of
@@ -322,7 +322,7 @@ def test_findings_hold_every_failing_value_once(page_source):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_finding_says_the_number_of_a_row_of_its_own_that_is_farthest_out(page_source):
+def test_finding_with_the_number_of_its_worst_row(page_source):
     """The text's numbers, read back: value, truth and tolerance of one row, and none of the family is worse."""
     looked = 0
     for mark, _, shown in findings(page_source):
@@ -372,7 +372,7 @@ def test_a_familys_marks_count_the_rows_of_its_scenes(page_source):
     assert failing and rebound.marks[column].text == f"{failing}/{len(judged)}"
 
 
-def test_the_sentence_of_a_family_changes_when_the_physics_of_the_data_flips():
+def test_family_sentence_after_reversed_physics():
     base, flipped = (sentence(golden(name), ["bounce"]) for name in ("base", "flip"))
     assert "every check" in base and " fails " not in base
     assert "fails bounce" in flipped
@@ -439,7 +439,7 @@ def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_explorer_holds_measured_heights_and_names_who_rebounds_wrongly(page_source):
+def test_explorer_heights_and_names_of_wrong_rebounds(page_source):
     found = explorer(page_source)
     tuned = next(s for s in found.data["series"] if s["name"] == "chipmunk/tuned")
     assert tuned["heights"]["0.8"][0] == pytest.approx(0.64, abs=0.02)
@@ -494,7 +494,7 @@ def _recordings(source, scene, dimension):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_first_departure_is_told_for_engines_that_leave_and_for_no_other(page_source):
+def test_first_departure_only_of_engines_that_leave(page_source):
     found = next(r for r in replays(page_source) if r.id == "replay-bounce-2")
     gone = {f"{engine}/{profile}": departure for engine, profile, departure, *_ in found.departures}
     assert gone["bullet/default"] is not None and gone["bullet/tuned"] is None and gone["chipmunk/tuned"] is None
@@ -534,7 +534,7 @@ def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
     assert "have no result" not in render(load_source(tmp_path))
 
 
-def test_the_page_of_a_run_in_which_nothing_could_be_asked_claims_nothing(tmp_path):
+def test_page_of_a_run_without_supported_cells(tmp_path):
     pytest.importorskip("pymunk")
     slots = [Slot("impact", (), 3, "chipmunk", profile, 1 / 240) for profile in ("default", "tuned")]
     store = Store(tmp_path)
@@ -568,7 +568,7 @@ def test_a_picture_keeps_its_pixels_and_says_where_it_is_from():
 
 
 @pytest.mark.parametrize("low", [1e-9, 1e-3])
-def test_the_guides_of_a_chart_have_the_slopes_they_claim_also_where_the_picture_ends(low):
+def test_slopes_of_chart_guides_at_the_edge(low):
     import altair
 
     from reports.page.figures import _guides
@@ -613,7 +613,7 @@ def test_equal_cures_are_said_once_and_others_point_at_the_first():
     assert [c.paste for c in found[1:4]] == ["", other.paste, "iterations = 31"]  # lines of its own stay with a scene
 
 
-def test_the_page_of_a_run_that_lacks_an_engine_that_the_last_bench_has_names_both(page_source):
+def test_page_of_a_run_without_an_engine_of_the_last_bench(page_source):
     """The run is of later, of one engine less than the bench of the same folder: the page shows both all the same."""
     gone = page_source.engines[-1]
     assert any(observation.slot.engine == gone for observation in page_source.bench.observations)

@@ -94,7 +94,7 @@ def test_every_link_of_the_page_leads_somewhere(browser, page_file):
                              "return ids.filter((id, k) => ids.indexOf(id) !== k); }") == []  # fmt: skip
 
 
-def test_a_field_of_the_matrix_leads_to_its_row_and_the_row_to_its_opened_check(browser, page_file):
+def test_link_from_matrix_field_to_row_and_opened_check(browser, page_file):
     with opened(browser, page_file) as page:
         page.locator(".matrix.overall a.h", has_text="known").first.click()
         page.locator("div:target .matrix a.h", has_text="known").first.click()
@@ -111,7 +111,7 @@ def test_what_a_link_leads_to_opens_without_javascript(browser, page_file):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_reason_of_a_worst_value_stands_in_the_findings_with_what_cures_it(browser, page_file):
+def test_reason_and_cure_of_the_worst_value_in_the_findings(browser, page_file):
     with opened(browser, page_file, "#bounce-2") as page:
         page.locator("#bounce-2 details.check").first.evaluate("node => node.open = true")
         page.locator("#bounce-2 .worst li", has_text="bullet/default").first.locator("a").click()
@@ -124,7 +124,7 @@ def picture(page):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_the_replay_plays_steps_jumps_and_magnifies_by_mouse_and_keyboard(browser, page_file):
+def test_replay_controls_by_mouse_and_keyboard(browser, page_file):
     with opened(browser, page_file, "#replay") as page:
         page.locator("#player").wait_for(state="visible")
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
@@ -260,7 +260,7 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_who_is_switched_off_leaves_tables_charts_and_replay_and_the_address_keeps_it(browser, page_file):
+def test_switched_off_engine_left_out_and_kept_in_the_address(browser, page_file):
     who, other = "bullet/default", "bullet/tuned"
     charts, rows = f".canvas [data-who='{who}']", f"#impact-2 tr[data-who='{who}']"
 
@@ -404,7 +404,7 @@ def test_the_text_of_the_explorer_can_be_read_on_a_phone(browser, page_file):
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_headline_picture_and_matrix_stand_before_the_filter_and_the_facts(browser, page_file, page_source, width):
+def test_headline_picture_and_matrix_before_filter_and_facts(browser, page_file, page_source, width):
     parts = ("h1", ".talk svg", ".matrix.overall", ".families", "#filter", ".facts")
     with opened(browser, page_file, width=width) as page:
         boxes = [page.locator(f"#verdicts {part}").first.bounding_box() for part in parts]

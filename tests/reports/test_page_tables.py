@@ -41,7 +41,7 @@ def test_the_cheapest_cell_names_one_its_cost_and_who_is_not_told_apart():
     assert cost._cheapest_cell([]) == cost.LevelCell("none reaches it", "", False, "")
 
 
-def test_the_legend_of_the_cost_charts_names_who_was_timed_in_the_order_of_the_page():
+def test_legend_of_cost_charts_in_page_order():
     """A profile without a rank is run for its verdicts, and its name above charts without it would be a riddle."""
     columns = [("bullet", "one"), ("mujoco", "matched"), ("mujoco", "tuned"), ("chipmunk", "tuned")]
     points = pd.DataFrame([{"engine": "mujoco", "profile": "tuned"}, {"engine": "bullet", "profile": "one"}])
@@ -51,7 +51,7 @@ def test_the_legend_of_the_cost_charts_names_who_was_timed_in_the_order_of_the_p
     assert cost._timed(source, {"work_points": points, "scaling": pd.DataFrame()}) == [columns[0], columns[2]]
 
 
-def test_a_table_of_levels_has_who_answers_and_names_who_cannot_be_asked():
+def test_table_of_iteration_levels_with_unsupported_engines():
     assert cost._level_tables(pd.DataFrame(columns=list(told("a"))), "cost", 0.0) == []
     rows = [
         told("chipmunk"), told("chipmunk", level=1e-6, cost=8e-3),
@@ -72,7 +72,7 @@ def test_a_table_of_levels_has_who_answers_and_names_who_cannot_be_asked():
     assert len(coarse.levels) == 1
 
 
-def test_a_mark_of_a_family_counts_what_fails_and_says_more_where_there_is_more():
+def test_failure_count_in_the_mark_of_a_family():
     passing, failing = MARKS[-1], "known"
     assert passing == "pass" and failing in MARKS
     mixed = family_mark(Field(Counter({failing: 2, passing: 3})), "there")
@@ -118,7 +118,7 @@ def slip(measured, holds=True, **changed):
     } | changed  # fmt: skip
 
 
-def test_of_the_receipts_of_a_quantity_the_one_farthest_from_what_is_declared_is_told():
+def test_receipt_farthest_from_its_declared_value():
     runs = [SimpleNamespace(receipts=(slip(0.5004567),)), SimpleNamespace(receipts=(slip(0.493456789),))]
     (line,) = fairness._receipts(runs)
     assert (line.quantity, line.asked, line.measured, line.holds) == ("friction", "0.5", "0.493457", "2/2")
@@ -152,7 +152,7 @@ def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monke
 
 
 @pytest.mark.parametrize(("standing", "covered"), [("known", True), ("known", False), ("new", True), (None, False)])
-def test_a_row_is_counted_for_an_entry_that_covers_it_and_by_which_it_is_known(standing, covered):
+def test_row_counted_for_the_entry_that_covers_it(standing, covered):
     slot = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
     entry = SimpleNamespace(covers=lambda asked: covered and asked == slot)
     assert fairness._is_about({"standing": standing, "slot": slot.as_dict()}, entry) is (
@@ -161,7 +161,7 @@ def test_a_row_is_counted_for_an_entry_that_covers_it_and_by_which_it_is_known(s
 
 
 @pytest.mark.parametrize(("missed", "judged", "length"), [(0, 8, 0), (1, 289, 1), (1, 20, 1), (26, 283, 2), (8, 8, 20)])
-def test_the_shade_of_a_field_is_the_share_that_fails_and_never_paper_where_one_does(missed, judged, length):
+def test_shade_of_a_matrix_field_by_failing_share(missed, judged, length):
     found = family_mark(Field(Counter({"known": missed, "pass": judged - missed})), "there")
     assert found.twentieths == length
     assert f".w{length}{{background:light-dark({heat('light', length)},{heat('dark', length)})}}" in heat_style()
@@ -170,7 +170,7 @@ def test_the_shade_of_a_field_is_the_share_that_fails_and_never_paper_where_one_
     assert found.percent == said[missed, judged]
 
 
-def test_time_steps_stand_above_both_ends_of_the_front_and_within_the_panel():
+def test_time_step_labels_at_both_ends_of_the_front():
     """Below a point lies the axis of cost, to the left of the first one that of the error."""
     points = [(1e-4, 1e-1, 1 / 60), (3e-4, 1e-3, 1 / 240), (1e-3, 1e-18, 1 / 960)]
     table = pd.DataFrame([

@@ -56,7 +56,7 @@ def test_engines_stay_apart_in_every_kind_of_vision(vision):
 
 
 @pytest.mark.parametrize("scheme", PAPER)
-def test_a_share_that_fails_is_a_shade_of_one_hue_on_which_its_number_can_be_read(scheme):
+def test_readable_number_on_the_shade_of_a_failing_share(scheme):
     """WCAG 2.2, 1.4.3: text needs 4.5:1, on every shade; from one shade to the next light runs one way only."""
     shades = [heat(scheme, k) for k in range(21)]
     assert shades[0] == PAPER[scheme]
@@ -87,7 +87,7 @@ def test_an_engine_that_is_set_apart_brings_no_colour():
     assert apart and not [name for name in apart if registry.facts(name).colour]
 
 
-def test_every_role_has_a_mark_and_every_engine_of_ours_a_colour_of_its_own():
+def test_marks_of_roles_and_colours_of_our_engines():
     assert set(MARKS) == set(ROLES)
     ours = [name for name in ENGINES if registry.is_ours(registry.entry(name))]
     assert not {ENGINES[name] for name in ours} & set(OTHERS) and len({ENGINES[name] for name in ours}) == len(ours)

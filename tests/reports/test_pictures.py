@@ -37,7 +37,7 @@ def browser(monkeypatch):
     return SimpleNamespace(page=page, found=found, opened=opened)
 
 
-def test_every_part_is_taken_in_light_and_dark_without_a_network_and_says_its_run(browser, tmp_path):
+def test_pictures_in_light_and_dark_without_a_network(browser, tmp_path):
     report = tmp_path / "report.html"
     pictures.main(str(report), str(tmp_path / "new" / "folder"))
     taken = sorted(path.name for path in (tmp_path / "new" / "folder").iterdir())

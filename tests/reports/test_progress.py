@@ -53,7 +53,7 @@ def test_the_line_counts_every_cell_that_ends_and_names_the_last(planned):
     assert run.finished and {o.slot for o in planned.store.observations(run)} == set(SLOTS)
 
 
-def test_kernels_that_are_missing_are_compiled_beside_the_cells_and_for_no_cluster(planned, monkeypatch, tmp_path):
+def test_missing_kernels_compiled_beside_the_cells(planned, monkeypatch, tmp_path):
     part = Part(key_of(SLOTS[0]), tuple(SLOTS), tmp_path / "mark")
     monkeypatch.setattr(progress, "missing", lambda slots: [part] if slots else [])
     _, said = planned(lambda todo, leave: map(answer, todo))
@@ -73,7 +73,7 @@ def test_who_writes_into_a_file_gets_no_line(planned):
     assert counted(said) == [] and "\x1b" not in said
 
 
-def test_what_was_left_is_said_by_reason_and_the_same_plan_goes_on_with_it_alone(planned):
+def test_resumed_plan_after_a_stop_with_reasons(planned):
     def cells(todo, leave):
         yield answer(todo[0])
         for slot in todo[1:3]:
@@ -112,7 +112,7 @@ def test_ctrl_c_says_that_nothing_is_lost_and_loses_nothing(planned):
     assert "1 of 4 cases done" in said
 
 
-def test_answers_that_are_known_are_kept_and_not_asked_again_and_others_are_not_taken(planned):
+def test_known_answers_kept_and_not_asked_again(planned):
     asked = []
     elsewhere = Slot("impact", (("v", 9.0),), 2, "toy", "default", 1 / 240)
     run, said = planned(

@@ -25,7 +25,7 @@ def run(*arguments):
         ("phlogiston", "crosscheck explain names that of a known failure"),
     ],
 )
-def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, hint):
+def test_unknown_reason_with_the_nearest_names(asked, hint):
     """Hundreds of names are no hint."""
     result = run("--prove", asked)
     assert result.exit_code == 2
@@ -34,7 +34,7 @@ def test_an_unknown_reason_is_refused_in_one_line_with_the_nearest_names(asked, 
     assert len(said) < 240
 
 
-def test_a_failure_on_record_has_the_command_that_tests_its_cause_if_there_is_an_experiment():
+def test_experiment_command_of_a_known_failure():
     """Else nothing printed would say by which name `--prove` knows a cause."""
     known, tested = findings_of("bullet"), {each.family for each in experiments_on("bullet")}
     found = {}
@@ -96,7 +96,7 @@ def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
     assert said == ["PROVEN", "NOT"] and "1 of 2 experiments confirm their cause" in result.stdout
 
 
-def test_a_name_with_a_slip_is_answered_with_the_nearest_and_not_with_all(page_folder):
+def test_misspelt_name_with_the_nearest_names(page_folder):
     said = run("--out", str(page_folder), "--scene", "bounc").stderr
     assert said.endswith("this run has no check of 'bounc', did you mean 'bounce'?\n")
 

@@ -80,7 +80,7 @@ def test_a_sound_engine_passes_and_what_it_cannot_be_asked_is_skipped(repository
     assert ("crosscheck: toy 1.0" in output and "the toy" in output) or "dimension" in output
 
 
-def test_a_known_finding_is_an_expected_failure_with_its_reason_and_a_new_one_fails_with_its_numbers(repository):
+def test_known_finding_as_xfail_and_new_one_as_failure(repository):
     output = repository("3.0", SLOW, options=(*ASK, "-k", "rebound_ratio and default"), status=1)
     assert "XFAIL" in output and "the toy moves no faster than 3 m/s" in output
     assert counts(output)["xfailed"] == 1 and counts(output)["failed"] >= 1  # the other cells are not listed
@@ -101,7 +101,7 @@ def test_a_finding_of_other_releases_that_passes_is_mended(repository):
 
 
 @pytest.mark.long
-def test_a_finding_of_other_releases_that_still_fails_is_expected_but_not_strictly(repository):
+def test_finding_of_other_releases_as_non_strict_xfail(repository):
     output = repository("3.0", SLOW, releases="<1.0", options=(*ASK, "-k", "rebound_ratio"), status=1)
     assert "as listed for <1.0" in output
 

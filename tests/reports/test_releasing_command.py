@@ -60,7 +60,7 @@ def call(*words, status=0):
     return done
 
 
-def test_every_release_is_asked_the_same_cells_and_each_is_told_in_a_line(monkeypatch, tmp_path):
+def test_same_cells_and_one_line_for_every_release(monkeypatch, tmp_path):
     asked = Asked(monkeypatch, lambda version, slot: dict(slot.params)["e"])
     done = call("releases", "chipmunk", "1.0..2.0", "impact", "--json", "--jobs", "3", "--out", str(tmp_path / "out"))
     effort = Effort(3, TIMEOUT, False, False)
@@ -82,7 +82,7 @@ def test_the_command_below_what_moved_finds_the_results_in_their_folder(monkeypa
     assert f"crosscheck compare chipmunk==1.1 chipmunk==2.0 --out {tmp_path}" in said
 
 
-def test_options_of_effort_reach_the_releases_and_times_are_taken_where_they_are_asked_for(monkeypatch, tmp_path):
+def test_effort_options_and_times_for_the_releases(monkeypatch, tmp_path):
     asked = Asked(monkeypatch, lambda version, slot: 0.5)
     more = ("--times", "--fresh", "--try", "--timeout", "7", "--out", str(tmp_path))
     done = call("releases", "chipmunk", "1.0", "impact", *more)
@@ -91,13 +91,13 @@ def test_options_of_effort_reach_the_releases_and_times_are_taken_where_they_are
     assert "chipmunk==1.0: not timed: it is asleep" in done.stderr
 
 
-def test_a_release_that_does_not_answer_makes_the_whole_incomplete_and_says_why(monkeypatch, tmp_path):
+def test_release_without_an_answer_makes_the_result_incomplete(monkeypatch, tmp_path):
     Asked(monkeypatch, lambda version, slot: None if version == "1.1" else 0.5)
     done = call("releases", "chipmunk", "1.0..2.0", "impact", "--out", str(tmp_path), status=4)
     assert "chipmunk==1.1: no wheel" in done.stderr and "chipmunk==2.0: 2 cases" in done.stderr
 
 
-def test_values_that_moved_are_asked_again_from_moved_starts_of_what_is_stored(monkeypatch, tmp_path):
+def test_moved_starts_only_for_changed_values(monkeypatch, tmp_path):
     more = [replace(SLOTS[0], ulp=1)]
     asked = Asked(monkeypatch, lambda version, slot: 0.5, starts={"1.1": more})
     call("releases", "chipmunk", "1.0..2.0", "impact", "--fresh", "--out", str(tmp_path))
@@ -136,11 +136,11 @@ def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path
     assert said in done.stderr
 
 
-def test_a_scene_has_the_checks_of_its_cases_and_those_that_judge_several_together():
+def test_scene_checks_of_single_and_combined_cases():
     assert {"creep", "threshold"} <= set(releasing._metrics(replace(SLOTS[0], scene="incline", params=())))
 
 
-def test_bisection_asks_the_ends_and_what_lies_between_and_names_both_sides(monkeypatch, tmp_path):
+def test_bisection_between_two_ends_with_both_named(monkeypatch, tmp_path):
     asked = Asked(monkeypatch, lambda version, slot: 0.9 if version == "2.0" else dict(slot.params)["e"])
     words = ("bisect", "chipmunk", "1.0..2.0", "impact", "--check", "rebound_ratio", "--out", str(tmp_path))
     plain = json.loads(call(*words, "--json").stdout)

@@ -35,7 +35,7 @@ def directions(dimension, count=200):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_capsule_reaches_its_radius_about_its_segment_in_every_direction(dimension):
+def test_reach_of_a_capsule_in_every_direction(dimension):
     points, aside = corners(Capsule(LENGTH, RADIUS), dimension), directions(dimension)
     exact = LENGTH * np.abs(aside[:, 0]) + RADIUS
     found = towards(points, aside)
@@ -64,7 +64,7 @@ def test_a_polygon_and_a_hull_are_their_own_corners():
     assert corners(Hull(solid), 3) == pytest.approx(np.array(solid))
 
 
-def test_round_bodies_boxes_and_faces_are_told_by_their_sizes_and_where_they_start():
+def test_replay_shapes_by_size_and_start():
     told = {"name": "it", "start": [0.5, 1.5, 0.25]}
     place = {"pose": (0.5, 1.5, 0.25)}
     assert drawn(Disc(RADIUS), 2, **place) == told | {"type": "ball", "radius": RADIUS, "dimension": 2}

@@ -74,7 +74,7 @@ def test_a_replay_gives_back_every_number_to_half_of_its_level(dimension):
     assert levels == []
 
 
-def test_what_should_stay_stands_still_wherever_it_is_and_what_should_move_along_one_axis_does_not():
+def test_replay_motion_still_or_along_one_axis():
     body = Body("one", Box((0.25, 0.25)), 1.0, 0.1)
     scene = Scene("toy", 1, 2, (body,), (), (0.0, 0.0), 1.0, {})
     run = recording(2, 8, 1)

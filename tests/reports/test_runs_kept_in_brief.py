@@ -52,7 +52,7 @@ def test_a_run_that_has_been_judged_is_not_judged_again(stored, monkeypatch):
     assert none == (pytest.approx(0.25), 0, 0, 0), "no row is not the same as not judged"
 
 
-def test_a_run_is_judged_by_the_first_who_reads_it_and_again_where_code_or_results_are_others(stored, monkeypatch):
+def test_run_judged_once_and_again_after_changed_code_or_results(stored, monkeypatch):
     store, run, _ = stored
     asked = []
     monkeypatch.setattr(brief, "rows_of", lambda *given: asked.append(given) or rows_of(*given))
@@ -77,7 +77,7 @@ def test_a_damaged_result_is_told_to_each_reader(stored):
             assert judged(store, run).rows == []
 
 
-def test_a_run_that_goes_on_is_judged_each_time_and_a_deleted_one_is_forgotten(stored, monkeypatch):
+def test_unfinished_run_judged_each_time_and_deleted_run_dropped(stored, monkeypatch):
     store, run, _ = stored
     asked = []
     monkeypatch.setattr(brief, "rows_of", lambda *given: asked.append(given) or rows_of(*given))
@@ -128,7 +128,7 @@ def test_what_crashed_has_no_error_and_counts_no_check():
     assert brief._error(cell(outcome=Outcome.INVALID)) is None
 
 
-def test_a_summary_of_other_code_or_a_spoilt_one_is_none_and_a_later_one_takes_its_place(tmp_path, monkeypatch):
+def test_summary_of_other_code_or_damaged_replaced(tmp_path, monkeypatch):
     one, other = Summary({PANEL: {"a": (0.5, 1, 2, 1)}}, {"chipmunk": "1"}, {PANEL: (2.5, "bullet")}), Summary({}, {})
     kept = Kept(tmp_path)
     kept.put("run", other)
@@ -159,7 +159,7 @@ def test_where_nothing_can_be_kept_nothing_is_and_nothing_ends(tmp_path):
 
 @pytest.mark.parametrize(("tolerances", "mends"), [(0.5, True), (0.9, True), (1.1, False), (1.9, False)])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_moved_start_mends_a_check_that_it_passes_and_none_that_it_misses_by_little(tolerances, mends, side):
+def test_moved_start_that_passes_and_one_that_narrowly_fails(tolerances, mends, side):
     (row,) = [row for row in rows_of("", [cell()]) if row.metric == "rebound_ratio"]
     assert row.physics == "fail" and row.tolerance > 0.0
     moved = cell(replace(SLOT, ulp=3), ratio=row.truth + side * tolerances * row.tolerance)

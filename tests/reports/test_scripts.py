@@ -436,7 +436,7 @@ def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
     assert re.search(r"apex\[1\] = 0.25 m within [\d.e+-]+ m: ", done.stdout)
 
 
-def test_the_head_names_a_scene_file_by_its_path_where_it_points_to_all_checks_and_to_who_judges(tmp_path):
+def test_script_head_with_scene_file_path_and_judge(tmp_path):
     """The head of a script names the scene file by its path, in quotes where the path has spaces."""
     pytest.importorskip("pymunk")
     (tmp_path / "own files").mkdir()

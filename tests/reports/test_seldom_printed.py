@@ -91,7 +91,7 @@ def test_sensitivity_is_asked_of_checks_alone(monkeypatch):
 
 
 @pytest.mark.parametrize(("most", "found"), [(80, "1.50 +- 0.00   1.00 +- 0.00"), (20, "-")])
-def test_costs_of_piles_have_an_exponent_where_there_are_two_sizes_or_more(monkeypatch, most, found):
+def test_exponent_of_pile_cost_from_two_sizes(monkeypatch, most, found):
     """Cost n^1.5 when cut at events, n when fixed."""
 
     def laps(kind, limit, seed):
@@ -108,7 +108,7 @@ def test_costs_of_piles_have_an_exponent_where_there_are_two_sizes_or_more(monke
 NAMES = {"purpose": "bodies", "scene": "pyramid", "dimension": 2, "engine": "bullet", "profile": "tuned"}
 
 
-def test_cost_over_size_is_that_of_the_largest_that_ran_and_says_what_did_not():
+def test_pile_cost_of_the_largest_size_that_ran():
     sizes = [{**NAMES, "x": x, "per_step": 1e-6 * x * x, "void": ""} for x in (40.0, 10.0, 20.0)]
     lost = [{**NAMES, "x": x, "per_step": math.nan, "void": f"too slow at {x:g}"} for x in (160.0, 80.0)]
     other = [{**row, "engine": "chipmunk"} for row in sizes]
@@ -124,7 +124,7 @@ def test_cost_over_size_is_that_of_the_largest_that_ran_and_says_what_did_not():
     assert said[-1].endswith("2.00 +- 0.02") and "left out" not in said[1]
 
 
-def test_the_cost_of_the_binding_has_a_line_an_engine_in_the_order_of_all_tables():
+def test_binding_cost_per_engine_in_table_order():
     rows = [
         {"dimension": 2, "engine": engine, "profile": "tuned", "scene": scene, "sampled": sampled,
          "per_step": 1e-6 * (1 + sampled), "void": "it hung" if scene == "flight" and engine == "bullet" else ""}
@@ -178,7 +178,7 @@ def changed(kind=Kind.FLIP, worse=True):
      (((0, 1), (2, 3)), "not the only change of this check: also 1.0 -> 1.1, 1.2 -> 2.0"),
      ((), "the only change of this check: every release ran")],
 )  # fmt: skip
-def test_a_bisection_says_what_changed_who_was_silent_and_how_to_see_it_again(others, said):
+def test_bisection_output_with_change_silent_releases_and_command(others, said):
     found = Found(1, 3, (0, 3, 1), {2: "it cannot be imported"}, changed(), others)
     again = releasing._commands("toy", "1.1", "2.0", SLOT, Path("else where"))
     lines = told_releases.found_as_text(told_releases.found_as_plain(found, "toy", VERSIONS, again)).splitlines()
@@ -206,7 +206,7 @@ def test_a_bisection_says_what_changed_who_was_silent_and_how_to_see_it_again(ot
     [("", "creep of stack is the same in 1.0 and 2.0", 0),
      ("release 0 has no answer", "1.0 has no answer", 4), ("release 3 has no answer", "2.0 has no answer", 4)],
 )  # fmt: skip
-def test_where_nothing_was_found_it_says_so_and_whether_that_is_an_answer(capsys, reason, said, status):
+def test_bisection_output_without_a_change(capsys, reason, said, status):
     for as_json in (False, True):
         with pytest.raises(SystemExit) as left:
             releasing._say_unchanged(Unchanged(reason), VERSIONS, "creep", "stack", as_json)
@@ -215,7 +215,7 @@ def test_where_nothing_was_found_it_says_so_and_whether_that_is_an_answer(capsys
         assert json.loads(out) == {"found": None, "reason": said} if as_json else out == f"{said}\n"
 
 
-def test_environments_are_listed_with_what_is_wrong_and_removed_by_name_or_all(monkeypatch):
+def test_environments_listed_with_faults_and_removed(monkeypatch):
     receipt = {"python": "3.11.4", "packages": {"numpy": "2.0"}, "files": "abc"}
     own = [Environment(Path("/x/toy-1.0"), receipt), Environment(Path("/x/toy-2.0"), {}),
            Environment(Path("/x/toy-3.0"), {})]  # fmt: skip
@@ -240,7 +240,7 @@ def test_environments_are_listed_with_what_is_wrong_and_removed_by_name_or_all(m
     assert call(*listed, "--remove", "all").stdout == "0 environments in /x\n"
 
 
-def test_rows_that_moved_between_releases_are_counted_by_what_became_of_them():
+def test_moved_rows_between_releases_counted_by_outcome():
     def step(*kinds):
         return history.Step("1.0", "1.1", Moved(tuple(changed(*kind) for kind in kinds)))
 
@@ -259,7 +259,7 @@ def test_rows_that_moved_between_releases_are_counted_by_what_became_of_them():
 # ---- cells posed otherwise -------------------------------------------------------------------------------------------
 
 
-def test_one_cell_a_profile_is_posed_otherwise_the_scene_s_own_unless_it_is_named():
+def test_one_transformed_cell_per_profile():
     slots = [Slot("stack", (("n", n),), 2, "chipmunk", profile, dt, iterations, ulp)
              for n, profile, dt, iterations, ulp in (
                  (3.0, "tuned", 1 / 240, None, 0), (2.0, "tuned", 1 / 240, None, 0), (2.0, "default", 1 / 240, 4, 0),
@@ -291,7 +291,7 @@ def test_what_changed_an_answer_is_said_and_as_data_has_its_cell(monkeypatch, ca
 # ---- health, findings, pictures, citing ------------------------------------------------------------------------------
 
 
-def test_doctor_says_of_each_engine_and_package_what_it_is_and_where_and_what_is_wrong(monkeypatch):
+def test_doctor_lines_of_engines_and_packages(monkeypatch):
     data = {
         "machine": {"cpu": "a [fast] one", "cores": 4}, "commit": "", "executable": "/x/python",
         "engines": [{"name": "toy", "version": "1.2", "status": "installed", "reason": ""},
@@ -313,7 +313,7 @@ def test_doctor_says_of_each_engine_and_package_what_it_is_and_where_and_what_is
     assert said[-1] == "no problem found" and "commit abc" in said and "compiled kernels /z" in said
 
 
-def test_before_a_family_is_accepted_its_rows_are_counted_and_the_first_three_told():
+def test_rows_counted_before_a_family_is_accepted():
     family = Family("f-1", ("default", "tuned"), "stack", ("creep",), "", "", ">=1")
     keys = [("default", "stack", "2", "", f"n={n}", "", f"creep[{n}]") for n in range(5)]
     keys += [("tuned", "stack", "3", "4", "", "", "drift")]
@@ -332,7 +332,7 @@ def test_before_a_family_is_accepted_its_rows_are_counted_and_the_first_three_to
     assert accepting._details(Proposed(family, same=values)) == "cause f-1: default, tuned on stack"
 
 
-def test_a_stack_that_sinks_is_a_tile_with_its_depth_in_words_and_dark_where_it_is_deep():
+def test_tile_of_a_sinking_stack_with_its_depth():
     rows = [Starved(10, 1, 9.0, 1.6, 1.0, False), Starved(10, 20, 0.0077, 0.002, 0.15, True),
             Starved(10, 40, 0.021, 0.002, 0.15, True), Starved(1, 100, 0.0, 0.0, 0.0, True)]  # fmt: skip
     tiles = starved.table(rows)

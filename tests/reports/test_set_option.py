@@ -65,7 +65,7 @@ def test_it_is_shown_under_its_name_at_any_width(ran, width, monkeypatch):
     assert PROFILE in text and all(len(line.rstrip()) <= width for line in text.splitlines() if "/" not in line)
 
 
-def test_a_name_that_leaves_no_room_for_a_scene_has_a_line_for_each_setting():
+def test_lines_per_setting_under_a_long_scene_name():
     """A count that is cut would be another count."""
     name = "default+cone=elliptic+solimp=0.99,0.99,0.001,0.5,2+solref=0.004,1"
     rows = [
@@ -117,7 +117,7 @@ def test_what_explain_cannot_find_is_one_line(ran):
         ("damping=much", "set: damping=much: must be a number"),
     ],
 )
-def test_explain_says_of_a_setting_that_there_is_not_that_it_is_none_as_run_does(ran, asked, said):
+def test_explain_of_an_unknown_setting_as_in_run(ran, asked, said):
     done = call("explain", "chipmunk/default/bounce/apex", "--set", asked, "--out", ran[0], status=2)
     assert said in done.output and len(done.output.splitlines()) == 1
 

@@ -55,7 +55,7 @@ PARTS = [Part(("toy", profile, 2), (), Path("mark")) for profile in ("tuned", "[
 
 
 @pytest.mark.parametrize(("beside", "others"), [(False, ""), (True, "; other engines run meanwhile")])
-def test_compilation_is_announced_with_its_time_and_each_part_when_it_is_done(console, monkeypatch, beside, others):
+def test_compilation_announced_with_time_and_parts(console, monkeypatch, beside, others):
     ticks = iter([100.0, 111.0, 185.0])
     monkeypatch.setattr(stages.time, "monotonic", lambda: next(ticks))
     done = stages.compiling(PARTS, console, beside)

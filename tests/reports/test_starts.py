@@ -46,7 +46,7 @@ def imported(*calls):
     return dict(zip(calls, (set(json.loads(line)) for line in done.stdout.splitlines()), strict=True))
 
 
-def test_help_and_a_command_that_there_is_not_import_no_command_and_no_numpy():
+def test_help_and_unknown_command_without_imports():
     for found in imported("--help", "rnu", "--version").values():
         assert {name for name in found if name.startswith("reports.command.")} == {
             f"reports.command.{name}" for name in ("group", "files", "statuses")
@@ -54,7 +54,7 @@ def test_help_and_a_command_that_there_is_not_import_no_command_and_no_numpy():
         assert not found & {"numpy", "adapters", "validation", "rich"}
 
 
-def test_commands_that_run_nothing_import_no_engine_and_no_large_library():
+def test_commands_without_runs_import_no_engine():
     calls = ["describe bounce", "describe bonce", "list scenes", "run --no-such-option", "list engines", "list suites",
              "ask my ball does not bounce", "ask mujoco grip slips", "describe bullet",
              "run bonce --engine mujoco",

@@ -105,7 +105,7 @@ def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
     assert one_line(result).endswith("it is not a regular file")
 
 
-def test_a_parameter_that_is_given_twice_is_refused_and_the_way_to_ask_both_is_named(tmp_path):
+def test_repeated_parameter_refused_with_the_list_form(tmp_path):
     result = call(*SMALL, "--param", "e=.5", "--param", "e=.6", "--out", tmp_path)
     assert result.exit_code == statuses.WRONG_CALL
     assert one_line(result) == "crosscheck: param: e is given twice; crosscheck sweep --grid runs several values"
@@ -171,9 +171,7 @@ def test_a_reader_that_goes_away_does_not_change_the_status(arguments):
     ("arguments", "status"),
     [("list scenes", statuses.FINE), ("explain nothing", statuses.WRONG_CALL), ("run-cell", statuses.WRONG_CALL)],
 )
-def test_a_stream_that_the_caller_has_closed_is_nothing_to_read_and_nowhere_to_write(
-    tmp_path, closed, arguments, status
-):
+def test_stream_closed_by_the_caller(tmp_path, closed, arguments, status):
     """A closed stdout was a traceback with status 1, which says that a verdict is bad."""
     said = tmp_path / "said"
     line = f'exec 3>"{said}"; "{sys.executable}" -m reports.command {arguments} </dev/null >&3 2>&3 {closed}'
@@ -198,7 +196,7 @@ def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no ulimit on Windows")
-def test_a_shell_that_allows_too_little_memory_is_told_so_and_stores_no_crashes(tmp_path):
+def test_memory_limit_of_the_shell_told_without_crashes(tmp_path):
     command = [sys.executable, "-m", "reports.command", *SMALL, "--out", str(tmp_path)]
     script = 'ulimit -v "$0" && exec "$@"'
     done = subprocess.run(["bash", "-c", script, str(2**20), *command], cwd=ROOT, capture_output=True, text=True)
@@ -257,5 +255,5 @@ def test_a_bench_of_which_no_cell_has_a_result_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("asked", "status"), [((False,), 0), ((True,), 1), ((False, False), 4), ((True, False), 1), ((True, True), 1)]
 )
-def test_a_run_that_is_complete_unless_said_otherwise_ends_by_its_alarms(asked, status):
+def test_status_of_a_complete_run_by_its_alarms(asked, status):
     assert statuses.verdict(*asked) == status

@@ -66,7 +66,7 @@ def shown(rows, width, **more):
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
-def test_the_matrix_of_the_whole_quick_suite_stands_in_the_first_thirty_lines(width):
+def test_matrix_in_the_first_thirty_lines_of_the_quick_suite(width):
     lines = shown(quick_suite(), width)
     assert max(map(len, lines)) <= width
     head = lines[:30]
@@ -98,14 +98,14 @@ def test_a_sweep_over_iterations_is_counted_apart_from_the_profile():
     assert "3 of 9 fail" in "\n".join(shown(rows, 80))
 
 
-def test_an_answer_that_never_changes_is_told_in_one_clause_with_its_cure():
+def test_constant_answer_in_one_clause_with_its_cure():
     rows = [row("impact", 3, "mujoco", "default", "explained", 0.1 + 0.001 * e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
     rows += [row("impact", 3, "mujoco", "tuned", "pass", e, e, e=e, v=1.0) for e in (0.2, 0.5, 1.0)]
     (answer,) = answers(rows)
     assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101, whatever e is; profile tuned fixes it"
 
 
-def test_a_parameter_is_named_only_if_the_truth_of_one_number_follows_it():
+def test_parameter_named_only_if_the_truth_depends_on_it():
     """Numbers of one cell have truths of their own, whatever its parameters are."""
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1, truth, e=e, v=1.0) | {"metric": f"restitution[{i}]"}
             for e in (0.5, 1.0) for i, truth in ((1, 0.3), (2, 0.9))]  # fmt: skip
@@ -122,7 +122,7 @@ def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
     assert answer.cure == "no other profile was run in this case; crosscheck cure bullet bounce searches for settings"
 
 
-def test_a_number_of_a_scene_file_is_told_by_its_name_and_where_to_search(tmp_path):
+def test_number_of_a_scene_file_with_name_and_search_command(tmp_path):
     """A file has no parameters that a truth could follow."""
     path = tmp_path / "a.toml"
     path.write_text(FALL)
@@ -158,7 +158,7 @@ def test_a_number_of_a_scene_file_is_told_by_its_name_and_where_to_search(tmp_pa
         ("conveyor", "pull", -0.5, "is held back by 0.5; true: is pulled by 2"),
     ],
 )
-def test_a_direction_is_told_in_words_and_not_by_a_sign_that_contradicts_them(scene, metric, value, words):
+def test_direction_in_words_without_a_sign(scene, metric, value, words):
     truth = 0.0 if metric == "creep" else -3.0 if words.endswith("instead of 3") else 2.0
     (answer,) = answers(
         [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": scene, "metric": metric}]
@@ -365,7 +365,7 @@ def two_engines(tmp_path_factory):
     return out, result.stdout
 
 
-def test_a_run_says_which_engine_to_use_for_stacks_how_wrong_the_bounce_is_and_the_cure(two_engines):
+def test_run_advice_for_stacks_and_bounce_with_the_cure(two_engines):
     _, text = two_engines
     lines = text.splitlines()
     head, rest = lines[:30], " ".join(" ".join(lines).split())
@@ -398,7 +398,7 @@ def test_a_store_is_opened_once(two_engines, monkeypatch, arguments):
     assert len(opened) == 1
 
 
-def test_what_is_shown_ends_with_the_path_of_the_report_where_there_is_one(two_engines):
+def test_output_ends_with_the_report_path(two_engines):
     out, text = two_engines
     assert "report:" not in text
     report = Path(out) / "report.html"
@@ -439,7 +439,7 @@ def test_findings_lists_every_failing_row_once_and_filters(two_engines):
     assert every[0]["worst"]["metric"].partition("[")[0] in text and max(map(len, text.splitlines())) <= 100
 
 
-def test_explain_says_truth_tolerance_reason_and_a_cure_that_can_be_pasted(two_engines):
+def test_explain_with_truth_tolerance_reason_and_cure(two_engines):
     out, _ = two_engines
     text = call("explain", "mujoco/default/bounce/apex", "--out", out).stdout
     for word in (
@@ -555,14 +555,14 @@ def test_a_run_is_judged_once_for_all_commands(two_engines, monkeypatch):
         ("toy/tuned/my/a b", {"scene": "my", "metric": "a b"}),
     ],
 )  # fmt: skip
-def test_a_row_is_named_by_the_path_or_the_name_of_its_scene_file_as_well(name, found):
+def test_row_named_by_path_or_name_of_its_scene_file(name, found):
     """Paths have slashes, and a hash that nobody types."""
     scenes = {"bounce", "/my/a b.toml@0123abcd", "drop.json@89abcdef", "/my/bounce.toml@11111111",
               "two.toml@22222222", "/my/two.toml@33333333"}  # fmt: skip
     assert showing.named_by(name, scenes) == {"engine": "toy", "profile": "tuned", **found}
 
 
-def test_a_name_that_several_scene_files_of_a_run_have_is_refused_with_their_paths():
+def test_ambiguous_scene_file_name_refused_with_paths():
     scenes = {"/my/ball.toml@0123abcd", "/your/ball.json@89abcdef"}
     with pytest.raises(SceneError, match=r"several files called 'ball': /my/ball\.toml, /your/ball\.json"):
         showing.named_by("toy/tuned/ball/energy_growth", scenes)
@@ -641,7 +641,7 @@ def test_of_numbers_that_are_alike_at_a_glance_the_difference_is_told(scene, met
     assert answer.wrong == f"{words} (e=1 v=1)"
 
 
-def test_commands_that_are_named_at_the_end_find_the_results_that_were_shown(tmp_path):
+def test_final_commands_find_the_shown_results(tmp_path):
     rows = [row("impact", 2, "bullet", "tuned", "new", 0.1)]
     for out, said in ((Path("crosscheck-out"), ""), (None, ""), (tmp_path / "a b", f" --out '{tmp_path}/a b'")):
         lines = shown(rows, 200, out=out)
@@ -675,7 +675,7 @@ def test_what_is_shown_says_which_run_it_is_and_names_a_larger_one(tmp_path):
     assert alone.exit_code == 0 and json.loads(alone.stdout)["run"] == whole
 
 
-def test_a_profile_whose_measurement_is_broken_is_no_profile_that_does_no_better():
+def test_profile_with_a_broken_measurement_not_compared():
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1), row("impact", 2, "mujoco", "tuned", "known", 0.1)]
     assert answers(rows)[0].cure.startswith("no other profile does better")
     rows[1] |= {"outcome": "invalid", "physics": None, "standing": None, "reason": "receipt mass"}
@@ -686,6 +686,6 @@ def test_a_profile_whose_measurement_is_broken_is_no_profile_that_does_no_better
     ("engine", "profile", "searched"),
     [("mujoco", "default", True), ("mujoco", "tuned", False), ("reference", "classical", False)],
 )
-def test_a_search_is_offered_only_where_it_starts_from_the_profile_that_fails(engine, profile, searched):
+def test_search_offered_only_from_the_failing_profile(engine, profile, searched):
     (answer,) = answers([row("impact", 2, engine, profile, "known", 0.1, e=0.77, v=1.0)])
     assert ("crosscheck cure" in answer.cure) == searched

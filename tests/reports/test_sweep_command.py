@@ -24,7 +24,7 @@ def call(*words, status=0):
     return done
 
 
-def test_a_dimension_that_an_engine_does_not_have_is_no_line_of_the_summary(tmp_path):
+def test_unsupported_dimension_absent_from_the_summary(tmp_path):
     told = call("sweep", "impact", "--engine", "chipmunk", "--profile", "tuned", "--out", tmp_path).output
     assert "impact 2-D" in told and "impact 3-D" not in told
     assert "7 cases" in told and "unsupported: 1 case, which the engine cannot run" in told
@@ -100,7 +100,7 @@ def test_without_a_scene_there_is_nothing_to_vary(tmp_path):
     assert "needs the name of a scene" in call("sweep", "--list", "e=1", "--out", tmp_path, status=2).output
 
 
-def test_a_sweep_has_a_line_per_cell_and_the_same_command_makes_it_again(tmp_path):
+def test_sweep_line_per_cell_and_repeatable_command(tmp_path):
     words = (*CELL, "--grid", "e=0:1:3", "--list", "v=1,2", "--jobs", 1, "--out", tmp_path)
     assert call(*words, "--dry-run").stdout == "6 cases\n"
     told = json.loads(call(*words, "--json").stdout)

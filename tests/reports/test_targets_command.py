@@ -45,7 +45,7 @@ def call(*arguments):
     return CliRunner().invoke(main, ["bench", "--targets", *map(str, arguments)])
 
 
-def test_the_table_has_a_line_for_each_opponent_and_at_most_a_hundred_columns():
+def test_targets_table_by_opponent_within_a_hundred_columns():
     told = shown.lines(rows())
     assert max(map(len, told)) <= 100 and all(line == line.rstrip() for line in told)
     plain = [" ".join(line.split()) for line in told]

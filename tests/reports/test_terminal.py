@@ -143,7 +143,7 @@ def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch)
     assert flat(said).count("(2) scene_number_40, scene_number_41") == 1
 
 
-def test_markdown_holds_no_html_and_no_field_that_ends_in_text_from_outside(folder):
+def test_markdown_without_html_or_open_outside_text(folder):
     evil = "<img src=x onerror=alert(1)> & a|b"
     (row, *_) = [row.as_dict() for row in exports.load_rows(folder) if row.physics == "fail"]
     row |= {"scene": f"{evil}.toml@0a1b2c3d", "reason": evil, "because": evil, "engine": "toy<b>", "profile": evil}
@@ -173,7 +173,7 @@ def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
     assert ["as above" in lines[check["name"]] for check in plain[1:]] == shared
 
 
-def test_checks_are_listed_a_line_each_and_say_where_their_reasons_stand():
+def test_one_line_per_check_with_the_place_of_its_reason():
     """At 80 columns the reasons made 1801 lines of some 300."""
     plain = json.loads(call("list", "checks", "--json").stdout)
     told = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["list", "checks"]).stdout.splitlines()
@@ -191,7 +191,7 @@ WIDE = [
 
 
 @pytest.mark.parametrize("words", WIDE, ids=" ".join)
-def test_what_is_listed_and_described_fits_every_width_and_is_cut_off_at_none(words):
+def test_list_and_describe_at_every_width_uncut(words):
     sizes = []
     for width in (80, 100, 120):
         told = CliRunner(env={"COLUMNS": str(width)}).invoke(main, list(words)).stdout.splitlines()

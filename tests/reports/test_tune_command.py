@@ -40,7 +40,7 @@ def lines(text):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_all_groups_are_searched_from_the_tuned_profile_in_all_dimensions_of_the_engine(tune):
+def test_tuning_of_all_groups_in_all_dimensions(tune):
     done, asked = tune("chipmunk")
     assert done.exit_code == 0 and asked == [("chipmunk", "tuned", name, 1, (2,)) for name in groups()]
     done, asked = tune("bullet", "--group", "slide", "--jobs", "2")
@@ -60,7 +60,7 @@ def test_where_nothing_is_better_that_is_said_and_the_status_is_0(tune):
     ]
 
 
-def test_what_is_better_is_said_with_what_was_held_out_and_the_status_is_1(tune):
+def test_better_tuning_with_held_out_cells_and_status_1(tune):
     done, _ = tune("chipmunk", "--group", "slide", "--json", changes={"slop": 0.1}, needless={"bias": 0.0})
     assert done.exit_code == 1
     assert lines(done.stderr)[2:] == [
@@ -74,7 +74,7 @@ def test_what_is_better_is_said_with_what_was_held_out_and_the_status_is_1(tune)
     assert [trial["changes"] for trial in plain["trials"]] == [{"slop": 0.1}, {"slop": 0.2}]
 
 
-def test_a_group_that_there_is_not_and_an_engine_without_candidates_are_refused_in_a_line(tune):
+def test_unknown_group_and_engine_without_candidates_refused(tune):
     done, asked = tune("chipmunk", "--group", "nosuch")
     assert done.exit_code == 2 and asked == []
     assert "'nosuch' is not one of" in done.stderr and all(name in done.stderr for name in groups())
@@ -101,7 +101,7 @@ def measured(monkeypatch, tmp_path):
     return run
 
 
-def test_what_decides_a_cure_is_said_and_kept_and_the_status_tells_whether_it_is_what_was_listed(measured, tmp_path):
+def test_decisive_settings_kept_and_compared_with_the_list(measured, tmp_path):
     found = [cured("stack", "slop"), cured("impact", "sweeps")]
     done = measured(found[::-1], found)
     assert done.exit_code == 0
@@ -114,7 +114,7 @@ def test_what_decides_a_cure_is_said_and_kept_and_the_status_tells_whether_it_is
     assert [(each["scene"], each["parts"][0]["setting"]) for each in plain] == [("stack", "slop"), ("impact", "sweeps")]
 
 
-def test_an_engine_without_cures_and_a_list_that_is_no_longer_true_are_refused_in_a_line(measured, monkeypatch):
+def test_engine_without_cures_and_outdated_list_refused(measured, monkeypatch):
     def stale(engine, jobs):
         raise ValueError("the profile changes no setting of stack")
 

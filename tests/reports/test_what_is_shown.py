@@ -97,7 +97,7 @@ def test_a_number_is_shown_as_it_is(value, digits, text):
     assert number(value, digits) == text
 
 
-def test_a_finding_says_value_truth_tolerance_reason_and_how_to_reproduce_it():
+def test_finding_with_value_truth_tolerance_and_command():
     line = finding_line(ROW.as_dict())
     assert line.startswith("FAIL, new: chipmunk/tuned impact 2-D e=0.8: ")
     for text in ("rebound_ratio 0.123457", "truth 0.8", "tolerance 1.0e-12", "exact law", "nobody knew"):

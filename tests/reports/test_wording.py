@@ -141,7 +141,7 @@ def test_a_command_without_parameters_names_the_first_with_its_default():
     assert [value for name, value in options if name == "--param"] == [f"{first.name}={first.default:.12g}"]
 
 
-def test_the_id_of_a_row_is_eight_digits_of_what_was_asked_and_of_nothing_else():
+def test_row_id_of_eight_digits_from_the_question_alone():
     row = {"slot": SLOT, "metric": "rebound_ratio", "value": 0.1, "run": "one"}
     text = json.dumps([SLOT, "rebound_ratio"], sort_keys=True)
     assert row_id(row) == hashlib.sha256(text.encode()).hexdigest()[:8]

@@ -57,7 +57,7 @@ def values(canonical: CanonicalScene, scene: Scene, found: Trajectory) -> dict[s
 @pytest.mark.few(8)
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_what_would_be_seen_if_it_were_large_is_not_passed_over_where_it_is_no_number(name):
+def test_motions_that_are_not_a_number_not_passed_over(name):
     """A sample that changes a metric if it is far off leaves no value of it if it is NaN: that would read as good."""
     canonical = CATALOGUE[name]
     scenes = (canonical.scene(dimension, params) for _, dimension, params in cells(canonical))

@@ -6,5 +6,5 @@ from telling import check
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_what_cells_are_made_of_their_truths_and_bounds_are_as_they_were_kept(name):
+def test_scenes_truths_and_bounds_against_the_kept_table(name):
     check(name, SCENES[name])

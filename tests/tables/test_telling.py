@@ -13,7 +13,7 @@ CELLS = {
 }
 
 
-def test_a_table_is_read_as_it_was_written_and_later_cells_say_what_differs():
+def test_table_read_back_with_differences_of_later_cells():
     text = as_text(CELLS)
     assert from_text(text) == CELLS
     assert text.count("mass = 1") == 1 and f"says = {ABSENT}" in text
@@ -76,7 +76,7 @@ def test_what_the_first_spatial_cell_changes_is_expected_of_later_ones():
     assert text.split("[3-D e=1]\n")[1].split("\n[")[0] == "place = (0, 0, 1)"
 
 
-def test_a_screen_agrees_where_only_last_digits_differ_and_tells_lines_that_are_others():
+def test_screen_agreement_to_last_digits_and_other_lines():
     kept = "row a\nerror 1.00000001e-3 m\nend\n"
     assert screen_differences("row a\nerror 1.00000002e-3 m\nend\n", kept) == []
     assert screen_differences("row a\nerror 2e-3 m\nend\n", kept) == ["-error 1.00000001e-3 m", "+error 2e-3 m"]

@@ -40,7 +40,7 @@ def listed(*families, **members):
     return Findings("nameless", {family.id: family for family in families}, (), entries)
 
 
-def test_a_new_row_is_listed_with_value_and_band_only_once_its_family_is_accepted():
+def test_new_row_listed_only_after_its_family_is_accepted():
     proposal = propose(rows(), "nameless", listed(FAMILY))
     (change,) = proposal.changes
     assert (list(change.new), change.asks, change.is_draft) == ([KEY], True, False)
@@ -48,7 +48,7 @@ def test_a_new_row_is_listed_with_value_and_band_only_once_its_family_is_accepte
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, 0.5, pytest.approx(4e-3))}
 
 
-def test_rows_without_a_family_become_a_draft_that_cannot_be_accepted_without_a_reason():
+def test_rows_without_a_family_as_a_draft_that_needs_a_reason():
     proposal = propose(rows(), "nameless", None)
     (change,) = proposal.changes
     assert change.is_draft and change.family.profiles == ("default",) and change.family.metrics == ("creep",)
@@ -56,7 +56,7 @@ def test_rows_without_a_family_become_a_draft_that_cannot_be_accepted_without_a_
     assert accepted(proposal, [change.family.id]) == {}
 
 
-def test_a_drifted_row_keeps_its_old_entry_until_its_family_is_accepted_again():
+def test_drifted_row_keeps_its_entry_until_accepted():
     old = Finding(FAMILY, 0.51, 1e-3)
     proposal = propose(rows(), "nameless", listed(FAMILY, creep=old))
     (change,) = proposal.changes
@@ -72,7 +72,7 @@ def test_a_row_within_its_band_stays_as_it_is_listed_and_asks_nothing():
     assert accepted(proposal, []) == accepted(proposal, ["creeps"]) == {KEY: old}
 
 
-def test_a_row_that_passes_now_is_dropped_only_once_its_family_is_accepted():
+def test_passing_row_dropped_only_after_its_family_is_accepted():
     old = Finding(FAMILY, 0.5, 1e-3)
     proposal = propose(rows(creep=0.0), "nameless", listed(FAMILY, creep=old))
     assert list(proposal.changes[0].gone) == [KEY]
@@ -98,7 +98,7 @@ def test_entries_of_cells_that_the_run_does_not_have_stay():
 
 
 @pytest.mark.parametrize("part", range(6), ids=["profile", "scene", "dimension", "params", "dt", "iterations"])
-def test_entries_of_a_cell_that_differs_in_one_thing_stay_though_their_check_is_not_stated_here(part):
+def test_entries_of_another_cell_kept_without_their_check(part):
     """At iterations asked for a cell is another one: what was listed there was dropped by a run without them."""
     other = {0: "tuned", 1: "stack", 2: "3", 3: "ratio=0.9", 4: "1/960", 5: "20"}[part]
     key = (*KEY[:part], other, *KEY[part + 1 :])
@@ -125,7 +125,7 @@ def test_a_divergence_is_listed_as_one():
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, None, diverged=True)}
 
 
-def test_a_pass_that_fails_from_a_moved_start_is_listed_and_any_other_is_not():
+def test_pass_that_fails_from_a_moved_start_is_listed():
     near = 0.9 * TOLERANCE
     wide = propose(rows(creep=near, moved=0.2 * TOLERANCE), "nameless", listed(FAMILY))
     assert list(wide.changes[0].new) == [KEY]
@@ -137,7 +137,7 @@ def test_a_pass_that_fails_from_a_moved_start_is_listed_and_any_other_is_not():
     assert list(told.changes[0].new) == [KEY]
 
 
-def test_a_case_that_the_engine_refuses_is_refused_until_it_is_listed_as_unsupported():
+def test_unsupported_case_refused_until_listed():
     """With a list the refusal is new, and the run fails: a first list has what every profile refuses."""
     refused = rows(outcome=Outcome.UNSUPPORTED, creep=None, moved=0.0)
     here = Unsupported("slopes", ("*",), "incline", 2, "no slopes", "its manual")
@@ -183,7 +183,7 @@ def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
 
 
 @pytest.mark.parametrize("follows", [False, True])
-def test_a_law_speaks_of_iterations_that_are_asked_for_only_where_it_follows_them(monkeypatch, follows):
+def test_law_at_requested_iterations_only_if_it_follows_them(monkeypatch, follows):
     """What a profile's own sweeps do says nothing of others; one that follows them says of each count its own."""
     asked = (lambda scene, dt, measure, sweeps: (0.05 * sweeps, 0.01)) if follows else None
     law = Deviation(
@@ -240,9 +240,7 @@ def test_a_row_whose_scatter_is_not_known_is_refused():
     ("value", "tolerance", "scatter", "expected"),
     [(1.0, 1e-3, 0.0, 1e-5), (1.0, 1e-12, 0.0, 1e-6), (-1.0, 1e-12, 0.0, 1e-6), (1.0, 1e-3, 0.01, 0.04)],
 )
-def test_a_band_is_the_scatter_but_no_less_than_what_matters_and_what_round_off_makes(
-    value, tolerance, scatter, expected
-):
+def test_band_by_scatter_relevance_and_round_off(value, tolerance, scatter, expected):
     assert band(value, tolerance, scatter) == pytest.approx(expected)
 
 
@@ -257,7 +255,7 @@ def wide(values, **fields):
     return row, acceptance._entry(row, values)[1]
 
 
-def test_a_band_that_would_hold_the_truth_is_drawn_from_sixteen_starts_and_holds_one_more_draw():
+def test_band_containing_the_truth_from_sixteen_starts():
     row, (value, _, _, ends) = wide(TWO_WAYS)
     assert acceptance.hides(row, (3.0 - 4.0, 3.0 + 4.0)) and not acceptance.hides(row, ends)
     values, logs, widths = np.array(TWO_WAYS), np.log(TWO_WAYS), 4.015 * math.sqrt(18 / 17)
@@ -289,7 +287,7 @@ def test_one_more_draw_leaves_a_band_as_rarely_as_it_says(spread):
     assert all(low <= row[:17].min() and row[:17].max() <= high for (low, high), row in zip(bands, draws, strict=True))
 
 
-def test_draws_on_both_sides_of_the_truth_have_no_logarithm_and_a_band_that_holds_it():
+def test_band_of_starts_on_both_sides_of_the_truth():
     draws = (1.0, *(1.0, -1.0) * 8)
     row, (_, _, _, (low, high)) = wide(draws)
     assert low < -1.0 < 1.0 < high and acceptance.hides(row, (low, high))
@@ -333,7 +331,7 @@ def scattered(*values):
     return [observed(replace(SLOT, ulp=n), creep=value) for n, value in zip(ulps, values, strict=False)]
 
 
-def test_only_cells_whose_band_hides_something_are_moved_further_and_once():
+def test_further_starts_only_for_hiding_bands_and_once():
     def further(values, about=lambda key: True):
         seen = scattered(*values)
         return acceptance.slots_to_move_further(rows_of("run", seen), "nameless", acceptance.draws_of(seen), about)
@@ -353,7 +351,7 @@ def test_draws_stand_in_the_order_of_moves_and_only_of_sound_cells():
     assert acceptance.draws_of(seen[1:]) == {}
 
 
-def test_a_listed_row_with_a_band_that_hides_gets_another_once_its_family_is_accepted_again():
+def test_band_that_hides_replaced_when_its_family_is_accepted():
     seen = scattered(*(each / 6.0 for each in TWO_WAYS))
     draws, judged = acceptance.draws_of(seen), rows_of("run", seen)
     old = Finding(FAMILY, 0.5, 0.6)
@@ -377,14 +375,14 @@ def test_cells_that_fail_or_nearly_fail_are_moved_and_no_others():
     assert slots_to_move(rows_of("run", cells), "nameless", lambda key: key[2] == "3") == []
 
 
-def test_what_is_not_asked_about_stays_as_it_is_listed_and_needs_no_moved_starts():
+def test_rows_of_other_families_kept_without_moved_starts():
     unmoved = rows(moved=None)
     proposal = propose(unmoved, "nameless", listed(FAMILY, creep=Finding(FAMILY, 0.4, 0.01)), lambda key: False)
     assert not proposal.refused and not any(change.asks for change in proposal.changes)
     assert [finding.value for finding in accepted(proposal, []).values()] == [0.4]
 
 
-def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law_misses_it(monkeypatch):
+def test_new_row_of_another_family_told_or_refused_by_a_law(monkeypatch):
     """Naming one family must not make silence of what the others would have said."""
     proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
     assert [row.metric for row in proposal.left_out] == ["creep"]
@@ -398,7 +396,7 @@ def test_what_is_not_asked_about_is_told_where_it_is_new_and_refused_where_a_law
     assert all("predicts another" in why for _, why in proposal.refused) and proposal.refused
 
 
-def test_of_what_is_not_asked_about_all_that_is_new_or_drifted_is_told_and_nothing_else():
+def test_only_new_and_drifted_rows_of_other_families_told():
     """In the order of the run, whatever stands between; what is asked about afterwards is still proposed."""
     known = {row_key(SLOT, name): Finding(FAMILY, 0.5, 1e-3) for name in ("known", "drifted", "drifted pass")}
     cases = (
@@ -417,7 +415,7 @@ def test_of_what_is_not_asked_about_all_that_is_new_or_drifted_is_told_and_nothi
     assert [list(change.new) for change in proposal.changes] == [[KEY]]
 
 
-def test_rows_that_are_not_asked_about_do_not_hide_those_after_them_from_being_moved():
+def test_moved_starts_of_rows_after_those_of_other_families():
     steeper = rows(replace(SLOT, params=(("ratio", 0.9),)), moved=None)
     others = [replace(row, engine="another") for row in steeper]
     found = slots_to_move([*others, *steeper, *rows(moved=None)], "nameless", lambda key: key == KEY)
@@ -455,7 +453,7 @@ def test_the_check_of_a_row_is_what_it_was_judged_by():
 # ---- what a proposal holds, in full --------------------------------------------------------------------------------
 
 
-def test_a_draft_names_profile_scene_and_kind_of_metric_and_the_release_by_two_numbers():
+def test_draft_with_profile_scene_metric_kind_and_release():
     (row,) = rows(version="3.2.7+5f3a")
     draft = acceptance._draft(replace(row, metric="interface_impulse[3]", scene="stack"))
     assert draft == Family(
@@ -470,7 +468,7 @@ def test_a_draft_holds_for_its_release_whatever_was_built_locally(version, relea
     assert acceptance._draft(rows(version=version)[0]).releases == releases
 
 
-def test_a_proposal_is_of_its_engine_and_its_changes_hold_what_was_listed_and_what_is_found():
+def test_proposal_of_one_engine_with_listed_and_found_values():
     old = Finding(FAMILY, 0.51, 1e-3)
     drifted = propose(rows(), "nameless", listed(FAMILY, creep=old))
     assert drifted.engine == "nameless"
@@ -526,11 +524,11 @@ def test_rows_that_say_nothing_do_not_hide_those_that_come_after_them():
 
 
 @pytest.mark.parametrize("slot", [replace(SLOT, engine="another"), replace(SLOT, dt=1 / 1000)])
-def test_rows_of_another_engine_or_outside_the_standard_suite_propose_nothing(slot):
+def test_no_proposal_from_another_engine_or_suite(slot):
     assert not propose(rows(slot), "nameless", listed(FAMILY)).changes[0].asks
 
 
-def test_a_listed_row_stays_with_its_family_though_another_speaks_about_it_first():
+def test_listed_row_stays_with_its_family():
     second = replace(FAMILY, id="second", reason="another mechanism")
     old = Finding(second, 0.5, 1e-3)
     first, other = propose(rows(), "nameless", listed(FAMILY, second, creep=old)).changes
@@ -629,7 +627,7 @@ def test_which_bands_are_of_sixteen_starts_and_which_of_four():
         ((2.0, 2.0, 2.0, 2.0, 2.125, 9.0), 0.25, 0.125),  # the sixth was moved further, for another row
     ],
 )  # fmt: skip
-def test_half_a_width_is_four_times_what_four_moves_change_or_the_floor_that_is_known(draws, floor, scatter):
+def test_band_half_width_of_four_times_the_moves_or_the_floor(draws, floor, scatter):
     row = row_of(value=2.0, truth=1.0, tolerance=0.0, floor=floor)
     assert acceptance._width(row, draws) == max(4.0 * scatter, 2e-6)
 
@@ -674,7 +672,7 @@ def test_a_listed_value_of_nothing_has_a_band_about_nothing():
         assert (change.bands, change.same) == (({KEY: (old, found)}, {}) if asks else ({}, {KEY: old}))
 
 
-def test_rows_that_were_moved_further_or_of_which_no_draw_is_known_are_told_apart():
+def test_rows_moved_further_and_rows_without_starts_told_apart():
     judged = rows(moved=0.2)
     asked = [replace(SLOT, ulp=n) for n in acceptance.MORE_MOVES]
     assert acceptance.slots_to_move_further(judged, "nameless", {}) == asked  # by the floor that they have

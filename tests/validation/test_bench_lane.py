@@ -247,9 +247,7 @@ def test_overhead_is_timed_for_every_engine_that_has_the_dimension(clockwork):
 
 @pytest.mark.parametrize("iterations", [None, 4])
 @pytest.mark.parametrize("dt", [SAMPLED_DT, 0.5 * SAMPLED_DT])
-def test_a_work_point_is_timed_with_states_read_too_at_one_step_and_the_profile_s_own_sweeps(
-    monkeypatch, dt, iterations
-):
+def test_work_point_timed_with_states_at_one_step(monkeypatch, dt, iterations):
     slot = Slot("impact", (), 2, "chipmunk", "tuned", dt, iterations)
     members = [SimpleNamespace(slot=slot, cell="its cell")]
     point = {"reason": "", "slot": slot.as_dict(), "error": 0.25}

@@ -88,7 +88,7 @@ def test_a_real_lap_costs_something():
 
 
 @pytest.mark.parametrize("kind", piles.KINDS)
-def test_each_kind_is_a_pile_of_its_dimension_share_and_size_asked_for_by_each_seed(clocked, monkeypatch, kind):
+def test_piles_by_kind_dimension_size_and_seed(clocked, monkeypatch, kind):
     """Warmed with one before the clock runs; then each seed at each size, from the instants of its fall."""
     asked = []
     made = {2: piles.planar_pile, 3: piles.spatial_pile}

@@ -60,7 +60,7 @@ def test_a_dead_rebound_is_wrong_by_e():
     assert error("impact", {"e": 0.8}, {"rebound_ratio": 0.0})[0] == pytest.approx(0.8)
 
 
-def test_an_apex_counts_relative_to_the_drop_and_only_while_it_is_resolved():
+def test_apex_error_relative_to_the_drop_while_resolved():
     metrics = truth("bounce", {"e": 0.5, "height": 1.0})
     # 4.43 m/s halves with every bounce; 20 g dt is 0.82 m/s: 1.1 m/s (n = 2) is resolved, 0.55 (n = 3) is not.
     assert error("bounce", {"e": 0.5}, {**metrics, "apex[2]": metrics["apex[2]"] + 0.03})[0] == pytest.approx(0.03)
@@ -69,7 +69,7 @@ def test_an_apex_counts_relative_to_the_drop_and_only_while_it_is_resolved():
     assert 0.5**2 * speed > 20.0 * GRAVITY * DT > 0.5**3 * speed
 
 
-def test_a_step_that_resolves_no_apex_has_no_error_rather_than_a_small_one():
+def test_step_without_a_resolved_apex_has_no_error():
     value, reason = error("bounce", {"e": 0.5}, truth("bounce", {"e": 0.5}), dt=1 / 10)
     assert value is None and "no apex" in reason
 
@@ -80,7 +80,7 @@ def test_a_column_may_neither_drift_nor_sink():
     assert error("stack", {"n": 10}, {**metrics, "drift": 0.1, "penetration": 0.2})[0] == 0.2
 
 
-def test_creep_and_acceleration_that_lead_equally_far_astray_are_equally_wrong():
+def test_equal_errors_of_creep_and_acceleration():
     duration = resolve("incline").complete({})["duration"]
     astray = 0.05  # [m] over the whole run
     creep = error("incline", {"ratio": 0.9}, {"creep": astray / duration})[0]

@@ -79,7 +79,7 @@ def test_a_bench_is_the_latest_run_only_where_there_is_no_other(store):
     assert store.run("latest").id == plain.id
 
 
-def test_a_work_point_has_the_worst_error_of_its_phases_and_the_cost_of_a_simulated_second(store):
+def test_work_point_with_worst_phase_error_and_cost_per_second(store):
     run = filled(store, {("a", STEPS[0]): 0.4}, {("a", STEPS[0]): 0.02})
     (point,) = work_points(store, run).to_dict("records")
     assert point["error"] == pytest.approx(0.4) and point["cells"] == 16
@@ -124,7 +124,7 @@ def random_points(store, seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_time_at_equal_error_is_the_cheapest_point_that_ran_and_is_exact_enough(store, seed):
+def test_cheapest_exact_enough_point_at_equal_error(store, seed):
     errors, costs, points = random_points(store, seed)
     table = time_at_equal_error(points).set_index(["engine", "level"])
     for engine, level in product("abc", ERROR_LEVELS):
@@ -143,7 +143,7 @@ def test_time_at_equal_error_is_the_cheapest_point_that_ran_and_is_exact_enough(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_error_at_equal_time_is_the_most_exact_point_that_is_cheap_enough(store, seed):
+def test_most_exact_cheap_enough_point_at_equal_time(store, seed):
     errors, costs, points = random_points(store, seed)
     table = error_at_equal_time(points).set_index(["engine", "level"])
     for engine, level in product("abc", COST_LEVELS):
@@ -227,7 +227,7 @@ def test_a_sweep_asks_for_all_phases_at_every_step_and_count():
     assert {(slot.dt, slot.iterations) for slot in asked} == set(product(STEPS, (None, 1)))
 
 
-def test_a_quick_benchmark_has_a_dozen_scenes_whose_cases_the_quick_suite_has():
+def test_quick_benchmark_of_a_dozen_quick_suite_scenes():
     """At 1/240 s and each profile's own iterations; contact times within a step are the benchmark's alone."""
     scenes = benched("quick")
     asked = accuracy_slots(Sweep(Request(scenes, ["reference", "chipmunk"])))
@@ -245,7 +245,7 @@ def test_a_quick_benchmark_runs_one_dimension_unless_others_are_named(scene, dim
 
 
 @pytest.mark.parametrize("suite", ["quick", "full"])
-def test_a_scene_is_benched_in_the_cases_of_its_error_even_if_these_are_its_defaults(suite):
+def test_bench_cases_of_the_error_even_at_defaults(suite):
     assert primary_of("slide").variations(1 / 240) == [{}] and len(resolve("slide").variations(suite)) > 1
     assert {slot.params for slot in accuracy_slots(Sweep(Request(["slide"], ["reference"], suite=suite)))} == {()}
 
@@ -257,7 +257,7 @@ def test_a_fixed_parameter_replaces_the_phases():
     assert [slot.params for slot in accuracy_slots(sweep)] == [(("height", 2.0),)]
 
 
-def test_what_has_no_rank_is_told_beside_the_others_and_neither_best_nor_tied(store, monkeypatch):
+def test_profiles_without_a_rank_neither_best_nor_tied(store, monkeypatch):
     """The dearest and least exact has the first rank, where the others have none."""
     monkeypatch.setattr("validation.bench.work.is_ranked", lambda engine, profile: engine != "b")
     run = filled(store, {("a", STEPS[0]): 0.05, ("b", STEPS[0]): 0.01}, {("a", STEPS[0]): 0.2, ("b", STEPS[0]): 0.1})

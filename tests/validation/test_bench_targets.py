@@ -43,7 +43,7 @@ def test_the_search_ends_at_the_most_sweeps():
     assert tried[1:] == [10, 20, 40, 80, 100]
 
 
-def test_where_time_ends_the_fewest_that_are_known_to_reach_an_error_are_told():
+def test_fewest_iterations_known_when_time_ends():
     assert fewest_sweeps(lambda sweeps: {10: False, 20: False, 40: True, 30: True}.get(sweeps), 10, 640) == 30
 
 
@@ -90,7 +90,7 @@ def test_sweeps_are_tried_once_and_only_while_there_is_time():
 
 
 @pytest.mark.parametrize("case", ASKED.cases, ids=lambda case: case.title)
-def test_the_scenes_of_the_table_are_there_with_as_many_bodies_as_they_say(case):
+def test_target_scenes_with_their_number_of_bodies(case):
     scene = scene_of(case.ours(10))
     assert scene.dimension == case.dimension and ("space" in case.title) == (case.dimension == 3)
     free = [body for body in scene.bodies if body.motion == "free"]
@@ -135,7 +135,7 @@ def moved(scene, *shifts):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_error_of_a_column_is_the_farthest_that_its_top_was_aside_and_down(dimension):
+def test_column_error_by_largest_offset_of_its_top(dimension):
     scene = scene_of(Slot("stack", (("n", 3.0),), dimension, registry.solver(), "classical", 1 / 240))
     aside, back = np.zeros(dimension), np.zeros(dimension)
     aside[:-1], aside[-1], back[-1] = 0.03, -0.01, 0.02
@@ -146,7 +146,7 @@ def test_the_error_of_a_column_is_the_farthest_that_its_top_was_aside_and_down(d
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_error_of_a_heap_is_its_deepest_overlap_and_its_energy_at_the_end(dimension):
+def test_heap_error_by_deepest_overlap_and_final_energy(dimension):
     params = (("layers", 1.0), ("n", 2.0), ("seed", 3.0))
     scene = scene_of(Slot("heap", params, dimension, registry.solver(), "classical", 1 / 240))
     first, second = scene.bodies[-2:]
@@ -176,7 +176,7 @@ def test_an_engine_that_refuses_costs_a_reason():
     assert "planar" in errors_of("column", slot, 0.1).reason
 
 
-def test_the_error_of_a_scene_of_the_catalogue_is_the_one_that_it_declares():
+def test_target_error_as_the_scene_declares_it():
     pytest.importorskip("numba")
     case = next(case for case in ASKED.cases if case.errors == "primary")
     found = errors_of("primary", case.ours(10), case.seconds)

@@ -44,7 +44,7 @@ def judged(scene, trajectory, metric):
 
 @pytest.mark.parametrize("scheme", ["velocity first", "position first", "mid-point"])
 @pytest.mark.parametrize("dt", DTS)
-def test_no_order_of_a_step_owes_growth_at_e_1_however_late_an_impact_is_found(scheme, dt):
+def test_no_growth_allowance_at_e_1_for_late_impacts(scheme, dt):
     for height in np.linspace(1.0, 1.1, 7):
         scene = CATALOGUE["bounce"].scene(2, {"e": 1.0, "height": float(height)})
         growth, bound = judged(scene, reflected(scene, dt, scheme), "apex_growth")

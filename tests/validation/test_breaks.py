@@ -134,7 +134,7 @@ def test_where_nothing_may_change_a_change_has_a_size_still():
     assert decades_of(Change("again", "count", 1.0, 0.0)) == pytest.approx(323.3, abs=0.1)
 
 
-def test_the_command_fails_for_what_is_new_or_drifted_and_passes_what_is_known(folder, monkeypatch):
+def test_invariance_status_of_new_drifted_and_known_breaks(folder, monkeypatch):
     pytest.importorskip("pymunk")
     answer = [Change("again", "speed", 0.0, 1e-9), BROKEN]
     monkeypatch.setattr(posing, "compare", lambda slot: answer)

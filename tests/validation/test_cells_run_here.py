@@ -69,7 +69,7 @@ def test_a_cell_of_a_frontier_is_run_with_its_profile_and_measured(monkeypatch):
         ({"said": 3}, Outcome.CRASHED, None),
     ],
 )
-def test_a_cell_of_a_frontier_that_has_no_answer_says_why_and_measures_nothing(monkeypatch, given, outcome, reason):
+def test_frontier_cell_without_an_answer_and_its_reason(monkeypatch, given, outcome, reason):
     told = Told(monkeypatch, frontier, **given)
     found = run_only(SLOT)
     assert (found.outcome, dict(found.metrics), found.slot) == (outcome, {}, SLOT)
@@ -90,7 +90,7 @@ def test_a_process_that_hangs_or_dies_over_a_cell_is_told_of_that_cell(answer, o
     assert _looked(SLOT, SimpleNamespace(ask=lambda *given: sound)) is sound
 
 
-def test_a_cell_that_is_posed_otherwise_keeps_the_settings_of_the_scene_as_it_is(monkeypatch):
+def test_transformed_cell_keeps_the_original_settings(monkeypatch):
     """What a profile makes of another pose is no question to the engine; the motion is measured as if it were none."""
     told = Told(monkeypatch, invariance)
     found = measured(SLOT, "mirrored")
@@ -130,7 +130,7 @@ def test_a_cell_that_is_posed_otherwise_and_has_no_answer_says_why(monkeypatch, 
     assert measured(SLOT, "again") == reason
 
 
-def test_a_scene_that_cannot_be_posed_so_says_why_and_no_engine_is_asked(monkeypatch):
+def test_scene_that_cannot_be_transformed_and_its_reason(monkeypatch):
     told = Told(monkeypatch, invariance)
     relation = SimpleNamespace(name="odd", pose=lambda scene: f"{scene.name} has nothing to turn")
     monkeypatch.setattr(invariance, "RELATIONS", (relation,))

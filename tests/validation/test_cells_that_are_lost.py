@@ -20,7 +20,7 @@ def test_a_lost_cell_has_its_own_key_and_versions_and_what_was_said():
     assert len(prepared.cell.key()) > 8 and prepared.scene.version >= 1
 
 
-def test_a_lost_cell_that_cannot_even_be_prepared_has_the_version_of_its_engine_alone(monkeypatch):
+def test_lost_cell_that_cannot_be_prepared(monkeypatch):
     def broken(slot):
         raise RuntimeError("its settings are broken")
 

@@ -20,7 +20,7 @@ def test_a_certified_run_is_judged():
     assert observation.outcome is Outcome.OK and observation.certificate["certified"] is True
 
 
-def test_a_bounce_that_records_its_contacts_owes_its_rest_time_to_no_other_step():
+def test_bounce_rest_time_from_its_recorded_contacts():
     """What counts as rest is a share of the step: asked of the steps of a finer run it would be half a second off."""
     found = execute(Slot("bounce", (("e", 0.95),), 2, "reference", "reference", 1 / 240))
     assert found.outcome is Outcome.OK, found.certificate["reasons"]
@@ -69,14 +69,14 @@ def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
 
 
 @pytest.mark.parametrize("rate", [480, 960])
-def test_what_sums_of_ways_are_rounded_by_far_from_the_origin_refuses_no_certificate(rate):
+def test_certificate_far_from_the_origin_despite_round_off(rate):
     """A prescribed box pushes a column; friction ends all disturbances, but each step rounds the places of both."""
     found = execute(Slot("shove", (("angle", 45.0),), 2, "reference", "reference", 1 / rate))
     assert found.outcome is Outcome.OK, found.certificate["reasons"]
 
 
 @pytest.mark.long
-def test_eight_blocks_that_fall_off_each_other_are_located_throughout_and_certified():
+def test_certificate_of_eight_blocks_that_fall_off_each_other():
     """Slips of 5e-11 m/s end in a stack that rocks: a projection that takes them out leaves 4e-11 of a cone."""
     asked = {"n": 8.0, "margin": -0.05, "duration": 1.5}
     slot = Slot("overhang", CATALOGUE["overhang"].minimal(asked), 2, "reference", "reference", 1 / 240)
@@ -128,7 +128,7 @@ def on_ice(tmp_path, x, duration):
 
 
 @pytest.mark.parametrize(("x", "duration"), [(-0.7, 0.5), (-0.8, 0.2)])
-def test_of_a_motion_that_is_not_determined_only_what_comes_before_and_what_any_obeys_is_judged(tmp_path, x, duration):
+def test_undetermined_motion_judged_before_the_branch_and_by_invariants(tmp_path, x, duration):
     """While the box is on both, each may carry all of it or nothing: it ends anywhere within decimetres."""
     found = on_ice(tmp_path, x, duration)
     assert [found[metric][0] for metric in ("energy_growth", "penetration", "at[0.05 s][box.x]")] == ["pass"] * 3
@@ -150,7 +150,7 @@ def test_before_it_meets_the_asphalt_all_of_it_is_judged(tmp_path):
     assert on_ice(tmp_path, -0.7, 0.06)["final[box.x]"] == ("pass", "")
 
 
-def test_what_is_told_at_an_instant_after_loads_are_shared_is_not_judged(tmp_path, monkeypatch):
+def test_values_after_an_ambiguous_load_not_judged(tmp_path, monkeypatch):
     monkeypatch.setitem(globals(), "ICE", ICE.replace("at = 0.05", "at = 0.15"))
     found = on_ice(tmp_path, -0.7, 0.5)
     assert found["at[0.15 s][box.x]"][0] is None and found["energy_growth"][0] == "pass"

@@ -132,7 +132,7 @@ def test_a_study_has_the_rows_of_the_local_pool_and_runs_no_cell_twice(tmp_path)
 
 
 @pytest.mark.long
-def test_a_worker_that_dies_takes_nothing_along_and_every_cell_is_accounted_for(cluster, undisturbed, tmp_path):
+def test_every_cell_kept_after_a_dead_worker(cluster, undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, cluster.address)
     wait_for(lambda: finished_cells(out) >= 3)
@@ -148,7 +148,7 @@ def test_a_worker_that_dies_takes_nothing_along_and_every_cell_is_accounted_for(
 
 
 @pytest.mark.long
-def test_a_scheduler_that_dies_loses_nothing_and_the_same_command_goes_on(cluster, undisturbed, tmp_path):
+def test_resumed_run_after_a_dead_scheduler(cluster, undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, cluster.address)
     wait_for(lambda: finished_cells(out) >= 3)

@@ -96,7 +96,7 @@ def test_a_cell_that_comes_back_twice_counts_once(driver):
     assert list(driver._ended(name)) == [] and not driver.batches
 
 
-def test_what_a_lost_batch_had_not_brought_back_is_asked_again_in_halves(driver):
+def test_lost_batch_asked_again_in_halves(driver):
     slots = cells(5)
     name = batch_of(driver, slots)
     driver._line(driver.batches[name], answer(slots[0]), "w").__next__()
@@ -109,7 +109,7 @@ def test_what_a_lost_batch_had_not_brought_back_is_asked_again_in_halves(driver)
     assert note["event"] == "lost" and len(note["cells"]) == 4 and "its worker died" in note["reason"]
 
 
-def test_a_cell_that_takes_its_worker_along_again_and_again_is_one_crash(driver):
+def test_cell_that_kills_its_worker_repeatedly_as_one_crash(driver):
     name = batch_of(driver, cells(1))
     for _ in range(MOST_LOST - 1):
         driver.futures[name] = Future(error=RuntimeError("gone"))
@@ -200,7 +200,7 @@ def driven(client, slots):
     return found, left, [json.loads(line) for line in made.journal.getvalue().splitlines()], made
 
 
-def test_every_slot_is_back_once_and_the_journal_has_a_line_for_each_batch_that_began_and_ended():
+def test_slots_returned_once_and_batches_in_the_journal():
     slots, client = cells(60), Busy()
     found, left, notes, made = driven(client, slots)
     assert sorted(each.slot.params for each in found) == sorted(slot.params for slot in slots) and not left
@@ -215,7 +215,7 @@ def test_every_slot_is_back_once_and_the_journal_has_a_line_for_each_batch_that_
     assert all(abs(note["time"] - notes[0]["time"]) < 60.0 for note in notes)
 
 
-def test_a_cell_that_is_lost_each_time_is_asked_alone_and_told_as_a_crash_with_what_was_said():
+def test_repeatedly_lost_cell_asked_alone_and_told_as_a_crash():
     dead = Future({"lines": [], "left": "", "said": "run-cell ended with -9: killed", "worker": "w"})
     client = Busy([lambda slots: dead] * (1 + MOST_LOST))
     (found,), left, notes, _ = driven(client, cells(1))
@@ -231,7 +231,7 @@ def test_a_cell_that_is_lost_each_time_is_asked_alone_and_told_as_a_crash_with_w
     ]
 
 
-def test_what_a_batch_leaves_is_told_with_its_reason_and_is_in_the_journal():
+def test_leftovers_of_a_batch_with_reason_in_the_journal():
     def leaving(slots):
         return Future({"lines": [answer(slots[0])], "left": "left: it hung\nthree times", "said": "", "worker": "w"})
 
@@ -273,7 +273,7 @@ def test_a_cluster_without_a_worker_is_one_line(monkeypatch):
         driven(Empty(), cells(1))
 
 
-def test_other_code_on_a_worker_is_told_with_both_versions_and_each_worker_is_asked_once(driver, monkeypatch):
+def test_other_code_on_a_worker_told_with_both_versions(driver, monkeypatch):
     slots = cells(3)
     name = batch_of(driver, slots)
     wrong = answer(slots[0], cell="0" * 16, engine_version="7.0")
@@ -292,7 +292,7 @@ def test_other_code_on_a_worker_is_told_with_both_versions_and_each_worker_is_as
     assert list(driver._heard({"batch": "of another run", "line": answer(slots[0])})) == []
 
 
-def test_without_slots_nothing_is_started_and_a_cluster_of_processes_is_as_large_as_asked(monkeypatch, tmp_path):
+def test_cluster_size_as_requested_and_none_without_slots(monkeypatch, tmp_path):
     import distributed
 
     def asked(*given, **options):
@@ -347,7 +347,7 @@ class Process:
         (-9, ['{"slot": 1}\n', '{"err'], ""),
     ],
 )
-def test_a_batch_hands_on_each_answer_at_once_and_says_how_its_process_ended(monkeypatch, code, answers, left):
+def test_answers_of_a_batch_at_once_and_end_of_its_process(monkeypatch, code, answers, left):
     import distributed
 
     heard = []

@@ -42,14 +42,14 @@ def brief(found):
 # ---- one row -------------------------------------------------------------------------------------------------------
 
 
-def test_a_cell_that_ends_otherwise_is_an_outcome_with_its_reason_and_worse_unless_it_has_an_answer():
+def test_cell_with_another_outcome_worse_unless_answered():
     crashed = {**ROW, "outcome": "crashed", "physics": None, "value": None, "error": None, "reason": "signal 11"}
     ended = (Kind.OUTCOME, True, "0.25 m (pass)", "crashed", 0.0, "signal 11")
     assert brief(change(ROW, crashed)) == ended
     assert brief(change(crashed, ROW)) == (Kind.OUTCOME, False, "crashed", "0.25 m (pass)", 0.0, "")
 
 
-def test_a_verdict_that_flips_grows_by_its_error_in_tolerances_and_says_the_versions():
+def test_growth_of_a_flipped_verdict_in_tolerances():
     fails = {**ROW, "physics": "fail", "value": -2.25, "error": -2.25}
     flipped = (Kind.FLIP, True, "0.25 m (pass)", "-2.25 m (fail)", 2.0, SAME)
     assert brief(change(ROW, fails)) == flipped
@@ -64,7 +64,7 @@ def test_a_flip_without_error_or_tolerance_has_no_size(missing):
     assert change({**ROW, "error": None}, {**ROW, "physics": "fail"}).size == 0.0
 
 
-def test_a_value_that_is_gone_is_worse_and_says_why_and_one_that_is_there_again_is_not():
+def test_missing_value_worse_and_returned_value_not():
     none = {**ROW, "value": None, "error": None, "reason": "it never touched"}
     gone = (Kind.ERROR, True, "0.25 m (pass)", "no value (pass)", 0.0, "it never touched")
     assert brief(change(ROW, none)) == gone
@@ -175,7 +175,7 @@ def test_a_change_is_plain_data_and_what_is_not_finite_is_none():
         json.dumps(plain, allow_nan=False)
 
 
-def test_families_hold_rows_of_one_kind_direction_and_metric_the_largest_first():
+def test_families_of_changes_by_kind_direction_and_metric():
     first = replace(CHANGE, metric="impulse[1]", size=2.0)
     largest = replace(CHANGE, metric="impulse[12]", size=7.0)
     others = [
@@ -237,7 +237,7 @@ def test_a_change_of_speed_says_both_ratios_and_its_interval():
         (timed(1.0), timed(0.5, 0.25, 0.95), False),
     ],
 )
-def test_a_change_of_speed_counts_if_its_whole_interval_is_beyond_a_tenth(before, after, counts):
+def test_speed_change_with_its_interval_beyond_a_tenth(before, after, counts):
     found = compare_speeds([before], [after])
     assert bool(found) == counts and all(each.regressed == (after["ratio"] > before["ratio"]) for each in found)
 

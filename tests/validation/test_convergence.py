@@ -79,7 +79,7 @@ def test_richardson_recovers_the_limit_of_a_single_power_exactly(order, ratio):
     assert found[1] == pytest.approx(2.5, abs=1e-10)
 
 
-def test_the_band_covers_the_limit_when_a_second_power_disturbs_the_first():
+def test_band_with_a_disturbing_second_power():
     for second in (-2.0, -0.5, 0.5, 2.0):
         dts = [0.1, 0.05, 0.025]
         _, limit, band = richardson(dts, [1.0 + dt + second * dt**2 for dt in dts])
@@ -87,7 +87,7 @@ def test_the_band_covers_the_limit_when_a_second_power_disturbs_the_first():
 
 
 @pytest.mark.parametrize("values", [[1.0, 2.0, 1.5], [1.0, 1.1, 1.4], [1.0, 1.0, 1.0], [1.0, 1.2]])
-def test_an_oscillating_growing_constant_or_short_sequence_is_not_extrapolated(values):
+def test_no_extrapolation_of_oscillating_growing_or_short_sequences(values):
     assert richardson(DTS[: len(values)], values) is None
 
 
@@ -157,7 +157,7 @@ def test_what_has_too_few_errors_says_so():
     assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:3], [0.25] * 3, 0.25) == exact
 
 
-def test_a_level_is_three_errors_that_hardly_differ_over_a_factor_of_four():
+def test_error_plateau_of_three_values_over_a_factor_of_four():
     assert said([9.0, 0.54, 0.45, 0.4]) == (Limit.ELSEWHERE, "levels off at an error of 0.4")
     assert said([9.0, 0.541, 0.45, 0.4])[0] is not Limit.ELSEWHERE
     assert said([0.1, 0.54, 0.45, 0.4])[0] is Limit.ELSEWHERE  # what came before the three is no part of the level
@@ -220,7 +220,7 @@ def test_two_positive_errors_have_a_slope_and_no_standard_error():
     assert observed_order(DTS[:3], [0.5, 1e-290, 0.25]) is not None
 
 
-def test_differences_that_are_equal_or_steps_that_are_nearly_in_proportion():
+def test_sequences_of_equal_differences_or_steps_in_proportion():
     assert richardson(DTS[:3], [3.0, 2.0, 1.0]) is None  # they do not shrink
     assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-7)], [1.4, 1.2, 1.1]) is not None
     assert richardson([0.4, 0.2, 0.1 * (1.0 + 1e-5)], [1.4, 1.2, 1.1]) is None
@@ -288,7 +288,7 @@ def test_round_off_is_that_of_the_largest_value_and_of_one_at_least():
     assert extrapolated(TRUTH + 1e6, *[TRUTH + 2.1e-6] * 3).limit is Limit.ELSEWHERE
 
 
-def test_cells_that_are_moved_starved_or_without_an_answer_are_no_part_of_a_series():
+def test_moved_starved_and_unanswered_cells_not_in_a_series():
     def cell(dt, **changes):
         own = slide(dt, 1.0 + dt)
         return replace(own, slot=replace(own.slot, **changes))
@@ -305,13 +305,13 @@ def test_cells_that_are_moved_starved_or_without_an_answer_are_no_part_of_a_seri
         ("toy", "default", 2), ("toy", "tuned", 2), ("other", "default", 3)]  # fmt: skip
 
 
-def test_a_value_that_is_missing_at_one_step_or_has_no_truth_is_not_extrapolated():
+def test_no_extrapolation_with_a_missing_value_or_truth():
     cells = [slide(dt, 1.0 + dt) for dt in DTS[:3]]
     assert extrapolations([*cells[:2], observed(cells[2].slot, {"creep": 0.0})]) == []
     assert extrapolations([*cells[:2], observed(cells[2].slot, {"acceleration": None})]) == []
 
 
-def test_cells_beside_the_declared_ones_and_moved_ones_have_no_part_in_an_error():
+def test_undeclared_and_moved_cells_not_in_an_error():
     cells = [observed(impact_slot(dt, k), {"rebound_ratio": 0.8 + dt}) for dt in DTS[:2] for k in range(PHASES)]
     other = observed(Slot("impact", (("e", 0.25),), 2, "toy", "default", DTS[0]), {"rebound_ratio": 9.0})
     moved = [replace(cell, slot=replace(cell.slot, ulp=1)) for cell in cells]
@@ -330,7 +330,7 @@ def test_differences_that_are_the_same_do_not_grow():
     assert (found.limit, found.because) == (Limit.NOISY, "differences do not shrink with one sign")
 
 
-def test_what_is_the_same_but_for_round_off_is_the_value_of_the_finest_step():
+def test_values_equal_but_for_round_off_as_the_finest_one():
     """Round-off of the values is 1e-12: the last one is within twice that of the truth, the one before it is not."""
     found = extrapolated(TRUTH + 2.6e-12, TRUTH + 2.4e-12, TRUTH + 1.8e-12)
     assert found.limit is Limit.TRUTH and found.value == TRUTH + 1.8e-12
@@ -349,7 +349,7 @@ def test_round_off_of_small_values_is_that_of_a_large_truth():
     assert found.truth == pytest.approx(TRUTH / 9.81 * 1e3) and found.because.startswith("the same value at every step")
 
 
-def test_a_truth_without_a_bound_and_a_bound_without_a_truth_are_shown_and_not_extrapolated(monkeypatch):
+def test_truth_or_bound_alone_shown_without_extrapolation(monkeypatch):
     cells = [slide(dt, 1.0 + dt) for dt in DTS[:3]]
     whole = CATALOGUE["incline"]
     for changes in ({"truth": None}, {"bound": None}):

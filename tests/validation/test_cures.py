@@ -48,7 +48,7 @@ def test_a_table_is_read_back_with_its_tuples(tmp_path):
     assert read(tmp_path / "cures.csv") == [mending]
 
 
-def test_a_table_of_before_what_is_mended_was_written_down_is_read_all_the_same(tmp_path):
+def test_old_table_of_cures_without_mended_checks(tmp_path):
     path = tmp_path / "cures.csv"
     write([CURE], path)
     later = ",mends,dt,alone,alone_after,panel,shown"
@@ -58,7 +58,7 @@ def test_a_table_of_before_what_is_mended_was_written_down_is_read_all_the_same(
     assert "mends" not in path.read_text() and read(path) == [CURE]
 
 
-def test_numbers_of_numpy_are_written_and_a_table_that_cannot_be_keeps_the_old_one(tmp_path):
+def test_table_of_cures_with_numpy_numbers_or_unwritable(tmp_path):
     path = tmp_path / "cures.csv"
     write([replace(CURE, failing=np.int64(CURE.failing), truth=np.float64(CURE.truth))], path)
     assert read(path) == [CURE]
@@ -81,7 +81,7 @@ def test_a_cure_is_told_in_one_line_with_error_and_cost():
     assert cure_text(replace(CURE, left=5, changes={})).endswith("2-D: no setting helps (45 tried)")
 
 
-def test_a_search_that_found_nothing_says_how_many_settings_it_tried_in_each_dimension(monkeypatch):
+def test_number_of_tried_settings_without_a_cure(monkeypatch):
     nothing = replace(CURE, left=CURE.failing, changes={})
     listed = {("pinch", 2): nothing, ("pinch", 3): replace(nothing, dimension=3, tried=30)}
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
@@ -89,7 +89,7 @@ def test_a_search_that_found_nothing_says_how_many_settings_it_tried_in_each_dim
     assert said == "no setting helps (45 tried in 2-D, 30 tried in 3-D)"
 
 
-def test_settings_that_leave_most_checks_failing_are_counted_and_not_recommended(monkeypatch):
+def test_settings_with_mostly_failed_checks_not_recommended(monkeypatch):
     most = replace(CURE, failing=20, left=19)
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): most})
     assert told_cures("mujoco", "4.0.1", "pinch", "default", [2]) == [
@@ -145,7 +145,7 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
         ({"params": {"margin": 100.0}}, "crosscheck cure mujoco pinch"),  # standard, though this table has it not
     ],
 )
-def test_of_another_case_than_was_searched_no_cure_is_told_but_where_to_search_it(monkeypatch, case, command):
+def test_cure_of_another_case_not_told(monkeypatch, case, command):
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): replace(CURE, mends=("creep",))})
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "creep", "params": {}, "dt": 1 / 240, "iterations": None, "outcome": "ok"}
@@ -171,7 +171,7 @@ def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
         assert f'solref="0 {damping}"' in cure_paste(found) and found.params == params
 
 
-def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_lines_says_so(monkeypatch):
+def test_smallest_known_cure_for_pasting_or_none_without_lines(monkeypatch):
     listed = {("pinch", 2): replace(CURE, mends=("creep",))}
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
     monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "<option/>")
@@ -189,7 +189,7 @@ def test_what_is_pasted_is_the_smallest_that_is_known_and_an_engine_without_line
     assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("", said)
 
 
-def test_a_cure_of_an_engine_without_lines_of_settings_says_how_its_calls_are_written(monkeypatch):
+def test_cure_of_an_engine_without_setting_lines_as_calls(monkeypatch):
     """Neither `explain` nor `cure` is silent about it, though no profile has the settings."""
     cure = replace(CURE, mends=("creep",), changes={"cone": "elliptic", "impratio": 10.0}, alone={}, profile="")
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): cure})
@@ -353,7 +353,7 @@ def test_what_mends_in_one_size_alone_is_none(monkeypatch):
     assert best.failing == 1
 
 
-def test_the_single_setting_that_does_most_is_told_beside_a_cure_of_several(monkeypatch):
+def test_single_best_setting_beside_a_cure_of_several(monkeypatch):
     def off(s):
         first = 0.5 if s.get("a") and s.get("c") else 2.0 if s.get("c") else 900.0
         return (first, 0.5 if s.get("c") else 9.0)
@@ -368,7 +368,7 @@ def test_the_single_setting_that_does_most_is_told_beside_a_cure_of_several(monk
 
 
 @pytest.mark.parametrize("left, told", [(450.0, True), (451.0, False), (899.0, False)])
-def test_a_single_setting_that_leaves_more_than_half_of_the_error_is_not_told_beside_a_cure(monkeypatch, left, told):
+def test_single_setting_with_most_of_the_error_left_not_told(monkeypatch, left, told):
     def off(s):
         return (0.5 if s.get("a") and s.get("c") else left if s.get("c") else 900.0, 0.5 if s.get("c") else 9.0)
 
@@ -413,7 +413,7 @@ def test_an_engine_or_a_scene_that_has_nothing_to_search_says_so(monkeypatch):
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
-def test_the_committed_tables_are_of_the_installed_release_and_of_scenes_that_exist(engine):
+def test_committed_cures_for_installed_release_and_existing_scenes(engine):
     listed = read(inside(engine, CURES))
     assert {cure.engine for cure in listed} == {engine}
     assert len({(cure.scene, cure.dimension) for cure in listed}) == len(listed) == len(cures_of(engine))
@@ -433,7 +433,7 @@ def stated(engine, cure):
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
-def test_a_committed_cure_was_measured_with_the_checks_that_its_scene_states_today(engine):
+def test_committed_cure_measured_with_today_s_checks(engine):
     """A check that came later may fail with a cure that is told as one of all checks: so it was with `out_of_plane`."""
     for cure in read(inside(engine, CURES)):
         known = stated(engine, cure)
@@ -459,7 +459,7 @@ def test_no_cure_has_the_settings_of_a_profile_without_a_rank():
     assert cures._profiles("mujoco") == ["default", "tuned"]
 
 
-def test_a_search_asks_with_as_many_processes_as_it_was_given_and_ends_where_the_engine_refuses(monkeypatch):
+def test_processes_and_refused_cells_of_a_search(monkeypatch):
     asked = []
 
     def refusing(slots, jobs):

@@ -77,7 +77,7 @@ def test_a_list_is_read_back(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_cure_is_listed_with_the_settings_that_its_profile_changes_today(engine):
+def test_listed_cures_match_today_s_profiles(engine):
     if find(engine).engine is None:
         pytest.skip(f"{engine}: {find(engine).reason}")
     listed, targets = read(inside(engine, DECISIVE)), cured_of(engine)
@@ -114,7 +114,7 @@ def test_what_passes_as_shipped_has_no_cure():
         measure("chipmunk", Cured("default", "tuned", "incline", ({},)))
 
 
-def test_every_cure_that_is_named_is_measured_with_the_workers_that_are_asked_for(monkeypatch):
+def test_named_cures_measured_with_the_requested_workers(monkeypatch):
     engine = ENGINES[0]
     monkeypatch.setattr(decisive, "measure", lambda *asked: asked)
     assert decisive.measure_all(engine, 3) == [(engine, target, 3) for target in cured_of(engine)]

@@ -30,7 +30,7 @@ def broken(engine, profile, needs):
 
 @pytest.mark.parametrize("name, package", [("chipmunk", "pymunk"), ("bullet", "pybullet"), ("mujoco", "mujoco")])
 @pytest.mark.parametrize("fault, scene", ATTACKS)
-def test_two_per_cent_of_impulses_or_friction_break_a_receipt_of_every_engine_and_profile(name, package, fault, scene):
+def test_receipts_against_two_per_cent_of_impulses_or_friction(name, package, fault, scene):
     pytest.importorskip(package)
     engine = registry.load(name)
     for profile in engine.profiles:
@@ -92,7 +92,7 @@ GUARDED = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", GUARDED)
-def test_what_no_parameter_makes_is_seen_by_the_check_that_is_there_for_it(whole, name):
+def test_special_faults_seen_by_their_own_checks(whole, name):
     fault, size = GUARDED[name]
     own = {e.fault: e.size for e in whole.seen if name in (f"{e.scene}/{e.watcher}", e.watcher)}
     assert own[fault] == size
@@ -128,7 +128,7 @@ def test_every_check_of_the_table_sees_a_fault():
     assert not [line for line in committed()[0] if "none of these faults" in line]
 
 
-def test_a_blind_spot_is_told_with_what_the_fault_changes_and_what_a_step_may_miss(detected):
+def test_blind_spot_with_changed_values_and_step_allowance(detected):
     """A slide of v^2/(2 mu g) is 1/0.99 as long with 1 % less friction; what sees that is the braking beside it."""
     canonical = CATALOGUE["slide"]
     scene = canonical.scene(2)
@@ -235,7 +235,7 @@ def test_a_fault_that_does_not_exist_cannot_be_planted():
         Planted(registry.load("reference"), "colour", 0.1)
 
 
-def test_a_line_names_its_scene_and_a_receipt_is_any_scene_s_and_comes_last():
+def test_detection_line_with_scene_and_receipts_last():
     found = [
         Seen("any", "receipt mass", "mass", 0.01), Seen("bounce", "apex", "mass", None),
         Seen("bounce", "apex", "gravity", 0.001), Seen("any", "receipt mass", "gravity", 0.1),

@@ -62,7 +62,7 @@ def test_all_five_numbers_of_an_impact_are_predicted(profile, e, v, dt, dimensio
     assert_predicted(compare("impact", {"e": e, "v": v, "delay": 0.061}, profile, dt, dimension), 5)
 
 
-def test_impact_law_has_power_it_excludes_the_textbook_and_a_hundredth_of_a_per_cent():
+def test_bullet_impact_law_excludes_a_hundredth_of_a_per_cent():
     for profile in ("default", "one"):
         _, (centre, band), check = compare("impact", {"e": 0.63, "v": 4.7}, profile, 1 / 240)["rebound_ratio"]
         assert abs(check.truth - centre) > 1e3 * band and band < 1e-4 * check.truth
@@ -99,7 +99,7 @@ def test_plastic_drop_is_predicted_with_its_baumgarte_hop(profile, height, dt):
     assert_predicted(rows, len(rows))
 
 
-def test_tuned_plastic_drop_hops_by_what_rest_settings_make_of_the_overlap():
+def test_tuned_plastic_drop_hop_by_the_overlap():
     path = fall(REST, 0.5, 0.731, 0.0, 0.0, 9.81, 1 / 240, 200)
     first = np.flatnonzero(path.impulse)[0]
     overlap = -path.gap[first - 1]

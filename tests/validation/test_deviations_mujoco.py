@@ -85,7 +85,7 @@ def test_mass_and_radius_enter_only_where_they_should() -> None:
     assert rows["rebound_ratio"][0] == pytest.approx(same["rebound_ratio"][0], rel=1e-9)
 
 
-def test_impact_law_has_power_it_excludes_the_textbook_and_a_millionth_of_itself() -> None:
+def test_mujoco_impact_law_excludes_a_millionth() -> None:
     _, prediction, check = compare("default", DT, "impact", e=0.63, v=4.7)["rebound_ratio"]
     assert prediction is not None
     centre, band = prediction
@@ -99,7 +99,7 @@ def test_apexes_and_rest_of_a_bounce_are_predicted(profile, e, height, dt) -> No
     assert_predicted(rows, *rows)
 
 
-def test_plastic_ball_under_gravity_rebounds_by_the_spring_that_is_to_carry_it() -> None:
+def test_plastic_ball_rebound_by_the_rest_spring() -> None:
     rows = compare("tuned", DT, "bounce", e=0.0, height=0.97)
     assert_predicted(rows, "rest_time")
 
@@ -113,7 +113,7 @@ def test_sinking_of_a_stack_is_predicted(dimension: int, n: int, dt: float) -> N
     assert_predicted(compare("default", dt, "stack", dimension, n=n, duration=2.0), "penetration", "settle_time")
 
 
-def test_friction_mass_and_gravity_enter_the_column_as_they_enter_the_engine() -> None:
+def test_friction_mass_and_gravity_in_the_column_law() -> None:
     rows = compare("default", DT, "stack", n=4, mu=0.9, mass=3.0, g=3.7, duration=2.0)
     assert_predicted(rows, "penetration", "settle_time")
 
@@ -154,7 +154,7 @@ def test_slide_law_is_sharper_than_the_departure_it_explains() -> None:
         assert abs(prediction[0] - check.truth) > check.bound and prediction[1] < 0.1 * abs(prediction[0] - check.truth)
 
 
-def test_box_law_reduces_to_the_documented_creep_where_every_corner_sticks() -> None:
+def test_box_law_at_sticking_corners_as_documented_creep() -> None:
     """``(1 - d)/(d b n impratio) g sin(theta)``, up to the rear corner's limit tan(theta) = mu/(1 + mu)."""
     for ratio in (0.2, 0.4, 0.6):
         scene = make("incline", ratio=ratio)
@@ -169,7 +169,7 @@ def test_box_law_reduces_to_the_documented_creep_where_every_corner_sticks() -> 
 # ---- the scalar law against closed forms ----------------------------------------------------------------------
 
 
-def test_rebound_of_a_small_step_is_the_closed_form_of_a_spring_that_never_pulls() -> None:
+def test_small_step_rebound_of_a_spring_that_never_pulls() -> None:
     """zeta = 1: the force ends where 2 v = -omega r, at e = exp(-2) [Schwager and Poeschel 2007]."""
     rigid = (0.9999, 0.9999, 0.001, 0.5, 1.0)
     law = ContactLaw.of(1e-6, (0.02, 1.0), rigid, 1.0)
@@ -209,7 +209,7 @@ def test_a_pyramid_of_mu_one_is_as_soft_as_its_normal() -> None:
 # ---- as data --------------------------------------------------------------------------------------------------
 
 
-def test_every_law_has_a_reason_a_source_and_a_version_and_is_silent_on_other_scenes() -> None:
+def test_laws_with_reason_source_version_and_scene() -> None:
     others: dict[str, Any] = {"impact": make("stack", n=2), "bounce": make("incline"), "stack": make("incline")}
     for law in DEVIATIONS:
         assert (

@@ -87,7 +87,7 @@ def test_the_law_of_a_belt_is_measured_in_the_room():
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("whirl", [-4.0, -2.0, 2.0])
 @pytest.mark.parametrize("delay", [0.0511, 0.0518, 0.0525])
-def test_what_a_blow_takes_of_a_spinning_bar_s_energy_is_told_by_the_step_that_finds_it(delay, whirl, dimension):
+def test_energy_loss_of_a_spinning_bar_by_the_step_of_the_blow(delay, whirl, dimension):
     canonical, dt = CATALOGUE["off_centre"], 1 / 960
     params = {"whirl": whirl, "delay": delay}
     scene = canonical.scene(dimension, params)

@@ -127,7 +127,7 @@ def test_one_entry_point_brings_all_parts_of_its_folder(site):
     assert palette.shape_of("default") == palette.MARKS["shipped"][0]
 
 
-def test_experiments_that_are_data_stand_beside_those_in_python_and_its_tuning_takes_their_place(site):
+def test_experiments_as_data_beside_python_and_tuning(site):
     with (site / "findings" / files.FAMILIES).open("a") as families:
         families.write(PROOF)
     (site / TUNING).write_text(TUNED)
@@ -142,7 +142,7 @@ def test_experiments_that_are_data_stand_beside_those_in_python_and_its_tuning_t
     assert len(experiments_on("toy")) == 1 and len(cured_of("toy")) == 1
 
 
-def test_a_tuning_file_that_is_wrong_is_named_by_the_doctor_and_by_the_command_that_wants_it(site):
+def test_wrong_tuning_file_named_by_doctor_and_tune(site):
     (site / TUNING).write_text(TUNED.replace("cells", "cell"))
     forget()
     said = (
@@ -177,7 +177,7 @@ def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_p
     assert done.exit_code == 0 and ",known," in rows
 
 
-def test_where_a_plugin_raised_what_is_wrong_is_kept_and_told_by_the_doctor(site):
+def test_plugin_exception_told_by_the_doctor(site):
     (site / "numbers.py").write_text("def colour():\n    raise LookupError('no\x1b[31m colour')\nCOLOUR = colour()\n")
     registry.forget()
     found = registry.find("toy")
@@ -205,7 +205,7 @@ BROKEN_LAWS = [
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("code", "said"), BROKEN_LAWS)
-def test_laws_that_cannot_be_had_are_named_by_the_doctor_and_the_engine_runs_without_them(site, tmp_path, code, said):
+def test_unreadable_laws_named_by_the_doctor_with_the_engine_run(site, tmp_path, code, said):
     (site / "laws.py").write_text(code)
     forget()
     before = len(laws_of("chipmunk"))
@@ -250,7 +250,7 @@ def test_experiments_that_cannot_be_had_are_named_and_there_are_none(site, code,
     assert len(laws_of("toy")) > 0
 
 
-def test_findings_that_cannot_be_read_leave_its_rows_unlisted_and_say_why(site, tmp_path):
+def test_unreadable_findings_leave_rows_unlisted(site, tmp_path):
     (site / "findings" / files.FAMILIES).write_text("[[family")
     forget()
     done, rows = run(tmp_path, "stack", "--param", "n=10")
@@ -308,7 +308,7 @@ def test_what_judges_is_no_part_of_a_cell_s_identity(site, name):
 
 
 @pytest.mark.parametrize("name", ["__init__.py", "numbers.py"])
-def test_all_that_an_adapter_imports_of_its_own_package_is_in_its_identity(site, name):
+def test_own_imports_of_an_adapter_in_its_identity(site, name):
     before = hashes()
     with (site / name).open("a") as file:
         file.write("# another line\n")

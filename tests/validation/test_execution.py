@@ -106,7 +106,7 @@ def test_a_solver_that_raises_with_a_reason(monkeypatch):
     assert execute(Slot("impact", (), 2, "reference", "classical", 1 / 240)).outcome is Outcome.CRASHED
 
 
-def test_a_measure_that_is_not_finite_is_a_missing_value_with_its_reason(monkeypatch):
+def test_measure_that_is_not_finite_as_a_missing_value(monkeypatch):
     """It could be neither judged nor stored: one of them made a whole run unreadable."""
     prepared = execution.prepare(SLOT)
     found = {"momentum_defect": (math.inf, ""), "impulse": (math.nan, "late"), "rebound_ratio": (0.8, "")}
@@ -127,7 +127,7 @@ def test_a_measure_that_is_not_finite_is_a_missing_value_with_its_reason(monkeyp
     assert {row.metric for row in rows_of("run", [observation]) if row.standing == "new"} >= {"momentum_defect"}
 
 
-def test_a_receipt_that_could_not_be_measured_and_does_not_hold_is_broken_too(monkeypatch):
+def test_unmeasured_receipt_counts_as_broken(monkeypatch):
     silent = replace(BROKEN, measured=math.nan, because="probe slide diverged")
     assert observed(monkeypatch, silent).outcome is Outcome.INVALID
 

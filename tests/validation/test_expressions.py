@@ -64,7 +64,7 @@ def read(tmp_path, check, constants=""):
     return stated_from_text(FILE.format(check=check, constants=constants), tmp_path / "drop.toml")
 
 
-def test_a_check_s_value_and_tolerance_are_formulas_in_the_file_s_constants(tmp_path):
+def test_formulas_of_value_and_tolerance_in_constants(tmp_path):
     check = 'quantity = "ball.y"\nvalue = "h - fall"\ntolerance = "g * t * dt"\nbecause = "free fall"'
     text = FILE.format(check=check, constants='[constants]\nh = 3.0\nfall = "0.5 * g * 0.5 ** 2"')
     found = stated_from_text(text, tmp_path / "drop.toml")

@@ -15,7 +15,7 @@ from validation.settings.switching import readings
 HERE = [note for note in notes() if find(note.engine).engine is not None]
 
 
-def test_there_are_twenty_and_each_has_a_source_a_symptom_and_a_check_that_its_scene_states():
+def test_twenty_field_notes_with_source_symptom_and_check():
     assert len(notes()) >= 20 and len({note.source for note in notes()}) == len(notes())
     for note in notes():
         assert re.fullmatch(r"[\w.-]+/[\w.-]+#\d+", note.source)

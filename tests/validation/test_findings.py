@@ -118,7 +118,7 @@ def test_every_member_is_a_row_that_the_standard_suite_states(engine):
 # ---- what a row's standing is --------------------------------------------------------------------------------------
 
 
-def test_a_listed_row_is_known_within_its_band_and_drifted_outside_it_on_either_side(findings):
+def test_listed_row_within_and_outside_its_band(findings):
     findings()
     assert judged(SLOT, creep=0.5005) == ("fail", "known", False)
     assert judged(SLOT, creep=0.502) == ("fail", "drifted", True)
@@ -126,7 +126,7 @@ def test_a_listed_row_is_known_within_its_band_and_drifted_outside_it_on_either_
     assert judged(SLOT, creep=0.0) == ("pass", "drifted", True)
 
 
-def test_a_fail_that_is_not_listed_is_new_though_a_family_would_cover_it(findings):
+def test_unlisted_failure_is_new_despite_a_family(findings):
     findings(members=HEAD)
     assert judged(SLOT, creep=0.5) == ("fail", "new", True)
 
@@ -154,7 +154,7 @@ def test_a_family_holds_for_its_releases_and_no_others(findings):
     assert judged(SLOT, "1.9.1+5f3a", creep=0.5) == ("fail", "known", False)
 
 
-def test_outside_the_standard_suite_a_family_gives_no_standing_and_what_no_family_is_like_is_new(findings):
+def test_family_without_standing_outside_the_standard_suite(findings):
     findings()
     outside = replace(SLOT, dt=1 / 1000)
     assert judged(outside, creep=0.5) == ("fail", None, False)
@@ -176,12 +176,12 @@ def test_an_engine_without_findings_is_unlisted(findings):
 
 
 @pytest.mark.parametrize("outcome", ["invalid", "crashed", "timed_out", "missing"])
-def test_a_cell_without_an_answer_is_an_alarm_though_its_rows_are_listed(findings, outcome):
+def test_alarm_for_a_listed_cell_without_an_answer(findings, outcome):
     findings()
     assert judged(SLOT, outcome=Outcome(outcome), creep=0.5) == (None, None, True)
 
 
-def test_a_planned_cell_without_an_observation_has_its_rows_and_is_an_alarm(findings):
+def test_alarm_for_a_planned_cell_without_an_observation(findings):
     findings()
     other = replace(SLOT, params=(("ratio", 0.9),))
     rows = rows_of("run", [observed(other, creep=0.0)], [other, SLOT])
@@ -283,13 +283,13 @@ def test_families_without_members_are_findings_of_their_engine(findings):
     assert [(entry.id, entry.dimension) for entry in found.unsupported] == [("planar", 0), ("again", 2)]
 
 
-def test_parameters_of_an_unsupported_entry_are_read_in_the_order_of_their_names(findings):
+def test_parameters_of_an_unsupported_entry_in_name_order(findings):
     (entry,) = files.read("nameless", findings(UNSUPPORTED + "params = { n = 2, far = 1e8 }\n", HEAD)).unsupported
     assert entry.params == (("far", 1e8), ("n", 2.0)) and all(type(value) is float for _, value in entry.params)
 
 
 @pytest.mark.parametrize("profiles", ['["reference"]', '["classical", "reference"]'])
-def test_rows_of_a_profile_that_promises_a_solution_cannot_be_listed_by_hand_either(findings, profiles):
+def test_solver_profile_rows_not_listed_by_hand(findings, profiles):
     folder = findings(FAMILY.replace('["default"]', profiles), HEAD)
     with pytest.raises(FindingsError, match="never listed"):
         files.read("reference", folder)
@@ -467,7 +467,7 @@ def test_an_engine_that_is_no_folder_has_nowhere_to_keep_findings(monkeypatch):
 
 @pytest.mark.parametrize(("band", "ends"), [("0.25..0.5", (0.25, 0.5)), ("0.5..0.75", (0.5, 0.75)), ("0.....75", None),
                                             ("0...75", (0.0, 0.75))])  # fmt: skip
-def test_a_value_at_an_end_of_its_band_is_within_and_the_first_two_dots_part_the_ends(findings, band, ends):
+def test_band_ends_inclusive_and_split_at_the_first_dots(findings, band, ends):
     folder = findings(FAMILY, HEAD + MEMBER.replace("1e-3", band))
     if ends is None:
         with pytest.raises(FindingsError, match="must be numbers"):

@@ -69,9 +69,7 @@ STEPS = [
         ("floor/top.fy", (0.0, 0.0, 0.0, 0.0)),
     ],
 )
-def test_the_force_of_a_step_is_its_impulse_over_its_length_with_all_contacts_and_the_sign_of_who_is_pushed(
-    name, steps
-):
+def test_force_of_a_step_from_impulses_of_all_contacts(name, steps):
     trajectory = told(STEPS)
     mean = sum(steps) / 4
     spread = math.sqrt(sum((force - mean) ** 2 for force in steps) / 4)
@@ -115,7 +113,7 @@ def test_a_contact_touches_or_pushes_and_what_is_near_is_none():
     ]
 
 
-def test_an_overlap_without_force_is_there_at_both_ends_of_a_step_in_which_nothing_pushes():
+def test_overlap_without_force_at_both_ends_of_a_step():
     push = [(FLOOR, BALL, (0.0, 1.0))]
     height = np.full(17, 0.5)
     height[12:] = [0.5, 0.4, 0.375, 0.25, 0.45]  # overlaps of 0, .1, .125, .25 and .05 m at the ends of the last steps
@@ -182,7 +180,7 @@ tolerance = "0.001 * g"
 
 
 @pytest.mark.parametrize("name", ["contacts", "contact_fy"])
-def test_single_contacts_of_a_box_are_not_those_of_the_plane_where_it_was_run_in_space(name):
+def test_box_contacts_in_space_and_in_the_plane(name):
     """A corner in the plane is an edge in space, with a contact at both ends: neither number nor forces compare."""
     planar, lifted = told(STEPS), replace(told(STEPS), out_of_plane=0.0)
     scene = scene_of()
@@ -238,7 +236,7 @@ def test_a_hand_that_is_pushed_steadily_passes(tmp_path, engine, profile):
     assert fails(found) == set() and len(found) == 4
 
 
-def test_a_check_may_be_of_the_mean_alone_of_one_number_or_of_an_instant(tmp_path):
+def test_check_of_a_mean_a_number_or_an_instant(tmp_path):
     text = HAND.replace("SPEED", "0.1")
     assert {check.metric: check.truth for check in stated(tmp_path, text).checks(stated(tmp_path, text).scene(3), 0.01)
             if check.source.endswith("[[checks]]")} == {

@@ -70,7 +70,7 @@ def test_whole_numbers_end_at_neighbours_from_either_side():
     assert few.survives.slot.iterations == 23 and dict(few.survives.slot.params) == {"n": 10.0}
 
 
-def test_what_never_fails_and_what_never_survives_is_said_and_asked_no_further():
+def test_frontier_without_a_failure_or_without_a_pass():
     safe, lost = bracket("thin_wall", "impact speed"), bracket("thin_wall", "impact speed")
     assert asked(safe, lambda v: True, QUICK_RATIO, BACK, THROUGH) == [1.0, 1e3]
     assert safe.text == "1000 m/s works, the hardest value that was tried"
@@ -162,7 +162,7 @@ def test_a_scene_that_cannot_be_driven_is_refused_with_those_that_can():
     )
 
 
-def test_a_quick_search_asks_one_dimension_and_a_named_one_is_asked_whatever_the_search():
+def test_dimensions_of_a_quick_and_a_named_search():
     pytest.importorskip("pymunk")
     name, frontier = next((name, f) for name, f in axes() if resolve(name).dimensions == (2, 3))
 

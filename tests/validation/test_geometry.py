@@ -213,7 +213,7 @@ def test_a_pose_that_gives_no_distance_is_neither_apart_nor_shallow(shapes):
 
 
 @pytest.mark.filterwarnings("ignore:invalid value")
-def test_a_turn_that_is_no_number_gives_no_depth_though_its_place_says_how_deep_it_may_be():
+def test_depth_of_a_rotation_that_is_nan():
     """Lower bounds of what is round ask for no turn: seventy samples are apart enough to be asked for in turn."""
     pose_a, pose_b = np.zeros((70, 3)), np.zeros((70, 3))
     pose_b[:, 1] = np.linspace(0.1, 2.0, 70)

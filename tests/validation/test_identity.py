@@ -10,7 +10,7 @@ from validation import identity
 from validation.cells import Slot, prepare
 
 
-def test_a_machine_is_told_by_what_a_time_means_and_what_may_move_a_last_bit(monkeypatch):
+def test_machine_facts_for_times_and_last_bits(monkeypatch):
     monkeypatch.setattr(identity, "_cpu_name", lambda: "a fast one")
     found = identity.machine()
     assert list(found) == ["cpu", "cores", "memory_gib", "system", "machine", "python"]
@@ -24,7 +24,7 @@ def test_a_machine_is_told_by_what_a_time_means_and_what_may_move_a_last_bit(mon
     assert (found["memory_gib"], found["cores"]) == (2.2, 0)  # two and a quarter GiB, to a tenth
 
 
-def test_a_cpu_has_the_name_that_the_system_gives_it_or_that_of_its_kind(monkeypatch, tmp_path):
+def test_cpu_name_by_system_or_kind(monkeypatch, tmp_path):
     place = tmp_path / "cpuinfo"
     monkeypatch.setattr(identity, "Path", lambda name: place if name == "/proc/cpuinfo" else None)
     place.write_text("processor : 0\nmodel name\t: A Fast One @ 3 GHz: rev 2\nmodel name : another\n")
@@ -38,7 +38,7 @@ def test_a_cpu_has_the_name_that_the_system_gives_it_or_that_of_its_kind(monkeyp
     assert identity._cpu_name() == "x86"
 
 
-def test_sources_are_hashed_once_a_process_and_each_text_is_read_for_imports_once(monkeypatch):
+def test_sources_hashed_and_parsed_once_per_process(monkeypatch):
     hashed, read, hash_files = [], Counter(), identity._hash_files
     monkeypatch.setattr(identity, "_hash_files", lambda files: hashed.append(files) or hash_files(files))
     parse = {"parse": lambda text: read.update([text]) or ast.parse(text)}

@@ -133,7 +133,7 @@ def test_a_bystander_is_out_of_reach_and_in_no_wall(name, dimension):
             assert np.linalg.norm(place - body.pose[:dimension]) > 40.0 * size
 
 
-def test_where_walls_close_in_from_all_sides_there_is_no_place_for_a_bystander():
+def test_no_place_for_a_bystander_between_closing_walls():
     scene = CATALOGUE["rod_gas"].scene(2)
     walls = [
         Body(f"w{k}", HalfSpace((math.cos(angle), math.sin(angle)), -9.0), motion="fixed")
@@ -157,7 +157,7 @@ def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
 BASE = {"speed": (2.0, ""), "count": (0.0, ""), "absent": (None, "why")}
 
 
-def test_digits_that_places_have_lost_far_away_are_not_asked_of_an_answer():
+def test_lost_digits_of_distant_positions_not_required():
     change = {"speed": (2.0 + 1e-11, ""), "count": (0.0, "")}
     floors = dict.fromkeys(BASE, 0.0)
     assert not judged("moved", BASE, change, Allowances(floors)).holds
@@ -210,7 +210,7 @@ def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_moved_start_changes_what_lies_between_bodies_along_every_axis(dimension):
+def test_moved_start_changes_distances_along_every_axis(dimension):
     """Raised together they would be as far apart as before: scenes along the floor would have no floor."""
     scene = CATALOGUE["cradle"].scene(dimension, {})
     moved = _nudged(scene, 1e-3)
@@ -278,7 +278,7 @@ def compared(monkeypatch, answers):
     return {change.relation: change for change in compare(Slot("off_centre", (), 3, "chipmunk", "tuned", 1 / 240))}
 
 
-def test_what_scatters_in_the_other_pose_alone_is_a_break_unless_the_map_rounds(monkeypatch):
+def test_scatter_in_the_other_pose_as_a_break_unless_rounded(monkeypatch):
     """Renumbered, an engine that sees no order gets the same numbers from every start."""
 
     def answers(relation, moves, turns):
@@ -291,7 +291,7 @@ def test_what_scatters_in_the_other_pose_alone_is_a_break_unless_the_map_rounds(
     assert held == {"again", *({*found} & rounding)} - {name for name, change in found.items() if change.refused}
 
 
-def test_a_scene_is_as_large_as_its_free_bodies_lie_apart_along_an_axis_and_the_largest_of_them():
+def test_scene_size_by_distance_and_largest_free_body():
     def box(name, x, y, half, motion="free"):
         return Body(name, Box((half, half)), pose=(x, y, 0.0), motion=motion)
 
@@ -315,7 +315,7 @@ def test_scatter_of_turned_starts_counts_as_that_of_moved_ones(monkeypatch, shar
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_turned_start_keeps_places_and_turns_each_body_against_the_one_before(dimension):
+def test_turned_start_keeps_positions_and_turns_bodies(dimension):
     scene = CATALOGUE["cradle"].scene(dimension, {})
     turned = _nudged(scene, 0.0, 1e-5)
     free = [(one, other) for one, other in zip(scene.bodies, turned.bodies, strict=True) if one.motion == "free"]
@@ -327,7 +327,7 @@ def test_a_turned_start_keeps_places_and_turns_each_body_against_the_one_before(
         assert parts[0] == pytest.approx([0.5e-5] * 3) and parts[1] == pytest.approx([-0.5e-5] * 3)
 
 
-def test_last_digits_of_a_defect_are_those_of_what_it_is_a_difference_of():
+def test_last_digits_of_a_defect_by_its_operands():
     """Momentum that should vanish is a difference of momenta, a place at the origin one of places."""
     canonical = CATALOGUE["slide"]
     scene = canonical.scene(3)
@@ -342,7 +342,7 @@ def test_last_digits_of_a_defect_are_those_of_what_it_is_a_difference_of():
 
 
 @pytest.mark.parametrize("finish", ["diverged", "completed"])
-def test_of_a_motion_that_diverged_its_reason_is_told_and_nothing_is_measured_of_it(monkeypatch, finish):
+def test_diverged_motion_told_and_not_measured(monkeypatch, finish):
     from validation.questions import invariance
 
     pytest.importorskip("pymunk")
@@ -376,7 +376,7 @@ def asked_of(monkeypatch, answers, relations=()):
     return asked, compare(Slot("off_centre", (), 3, "chipmunk", "tuned", 1 / 240), relations)
 
 
-def test_starts_are_moved_once_for_maps_of_one_size_and_turned_only_where_something_is_to_be_mended(monkeypatch):
+def test_starts_moved_once_per_size_and_turned_only_if_needed(monkeypatch):
     canonical = CATALOGUE["off_centre"]
     scene = canonical.scene(3)
     unit = unit_of(scene, 0.0)
@@ -409,7 +409,7 @@ def test_starts_are_moved_once_for_maps_of_one_size_and_turned_only_where_someth
     assert change.allowed == pytest.approx(allowed, rel=1e-6)
 
 
-def test_a_map_that_rounds_is_asked_of_moved_starts_in_its_own_pose_before_it_counts_as_a_break(monkeypatch):
+def test_rounding_map_checked_by_moved_starts_before_a_break(monkeypatch):
     scene = CATALOGUE["off_centre"].scene(3)
     shift = next(each for each in RELATIONS if each.name == "turned 33").pose(scene).shift
     unit = unit_of(scene, shift)
@@ -423,7 +423,7 @@ def test_a_map_that_rounds_is_asked_of_moved_starts_in_its_own_pose_before_it_co
     assert asked[-1 - len(steps) : -1] == [("turned 33", k * unit, 0.0, False) for k in steps]
 
 
-def test_a_cell_without_an_answer_has_none_in_any_pose_and_one_that_is_lost_in_a_pose_is_lost_there(monkeypatch):
+def test_unanswered_and_lost_cells_in_every_pose(monkeypatch):
     asked, found = asked_of(monkeypatch, lambda *given: "it crashed")
     assert asked == [("again", 0.0, 0.0, False), "over"]
     assert found == [Change(each.name, refused="it crashed") for each in RELATIONS]
@@ -433,7 +433,7 @@ def test_a_cell_without_an_answer_has_none_in_any_pose_and_one_that_is_lost_in_a
     assert change == Change("mirrored", refused="it hung", lost=True)
 
 
-def test_a_force_that_is_not_told_in_a_pose_is_no_break_and_a_value_that_is_lost_for_another_reason_is():
+def test_untold_force_and_otherwise_lost_value_in_a_pose():
     floors = dict.fromkeys(BASE, 0.0)
     told = {"speed": (None, UNAVAILABLE), "count": BASE["count"]}
     assert judged("mirrored", BASE, told, Allowances(floors)).holds
@@ -444,7 +444,7 @@ def test_a_force_that_is_not_told_in_a_pose_is_no_break_and_a_value_that_is_lost
     assert not changed.holds and changed.metric == "count"
 
 
-def test_a_pose_that_an_engine_refuses_is_no_break_and_one_that_it_fails_at_is():
+def test_pose_refused_and_pose_failed_by_an_engine():
     refused = judged("bystander", BASE, Refusal("bodies: more than it takes"), Allowances({}))
     assert (refused.refused, refused.lost, refused.holds) == ("bodies: more than it takes", False, True)
     assert judged("bystander", BASE, "it hung", Allowances({})).lost

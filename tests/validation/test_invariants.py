@@ -91,7 +91,7 @@ def test_a_missing_contact_fails_after_two_steps_of_fall():
         assert verdicts(scene, moved(scene, (pose[:last], twist[:last])))["penetration"] is passes
 
 
-def test_two_bodies_that_close_with_both_speeds_may_be_found_one_step_late():
+def test_allowed_late_step_of_two_closing_bodies():
     """10 m/s each: their overlap after one step is 20 m/s times dt, which neither body's own speed explains."""
     scene = over_floor(ball("a", pose=(-1.0, 5.0, 0.0)), ball("b", pose=(1.0, 5.0, 0.0)), gravity=(0.0, 0.0))
     x = np.array([-0.31, -0.31 + 10.0 * DT, -0.31 + 10.0 * DT])
@@ -118,7 +118,7 @@ def test_spin_brings_a_corner_down_and_is_known(spin):
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
-def test_growth_without_loads_is_judged_by_round_off_of_the_energy_at_play(scale):
+def test_growth_without_loads_to_round_off_of_the_energy(scale):
     """A bound of 1e-12 J forgives everything a light scene does and nothing a heavy one must do."""
     scene = over_floor(ball(mass=2.0 * scale, inertia=0.09 * scale, twist=(3.0, 0.0, 1.0)), gravity=(0.0, 0.0))
     t = np.arange(100) * DT
@@ -212,7 +212,7 @@ def test_mass_properties_are_the_integrals_over_the_body(shape):
     assert moments(shape, 1.0, d) == pytest.approx(expected, rel=1e-2)
 
 
-def test_numbers_beyond_all_others_give_a_bound_that_judges_nothing_and_no_warning():
+def test_infinite_bounds_judge_nothing_without_a_warning():
     """Found by `make soak`: two kilograms under 1e308 m/s^2 weigh more than a number can say."""
     scene = over_floor(ball(mass=2.0), gravity=(0.0, -1e308))
     assert invariants.energy_bound(scene, DT) == math.inf
@@ -237,7 +237,7 @@ def test_both_checks_say_what_they_judge_in_which_unit_and_why():
     assert depth.because.startswith("a contact is found at most one step late")
 
 
-def test_energy_that_something_may_feed_is_shown_without_a_truth_and_says_what_feeds_it():
+def test_energy_with_a_source_shown_without_a_truth():
     pusher = Body("pusher", Disc(0.5), pose=(5.0, 5.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
     energy, depth = invariants.checks(over_floor(ball(), pusher), STEP)
     assert (energy.truth, energy.bound) == (None, None)
@@ -279,7 +279,7 @@ def test_a_fixed_box_is_no_body_that_turns():
     assert invariants.fed_by(scene) == ""
 
 
-def test_the_bound_of_energy_is_the_work_of_each_load_in_a_step_and_round_off_of_what_is_at_play():
+def test_energy_bound_by_work_of_loads_and_round_off():
     """Loads 2 (0, -8) + (6, 28) = (6, 12) and 4 (0, -8) = (0, -32); bounds in binary numbers."""
     one = ball("one", force=(6.0, 28.0), torque=(3.0,), inertia=0.5, pose=(3.0, 4.0, 0.0), twist=(0.0, 2.0, 4.0))
     two = ball("two", mass=4.0, pose=(0.0, 2.0, 0.0))
@@ -298,7 +298,7 @@ def test_a_body_without_load_is_known_to_the_round_off_of_its_size():
     assert invariants.energy_bound(scene, STEP) == pytest.approx(1e-24 * (reach / STEP) ** 2, rel=1e-12, abs=0.0)
 
 
-def test_in_space_a_torque_works_on_the_least_moment_and_spin_counts_with_the_largest():
+def test_least_moment_for_torque_and_largest_for_spin():
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed")
     pose = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     body = Body("body", Box((0.5, 0.5, 0.5)), 1.0, (0.5, 0.25, 1.0), pose, torque=(1.0, 2.0, 2.0))
@@ -311,7 +311,7 @@ def test_in_space_a_torque_works_on_the_least_moment_and_spin_counts_with_the_la
     assert invariants.energy_bound(scene, STEP) == pytest.approx(1e-12 * 0.5 * 1.0 * 4.0, rel=1e-6, abs=0.0)
 
 
-def test_the_bound_of_an_overlap_is_what_the_two_strongest_loads_add_in_a_step():
+def test_overlap_bound_by_the_two_strongest_loads():
     """Accelerations 8, 8 + 3 of a push, and 8 + 2 (.707)/.5 of a torque on a box; no torque moves a rim."""
     bodies = (
         ball("a", torque=(5.0,)), ball("b", force=(0.0, -6.0)),
@@ -326,7 +326,7 @@ def test_the_bound_of_an_overlap_is_what_the_two_strongest_loads_add_in_a_step()
     assert invariants.overlap_bound(alone, STEP) == pytest.approx(8.0 * STEP**2 + 1.3e-12, rel=1e-12)
 
 
-def test_the_place_of_a_body_that_does_not_move_counts_and_its_weight_does_not():
+def test_fixed_body_by_its_place_and_not_its_weight():
     wall = Body("wall", Box((0.5, 0.5)), mass=1e-9, motion="fixed", pose=(3e9, 4e9, 0.0))
     scene = over_floor(ball(), wall, gravity=(0.0, -8.0))
     assert invariants.overlap_bound(scene, STEP) == pytest.approx(8.0 * STEP**2 + 5e-3, rel=1e-9)
@@ -340,7 +340,7 @@ def resting(scene, overlaps, dt=STEP, speed=0.0):
     return moved(scene, (pose, twist), dt=dt)
 
 
-def test_an_overlap_may_be_one_step_of_the_approach_that_led_to_it_and_what_a_scene_starts_with():
+def test_allowed_overlap_of_one_approach_step_and_of_the_start():
     scene = over_floor(ball())
     step = 2.0 * STEP
 
@@ -382,7 +382,7 @@ def test_a_ball_that_rests_in_the_floor_after_a_blow_overlaps_it():
     assert beyond == depth == pytest.approx(0.02)
 
 
-def test_an_approach_is_along_a_face_s_normal_or_of_both_centres_with_the_spin_of_boxes():
+def test_approach_speed_along_normals_or_centres_with_spin():
     floor = Body("floor", HalfSpace((0.6, 0.8), 0.0), motion="fixed")
     scene = Scene("s", 1, 2, (floor, box(), ball(pose=(9.0, 9.0, 0.0))), (Pair(),), (0.0, 0.0), 1.0)
     twist = np.zeros((2, 3, 3))
@@ -394,7 +394,7 @@ def test_an_approach_is_along_a_face_s_normal_or_of_both_centres_with_the_spin_o
     assert invariants.approach(scene, trajectory, 1, 2) == pytest.approx([5.0 + 2.0 * reach, 4.0 * reach])
 
 
-def test_growth_is_against_the_start_less_half_a_step_of_power_then_and_now():
+def test_growth_less_half_a_step_of_power():
     """A ball of 2 kg under a force of 16 N across, no gravity; speeds 0, 1, 3, 2 m/s while it stays where it is."""
     scene = over_floor(ball(force=(16.0, 0.0)), gravity=(0.0, 0.0))
     speed = np.array([0.0, 1.0, 3.0, 2.0])
@@ -421,7 +421,7 @@ def test_energy_beyond_all_numbers_is_no_absence_of_growth():
     assert not np.isfinite(growth)
 
 
-def test_ripples_of_all_bodies_and_round_off_of_the_work_at_play_are_taken_off():
+def test_growth_less_ripples_and_round_off_of_the_work():
     """Two balls that fall at 4 m/s each under 8 m/s^2; and one that has come far under a load that moves little."""
     scene = over_floor(ball("a"), ball("b"), gravity=(0.0, -8.0))
     speed = np.array([0.0, -4.0])
@@ -462,7 +462,7 @@ def parted(depth, speed, mass=2.0, load=(0.0, -9.81)):
 
 @pytest.mark.parametrize("depth", [1e-5, 2e-3, 0.05])
 @pytest.mark.parametrize("gravity", [0.0, 9.81, 1e3])
-def test_an_overlap_that_is_undone_in_a_step_or_slower_adds_no_energy_and_an_explosion_does(depth, gravity):
+def test_energy_of_an_overlap_removed_slowly_and_explosively(depth, gravity):
     """Lifting it out is m g d, and whoever undoes it in a step makes a speed of d/dt of it."""
     load = (0.0, -gravity)
     assert parted(depth, 0.0, load=load) and parted(depth, depth / DT, load=load)

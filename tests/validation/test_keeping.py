@@ -86,7 +86,7 @@ def test_runs_of_one_id_from_two_machines_are_both_kept(tmp_path, monkeypatch):
         assert ours.observations(second)[0].metrics["rebound_ratio"][0] == 0.9
 
 
-def test_a_run_that_both_have_is_completed_and_ours_stays_where_they_differ(tmp_path, monkeypatch):
+def test_common_run_completed_and_ours_kept_at_differences(tmp_path, monkeypatch):
     store = filled(tmp_path / "a", "one", monkeypatch, finish=False)
     (tmp_path / "b").mkdir()
     store.close()
@@ -120,7 +120,7 @@ def test_what_cannot_be_merged_is_one_line_and_changes_nothing(tmp_path, monkeyp
     assert contents(ours) == before
 
 
-def test_a_run_of_another_machine_gets_an_id_from_what_it_is_and_a_third_is_refused(tmp_path, monkeypatch):
+def test_id_of_a_run_from_another_machine_and_a_third_refused(tmp_path, monkeypatch):
     """The id is that of the run and six digits of what it is, at most 63 characters; which it is does not change."""
     ours = filled(tmp_path / "a", "one", monkeypatch)
     long = "r" * 60
@@ -158,7 +158,7 @@ def test_a_name_of_any_length_is_refused_in_a_line(tmp_path, monkeypatch):
     assert len(str(caught.value)) < 500
 
 
-def test_a_finished_run_stays_finished_and_one_that_only_the_other_finished_is_finished_here(tmp_path, monkeypatch):
+def test_finished_state_of_a_run_in_either_store(tmp_path, monkeypatch):
     for here in (True, False):
         ours = filled(tmp_path / f"a{here}", "one", monkeypatch, finish=True)
         ours.close()
@@ -232,7 +232,7 @@ def test_pruned_runs_leave_no_row_and_give_their_room_back(tmp_path, monkeypatch
     assert store.path.stat().st_size < size
 
 
-def test_recordings_are_kept_of_the_newest_finished_run_of_each_title_alone(tmp_path, monkeypatch):
+def test_recordings_of_the_newest_finished_run_per_title(tmp_path, monkeypatch):
     store = filled(tmp_path, "one", monkeypatch, (0.1, 0.2))
     other, _ = store.start("quick: bounce", SLOTS, fresh=True)
     store.finish(other)
@@ -247,7 +247,7 @@ def test_recordings_are_kept_of_the_newest_finished_run_of_each_title_alone(tmp_
     assert first.id != second.id and last.id in {run.id for run in store.runs()}
 
 
-def test_the_age_of_a_run_is_measured_from_now_or_from_the_time_that_is_given(tmp_path, monkeypatch):
+def test_run_age_from_now_or_a_given_time(tmp_path, monkeypatch):
     store = filled(tmp_path, "one", monkeypatch, (0.1, 0.2))
     assert doomed(store.runs(), Rules(days=1)) == [] and len(doomed(store.runs(), Rules(days=-1))) == 1
     tomorrow = datetime.now(UTC) + timedelta(days=1.5)

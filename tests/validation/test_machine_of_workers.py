@@ -34,7 +34,7 @@ def machine(monkeypatch, cores=4, memory=16 * GIB, groups=(), hard=None):
     monkeypatch.setattr(limits, "_hard_limit", lambda: hard)
 
 
-def test_memory_is_the_machine_s_or_the_least_that_a_control_group_leaves(monkeypatch):
+def test_memory_by_machine_or_control_group(monkeypatch):
     for groups, most in (
         ((), 16 * GIB), (("max\n",), 16 * GIB), ((f"{3 * GIB}\n",), 3 * GIB), ((None, f"{5 * GIB}"), 5 * GIB),
         ((f"{6 * GIB}", f"{4 * GIB}"), 4 * GIB), (("max", f"{2**62}"), 16 * GIB),
@@ -70,7 +70,7 @@ def test_cores_are_those_of_this_process_or_of_the_machine(monkeypatch):
     assert limits.cores() == 1
 
 
-def test_a_worker_has_its_share_of_memory_no_less_than_engines_need_and_no_more_than_plenty(monkeypatch):
+def test_memory_share_of_a_worker_within_limits(monkeypatch):
     for memory, count, hard, share in (
         (64, 2, None, 8), (16, 4, None, 4), (16, 16, None, 2), (64, 2, 6, 6), (64, 2, 9, 8), (16, 16, 2, 2),
     ):  # fmt: skip
@@ -93,7 +93,7 @@ def test_the_shell_s_limit_is_the_lower_of_both_that_there_are(monkeypatch):
     assert limits._hard_limit() is None
 
 
-def test_rounding_is_asked_of_the_platform_s_library_and_of_nothing_where_there_is_none(monkeypatch):
+def test_rounding_mode_from_the_platform_s_library(monkeypatch):
     asked = []
     monkeypatch.setattr(ctypes, "CDLL", lambda name: (asked.append(name), "library")[1])
     for platform, name in (("linux", "libm.so.6"), ("darwin", None)):
@@ -108,7 +108,7 @@ def test_rounding_is_asked_of_the_platform_s_library_and_of_nothing_where_there_
         assert state._libm() is None
 
 
-def test_what_arithmetic_does_is_told_in_one_tuple_that_a_trap_or_a_mode_changes(monkeypatch):
+def test_floating_point_state_with_a_trap_or_rounding_mode(monkeypatch):
     before, unit = state._rounding(), 2.0**-52
     nearest = (1.0 + unit, -1.0 + unit, 1.0 - unit, -1.0 - unit)
     assert before == state._rounding() and before[:4] == nearest and before[4] is True

@@ -149,7 +149,7 @@ def test_columns_end_as_deep_as_measured(engine, profile, scene, dt, params, set
     assert np.max(1.0 - np.diff(found.pose[-1, 1:, 2])) == pytest.approx(depth, abs=within)
 
 
-def test_the_depth_of_tuned_columns_hangs_on_the_one_setting_that_is_named():
+def test_tuned_column_depth_by_its_one_setting():
     """Bullet's pairs in order, MuJoCo with the margin of our profile: neither is as deep as was measured."""
     sorted_pairs = ran(slot_of("stack", "bullet", "tuned", 1 / 240, n=10.0)).pose[-1, 1:, 2]
     assert np.max(1.0 - np.diff(sorted_pairs)) == pytest.approx(38e-6, abs=0.5e-6)
@@ -165,7 +165,7 @@ def test_columns_of_bullet_drift_along_one_axis_as_measured(n, drift, both):
     assert np.linalg.norm(moved, axis=1).max() == pytest.approx(both, rel=0.005)
 
 
-def test_a_shipped_bullet_column_of_ten_carries_its_weight_in_the_mean_of_half_a_second():
+def test_weight_on_a_shipped_bullet_column_over_half_a_second():
     found = ran(slot_of("stack", "bullet", "default", 1 / 240, n=10.0))
     load_of_steps = found.contacts.impulse_between(0, 1)[-120:, 2] / (10.0 * 9.81 / 240.0)
     assert abs(load_of_steps.mean() - 1.0) == pytest.approx(7e-9, abs=0.5e-9)
@@ -201,7 +201,7 @@ def test_touching_balls_part_as_measured_where_a_place_is_rounded(engine, radius
     assert found.twist[-1, :, 0] / found.twist[0, 0, 0] == pytest.approx(speeds, abs=1e-3)
 
 
-def test_one_sweep_of_chipmunk_is_off_as_measured_until_the_edge_strikes_again():
+def test_chipmunk_single_sweep_error_until_the_edge_strikes():
     found = ran(slot_of("flat_box", "chipmunk", "tuned", 1 / 240, 2, iterations=1, mu=0.5, v=5.0, e=0.5)).twist[:, 1]
     blow = int(np.argmax(found[:, 1] > 0.0))
     assert abs(found[blow, 1] / 5.0 - 0.5) == pytest.approx(0.18, abs=0.005)

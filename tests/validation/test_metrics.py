@@ -47,7 +47,7 @@ def test_last_motion_says_when_it_never_stops():
     assert metrics.last_motion(t, speed, 0.1)[0] == pytest.approx(0.5)
 
 
-def test_mean_rate_of_a_parabola_is_its_slope_in_the_middle_of_the_window():
+def test_mean_rate_of_a_parabola_as_its_middle_slope():
     t = np.linspace(0.0, 2.0, 481)
     assert metrics.mean_rate(t, 0.5 * 3.0 * t * t)[0] == pytest.approx(3.0 * 1.5, rel=1e-12)
 
@@ -152,7 +152,7 @@ def resting(samples, dt=0.1):
     return planar(np.arange(samples) * dt, np.zeros(samples), np.zeros(samples))
 
 
-def test_the_total_impulse_is_the_sum_over_all_samples_and_contacts_of_the_pair():
+def test_total_impulse_over_samples_and_contacts():
     rows = [[(0, 1, (1.0, 2.0)), (0, 1, (0.5, 0.25))], [], [(1, 0, (-1.0, -4.0)), (0, 2, (64.0, 64.0))]]
     total, why = metrics.total_impulse(recorded(resting(4), rows), 0, 1)
     assert (list(total), why) == ([2.5, 6.25], "")
@@ -188,7 +188,7 @@ def test_an_arc_counts_if_it_starts_faster_than_the_least_speed(least, found):
     assert len(times) == 1 + found
 
 
-def test_an_arc_that_ends_at_rest_has_ended_and_one_that_is_cut_off_has_not():
+def test_end_of_an_arc_at_rest_and_cut_off():
     t = np.arange(4) / 8
     y = np.array([0.0, 0.5, 0.75, 0.75])
     assert len(metrics.apexes(t, y, np.array([2.0, 1.0, 0.5, 0.0]))[0]) == 1
@@ -207,7 +207,7 @@ def test_the_ratio_of_intervals_is_the_second_over_the_first():
     assert metrics.interval_ratio(np.array([1.0, 3.0])) == (0.0, "there are only 2 apexes, three are needed")
 
 
-def test_the_last_motion_is_the_first_sample_from_which_no_speed_is_above_the_threshold():
+def test_last_motion_by_the_speed_threshold():
     t = np.arange(5) / 4
     assert metrics.last_motion(t, np.array([1.0, -1.0, 0.0, 0.0, 0.0]), 0.5) == (0.5, "")
     assert metrics.last_motion(t, np.array([1.0, 0.5, -0.5, 0.5, 0.0]), 0.5) == (0.25, "")
@@ -240,7 +240,7 @@ def pile(dimension, *shapes):
     return Scene("s", 1, dimension, (floor, *free), (Pair(),), (0.0,) * dimension, 1.0)
 
 
-def test_only_free_bodies_have_a_speed_and_spin_counts_at_the_outermost_point():
+def test_speed_of_free_bodies_with_spin_at_the_outermost_point():
     scene = pile(2, Disc(0.5), Box((3.0, 4.0)))
     assert metrics.free_bodies(scene) == [1, 2]
     twist = np.array([[[9.0, 9.0, 9.0], [3.0, 4.0, -2.0], [0.0, 0.0, 1.0]]])
@@ -285,7 +285,7 @@ def test_overlaps_are_those_of_all_pairs_that_can_meet_and_do():
     assert found == {(0, 1): [0.0, 0.125], (1, 3): [0.0, 0.75], (2, 3): [0.0, 0.125]}
 
 
-def test_the_load_of_an_interface_is_the_mean_and_scatter_of_its_last_window():
+def test_interface_load_by_mean_and_scatter_of_the_last_window():
     """Samples at .1 to 1 s, the first half of them absurd; windows begin after their first instant."""
     impulses = [(0.0, 100.0)] * 5 + [(5.0, f) for f in (1.0, 2.0, 3.0, 2.0, 2.0)]
     trajectory = recorded(resting(11), [[(0, 1, impulse)] for impulse in impulses])
@@ -317,7 +317,7 @@ def test_which_arcs_start_faster_than_the_least_speed(velocity, arcs):
     [([1.0, 0.9, 0.7, 0.4, 0.0, 0.0], [1.0, 1.0, 1.0, -1.0, -1.0, -1.0], 0.0),
      ([0.0, 0.7, 0.9, 1.0, 1.0, 1.0], [1.0, -1.0, -1.0, -1.0, -1.0, -1.0], 0.375)],
 )  # fmt: skip
-def test_a_top_lies_within_a_step_of_its_sample_though_the_parabola_says_more(height, velocity, time):
+def test_top_within_a_step_of_its_sample(height, velocity, time):
     times, tops = metrics.apexes(np.arange(6) / 8, np.array(height), np.array(velocity))
     assert list(times) == pytest.approx([time]) and list(tops) == pytest.approx([0.975])
 
@@ -328,7 +328,7 @@ def test_the_drift_is_that_of_one_body_and_not_of_all():
     assert metrics.lateral_drift(Trajectory(np.arange(2.0), pose, np.zeros_like(pose), None, 1.0, "completed")) == 4.0
 
 
-def test_a_load_in_space_is_along_the_third_axis_and_a_window_leaves_out_its_first_instant():
+def test_load_in_space_and_first_instant_of_a_window():
     t = np.arange(9) / 8
     still = spatial(t)
     trajectory = recorded(still, [[(0, 1, (7.0, 9.0, 64.0))]] * 4 + [[(0, 1, (7.0, 9.0, 3.0))]] * 4)
@@ -368,7 +368,7 @@ def test_astray_is_the_level_distance_from_a_line_through_the_start():
     assert metrics.astray(moved([(1.0, 2.0, 0.0), (4.0, 7.0, 1.0)]), np.array([1.0])) == 0.0
 
 
-def test_tilt_counts_whole_turns_and_its_rate_is_the_spin_about_the_same_axis():
+def test_tilt_in_whole_turns_and_its_rate():
     angles = np.linspace(0.0, 9.0, 19)
     plane = moved([(0.0, 0.0, a) for a in angles], np.full((19, 3), (1.0, 2.0, 5.0)))
     assert metrics.tilt(plane) == pytest.approx(angles)
@@ -404,7 +404,7 @@ def test_a_crossing_of_a_cubic_is_exact_wherever_samples_lie(level):
     assert speed == pytest.approx(1.5 * low**2 + 1.0, rel=1e-11)
 
 
-def test_a_crossing_is_the_first_on_the_way_up_and_none_where_the_level_is_not_reached():
+def test_first_upward_crossing_or_none():
     t = np.linspace(0.0, 10.0, 401)
     (time, _), (speed, _) = metrics.crossing(t, np.sin(t), np.cos(t), 0.5)
     assert time == pytest.approx(math.asin(0.5), abs=1e-8)
@@ -428,12 +428,12 @@ def test_a_crossing_at_a_sample_is_that_sample():
     assert time == pytest.approx(roots.real.min(), abs=1e-9)
 
 
-def test_a_crossing_starts_below_its_level_and_what_begins_at_it_has_not_risen_through():
+def test_crossing_from_below_its_level():
     t, value = np.arange(5.0), np.array([0.0, 1.0, 0.0, -1.0, 1.0])
     assert metrics.crossing(t, value, np.zeros(5), 0.0)[0][0] == pytest.approx(3.5)
 
 
-def test_a_crossing_lies_between_its_samples_though_its_cubic_crosses_elsewhere_as_well():
+def test_crossing_between_its_samples():
     """(s - 0.4)^2 meets 0.2 at 0.4 -+ 0.447; (s - 0.8)((s - 0.2)^2 + 0.25) has the one real root 0.8."""
     t = np.array([0.0, 1.0])
     (time, _), (speed, _) = metrics.crossing(t, (t - 0.4) ** 2, 2.0 * (t - 0.4), 0.2)
@@ -453,7 +453,7 @@ def test_what_only_just_gets_to_its_level_crosses_it_there(rate, level):
     assert (time, speed) == (pytest.approx(5.0, abs=1e-4), pytest.approx(0.0, abs=1e-4))
 
 
-def test_two_samples_have_no_top_and_a_top_is_looked_for_beside_its_turn_alone():
+def test_top_of_two_samples_and_of_a_turn():
     assert len(metrics.apexes(np.arange(2) / 8, np.array([0.0, 1.0]), np.array([1.0, -1.0]))[0]) == 0
     # The last sample is the highest and has no neighbour: the top is the nearest that has two.
     times, _ = metrics.apexes(np.arange(4) / 8, np.array([0.0, 0.2, 0.8, 1.0]), np.array([1.0, 1.0, 1.0, -1.0]))
@@ -463,7 +463,7 @@ def test_two_samples_have_no_top_and_a_top_is_looked_for_beside_its_turn_alone()
     assert list(times) == pytest.approx([3.5])  # and not the earlier one, which belongs to nothing
 
 
-def test_late_impulses_are_those_of_the_pair_step_by_step_after_the_windows_first_instant():
+def test_late_impulses_of_the_pair_after_the_first_instant():
     t = np.arange(9) / 8
     rows = [[(0, 1, (64.0, 64.0))]] * 4 + [[(0, 1, (1.0, 2.0)), (1, 0, (-0.5, -0.25))], [], [(0, 2, (9.0, 9.0))], []]
     trajectory = recorded(planar(t, np.zeros(9), np.zeros(9)), rows)
@@ -489,7 +489,7 @@ def test_the_deepest_overlap_of_stated_pairs_is_of_them_alone():
     assert metrics.deepest_overlap(scene, trajectory, []) == 0.0
 
 
-def test_astray_is_the_farthest_of_all_samples_from_where_the_first_one_was():
+def test_largest_distance_from_the_first_sample():
     line = np.array([1.0, 0.0])
     places = [(1.0, 2.0), (3.0, 2.5), (4.0, 1.25), (5.0, 2.5)]
     space = [(*p, 0.0, 1.0, 0.0, 0.0, 0.0) for p in places]
@@ -505,13 +505,13 @@ def test_what_has_turned_is_the_largest_angle_against_the_first_pose(angles):
         assert metrics.turned(pose) == pytest.approx(largest, abs=1e-7)
 
 
-def test_half_a_turn_in_space_is_the_largest_there_is_and_in_the_plane_whole_turns_count():
+def test_rotation_angle_of_half_a_turn_in_space_and_whole_in_plane():
     assert metrics.turned(np.array([(0.0, 0.0, 0.5), (0.0, 0.0, 10.5)])) == 10.0
     pose = np.array([(0.0, 0.0, 0.0, *q) for q in turned((0.6, 0.0, 0.8), (0.0, math.pi, 5.0))])
     assert metrics.turned(pose) == pytest.approx(math.pi)
 
 
-def test_the_largest_relative_error_is_told_and_a_missing_value_with_its_reason():
+def test_largest_relative_error_and_a_missing_value():
     found = {"a": (2.2, ""), "b": (-3.6, "read late"), "lost": (None, "it never touched"), "later": (None, "gone")}
     truth = {"a": 2.0, "b": -3.0, "lost": 1.0, "later": 1.0}
     assert metrics.relative_error(found, truth, ["a", "b"]) == (pytest.approx(0.2, rel=1e-12), "")
@@ -565,7 +565,7 @@ def test_an_overlap_of_a_pair_whose_pose_is_no_number_is_none(pair):
     assert math.isnan(metrics.deepest_overlap(scene, found, [(0, 1), (2, 3)]))
 
 
-def test_the_largest_relative_error_is_no_number_where_one_value_is_none():
+def test_largest_relative_error_with_a_missing_value():
     truth = {"a": 2.0, "b": 4.0}
     for found in ({"a": (math.nan, ""), "b": (5.0, "")}, {"a": (1.0, ""), "b": (math.nan, "")}):
         value, why = metrics.relative_error(found, truth, ["a", "b"])

@@ -90,7 +90,7 @@ def test_flight_goes_on_from_where_bodies_met():
     assert found.pose[-1, 1, 0] == pytest.approx(2.0 + speed * after + after**2)
 
 
-def test_what_touches_at_the_start_is_one_from_the_start_however_large_the_scene():
+def test_initial_touch_in_a_scene_of_any_size():
     near = [disc("a", 0.0, 2.0), disc("b", 1.0 + 5e-10, 0.0)]
     assert perfectly_inelastic(scene_of(*near), DT).twist[0, :, 0] == pytest.approx([1.0, 1.0])
     apart = [disc("a", 0.0, 0.0, spin=3.0), disc("b", 1.0 + 4e-9, 0.0)]
@@ -147,7 +147,7 @@ def test_three_in_a_row_end_as_one_and_a_wall_stops_them():
     assert not held.twist[-1].any() and held.pose[-1, 2, 0] == pytest.approx(3.5, abs=4.0 / 3.0 * DT)
 
 
-def test_a_ball_that_lands_stays_and_one_that_touches_from_the_start_never_falls():
+def test_null_ball_landing_and_touching_from_the_start():
     floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
     found = perfectly_inelastic(
         scene_of(floor, disc("high", 0.0, y=1.5), disc("low", 5.0, y=0.5), gravity=(0.0, -10.0)), DT
@@ -168,7 +168,7 @@ def test_every_scene_can_be_asked_of_every_null(name):
                     assert found.error is None or math.isfinite(found.error)
 
 
-def test_nobody_who_has_no_engine_passes_a_scene_in_which_something_must_bounce():
+def test_null_answers_fail_scenes_with_a_rebound():
     for scene, metric, truth in (("impact", "rebound_ratio", 0.8), ("thin_wall", "rebound_ratio", 0.5)):
         errors = {each.name: each.error for each in nulls_of(scene, 2, {}, DT, metric, truth)}
         assert errors == {"did nothing": truth, "free flight": 1.0 + truth, "perfectly inelastic": truth}
@@ -199,7 +199,7 @@ def judged(*slots):
     return rows_of("r", [execute(slot) for slot in slots])
 
 
-def test_nulls_are_rows_once_for_all_engines_and_every_error_has_its_skill():
+def test_null_rows_shared_by_engines_with_skill_of_each_error():
     pytest.importorskip("pymunk")
     slots = [Slot("impact", (), 2, "chipmunk", profile, DT) for profile in ("default", "tuned")]
     rows = judged(*slots)
@@ -230,7 +230,7 @@ def test_a_value_that_is_no_number_is_none(monkeypatch, value):
     assert nulls_of("impact", 2, {}, DT, "rebound_ratio", 0.8) == [Null("did nothing", None, None, "divided by 0")]
 
 
-def test_the_row_of_a_null_is_that_of_the_engine_with_its_own_answer_and_nothing_of_a_run():
+def test_null_row_with_its_own_answer_alone():
     """Everything of the check and the cell stays; what belongs to the engine's run is empty."""
     pytest.importorskip("pymunk")
     row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT, 7)) if r.metric == "rebound_ratio")
@@ -248,7 +248,7 @@ def test_the_row_of_a_null_is_that_of_the_engine_with_its_own_answer_and_nothing
         assert found[name].as_dict() == wanted.as_dict()
 
 
-def test_rows_of_several_cells_and_without_a_truth_are_nobody_s_and_their_outcome_is_not_the_null_s():
+def test_no_null_for_combined_rows_and_rows_without_a_truth():
     pytest.importorskip("pymunk")
     row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT)) if r.metric == "rebound_ratio")
     assert null_rows([replace(row, cells=["one", "two"])]) == [] and null_rows([replace(row, truth=None)]) == []

@@ -51,7 +51,7 @@ def test_a_matched_profile_with_settings_has_no_rank_either():
 
 
 @pytest.mark.parametrize("more", [{}, {"params": {"e": 0.8}}, {"suite": "standard"}, {"suite": "full"}])
-def test_the_cells_of_the_profile_as_shipped_are_asked_with_the_settings(more):
+def test_shipped_profile_cells_with_own_settings(more):
     found = asked("chipmunk", ("damping", 0.5), **more)
     plain = slots(Request(["bounce"], ["chipmunk"], profiles=["default"], **more))
     assert [slot.stock for slot in found] == plain and plain
@@ -124,7 +124,7 @@ def test_a_model_is_asked_with_its_own_profile():
         assert found.outcome is Outcome.OK and found.readback["cone"] == "mjCONE_ELLIPTIC" and not found.receipts
 
 
-def test_a_cell_runs_with_the_settings_and_what_they_make_of_the_engine_is_measured():
+def test_cell_with_own_settings_and_its_receipts():
     found = execute(OWN)
     assert found.outcome is Outcome.OK
     told = {setting["name"]: setting for setting in found.settings}
@@ -159,7 +159,7 @@ def test_a_release_that_has_no_such_setting_was_not_asked():
     assert row.standing is None and not row.alarming
 
 
-def test_a_receipt_of_settings_of_a_user_s_own_takes_no_verdict_from_a_release():
+def test_receipt_of_own_settings_not_counted_for_a_release():
     told = told_by("chipmunk", "7.3", [execute(OWN)])
     assert told.rows and all(row.outcome == "ok" for row in told.rows)
 

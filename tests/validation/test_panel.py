@@ -34,14 +34,14 @@ def test_a_check_that_passed_or_fails_three_times_as_much_is_broken(before, afte
     assert (len(found.breaks), found.mends) == (breaks, mends)
 
 
-def test_a_check_of_many_variants_counts_once_and_is_mended_where_none_breaks():
+def test_check_of_many_variants_counted_once():
     good, bad = (reading(2.0), reading(0.5)), (reading(0.5), reading(2.0))
     assert judged({("0", "creep"): [good, good]}, 2).mends == 1
     found = judged({("0", "creep"): [good, bad, bad]}, 3)
     assert found.mends == 0 and [each.case for each in found.breaks] == ["its own scene elsewhere"]
 
 
-def test_a_fix_that_breaks_more_than_it_mends_is_counted_and_not_printed():
+def test_fix_that_breaks_more_than_it_mends_not_printed():
     cost = Cost("a body at rest", "penetration", "m", 1e-4, 0.041, 0.0)
     fix = next(each for each in cures_of("mujoco").values() if each.recommended)
     kept = replace(fix, panel=Panel(20, 1, (cost,)))
@@ -53,7 +53,7 @@ def test_a_fix_that_breaks_more_than_it_mends_is_counted_and_not_printed():
     assert panel_text(Panel(20, 3, ())) == "tried in 20 other cases: breaks nothing"
 
 
-def test_a_number_with_a_formula_has_its_value_at_the_step_and_the_gravity_of_a_case():
+def test_formula_value_at_the_step_and_gravity_of_a_case():
     pytest.importorskip("mujoco")
     here = Slot("stack", (), 3, "mujoco", "default", 1 / 240)
     margin = {"margin": 0.001 * 9.81 / 240**2}
@@ -112,7 +112,7 @@ because = "never tips"
 
 
 @pytest.mark.parametrize(("elsewhere", "mended"), [(lambda slot: (), True), (search.at_other_steps, False)])
-def test_a_setting_that_mends_a_chaotic_case_at_one_step_alone_is_no_fix(tmp_path, elsewhere, mended):
+def test_no_fix_for_a_chaotic_case_at_one_step(tmp_path, elsewhere, mended):
     """It hops on MuJoCo's pyramid: a margin changes the hops, and where the cube ends by chance."""
     pytest.importorskip("mujoco")
     (tmp_path / "cube.toml").write_text(CUBE)
@@ -124,7 +124,7 @@ def test_a_setting_that_mends_a_chaotic_case_at_one_step_alone_is_no_fix(tmp_pat
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, PANELS)])
-def test_the_committed_panels_are_of_the_installed_release_and_of_profiles_that_exist(engine):
+def test_committed_panels_for_installed_release_and_profiles(engine):
     with inside(engine, PANELS).open(encoding="utf-8", newline="") as lines:
         rows = list(csv.DictReader(lines))
     assert {row["version"] for row in rows} == {find(engine).version}

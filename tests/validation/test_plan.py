@@ -19,7 +19,7 @@ from validation.running.plan import FULL_DT, Request, slots
 
 
 @pytest.mark.parametrize("engine", [name for name in registry.names() if registry.find(name).engine is not None])
-def test_the_full_suite_runs_the_customary_step_of_the_profile_as_shipped_only(engine):
+def test_full_suite_of_the_shipped_profile_at_its_usual_step(engine):
     facts, dts = registry.facts(engine), {}
     for slot in slots(Request(["impact"], [engine], suite="full", dimensions=[max(facts.dimensions)])):
         dts.setdefault(slot.profile, set()).add(slot.dt)
@@ -30,7 +30,7 @@ def test_the_full_suite_runs_the_customary_step_of_the_profile_as_shipped_only(e
 
 
 @pytest.mark.parametrize("scene", ["bounce", "stack"])
-def test_the_full_suite_has_all_variations_at_one_step_and_all_steps_for_those_of_the_standard_suite(scene):
+def test_full_suite_of_all_variations_and_all_steps(scene):
     wanted = Request([scene], ["chipmunk"], suite="full")
     full, quick = set(slots(wanted)), set(slots(replace(wanted, suite="standard")))
     assert quick < full
@@ -54,7 +54,7 @@ def test_steps_that_are_asked_for_are_asked_of_all_variations():
     assert {slot.dt for slot in found} >= set(FULL_DT)
 
 
-def test_starts_are_moved_for_floors_at_the_quick_step_and_each_profile_s_own_iterations():
+def test_moved_starts_at_the_quick_step_and_own_iterations():
     found = slots(Request(["stack"], ["chipmunk"], suite="full", floors=True))
     moved = [slot for slot in found if slot.ulp]
     assert {slot.iterations for slot in found} > {None}
@@ -64,7 +64,7 @@ def test_starts_are_moved_for_floors_at_the_quick_step_and_each_profile_s_own_it
 
 
 @pytest.mark.parametrize(("name", "profile"), [("chipmunk", "default"), ("reference", "classical")])
-def test_an_engine_that_is_not_here_has_its_rows_under_a_profile_that_it_has(monkeypatch, name, profile):
+def test_rows_of_an_absent_engine_under_its_profile(monkeypatch, name, profile):
     monkeypatch.setattr(plan, "find", lambda engine: Found(engine, None, "", "nothing is called that"))
     assert {slot.profile for slot in slots(Request(["impact"], [name]))} == {profile}
 
@@ -75,7 +75,7 @@ def test_an_engine_of_which_nothing_is_known_has_its_rows_too(monkeypatch):
     assert {slot.profile for slot in slots(Request(["impact"], ["anything"]))} == {NOT_KNOWN}
 
 
-def test_no_import_of_any_depth_is_overlooked_where_expressions_are_not_walked_through():
+def test_imports_of_any_depth_found_without_expressions():
     """The identity of a cell hangs on it: against a walk through every node of each source of ours."""
     deep = (
         b"def f():\n  try:\n    match 1:\n      case 1:\n        with x: import deep\n  except E: from . import other\n"
@@ -113,7 +113,7 @@ def test_a_slot_may_ask_as_much_as_it_is_told_and_no_more(field, most, least):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_the_quick_suite_has_a_few_cells_of_the_standard_one_with_every_check_of_each_scene(name):
+def test_quick_suite_as_a_part_of_the_standard_suite(name):
     canonical = CATALOGUE[name]
     asked, stated = {}, {}
     for suite in ("quick", "standard"):
@@ -142,7 +142,7 @@ def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
     assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))
 
 
-def test_a_study_is_listed_at_a_scene_s_defaults_whether_or_not_a_variation_has_them(monkeypatch):
+def test_study_at_defaults_without_a_matching_variation(monkeypatch):
     """Its rows are those of the scene without parameters: a study that no family could name would stay new for ever."""
     canonical = CATALOGUE["incline"]
     others = tuple(v for v in canonical.variations("standard") if canonical.minimal(v.params))
@@ -155,7 +155,7 @@ def test_a_study_is_listed_at_a_scene_s_defaults_whether_or_not_a_variation_has_
 
 
 @pytest.mark.skipif(registry.find("mujoco").engine is None, reason="mujoco is not installed")
-def test_the_quick_suite_asks_a_profile_without_a_rank_what_stands_for_a_scene():
+def test_quick_suite_cells_of_a_profile_without_a_rank():
     def asked(**more):
         found = slots(Request(["slide"], ["mujoco"], dimensions=[3], **more))
         cells = {}

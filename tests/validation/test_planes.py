@@ -40,20 +40,20 @@ def flying(body, gravity=(0.0, -9.81), duration=2.0):
         (Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (6.0, -8.0), 5.5),
     ],
 )
-def test_a_plane_is_owed_to_a_step_of_gravity_and_to_round_off_of_the_largest_numbers(body, gravity, size):
+def test_plane_bound_by_a_gravity_step_and_round_off(body, gravity, size):
     """1e-12 for a thousand updates, a thousandfold growth: 1e-9 of places and ways; and g dt^2."""
     found = bounds.planar(flying(body, gravity), DT)
     assert (found.metric, found.unit, found.truth) == ("out_of_plane", "m", 0.0)
     assert found.bound == pytest.approx(math.hypot(*gravity) * DT**2 + 1e-9 * size, rel=1e-12)
 
 
-def test_the_growth_that_a_plane_is_owed_is_the_horizon_of_the_certificate():
+def test_plane_growth_by_the_certificate_horizon():
     from reference_solver.certificate import truth
 
     assert bounds.GROWTH == truth.GROWTH
 
 
-def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_hundredth_is_not_judged():
+def test_plane_bound_times_growth_and_unjudged_beyond_a_hundredth():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
     assert bounds.planar(scene, DT, 0.5).bound == bounds.planar(scene, DT).bound == pytest.approx(1e-9 * 5.5)
     assert bounds.planar(scene, DT, 9e8).bound == pytest.approx(9e-4 * 5.5)  # a hundredth of the radius is 5e-3
@@ -62,7 +62,7 @@ def test_a_motion_that_multiplies_what_is_off_is_allowed_as_much_and_beyond_a_hu
         assert (beyond.truth, beyond.bound) == (None, None) and f"amplified {said} times" in beyond.because
 
 
-def test_a_plane_far_out_is_owed_by_bodies_that_are_large_beside_its_round_off():
+def test_plane_bound_of_large_bodies_far_from_the_origin():
     """At 1e8 m a tilt of 11 degrees would have passed: 1e-9 of the place is a tenth of the box."""
     canonical = CATALOGUE["far_origin"]
     for far, judged in ((1e8, False), (2.0**20, True)):
@@ -71,7 +71,7 @@ def test_a_plane_far_out_is_owed_by_bodies_that_are_large_beside_its_round_off()
 
 
 @pytest.mark.parametrize(("ratio", "gap"), [(1.0, 2.0), (3.0, 2.0), (16.0, 1.0)])
-def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio, gap):
+def test_ball_blows_off_line_growth_as_declared(ratio, gap):
     """By the reference, in the plane: the small ball begins 1e-11 m off the line, and ends that many times as far."""
     canonical = CATALOGUE["galperin"]
     scene = canonical.scene(2, {"ratio": ratio, "gap": gap})
@@ -94,7 +94,7 @@ def test_blows_of_balls_multiply_what_is_off_the_line_as_their_scene_says(ratio,
         ("hilltop", {"v": 1e-3, "mu": 0.0}, 1e2),
     ],
 )
-def test_unstable_scenes_say_by_how_much_they_multiply_what_leaves_their_plane(scene, params, least):
+def test_plane_growth_of_unstable_scenes_declared(scene, params, least):
     """By MuJoCo, in space: bodies begin 1e-12 m off the plane, to either side in turn.
 
     It is no more than the scene says, but for blows found late: 6, 2.5, .7 and .3 % more at 1/240, 1/480, 1/960 and
@@ -272,7 +272,7 @@ def test_a_plane_that_is_not_judged_is_a_check_all_the_same():
     assert judged.source == "a 2-D scene embedded in 3-D is symmetric about its plane"
 
 
-def test_where_nobody_is_free_no_load_is_granted_and_the_scene_itself_is_the_smallest():
+def test_plane_bound_without_free_bodies():
     fixed = replace(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), motion="fixed")
     found = bounds.planar(flying(fixed, (0.0, 0.0)), DT)
     assert found.bound == pytest.approx(1e-9 * 5.5, rel=1e-12)  # places alone
@@ -280,7 +280,7 @@ def test_where_nobody_is_free_no_load_is_granted_and_the_scene_itself_is_the_sma
     assert bounds.planar(flying(fixed, (0.0, 0.0)), DT, 1.1e10).bound is None
 
 
-def test_what_a_motion_multiplies_by_is_told_in_full_below_a_hundred_thousand():
+def test_growth_factor_in_full_below_a_hundred_thousand():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1), (0.0, 0.0))
     for growth, said in ((1.0, "1000"), (99999.4, "99999"), (100000.0, "1e+05"), (123456.0, "1.2e+05")):
         assert f"amplified {said} times" in bounds.planar(scene, DT, growth).because

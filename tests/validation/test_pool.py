@@ -89,7 +89,7 @@ def run(monkeypatch):
     return _run
 
 
-def test_an_answer_in_hand_is_not_lost_where_the_next_worker_cannot_start(run, monkeypatch):
+def test_finished_answer_kept_when_the_next_worker_fails(run, monkeypatch):
     """Its engine has nothing left that is worth asking, so the next cell is another engine's."""
     monkeypatch.setattr(pool, "MOST_TIMEOUTS", 1)
     late, left, other = cell("chipmunk", 1.0), cell("chipmunk", 2.0), cell("mujoco", 1.0)
@@ -99,7 +99,7 @@ def test_an_answer_in_hand_is_not_lost_where_the_next_worker_cannot_start(run, m
     assert found == [late] and reasons == [left] and isinstance(raised, limits.LimitError)
 
 
-def test_what_another_worker_has_computed_is_not_lost_where_one_cannot_start_again(run):
+def test_other_worker_s_answer_kept_when_a_restart_fails(run):
     """One of two workers is spoilt and cannot be renewed: the other's answer comes first, then the reason."""
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0, 4.0, 5.0)]
     found, raised = run(slots, {slots[0]: {"changed": "folder"}}, 2, jobs=2)
@@ -124,7 +124,7 @@ def test_a_recording_that_cannot_be_kept_costs_no_other_answer(run, monkeypatch)
     assert found and slots[0] not in found and set(found) < set(slots) and raised.errno == 28
 
 
-def test_an_answer_in_hand_is_not_lost_where_the_caller_has_no_place_for_the_next(run):
+def test_finished_answer_kept_when_the_caller_is_full(run):
     slots = [cell("chipmunk", v) for v in (1.0, 2.0)]
     found, raised = run(slots, {}, 1, keep=lambda slot: 1 / 0 if slot == slots[1] else None)
     assert found == slots[:1] and isinstance(raised, ZeroDivisionError)
@@ -233,7 +233,7 @@ def test_no_cell_starts_before_its_kernels_are_compiled(compiled, jobs):
     assert [slots[0].profile for kind, slots in log if kind == "compile"] == ["first", "then"]
 
 
-def test_one_of_two_workers_compiles_while_the_other_runs_cells_without_kernels(compiled):
+def test_kernel_compilation_beside_cells_without_kernels(compiled):
     log = compiled(MIXED, 2)
     assert log[0][0] == "compile" and not any(needs_kernels(slots[0]) for _, slots in log[1:5])
     at = log.index(("compile", [MIXED[1]]))

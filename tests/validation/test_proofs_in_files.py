@@ -35,7 +35,7 @@ def test_a_family_may_have_no_proof_and_the_next_family_has_its_own(proofs):
     assert first.family == "creeps"
 
 
-def test_what_is_not_said_is_as_in_the_quick_suite_and_what_is_shown_is_the_reason(proofs):
+def test_proof_defaults_of_the_quick_suite_and_reason(proofs):
     own = Experiment("creeps", "it is soft", "default", "incline", "creep[1]", {"stiff": True}, dimension=3)
     assert proofs(PROOF) == (own,)
 
@@ -92,7 +92,7 @@ def test_all_that_can_be_said_is_read_with_its_kind(proofs):
         (PROOF + '"\\u001b[31mred" = 1\n', "proof: \\u{1b}[31mred is not a field; fields are cell, set, not, within"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_proof_is_one_line_that_names_family_and_field(proofs, tmp_path, entry, said):
+def test_wrong_proof_refused_by_family_and_field(proofs, tmp_path, entry, said):
     with pytest.raises(FindingsError) as caught:
         proofs(entry)
     assert str(caught.value) == f"{tmp_path / FAMILIES}: family creeps: {said}"

@@ -17,7 +17,7 @@ def test_a_fast_slide_of_bullet_blames_points_that_are_dropped_and_drag():
         assert proof.holds and proof.idle, proof.why_not
 
 
-def test_a_wide_margin_mends_the_slide_of_bullet_tuned_and_leaves_its_stack_as_it_is():
+def test_wide_margin_for_bullet_slide_and_stack_tuned():
     """g (sin - mu cos) at 45 degrees and mu = 1/2; of a stack, whose points do not drift, no bit is another."""
     pytest.importorskip("pybullet")
     slide = Slot("incline", (("ratio", 2.0),), 3, "bullet", "tuned", QUICK_DT)

@@ -56,7 +56,7 @@ def test_forces_are_means_over_a_second_or_the_last_half_of_a_short_run(duration
      (3, "x", 0), (3, "y", 1), (3, "z", 2), (3, "vx", 0), (3, "vy", 1), (3, "vz", 2),
      (3, "wx", 3), (3, "wy", 4), (3, "wz", 5)],
 )  # fmt: skip
-def test_coordinates_are_those_of_the_body_at_the_end_or_between_samples(dimension, name, column):
+def test_coordinates_at_the_end_and_between_samples(dimension, name, column):
     sign = 1.0 if name in "xyz" else -1.0
     scene, trajectory = scene_of(dimension), moving(dimension)
     assert quantity(scene, trajectory, f"ball.{name}") == (sign * (104.0 + 10.0 * column), "")
@@ -82,7 +82,7 @@ def test_an_angle_in_the_plane_counts_all_turns_since_the_start():
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.48, 0.6, 0.64)])
 @pytest.mark.parametrize("turn", [0.0, 0.4, 1.7, 3.0])
-def test_an_angle_in_space_is_that_of_the_rotation_whatever_its_axis_and_start(axis, turn):
+def test_rotation_angle_in_space_at_any_axis_and_start(axis, turn):
     def quaternion(about, by):
         return np.array([math.cos(by / 2), *(math.sin(by / 2) * np.array(about))])
 
@@ -135,7 +135,7 @@ LAST_SECOND = [[(0, 1, (900.0, 900.0))]] * 12 + [[(0, 1, (0.5, f)), (1, 2, (0.0,
         ("floor/top.fy", 0.0),
     ],
 )
-def test_forces_are_signed_by_who_is_pushed_and_mean_over_the_last_second(name, force):
+def test_force_sign_and_mean_over_the_last_second(name, force):
     assert quantity(scene_of(2), pushed(2, LAST_SECOND), name) == (pytest.approx(force), "")
 
 

@@ -138,7 +138,7 @@ def test_a_ball_in_space_slips_by_what_its_spin_leaves_of_its_speed():
     assert found["slip"] == pytest.approx(0.25 * 2.0 / 8.0) and found["cone"] == found["separation"] == 0.0
 
 
-def test_two_that_move_together_do_not_slip_and_have_the_friction_of_their_own_pair():
+def test_common_motion_without_slip_and_with_pair_friction():
     left, right = (Body(name, Disc(0.5), 1.0, 0.1, (x, 5.0, 0.0)) for name, x in (("left", 0.0), ("right", 1.0)))
     floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
     pairs = (Pair("left", "right", 0.0, 0.25), Pair("floor", "*", 0.0, 0.0))
@@ -206,7 +206,7 @@ def test_a_ball_that_rolls_does_not_slip_whatever_friction_holds_it():
 
 
 @pytest.mark.parametrize("belt_last", [False, True])
-def test_friction_of_a_belt_drags_along_with_it_and_one_against_it_is_seen(belt_last):
+def test_belt_friction_along_and_against_its_motion(belt_last):
     """At rest on a belt of 3 m/s the ball slips back by 3: friction forwards is right, backwards it drives."""
     belt = Body("belt", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(3.0, 0.0))
     still = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
@@ -220,7 +220,7 @@ def test_friction_of_a_belt_drags_along_with_it_and_one_against_it_is_seen(belt_
         assert all(reason == "" for _, reason in found[0].values())
 
 
-def test_without_any_speed_there_is_no_work_and_what_parts_already_owes_nothing():
+def test_friction_work_without_speed_and_of_separating_bodies():
     """Pressed together without gravity: no residual but of momentum; and a contact that parted before, and carries."""
     floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
     still = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
@@ -233,7 +233,7 @@ def test_without_any_speed_there_is_no_work_and_what_parts_already_owes_nothing(
     assert found["separation"] == 0.0
 
 
-def test_an_engine_that_refuses_a_profile_is_asked_for_that_one_and_believed(monkeypatch):
+def test_residuals_of_a_refused_profile(monkeypatch):
     slot = Slot("impact", (), 2, "toy", "tuned", 1 / 240)
     refuses = {"tuned": "it has no such solver"}.get
     monkeypatch.setattr(
@@ -244,7 +244,7 @@ def test_an_engine_that_refuses_a_profile_is_asked_for_that_one_and_believed(mon
     assert measured(slot) == Residuals(slot, nothing(said), 0, said)
 
 
-def test_every_contact_is_recorded_from_the_first_step_on_whatever_the_scene_samples(monkeypatch):
+def test_contacts_recorded_from_the_first_step(monkeypatch):
     pytest.importorskip("pymunk")
     wanted, run = [], asked.run
     monkeypatch.setattr(asked, "run", lambda *given: wanted.append(given[-1]) or run(*given))
@@ -266,7 +266,7 @@ def test_a_contact_that_is_not_told_in_numbers_leaves_no_share_of_it(part):
     assert all("not a number" in why for value, why in told.values() if value is None)
 
 
-def test_a_momentum_that_is_no_number_is_not_passed_over_for_a_smaller_one():
+def test_momentum_that_is_nan_not_passed_over():
     bodies = tuple(Body(name, Disc(0.5), 1.0, 0.1, (x, 0.0, 0.0)) for name, x in (("a", 0.0), ("b", 1.0), ("c", 5.0)))
     row = (0, 1, (0.5, 0.0), (1.0, 0.0), (0.3, 0.0), 0.0)
     scene, found = touching(2, bodies, row, (Pair(),), np.zeros((2, 3, 3)))

@@ -84,7 +84,7 @@ def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
     assert missed.alarming and missed.reason.endswith("; it was not measured")
 
 
-def test_a_check_that_a_stored_run_does_not_have_is_newer_than_the_run_and_not_judged(monkeypatch):
+def test_check_newer_than_a_stored_run_not_judged(monkeypatch):
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     monkeypatch.setattr(rows, "findings_of", lambda engine: None)
     newer = judged(metrics={"another": (0.5, "")})
@@ -195,7 +195,7 @@ def test_a_unit_that_is_empty_leaves_no_space_behind():
         (None, "refused", "infinite"),
     ],
 )
-def test_a_run_whose_step_errs_by_more_than_a_tenth_of_the_tolerance_is_no_truth(error, outcome, said):
+def test_reference_run_with_too_large_a_step_error(error, outcome, said):
     row = judged(metrics={"creep": (0.0, "")}, certificate={"metric_errors": {"creep": error}})
     wanted = (
         f"its error for the step is {said}; a truth has at most {MOST:.3g}, a tenth of the tolerance" if said else ""
@@ -205,7 +205,7 @@ def test_a_run_whose_step_errs_by_more_than_a_tenth_of_the_tolerance_is_no_truth
     assert (row.value, row.cells) == (0.0, ["c0ffee"])  # what was measured stays to be seen
 
 
-def test_errors_of_other_metrics_and_of_cells_without_an_answer_cast_no_doubt():
+def test_truth_kept_despite_errors_of_other_metrics():
     sound = {"metrics": {"creep": (0.0, "")}}
     assert judged(**sound, certificate={"metric_errors": {"acceleration": 9.0}}).outcome == "ok"
     bad = {"metric_errors": {"creep": 9.0}}
@@ -261,7 +261,7 @@ def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
         assert predictions_of(other) == []
 
 
-def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law, monkeypatch):
+def test_law_not_applied_to_a_file_with_a_scene_s_name(law, monkeypatch):
     listed = judged(slot=OWN)
     law.clear()
     monkeypatch.setattr(rows, "is_file", lambda scene: scene == "incline")
@@ -273,7 +273,7 @@ def test_a_file_that_has_the_name_of_a_scene_is_another_scene_and_has_no_law(law
 @pytest.mark.parametrize(
     ("outcome", "alarming"), [(Outcome.OK, False), (Outcome.INVALID, False), (Outcome.CRASHED, True)]
 )
-def test_of_your_own_model_nothing_is_listed_and_only_a_cell_that_is_lost_is_an_alarm(monkeypatch, outcome, alarming):
+def test_own_model_without_list_and_alarm_for_lost_cells(monkeypatch, outcome, alarming):
     monkeypatch.setattr(rows, "is_model", lambda scene: scene == "incline")
     row = judged(slot=OWN, outcome=outcome, reason="so")
     assert (row.standing, row.alarming, row.failing) == (None, alarming, True)
@@ -292,7 +292,7 @@ def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
 
 
 @pytest.mark.parametrize("outcome", [Outcome.OK, Outcome.UNSUPPORTED])
-def test_wrong_findings_of_another_package_are_said_and_leave_no_standing(monkeypatch, outcome):
+def test_wrong_findings_of_an_outside_package(monkeypatch, outcome):
     def wrong(engine):
         raise FindingsError(f"{engine}: families.toml: no such field")
 
@@ -370,7 +370,7 @@ def test_no_rows_are_a_table_with_all_columns():
     assert list(frame([]).columns) == list(Row.__dataclass_fields__)
 
 
-def test_what_laws_have_said_ahead_is_not_asked_again_and_what_they_have_not_is(monkeypatch):
+def test_law_predictions_asked_only_once(monkeypatch):
     """Laws of thousands of rows are asked in processes side by side before the first row is made."""
     scene = CATALOGUE["incline"].scene(3, {"ratio": 0.99})
     monkeypatch.setattr(rows, "predictions", lambda slot, version, metric, scene: ["now", slot, version, metric])
@@ -417,7 +417,7 @@ def of_a_file(tmp_path, engine, outcome=Outcome.OK, **metrics):
 
 
 @pytest.mark.parametrize("engine", ["bullet", "an engine without a list"])
-def test_a_number_that_the_author_of_a_file_states_and_an_engine_misses_is_an_alarm_whoever_it_is(tmp_path, engine):
+def test_alarm_for_a_missed_number_of_a_scene_file(tmp_path, engine):
     missed = of_a_file(tmp_path, engine, **{OWN_CHECK: (0.5, "")})[OWN_CHECK]
     assert (missed.physics, missed.standing, missed.alarming) == ("fail", "new", True)
     met = of_a_file(tmp_path, engine, **{OWN_CHECK: (0.005, "")})[OWN_CHECK]
@@ -448,7 +448,7 @@ def test_a_failure_of_a_file_has_the_cause_of_the_law_that_predicts_it(tmp_path,
     assert ("and e is none of its parameters (predicted" in row.reason) == named
 
 
-def test_of_an_engine_without_a_list_only_cells_that_are_lost_are_alarms(tmp_path):
+def test_engine_without_a_list_alarms_for_lost_cells_alone(tmp_path):
     engine = "an engine without a list"
     grown = of_a_file(tmp_path, engine, **{INVARIANT: (0.5, "")})[INVARIANT]
     assert (grown.physics, grown.standing, grown.alarming, grown.failing) == ("fail", None, False, True)

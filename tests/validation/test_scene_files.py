@@ -307,7 +307,7 @@ pose = [0.0, 1.0, 0.0]
     ("stated", "growth"),
     [("", 1.0), ("growth = 5e4", 5e4), ('growth = "exp(t * sqrt(g / (2 * radius)))"', math.exp(2 * math.sqrt(10.0)))],
 )
-def test_a_file_may_state_by_how_much_its_motion_multiplies_what_is_off_its_plane(tmp_path, stated, growth):
+def test_file_with_a_growth_factor_off_its_plane(tmp_path, stated, growth):
     path = tmp_path / "pile.toml"
     path.write_text(PILE.format(stated=stated))
     canonical = canonical_from_file(path)

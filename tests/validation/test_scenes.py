@@ -60,7 +60,7 @@ def within(parameter, dice):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_whatever_its_ranges_admit_is_a_scene_or_refused_by_the_name_of_a_parameter(name):
+def test_parameter_ranges_of_every_scene_made_or_refused(name):
     """Values that no one else asks for: a scene of that size and name, or one line that says which number is wrong."""
     canonical, dice = CATALOGUE[name], random.Random(name)
     names, made = {parameter.name for parameter in canonical.parameters}, 0

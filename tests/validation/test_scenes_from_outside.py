@@ -63,7 +63,7 @@ def drop(site):
     forget()
 
 
-def test_the_recipe_s_scene_is_described_run_judged_benched_and_reported_by_its_commands(drop, tmp_path):
+def test_recipe_scene_through_all_commands(drop, tmp_path):
     pytest.importorskip("pymunk")
     pytest.importorskip("altair")
     out, commands = str(tmp_path / "out"), recipe()[2]

@@ -90,7 +90,7 @@ def of_blocks(slot):
     return first, second, 0.0, 2.0 if s.get("b") == 2 else 0.1
 
 
-def test_a_profile_is_searched_setting_by_setting_and_every_number_of_it_is_told(monkeypatch):
+def test_search_of_a_profile_by_setting_with_all_numbers(monkeypatch):
     heard = []
     candidates = {"a": (0, 1, 2), "b": (1, 2), "c": (5,), "e": (1,)}
     found, asked = searched_again(
@@ -118,7 +118,7 @@ def test_a_profile_is_searched_setting_by_setting_and_every_number_of_it_is_told
     assert {slot.iterations for slot in asked.slots} == {None, 1, 10}
 
 
-def test_fewer_sweeps_of_its_own_are_no_harm_to_who_asks_for_more_of_them(monkeypatch):
+def test_fewer_own_sweeps_at_more_requested_ones(monkeypatch):
     def off(slot):
         asked = slot.iterations
         return (0.5,) if asked == 100 else (9.0,) if asked is None else (0.5 if not slot.switched else 9.0,)
@@ -128,7 +128,7 @@ def test_fewer_sweeps_of_its_own_are_no_harm_to_who_asks_for_more_of_them(monkey
     assert found.changes == {"iterations": 100} and [score.failing for score in found.held_out] == [1, 0]
 
 
-def test_a_gain_that_nobody_sees_changes_nothing_and_no_more_settings_than_rounds_are_changed(monkeypatch):
+def test_search_without_a_visible_gain_and_limit_of_rounds(monkeypatch):
     found, _ = searched_again(monkeypatch, lambda slot: (8.0 if dict(slot.switched).get("a") else 9.0,), {"a": (1,)})
     assert found.changes == {} and found.before == found.after  # a twentieth of a decade
     many = {name: (1,) for name in "efghij"}
@@ -177,7 +177,7 @@ def of_a_pinch(slot):
     return 0.5, (0.25 if s.get("a") == 1 and margin < 100.0 else 2.0 * margin)
 
 
-def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monkeypatch):
+def test_cure_with_mended_checks_and_cost(monkeypatch):
     found, asked, clocks = cured(
         monkeypatch, of_a_pinch, {"a": (1,), "d": (1,)}, {"tuned": {"a": 1}, "other": {"b": 1}}
     )
@@ -200,7 +200,7 @@ def test_a_cure_says_which_checks_of_which_cells_it_mends_and_at_which_cost(monk
     assert {jobs for _, jobs in asked.calls} == {2} and {slot.dt for slot in asked.slots} == {DT, cures.ELSEWHERE[1]}
 
 
-def test_what_mends_nothing_is_told_with_the_worst_of_what_fails_first_and_is_not_clocked(monkeypatch):
+def test_search_without_a_cure_told_by_the_worst_failure(monkeypatch):
     found, _, clocks = cured(monkeypatch, lambda slot: (0.5, 2.0 * dict(slot.params).get("margin", 1.0)), {"a": (1, 2)})
     assert not found.helps and (found.failing, found.left, found.judged, found.changes) == (3, 3, JUDGED, {})
     assert (found.metric, found.params, found.profile, found.others) == ("turned", {"margin": 100.0}, "", ())
@@ -208,7 +208,7 @@ def test_what_mends_nothing_is_told_with_the_worst_of_what_fails_first_and_is_no
     assert (found.cost_before, found.cost_after, found.mends, found.tried) == (None, None, (), 2) and not clocks
 
 
-def test_settings_that_do_as_well_alone_are_named_and_a_profile_only_if_it_has_all_of_a_cure(monkeypatch):
+def test_equivalent_single_settings_and_profile_of_a_whole_cure(monkeypatch):
     def off(slot):
         s = dict(slot.switched)
         return (0.5 if s.get("a") == 2 or s.get("b") == 3 or slot.iterations == 40 else 9.0,)
@@ -324,13 +324,13 @@ def test_of_settings_of_which_each_is_enough_each_decides_alone(monkeypatch):
     assert {jobs for _, jobs in asked.calls} == {2} and {slot.profile for slot in asked.slots} == {"default"}
 
 
-def test_what_cannot_be_left_out_is_needed_and_what_another_could_stand_for_completes(monkeypatch):
+def test_needed_and_interchangeable_settings_of_a_cure(monkeypatch):
     found, _, _ = measured(monkeypatch, [{"a", "b"}, {"a", "c"}])
     assert [p.decides for p in found.parts] == [NEEDED, "", COMPLETES] and found.text == "a with c"
     assert found.parts[0] == Part("a", "1", pytest.approx(2.75, rel=ROUNDED), pytest.approx(2.5, rel=ROUNDED), NEEDED)
 
 
-def test_a_setting_that_belongs_to_another_is_switched_with_it_and_has_no_part(monkeypatch):
+def test_dependent_setting_switched_with_its_main_one(monkeypatch):
     found, asked, _ = measured(monkeypatch, [{"a", "c"}], belongs={"c": "a"})
     assert [(p.setting, p.decides) for p in found.parts] == [("a", ALONE), ("b", "")]
     assert all(("c" in dict(slot.switched)) == ("a" in dict(slot.switched)) for slot in asked.slots)
@@ -349,14 +349,14 @@ def test_what_passes_as_shipped_or_fails_with_every_change_is_no_cure(monkeypatc
     assert str(refused.value) == said
 
 
-def test_every_cure_that_an_engine_names_is_measured_with_the_processes_that_were_given(monkeypatch):
+def test_every_named_cure_measured_with_given_processes(monkeypatch):
     monkeypatch.setattr(decisive, "cured_of", lambda engine: (f"{engine} 1", f"{engine} 2"))
     monkeypatch.setattr(decisive, "measure", lambda engine, target, jobs=1: (engine, target, jobs))
     assert decisive.measure_all("toy", 4) == [("toy", "toy 1", 4), ("toy", "toy 2", 4)]
     assert [jobs for _, _, jobs in decisive.measure_all("toy")] == [1, 1]
 
 
-def test_a_cure_that_changes_nothing_in_the_cell_that_is_told_says_what_it_changes_elsewhere(monkeypatch):
+def test_cure_without_effect_in_the_told_cell(monkeypatch):
     """Values of other profiles differ from cell to cell; one that is as the profile has it there changes nothing."""
 
     def off(slot):
@@ -379,7 +379,7 @@ def test_what_is_left_a_little_above_its_tolerance_is_not_mended(monkeypatch):
     assert (found.failing, found.left, found.mends) == (6, 1, ("turned",))
 
 
-def test_a_table_of_cures_has_costs_to_three_digits_and_names_in_any_letters(tmp_path):
+def test_cure_table_with_three_digits_and_any_alphabet(tmp_path):
     cure = Cure(
         "toy", "2.1", "default", "pinch\u00e9", 2, ({},), 1, 0, 4, "creep", "m/s", {}, 0.0, 0.1, 0.9, 0.05, {"a": 1},
         "", (), 3,

@@ -21,7 +21,7 @@ def scene(duration, count=1):
     return Scene("own", 1, 2, bodies, (), (0.0, -9.81), duration)
 
 
-def test_the_longest_step_and_the_most_steps_and_samples_are_allowed_and_no_more():
+def test_largest_step_length_and_counts_of_steps_and_samples():
     def refused(scene, dt):
         with pytest.raises(SceneError) as error:
             check_size(scene, dt)
@@ -44,7 +44,7 @@ def test_the_longest_step_and_the_most_steps_and_samples_are_allowed_and_no_more
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
-def test_free_bodies_start_by_so_many_units_of_their_engine_s_numbers_higher_or_lower(kind):
+def test_free_bodies_started_some_units_of_precision_off(kind):
     flat = Scene("own", 1, 2, (FLOOR, BALL), (), (0.0, -9.81), 1.0)
     unit = float(np.finfo(kind).eps)
     for ulp, height in ((0, 1.0), (1, 1.0 + unit), (3, 1.0 + 3.0 * unit), (-1, 1.0 - unit / 2), (-2, 1.0 - unit)):
@@ -55,7 +55,7 @@ def test_free_bodies_start_by_so_many_units_of_their_engine_s_numbers_higher_or_
     assert cells._nudged(deep, 1, kind).bodies[0].pose == (4.0, 2.0, 1.0 + unit, 1.0, 0.0, 0.0, 0.0)
 
 
-def test_settings_are_those_of_the_profile_or_of_the_model_with_what_is_switched_in_their_place(monkeypatch):
+def test_settings_of_profile_or_model_with_replacements(monkeypatch):
     own, asked = [Setting("a", 1, "as shipped"), Setting("b", 2.0, "as shipped")], []
     engine = SimpleNamespace(settings=lambda *given: (asked.append(given), own)[1])
     slot = Slot("stack", (), 2, "toy", "tuned", 1 / 240, 7)

@@ -101,7 +101,7 @@ def test_mass_properties_by_integration():
     assert found == pytest.approx([2.0 * m / whole for m in (yy + zz, zz + xx, xx + yy)], rel=5e-3)
 
 
-def test_a_solid_ball_has_two_fifths_and_a_disc_a_half_of_its_mass_times_its_radius_squared():
+def test_mass_moments_of_a_solid_ball_and_a_disc():
     assert moments(Sphere(0.5), 3.0, 3) == pytest.approx((0.3,) * 3)
     assert moments(Disc(0.5), 3.0, 2) == pytest.approx(0.375)
     for measure in (volume, lambda shape: moments(shape, 1.0, 2)):

@@ -45,7 +45,7 @@ def told(slots, shifts, certificate=None, outcome=Outcome.OK):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_body_that_is_farthest_at_the_end_is_named_with_its_distance(dimension):
+def test_farthest_body_at_the_end_with_its_distance(dimension):
     (found,) = told([slot(dimension=dimension)], [(0.01, -0.03, 0.02)])
     names = [body.name for body in resolve("stack").scene(dimension, dict(PARAMS)).bodies if body.motion == "free"]
     assert (found.scene, found.dimension, found.engine, found.profile) == ("stack", dimension, "toy", "default")
@@ -66,7 +66,7 @@ def test_the_body_that_is_farthest_at_the_end_is_named_with_its_distance(dimensi
         ("none", 4.0, 16.0),
     ],
 )
-def test_it_is_asked_where_our_own_run_can_still_be_predicted_and_never_beyond_its_end(horizon, time, distance):
+def test_spread_time_within_the_predictable_run(horizon, time, distance):
     certificate = {"certified": True, "full": {"horizon": horizon}}
     (found,) = told([slot()], [(0.01,)], certificate)
     assert (found.time, found.certified) == (time, True)
@@ -81,7 +81,7 @@ def test_distances_are_of_centres_in_all_directions():
     assert found.distance == pytest.approx(0.5)
 
 
-def test_each_is_held_against_the_same_scene_alone_and_our_own_run_against_nothing():
+def test_spread_against_the_same_scene_and_none_for_our_run():
     taller = (("n", 2.0),)
     own, other = slot(*OURS), slot(*OURS, params=taller)
     asked = [slot(), slot(profile="tuned"), slot(params=taller), slot(dimension=3), slot(*OURS[:1], "classical")]

@@ -55,7 +55,7 @@ def test_what_a_cell_may_change_is_named(name, change):
     assert seen(*change()) == name
 
 
-def test_a_recursion_limit_a_mask_a_handler_and_a_blocked_signal_are_named():
+def test_changed_recursion_limit_umask_handler_and_signal_named():
     limit, mask = sys.getrecursionlimit(), os.umask(0o022)
     os.umask(mask)
     assert seen(lambda: sys.setrecursionlimit(limit + 7), lambda: sys.setrecursionlimit(limit)) == "interpreter"
@@ -118,7 +118,7 @@ def test_more_open_files_than_are_spare_are_named_and_one_is_not():
     assert state.changed(before) == ""
 
 
-def test_a_look_is_kept_while_no_name_comes_and_is_another_with_the_first_look_s_files_after(monkeypatch):
+def test_process_state_cached_until_a_new_name(monkeypatch):
     before = state.taken()
     assert state.still(before) is before
     monkeypatch.setitem(sys.modules, "crosscheck_that_came", types.ModuleType("crosscheck_that_came"))
@@ -183,7 +183,7 @@ def test_what_a_system_does_not_have_is_nothing(monkeypatch):
     assert state._open_files() == 0 and state._folder() is None
 
 
-def test_functions_classes_and_modules_are_watched_of_ours_and_of_what_judging_computes_with():
+def test_watched_functions_classes_and_modules():
     found = state._names()
     assert {"json", "numpy.linalg", "math", "validation.running.state", "validation.running.state.State"} <= set(found)
     assert "types" not in found and not any(name.startswith(("pytest", "reports")) for name in found)

@@ -22,7 +22,7 @@ def test_what_was_added_comes_back_equal_and_in_the_order_of_the_plan(tmp_path):
     assert store.observations(run) == [observed(slot) for slot in SLOTS]
 
 
-def test_an_unfinished_run_is_resumed_by_another_process_and_a_finished_one_is_not(tmp_path):
+def test_unfinished_run_resumed_and_finished_one_not(tmp_path):
     first = Store(tmp_path)
     run, _ = first.start("test", SLOTS)
     first.add(run, observed(SLOTS[0]))  # not closed: as after kill -9
@@ -67,7 +67,7 @@ def test_runs_before_the_latest(tmp_path):
             store.run(name)
 
 
-def test_a_run_of_moved_starts_is_the_latest_only_if_there_is_nothing_else(tmp_path):
+def test_run_of_moved_starts_as_latest_only_alone(tmp_path):
     store = Store(tmp_path)
     first, _ = store.start("quick: impact", SLOTS)
     store.finish(first)

@@ -278,7 +278,7 @@ def test_results_that_cannot_be_written_can_be_read(public):
     assert done.stdout.strip() == str(len(SLOTS)), done.stderr
 
 
-def test_a_store_from_before_versions_can_be_read_and_gets_what_it_lacks_when_written(tmp_path):
+def test_store_of_an_old_version_read_and_upgraded(tmp_path):
     run = filled(tmp_path)
     sql(tmp_path, "DROP TABLE scenes")
     sql(tmp_path, "PRAGMA user_version = 0")
@@ -314,7 +314,7 @@ def test_simultaneous_starts_are_runs_of_their_own(tmp_path):
     assert len(Store(tmp_path, create=False).runs()) == 3
 
 
-def test_whoever_reads_what_it_will_write_by_has_the_lock_to_write_already(tmp_path, monkeypatch):
+def test_write_lock_taken_before_a_dependent_read(tmp_path, monkeypatch):
     """Else two that start at once read that there is no such run, and one of them cannot write any more."""
     made, asked = Store(tmp_path), []
 
@@ -369,7 +369,7 @@ def forget(monkeypatch):
     resolve.cache_clear()
 
 
-def test_a_scene_file_that_was_edited_is_another_plan_and_the_old_run_keeps_its_scene(tmp_path, forget):
+def test_edited_scene_file_as_another_plan(tmp_path, forget):
     path = tmp_path / "drop.json"
     before = written(path)
     made = Store(tmp_path)

@@ -36,7 +36,7 @@ def test_all_that_is_asked_of_a_cell_is_in_the_key_that_it_is_stored_by(changed)
     assert replace(SLOT, **changed).key() != SLOT.key()
 
 
-def test_a_switched_slot_is_another_cell_that_survives_json_and_is_never_listed():
+def test_switched_cell_through_json_and_never_listed():
     other = switched(SLOT, {"collision_slop": 1e-5, "solref": (0.02, 1.0)})
     again = slot_from_dict(json.loads(json.dumps(other.as_dict())))
     assert again == other and again.key() == other.key() != SLOT.key()
@@ -128,7 +128,7 @@ def test_every_family_has_a_proof_of_a_cell_of_its_scene(engine):
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_a_family_has_two_proofs_only_where_each_switches_what_no_other_does(engine):
+def test_second_proof_of_a_family_with_its_own_switch(engine):
     proofs = experiments_on(engine)
     switched_by = [{(str(dict(e.off)), str(dict(idle))) for idle in (*e.idle, {})} for e in proofs]
     for k, own in enumerate(proofs):
@@ -189,7 +189,7 @@ def test_an_unfinished_cell_has_readings_without_values():
     assert all(each.value is None and "no answer" in each.reason for each in readings(lost))
 
 
-def test_a_study_whose_cells_have_no_answer_is_read_as_its_check_without_a_value(monkeypatch):
+def test_study_without_answers_read_as_a_missing_value(monkeypatch):
     slot = Slot("impact", (), 2, "chipmunk", "tuned", QUICK_DT)
     check = Check("threshold", "1", 0.5, 0.01, "a step", "a law")
     observation = Observation(slot, "", 1, "1", Outcome.OK)

@@ -41,7 +41,7 @@ def bouncing(e, height, position_first):
 
 
 @pytest.mark.parametrize("position_first", [True, False])
-def test_a_correct_method_stays_in_the_tube_in_every_phase_of_its_impacts(position_first):
+def test_correct_method_inside_the_tube_in_every_phase(position_first):
     for height in np.linspace(1.0, 1.04, 9):
         scene, trajectory = bouncing(0.8, float(height), position_first)
         assert record(CATALOGUE["bounce"], scene, trajectory).departure is None
@@ -51,7 +51,7 @@ def test_a_correct_method_stays_in_the_tube_in_every_phase_of_its_impacts(positi
     ("unit", "reach"),
     [("m", 1.0), ("m/s", 0.5), ("m/s^2", 0.125), ("1", 0.0), ("rad", 0.0)],  # of what lasts half a second
 )
-def test_what_a_check_allows_of_places_speeds_and_accelerations_is_how_far_it_leads_in_the_whole_run(unit, reach):
+def test_tube_width_by_the_allowance_of_the_whole_run(unit, reach):
     fallen = CATALOGUE["impact"].scene(2)
     scene = replace(fallen, duration=0.5, gravity=(0.0, -9.81), pairs=(Pair(restitution=0.0),))
     judge = SimpleNamespace(checks=lambda scene, dt: [Check("speed", unit, 0.0, 7.0, "planted", "")])
@@ -77,7 +77,7 @@ def test_the_departure_is_the_first_sample_outside_the_tube():
     assert record(canonical, scene, trajectory).departure == t[240]
 
 
-def test_bytes_give_back_poses_to_half_a_level_of_sixteen_bits_and_times_exactly():
+def test_replay_bytes_to_half_a_level_of_sixteen_bits():
     scene, trajectory = bouncing(0.8, 1.0, True)
     recording = record(CATALOGUE["bounce"], scene, trajectory)
     again = recording_from_bytes(recording.to_bytes())
@@ -95,7 +95,7 @@ def test_frames_are_sixty_a_second_and_at_least_a_hundred_and_twenty():
     assert len(record(CATALOGUE["impact"], short, trajectory_of(short, t, (0.0, 1.0))).t) == 121
 
 
-def test_one_cell_per_profile_is_kept_with_the_same_parameters_and_step_for_all():
+def test_one_replay_cell_per_profile_at_equal_parameters():
     def slot(profile, n, dt, iterations=None):
         return Slot("stack", (("n", float(n)),), 2, "toy", profile, dt, iterations)
 
@@ -120,6 +120,6 @@ def test_one_cell_per_profile_is_kept_with_the_same_parameters_and_step_for_all(
         ([(0.0, 8.0), (0.0, 0.0), (6.0, 8.0)], 0.0),
     ],
 )
-def test_a_point_is_as_far_from_a_path_as_from_its_nearest_line_or_its_only_point(path, distance):
+def test_distance_of_a_point_from_a_path(path, distance):
     found = _distance_to_path(np.array([3.0, 4.0]), np.array(path))
     assert found == pytest.approx(distance, abs=1e-12) and isinstance(found, float)

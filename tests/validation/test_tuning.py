@@ -35,13 +35,13 @@ def test_more_sweeps_are_found_where_too_few_are_the_fault(small, monkeypatch):
 
 
 @pytest.mark.long
-def test_what_helps_the_cells_searched_with_and_harms_others_is_not_kept(small, monkeypatch):
+def test_setting_that_helps_some_cells_and_harms_others_not_kept(small, monkeypatch):
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"iterations": (10, 1000)})
     monkeypatch.setattr(tuning, "_holds", lambda before, after: False)
     assert search("chipmunk", "default", "stand", dimensions=(2,)).changes == {}
 
 
-def test_a_tuned_value_that_does_no_better_than_the_shipped_one_is_named(small, monkeypatch):
+def test_tuned_value_no_better_than_shipped_named(small, monkeypatch):
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"collision_persistence": (1, 3)})
     found = search("chipmunk", "tuned", "stand", dimensions=(2,))
     assert found.changes == {} and found.needless == {"collision_persistence": 3}

@@ -63,7 +63,7 @@ def test_an_engine_that_follows_the_other_motion_is_not_failed(tmp_path):
     assert told in rows["reference"].certificate
 
 
-def test_an_engine_that_follows_neither_motion_before_they_part_or_where_there_is_one_fails(tmp_path):
+def test_engine_that_follows_neither_of_two_motions_fails(tmp_path):
     own, rows = both(tmp_path, 0.05, 1.0)
     assert own.outcome is Outcome.OK and not own.certificate["full"]["several"]
     assert rows["classical"].physics == "fail" and rows["classical"].alarming

@@ -107,7 +107,7 @@ def test_what_has_no_truth_or_no_bound_is_shown_and_not_judged(check, value):
 
 
 @pytest.mark.parametrize("check", [Check("m", "1", None, 1.0, "shown", ""), Check("m", "1", 1.0, None, "shown", "")])
-def test_what_has_no_truth_or_no_bound_has_no_physics_and_is_not_marginal(check):
+def test_row_without_truth_or_bound_not_judged(check):
     assert judge_physics(1.0, check) is None
     assert is_marginal(1.5, check) is False
 
@@ -194,7 +194,7 @@ def test_the_reason_of_a_divergence_in_full(known, said):
     assert judge_divergence(known, "it blew up").reason == said
 
 
-def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from_the_first():
+def test_row_explained_by_any_of_several_laws():
     other = Deviation("e", ("p",), "s", "m", lambda scene, dt, measure: (2.0, 0.1), "another mechanism", "its manual")
     both = [*LAWFUL, (other, 2.0, 0.1)]
     assert judge(2.05, CHECK, both, NEW).reason == "another mechanism (predicted 2 +- 0.1)"
@@ -202,7 +202,7 @@ def test_a_row_that_several_laws_speak_about_is_explained_by_any_and_drifts_from
     assert said == "outside the band of its contact law, 1.5 +- 0.01: it does so by design"
 
 
-def test_laws_are_asked_with_the_scene_and_its_step_and_those_that_say_nothing_are_left_out():
+def test_laws_asked_with_scene_and_step():
     asked = []
 
     def law(scene, dt, measure):

@@ -68,7 +68,7 @@ def test_the_first_bounce_in_numbers():
     assert first.source == "energy balance of a bounce that is found late by up to dt"
 
 
-def test_an_arc_counts_only_if_it_starts_faster_than_twenty_steps_of_gravity():
+def test_arc_counted_from_twenty_steps_of_gravity():
     """From 1 m under 8 m/s^2 speeds are 4, 2, 1, 0.5 m/s at e = 1/2; at 1/160 s twenty steps of gravity are 1 m/s."""
     assert {m for m in checks_of("bounce", dt=1 / 160, e=0.5, g=8.0) if m.startswith("apex[")} == {"apex[1]"}
     assert {m for m in checks_of("bounce", dt=1 / 161, e=0.5, g=8.0) if m.startswith("apex[")} == {"apex[1]", "apex[2]"}
@@ -115,7 +115,7 @@ def test_rest_allows_a_step_a_bounce_the_tail_and_the_scatter_of_phases(e, dt):
     assert f"each of {bounces:.0f} bounces" in check.because
 
 
-def test_rest_of_a_ball_that_does_not_bounce_is_its_one_impact_and_a_tail_of_four_steps():
+def test_rest_bound_of_a_ball_without_a_rebound():
     assert bounds_of("bounce", e=0.0)["rest_time"] == pytest.approx((1 + 4 + 1) * DT, rel=1e-14)
 
 
@@ -153,7 +153,7 @@ def test_a_stack_may_do_what_one_step_of_free_fall_adds(dimension, n, mass, g):
     assert {c.source for m, c in found.items() if "[" in m} == {"weight above the interface"}
 
 
-def test_the_overlap_of_a_high_column_is_told_to_the_round_off_of_its_height():
+def test_overlap_round_off_of_a_high_column():
     """A step so short that free fall adds less than the round-off of the place of the top body."""
     bound = checks_of("stack", n=1000, dt=1e-7, duration=5.0)["penetration"].bound
     assert bound == pytest.approx(9.81e-14 + 999.5e-12, rel=1e-9)
@@ -165,7 +165,7 @@ def test_a_stack_must_rest_in_its_last_second_however_short_the_run():
 
 
 @pytest.mark.parametrize(("g", "duration"), [(9.81, 2.0), (3.7, 8.0)])
-def test_a_box_that_sticks_may_move_by_one_step_and_one_that_slides_misses_a_hundredth_of_a_step(g, duration):
+def test_allowed_distance_of_sticking_and_sliding_boxes(g, duration):
     (creep,) = checks_of("incline", ratio=0.9, g=g, duration=duration).values()
     assert (creep.metric, creep.unit, creep.truth) == ("creep", "m/s", 0.0)
     assert creep.bound == pytest.approx(g * DT**2 / duration, rel=1e-14)
@@ -249,7 +249,7 @@ def test_a_bound_is_its_number_and_says_why(name):
     assert bound.because == because
 
 
-def test_one_is_the_scale_of_what_has_none_and_a_run_that_is_too_short_has_no_time_to_settle():
+def test_default_scale_of_one_and_short_run_without_settling():
     assert bounds.exact().value == bounds.bookkeeping().value == 1e-12
     assert bounds.settled(2, 0.25, 10.0).value == 9.0
 

@@ -48,7 +48,7 @@ def answer(monkeypatch):
     return run
 
 
-def test_a_cell_is_told_with_its_recording_and_the_look_that_the_next_one_is_compared_with(answer):
+def test_answer_with_recording_and_next_process_state(answer):
     told, looked, did = answer()
     assert told == {
         "observation": Observation(SLOT, "c", 1, "1", Outcome.OK).as_dict(), "recording": "a recording", "changed": "",
@@ -68,7 +68,7 @@ def test_a_cell_is_told_with_its_recording_and_the_look_that_the_next_one_is_com
     assert did[3:] == [("still", "a look"), "flush", ("changed", "a look, again")]
 
 
-def test_an_engine_that_is_there_and_not_in_the_worker_is_a_crash_and_one_that_is_nowhere_is_as_it_answers(answer):
+def test_engine_absent_in_the_worker_or_everywhere(answer):
     told, _, _ = answer(engine=None)
     assert told["observation"]["outcome"] == "crashed"
     assert told["observation"]["reason"] == "it can be loaded, but not in its worker process: no wheel"
@@ -83,7 +83,7 @@ def test_an_engine_that_is_there_and_not_in_the_worker_is_a_crash_and_one_that_i
         (OSError("odd"), [0, "OSError: odd", "/x/kept"]),
     ],
 )
-def test_a_file_that_cannot_be_kept_is_told_apart_from_what_an_engine_raises(answer, error, unwritten):
+def test_unwritable_recording_apart_from_an_engine_exception(answer, error, unwritten):
     told, _, did = answer(error, keep="/x/kept")
     assert told["unwritten"] == unwritten and told["recording"] is None and told["changed"] == ""
     assert told["observation"] == Observation(SLOT, "", 0, "", Outcome.CRASHED, process.said_by(error)).as_dict()
@@ -91,7 +91,7 @@ def test_a_file_that_cannot_be_kept_is_told_apart_from_what_an_engine_raises(ans
 
 
 @pytest.mark.parametrize("error", [SystemExit(0), KeyboardInterrupt(), ValueError("no\nnever")])
-def test_what_an_engine_raises_to_leave_is_a_crash_of_its_cell_and_its_process_gets_no_other(answer, error):
+def test_engine_exit_as_a_crash_and_a_fresh_process_after(answer, error):
     told, _, _ = answer(error)
     assert told["observation"] == Observation(SLOT, "", 0, "", Outcome.CRASHED, process.said_by(error)).as_dict()
     assert (told["changed"], told["unwritten"], told["recording"]) == ("what was raised", None, None)

@@ -186,7 +186,7 @@ def test_one_look_at_a_process_serves_until_names_or_modules_have_come(monkeypat
 
 @pytest.mark.skipif(platform.machine() != "x86_64" or sys.platform != "linux", reason="layout of glibc's fenv_t")
 @pytest.mark.parametrize("bit", [0x0040, 0x8000, 0x2000, 0x4000, 0x6000])
-def test_a_unit_that_takes_or_makes_no_denormals_or_rounds_otherwise_is_noticed(bit):
+def test_changed_denormal_or_rounding_mode_noticed(bit):
     """MXCSR: denormals are zeros, or flushed to it; rounding down, up, to zero (Intel's manual, volume 1, 10.2.3)."""
     libm, kept, spoilt = ctypes.CDLL("libm.so.6"), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
     before = state.taken()

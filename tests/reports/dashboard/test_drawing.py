@@ -72,7 +72,7 @@ def test_points_stand_evenly_between_the_labels_and_inside_the_picture():
     assert below < number(left, "y") == number(right, "y") < height
 
 
-def test_a_single_point_stands_in_the_middle_of_where_two_would_and_has_one_label():
+def test_place_and_label_of_a_single_point():
     alone, two = drawn([point(0, error=1.0)]), drawn([point(0, error=1.0), point(1, error=1.0)])
     (place,) = [x for x, _ in dots_of(alone)]
     assert place == pytest.approx(np.mean([x for x, _ in dots_of(two)]), abs=DRAWN)
@@ -82,7 +82,7 @@ def test_a_single_point_stands_in_the_middle_of_where_two_would_and_has_one_labe
 
 
 @pytest.mark.parametrize("name, kind, room", [("line", "error", ERROR), ("line time", "ratio", TIME)])
-def test_heights_are_logarithmic_and_fill_the_room_from_the_least_to_the_largest(name, kind, room):
+def test_logarithmic_heights_from_least_to_largest(name, kind, room):
     values = [3e-2, 1e-1, 3.0, 1.0]
     other = {"ratio": 1.0} if kind == "error" else {"error": 1.0}
     tree = drawn([point(i, **{kind: v}, **other) for i, v in enumerate(values)])
@@ -93,7 +93,7 @@ def test_heights_are_logarithmic_and_fill_the_room_from_the_least_to_the_largest
         assert heights[k] == pytest.approx(room[1] - decade * math.log10(value / values[0]), abs=DRAWN)
 
 
-def test_noise_of_a_few_percent_stays_flat_for_a_decade_is_the_least_that_is_shown():
+def test_flat_line_for_noise_below_a_decade():
     heights = line_of(drawn([point(i, error=e) for i, e in enumerate([1.0, 1.1, 1.0])]), "line")[:, 1]
     assert max(heights) - min(heights) == pytest.approx((ERROR[1] - ERROR[0]) * math.log10(1.1), abs=2 * DRAWN)
     assert 0.5 * (max(heights) + min(heights)) == pytest.approx(sum(ERROR) / 2, abs=2 * DRAWN)
@@ -104,7 +104,7 @@ def labels(tree):
     return {node.text: (number(node, "y"), number(node, "x")) for node in tree.iter("text") if " & s" not in node.text}
 
 
-def test_the_extremes_are_said_beside_their_heights_and_one_number_where_they_are_the_same():
+def test_extremes_beside_their_heights_and_equal_ones_once():
     tree = drawn([point(i, error=e) for i, e in enumerate([0.25, 2.5, 0.5])])
     said = labels(tree)
     assert list(said) == ["2.5", "0.25"]
@@ -130,7 +130,7 @@ def test_signs_of_an_error_do_not_matter():
     )
 
 
-def test_what_has_no_error_or_no_time_leaves_a_gap_and_no_line_where_none_has():
+def test_gaps_without_error_or_time():
     tree = drawn([point(0, error=1.0), point(1), point(2, error=4.0)])
     assert len(dots_of(tree)) == 2 and len(line_of(tree, "line")) == 2
     assert of_class(tree, "line time") == []
@@ -139,7 +139,7 @@ def test_what_has_no_error_or_no_time_leaves_a_gap_and_no_line_where_none_has():
     assert of_class(drawn([point(0), point(1)]), "line") == []
 
 
-def test_corners_that_change_nothing_are_left_out_and_those_that_do_are_there():
+def test_corners_left_out_only_where_nothing_changes():
     errors = [1.0] * 5 + [2.0] * 5 + [1.0]
     tree = drawn([point(i, error=e) for i, e in enumerate(errors)])
     corners = line_of(tree, "line")
@@ -182,7 +182,7 @@ def test_every_judged_run_has_a_cell_of_its_own_filled_where_it_fails(count):
 
 
 @given(st.lists(st.sampled_from(["good", "bad", ""]), min_size=MANY + 1, max_size=2 * MANY))
-def test_of_many_runs_neighbours_of_a_state_are_one_cell_from_the_first_to_the_last(states):
+def test_runs_of_equal_state_as_one_cell(states):
     kinds = {"good": (0, 1), "bad": (1, 1), "": (0, 0)}
     tree = drawn([point(i, 1.0, *kinds[state]) for i, state in enumerate(states)])
     assert dots_of(tree) == []
@@ -199,7 +199,7 @@ def test_of_many_runs_neighbours_of_a_state_are_one_cell_from_the_first_to_the_l
         assert each * (last - first) < number(cell, "width") + DRAWN < each * (last - first + 1) + 5 * DRAWN
 
 
-def test_a_flip_has_a_mark_over_its_run_that_points_down_where_it_is_lost_and_up_where_it_is_mended():
+def test_mark_of_a_flip_lost_or_mended():
     points = [point(i, error=1.0, lost=i == 1, mended=i in (1, 3)) for i in range(5)]
     tree = drawn(points)
     places = [x for x, _ in dots_of(tree)]

@@ -55,7 +55,7 @@ def test_a_summary_that_another_program_wrote_is_made_anew(file):
     kept.close()
 
 
-def test_a_file_that_another_process_writes_is_left_alone_and_a_folder_that_is_not_there_is_none(file, monkeypatch):
+def test_summary_file_in_use_or_without_a_folder(file, monkeypatch):
     connect = sqlite3.connect
     monkeypatch.setattr(sqlite3, "connect", lambda path, timeout=5.0, **more: connect(path, 0.01 * timeout, **more))
     kept, other = Kept(file.parent), connect(file)

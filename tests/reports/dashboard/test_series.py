@@ -104,7 +104,7 @@ def test_a_flip_is_marked_once_and_says_in_which_direction():
     assert (panel.unit, panel.law) == (primary.unit, primary.law)
 
 
-def test_cells_that_begin_and_cease_to_fail_at_once_are_said_in_one_line():
+def test_cells_with_simultaneous_changes_in_one_line():
     entries = []
     for k, (one, other) in enumerate([(0, 1), (0, 1), (1, 0)]):
         cells = {("e", "p", "impact", 2): {"s": (0.1, one, 1, one), "r": (0.1, other, 1, other)}}
@@ -131,7 +131,7 @@ HISTORY = {
 }
 
 
-def test_the_grid_has_a_line_per_scene_that_changes_and_the_share_that_fails_release_by_release():
+def test_grid_of_changed_scenes_and_failing_share_by_release():
     found = grid("releases", "e", released("e", HISTORY))
     assert found.labels == ["1.0", "1.1", "1.2", "1.3"] and found.same == 1
     assert [(scene, shares) for scene, _, shares in found.lines] == [
@@ -139,7 +139,7 @@ def test_the_grid_has_a_line_per_scene_that_changes_and_the_share_that_fails_rel
     ]  # fmt: skip
 
 
-def test_the_page_opens_with_the_grid_and_the_largest_steps_in_sentences():
+def test_opening_of_the_page_with_grid_and_largest_steps():
     panels_of = released("e", HISTORY)
     page = render(panels_of, "generated")
     said = re.sub(r"<[^>]+>", "", page)
@@ -222,7 +222,7 @@ def by_definition(panels):
 
 
 @given(st.lists(st.tuples(PANELS, st.booleans(), st.integers(1, 3)), min_size=1, max_size=8))
-def test_points_are_as_defined_whatever_repeats_is_missing_or_was_only_timed(history):
+def test_points_of_repeated_missing_and_timed_runs(history):
     entries = [
         _Entry(f"{k}.{i}", "", "", Summary({KEY: own}, {}), {KEY: (1.0 + k, "reference/reference")} if timed else {})
         for k, (own, timed, times) in enumerate(history)
@@ -264,7 +264,7 @@ def long_history(folder, runs=500):
 
 
 @pytest.mark.long
-def test_a_dashboard_of_500_runs_and_benches_takes_less_than_ten_seconds(tmp_path):
+def test_dashboard_of_500_runs_and_benches_below_ten_seconds(tmp_path):
     store, count = long_history(tmp_path)
     begun = time.process_time()
     found = panels(store, tmp_path)
@@ -308,7 +308,7 @@ def of_releases(folder, observation, answers):
     return store
 
 
-def test_releases_are_points_in_the_order_of_their_versions_apart_from_runs(tmp_path, observation):
+def test_release_points_by_version_apart_from_runs(tmp_path, observation):
     store = of_releases(tmp_path, observation, [("7.10.0", 0.3), ("7.9.0", 0.0)])
     (panel,) = panels(store, tmp_path)
     newest = store.release_runs("chipmunk", "7.10.0")[0].id
@@ -339,7 +339,7 @@ def test_a_release_is_judged_once_and_again_once_it_was_asked_more(tmp_path, obs
     assert judged[2:] == ["7.9.0"] and panel.points[0].error == pytest.approx(0.1)
 
 
-def test_a_run_keeps_its_own_summary_so_that_no_dashboard_judges_it_again(tmp_path, monkeypatch):
+def test_kept_summary_not_judged_again(tmp_path, monkeypatch):
     """Of 500 runs the quick suite's judging takes an hour; reading what they kept takes seconds."""
     words = ["run", "impact", "--param", "e=0.5", "--dim", "2", "--engine", "chipmunk", "--dt", "1/240"]
     done = CliRunner().invoke(main, [*words, "--jobs", "1", "--out", str(tmp_path)])
@@ -412,7 +412,7 @@ def test_a_store_without_a_finished_run_is_one_line(tmp_path):
 
 
 @pytest.mark.parametrize("was", [True, False])
-def test_the_collector_is_afterwards_as_it_was_also_when_something_breaks(was):
+def test_garbage_collector_restored_after_an_error(was):
     import gc
 
     from reports.dashboard.series import _nothing_thrown_away
@@ -428,7 +428,7 @@ def test_the_collector_is_afterwards_as_it_was_also_when_something_breaks(was):
         (gc.enable if before else gc.disable)()
 
 
-def test_a_time_is_of_a_unit_of_work_at_the_quick_step_where_there_is_one():
+def test_time_per_unit_of_work_at_the_quick_step():
     def row(purpose, dt, ratio):
         return {"purpose": purpose, "dt": dt, "ratio": ratio, "opponent": "chipmunk/default", "engine": "reference",
                 "profile": "classical", "scene": "stack", "dimension": 2}  # fmt: skip

@@ -116,7 +116,7 @@ def test_a_check_is_meant_by_its_name_its_series_or_its_place_in_it(asked, meant
     assert is_meant("mean[floor/ball.fy]", "floor/ball.fy") and not is_meant("apex[1]", "1")
 
 
-def test_who_was_asked_is_said_in_order_and_only_the_cell_that_is_followed_is_asked_between_the_ends():
+def test_order_of_asked_releases_and_cells_in_a_bisection():
     """The cell as it is and from starts moved by units in the last place: the floor of both sides."""
     cells = []
 
@@ -140,7 +140,7 @@ def test_a_flip_is_followed_by_its_verdict_whatever_the_value_does():
     assert (found.before, found.after, found.change.kind) == (2, 3, Kind.FLIP)
 
 
-def test_nothing_changed_has_no_reason_and_the_end_that_is_silent_has_its_own():
+def test_bisection_without_a_change_or_with_a_silent_end():
     assert bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.4, 0.5])) == Unchanged("")
     first = bisect(3, [SLOT], "rebound_ratio", Engine([None, 0.5, 0.5]))
     assert first == Unchanged("release 0 cannot run: no wheel")
@@ -158,7 +158,7 @@ def test_a_release_that_names_no_reason_has_that_of_its_rows():
     assert "no wheel" in found.silent[1]
 
 
-def test_a_value_that_moves_twice_is_told_with_what_it_was_in_the_two_releases_that_are_named():
+def test_value_that_changes_twice_between_two_releases():
     """It fails everywhere, and is .35 in the end: the release that is found is where it first left .4."""
     found = bisect(4, [SLOT], "rebound_ratio", Engine([0.4, 0.4, 0.37, 0.35], noise=1e-5))
     assert (found.before, found.after) == (1, 2)

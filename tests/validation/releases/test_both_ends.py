@@ -15,7 +15,7 @@ from validation.releases.driving import Effort, drive
 ONE = Effort(jobs=1)
 
 
-def test_what_a_release_answers_and_what_it_left_comes_over_the_line_as_it_is(store, monkeypatch):
+def test_answers_and_leftovers_of_a_release_over_the_line(store, monkeypatch):
     """Both ends of the line, without an environment between them: one cell ran, one was left with a reason."""
     asked = [Slot("impact", (("e", e),), 2, "chipmunk", "default", 1 / 240) for e in (0.25, 0.5)]
     own = SimpleNamespace(name="chipmunk==1", engine="chipmunk", version="1", distribution="pymunk", unknown="")
@@ -80,7 +80,7 @@ def timed(store, monkeypatch):
     return run
 
 
-def test_a_release_is_timed_once_and_again_if_its_adapter_is_another_or_more_is_asked(timed, store, monkeypatch):
+def test_release_timed_again_after_a_changed_adapter(timed, store, monkeypatch):
     asked, said, own = timed(TIMED[:1], [lap(TIMED[0], k) for k in range(2)])
     assert asked == [(own, ONE, None, [], asked[0][4], TIMED[:1])] and said == []
     (run,) = store.release_runs("chipmunk", "1")
@@ -101,7 +101,7 @@ def test_a_release_is_timed_once_and_again_if_its_adapter_is_another_or_more_is_
     assert len(store.release_runs("chipmunk")) == 4
 
 
-def test_what_could_not_be_timed_is_said_with_its_reason_and_the_run_is_over(timed, store):
+def test_timing_failure_with_its_reason_in_a_finished_run(timed, store):
     _, said, _ = timed(TIMED, [lap(TIMED[0], 0), lap(TIMED[1], 0, "it hung")])
     assert said == ["chipmunk==1: not timed: default impact 2-D: it hung"]
     _, said, _ = timed(TIMED, [driving.Unasked("cannot be driven: it ended\nat once")], Effort(fresh=True))

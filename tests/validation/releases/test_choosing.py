@@ -34,7 +34,7 @@ def test_what_the_adapter_does_not_know_is_said_with_the_range():
     assert release("e", TWO, "4.5").unknown == "it erases the disk"
 
 
-def test_a_prerelease_that_is_named_is_known_where_its_number_lies_in_what_the_adapter_knows():
+def test_named_prerelease_within_the_known_range():
     """It is asked for with all that a release of that number needs; before the first that is known it is not known."""
     found = release("e", TWO, "4.2rc1")
     assert found.requirements == ("new-name==4.2rc1", "helper==1", "numpy") and found.unknown == ""
@@ -46,7 +46,7 @@ def test_a_prerelease_that_is_named_is_known_where_its_number_lies_in_what_the_a
         release("e", only, "1.9b1")
 
 
-def test_mujoco_has_two_distributions_and_4_0_0_is_the_one_with_the_engine():
+def test_mujoco_release_4_0_0_of_two_distributions():
     assert [r.distribution for r in chosen("mujoco", "3.17.0,4.0.0")] == ["mujoco", "mujoco-core"]
 
 

@@ -26,7 +26,7 @@ def call(toy, tmp_path):
     return run
 
 
-def test_bisect_finds_the_planted_change_in_two_questions_and_says_what_did_not_answer(call, tmp_path):
+def test_bisection_of_a_planted_change_in_two_questions(call, tmp_path):
     done = call("bisect", "toy", "1.0.0..1.2.0", "impact", "--check", "rebound_ratio", *CELL, "--json")
     found = json.loads(done.stdout)
     assert (found["before"], found["after"]) == ("1.0.0", "1.2.0")
@@ -51,7 +51,7 @@ def test_the_commands_that_it_prints_reproduce_the_two_cells(call):
 
 
 @pytest.mark.long
-def test_all_asks_every_release_and_only_then_says_that_it_is_the_only_change(call):
+def test_every_release_asked_before_a_change_is_called_the_only_one(call):
     done = call("bisect", "toy", "1.0.0,1.1.0,1.2.0", "impact", "--check", "rebound_ratio", *CELL, "--all")
     assert "the only change of this check: every release ran" in done.stdout
 

@@ -32,13 +32,13 @@ def ask(store, version, slots=(SLOT,), effort=ONE, **kwargs):
     return drive(store, release(version), slots, effort, **kwargs)
 
 
-def test_cells_are_those_of_a_release_that_answers_where_none_is_installed_here(toy):
+def test_cells_of_an_answering_release_without_one_installed(toy):
     assert registry.find("toy").engine is None
     found = planned(chosen("toy", "1.0.0,1.1.0"), REQUEST, ONE, lambda line: None)
     assert found == [SLOT]
 
 
-def test_a_release_is_measured_under_its_own_version_and_is_never_the_latest_run(toy, store, monkeypatch):
+def test_release_stored_under_its_version_and_never_latest(toy, store, monkeypatch):
     latest, _ = store.start("quick: impact", [SLOT])
     (observation,) = ask(store, "1.0.0")
     assert (observation.outcome, observation.engine_version) == (Outcome.OK, "1.0.0")
@@ -86,7 +86,7 @@ def test_what_is_stored_is_not_asked_again_but_what_was_missing_is(toy, store):
     assert asked[-1] == "again"
 
 
-def test_what_an_adapter_refuses_is_stored_but_a_release_that_was_never_asked_is_asked_with_try(toy, store):
+def test_refusal_stored_and_unasked_release_asked_with_try(toy, store):
     refused = Slot("incline", (), 2, "toy", "default", 1 / 240)
     asked = []
     for _ in range(2):
@@ -98,7 +98,7 @@ def test_what_an_adapter_refuses_is_stored_but_a_release_that_was_never_asked_is
     assert answered(store, unknown, [SLOT]) == {}  # no code of ours has spoken: nothing of it counts
 
 
-def test_a_profile_of_which_a_receipt_fails_has_no_verdicts_on_that_release(toy, store):
+def test_profile_with_a_failed_receipt_without_verdicts(toy, store):
     asks_none = replace(SLOT, params=(("e", 0.0), ("v", 4.0)))
     found = ask(store, "2.0.0", (SLOT, asks_none))
     assert {o.slot: o.outcome for o in found} == {SLOT: Outcome.OK, asks_none: Outcome.OK}

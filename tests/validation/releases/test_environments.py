@@ -36,7 +36,7 @@ def made(copied):
     return copied(toy_release())
 
 
-def test_an_environment_holds_the_release_and_numpy_and_a_receipt_says_so(made):
+def test_environment_with_release_numpy_and_receipt(made):
     assert set(made.receipt["packages"]) == {"toyphysics", "numpy"}
     assert made.receipt["packages"]["toyphysics"] == "1.0.0"
     assert made.receipt["python"] == ".".join(map(str, sys.version_info[:3]))

@@ -47,7 +47,7 @@ def test_a_release_that_did_not_answer_is_passed_over():
     assert kinds([told("1", 0.5), silent, told("3", 0.4)]) == [("1", "3", Kind.FLIP, 1)]
 
 
-def test_cells_that_a_release_was_not_asked_are_compared_with_the_last_that_was():
+def test_cells_compared_with_the_last_release_that_was_asked():
     releases = [told("1", 0.5, (SLOT, OTHER)), told("2", 0.5), told("3", 0.4, (SLOT, OTHER))]
     assert sorted(kinds(releases)) == [("1", "3", Kind.FLIP, 1), ("2", "3", Kind.FLIP, 1)]
 
@@ -56,7 +56,7 @@ def test_rows_that_move_together_are_one_step():
     assert kinds([told("1", 0.5, (SLOT, OTHER)), told("2", 0.4, (SLOT, OTHER))]) == [("1", "2", Kind.FLIP, 2)]
 
 
-def test_a_cell_that_crashes_is_an_answer_and_one_that_is_invalid_is_none():
+def test_crashed_cell_as_an_answer_and_invalid_one_as_none():
     crashed = told("2", None, outcome=Outcome.CRASHED)
     assert kinds([told("1", 0.5), crashed]) == [("1", "2", Kind.OUTCOME, 1)]
     assert kinds([told("1", 0.5), told("2", 0.4, outcome=Outcome.INVALID), told("3", 0.5)]) == []
@@ -78,7 +78,7 @@ def test_a_value_that_moves_no_more_than_from_a_moved_start_is_no_step():
     assert kinds([noisy("1", 0.40, 0.001), noisy("2", 0.41, 0.001)]) == [("1", "2", Kind.ERROR, 1)]
 
 
-def test_starts_are_moved_where_values_moved_on_both_sides_and_nowhere_else():
+def test_starts_moved_only_for_values_changed_on_both_sides():
     releases = [told("1", 0.5), told("2", 0.4), told("3", 0.41, (SLOT, OTHER)), told("4", 0.41, (SLOT, OTHER))]
     starts = [replace(SLOT, ulp=1), replace(SLOT, ulp=2)]
     assert moved_starts(releases) == {"2": starts, "3": starts}
@@ -105,7 +105,7 @@ def test_the_command_asks_what_moved_again_and_only_that(monkeypatch):
     [(Outcome.OK, False), (Outcome.UNSUPPORTED, False), (Outcome.NOT_INSTALLED, False), (Outcome.CRASHED, True),
      (Outcome.TIMED_OUT, True), (Outcome.INVALID, True)],
 )  # fmt: skip
-def test_rows_that_end_without_an_answer_are_counted_apart_from_those_that_fail(outcome, ended):
+def test_rows_without_an_answer_counted_apart_from_failures(outcome, ended):
     release = told("2", 0.4 if outcome is Outcome.OK else None, outcome=outcome)
     assert release.ended == (len(release.rows) if ended else 0) and len(release.rows) > 1
 
@@ -134,7 +134,7 @@ def test_versions_are_in_the_order_of_versions(tmp_path):
 @pytest.mark.parametrize(
     ("value", "releases", "is_mended"), [(0.4, "<2", True), (0.4, ">=2", False), (0.5, "<2", False)]
 )
-def test_what_passes_beyond_the_band_of_a_finding_of_other_releases_is_mended(monkeypatch, value, releases, is_mended):
+def test_pass_beyond_the_band_of_an_older_finding_is_mended(monkeypatch, value, releases, is_mended):
     """What passes within the band was marginal there, and is the same here."""
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", releases)
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, value, 0.01))
@@ -166,7 +166,7 @@ HELD, BROKEN, WORSE = ({"quantity": name, "holds": holds} for name, holds in
                        (("mass", True), ("friction", False), ("gravity", False)))  # fmt: skip
 
 
-def test_a_profile_of_which_a_receipt_fails_has_no_verdicts_and_others_keep_theirs():
+def test_failed_receipt_removes_verdicts_of_its_profile_only():
     """Two cells of one profile, the second right: what is right by chance is not right either."""
     metrics = {"rebound_ratio": (0.5, "")}
     sound = replace(SLOT, profile="sound")
@@ -196,7 +196,7 @@ def test_what_was_invalid_before_keeps_its_own_reason():
     ("own", "other", "pace"),
     [({"a": 6.0, "b": 2.0, "c": 9.0}, {"a": 2.0, "b": 1.0, "d": 5.0}, 2.5), ({"a": 6.0}, {"b": 1.0}, None)],
 )
-def test_the_pace_of_a_release_is_the_median_over_what_both_were_timed_on(own, other, pace):
+def test_pace_of_a_release_as_median_over_common_cells(own, other, pace):
     first, second = (Told("toy", "1", (), times=times) for times in (own, other))
     assert first.pace(second) == pace
 
@@ -222,7 +222,7 @@ def ratios_of(release):
     return {row.params["v"]: row.value for row in release.rows if row.metric == "rebound_ratio"}
 
 
-def test_all_that_a_store_has_of_an_engine_is_told_oldest_first_unless_some_is_named(releases, monkeypatch):
+def test_releases_of_an_engine_oldest_first(releases, monkeypatch):
     store, add = releases
     for version, ratio, slot in (("10", 0.3, SLOT), ("9", 0.5, SLOT), ("9", 0.4, OTHER)):
         add(version, ratio, slot)
@@ -243,7 +243,7 @@ def test_all_that_a_store_has_of_an_engine_is_told_oldest_first_unless_some_is_n
     [(Outcome.OK, Outcome.OK, 0.4), (Outcome.OK, Outcome.INVALID, 0.4), (Outcome.OK, Outcome.NOT_INSTALLED, 0.5),
      (Outcome.NOT_INSTALLED, Outcome.UNSUPPORTED, 0.4), (Outcome.INVALID, Outcome.NOT_INSTALLED, 0.4)],
 )  # fmt: skip
-def test_the_newest_answer_to_a_cell_counts_and_what_is_none_replaces_no_answer(releases, first, second, kept):
+def test_newest_answer_kept_over_later_non_answers(releases, first, second, kept):
     store, add = releases
     add("1", 0.5, outcome=first)
     add("1", 0.4, outcome=second)
@@ -274,7 +274,7 @@ def test_the_newest_ratio_of_each_scene_of_a_release_is_its_time(releases, monke
 # ---- what moved, as data and in words ----
 
 
-def test_a_step_as_data_has_both_releases_its_largest_change_and_how_many_moved():
+def test_step_data_with_releases_largest_change_and_count():
     step = next(s for s in steps([told("1", 0.5, (SLOT, OTHER)), told("2", 0.4, (SLOT, OTHER))])
                 if s.family.first.metric == "rebound_ratio")  # fmt: skip
     assert step.as_dict() == {"before": "1", "after": "2", "rows": 2, "change": step.family.first.as_dict()}
@@ -313,7 +313,7 @@ def test_a_row_has_the_finding_of_its_own_engine_and_cell(monkeypatch):
 
 
 @pytest.mark.parametrize(("listed", "found", "is_mended"), [(None, 0.5, True), (0.4, 0.41, False), (0.4, 0.411, True)])
-def test_what_had_no_value_is_mended_by_any_and_the_end_of_a_band_is_in_it(monkeypatch, listed, found, is_mended):
+def test_mended_value_that_was_missing_or_at_the_band_s_end(monkeypatch, listed, found, is_mended):
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "<2")
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, listed, 0.41 - 0.4))
     row = next(row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio")
@@ -344,7 +344,7 @@ source = "notes of 2.5"
 """
 
 
-def test_a_step_is_told_with_the_note_between_its_releases_or_is_unexplained(noted):
+def test_step_between_releases_with_its_note_or_unexplained(noted):
     noted(NOTE)
     found = steps([told("2", 0.5), told("3", 0.4)])
     (said,) = sentences("toy", [step for step in found if step.family.first.metric == "rebound_ratio"])
@@ -402,7 +402,7 @@ def test_a_doubted_row_has_neither_verdict_nor_standing():
     assert history._doubted(known, {"default": "a receipt fails"}) is known
 
 
-def test_the_published_page_has_a_part_per_engine_with_what_moved_or_that_nothing_did(tmp_path, monkeypatch):
+def test_published_page_part_per_engine(tmp_path, monkeypatch):
     store = Store(tmp_path)
     monkeypatch.setattr(history, "engines", lambda store: ["one", "other"])
     monkeypatch.setattr(history, "told", lambda store, engine: [])

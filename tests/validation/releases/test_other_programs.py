@@ -72,7 +72,7 @@ def test_the_registry_is_asked_for_its_list_and_given_up_after_a_while(programs)
         assert str(error.value) == said
 
 
-def test_pip_installs_wheels_alone_and_what_it_cannot_is_said_in_one_line(programs, monkeypatch, tmp_path):
+def test_pip_installs_of_wheels_alone_with_one_line_errors(programs, monkeypatch, tmp_path):
     asked = programs((0, "", "ERROR: none\n"))
     environments._install(tmp_path, RELEASE)
     ((command, how),) = asked

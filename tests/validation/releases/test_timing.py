@@ -49,7 +49,7 @@ def test_cells_of_sweeps_experiments_and_files_are_not_timed(change):
 
 
 @pytest.mark.parametrize("outcome", [Outcome.CRASHED, Outcome.INVALID, Outcome.DIVERGED, Outcome.NOT_INSTALLED])
-def test_what_has_no_answer_has_no_time_and_no_other_cell_stands_in_for_it(outcome):
+def test_missing_time_of_a_cell_without_an_answer(outcome):
     again = replace(SLOT, params=(("e", 0.8),))
     assert timing.timed_cells([seen(outcome=outcome), seen(again)]) == []
 
@@ -75,7 +75,7 @@ def test_a_time_is_the_median_over_rounds_of_its_ratio_to_the_yardstick(tmp_path
     store.close()
 
 
-def test_profiles_of_a_scene_have_a_yardstick_each_and_what_is_void_has_no_time(tmp_path):
+def test_yardstick_per_profile_and_missing_time_when_void(tmp_path):
     other, gone = replace(SLOT, profile="other"), replace(SLOT, profile="gone")
     laps = []
     for k in range(3):
@@ -105,7 +105,7 @@ def test_a_pace_is_the_median_over_scenes_that_both_releases_have():
     assert told(new=1.0).pace(first) is None and told().pace(first) is None
 
 
-def test_a_lap_is_measured_by_the_yardsticks_on_both_of_its_sides_and_one_that_fails_is_not_asked_again(monkeypatch):
+def test_lap_by_both_neighbouring_yardsticks_and_no_retry_after_failure(monkeypatch):
     class FakeLane:
         started = 0
 
@@ -165,7 +165,7 @@ def test_releases_are_timed_in_their_environments_once(toy, tmp_path, monkeypatc
     store.close()
 
 
-def test_a_lap_is_kept_whole_and_its_yardstick_beside_it_under_the_same_profile():
+def test_lap_kept_with_its_yardstick_under_one_profile():
     told = lap(round_=3, seconds=0.5, yardstick=0.25, void="it hung") | {
         "order": 4, "wall_seconds": 0.75, "bodies": 2, "steps": 120}  # fmt: skip
     own, beside = timing.timings_of(told, "1.5")
@@ -180,7 +180,7 @@ def test_a_lap_is_kept_whole_and_its_yardstick_beside_it_under_the_same_profile(
     )  # fmt: skip
 
 
-def test_rounds_have_processes_of_their_own_and_what_is_void_once_is_timed_no_more(monkeypatch):
+def test_timing_rounds_in_own_processes_and_void_only_once(monkeypatch):
     """A lap lies between two yardsticks and is told with their mean; the lane ends whatever happens."""
     did, sticks = [], iter(range(1, 100))
     other = replace(SLOT, profile="other")

@@ -168,7 +168,7 @@ def test_what_should_stay_and_moves_or_bears_otherwise_fails(size):
         assert failing(canonical, scene, run(scene, loads=loads)) == {name}
 
 
-def test_an_arch_that_stands_where_it_gives_way_or_gives_way_where_it_stands_fails():
+def test_arch_standing_or_falling_against_its_threshold():
     canonical, slides = made("arch", ratio=0.8)
     assert {"parting[left]", "parting[right]", "sinking"} <= failing(
         canonical, slides, run(slides, factors=(0.0, 0.0, 0.0))

@@ -153,7 +153,7 @@ def gap_before_and_after(params):
         *({"whirl": whirl, "offset": 0.1, "delay": delay} for whirl in (6.0, 10.0) for delay in (0.05, 0.3)),
     ],
 )
-def test_a_bar_that_meets_the_ball_once_more_or_before_is_refused_and_only_that(params):
+def test_bar_with_a_second_or_earlier_blow_refused(params):
     """It is clear of the ball where the scene is made, and is not where it is refused."""
     canonical = CATALOGUE["off_centre"]
     params = canonical.complete(params)
@@ -171,7 +171,7 @@ def test_a_bar_that_gives_way_faster_than_the_ball_comes_is_refused():
 
 
 @pytest.mark.parametrize(("e", "whirl"), [(0.3, 0.0), (0.5, 0.0), (1.0, 0.0), (0.8, -2.0), (0.8, 2.0), (1.0, -8.0)])
-def test_a_blow_beside_the_centre_conserves_both_momenta_and_loses_what_newton_s_law_takes(e, whirl):
+def test_momenta_and_energy_loss_of_an_eccentric_blow(e, whirl):
     _, scene, truth = made("off_centre", e=e, whirl=whirl)
     (bar, ball), d = scene.bodies, scene.params["offset"]
     before = ball.mass * ball.twist[1] + bar.mass * bar.twist[1]
@@ -229,7 +229,7 @@ def judged(canonical, scene, trajectory):
 
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("whirl", [-8.0, -2.0, 2.0])
-def test_a_spinning_bar_struck_by_methods_of_fixed_steps_stays_within_the_bounds_and_uses_them(whirl, dt):
+def test_spinning_bar_bounds_against_fixed_step_methods(whirl, dt):
     canonical, used = CATALOGUE["off_centre"], {}
     for params in phases(dt):
         scene = canonical.scene(2, {"whirl": whirl, **params})
@@ -260,7 +260,7 @@ def test_a_spinning_bar_that_gets_another_push_or_turn_fails(size):
         assert found["sideways"] > 1.0 and found["momentum_defect"] <= 1.0
 
 
-def test_single_numbers_keep_the_momentum_of_a_spinning_bar_and_a_ball_within_the_law_and_no_fault_does():
+def test_momentum_law_of_a_spinning_bar_in_single_precision():
     """Every velocity rounded to 24 bits; a thousandth of the push that the bar gets is more than ten bands."""
     canonical, law = CATALOGUE["off_centre"], booked_law("momentum_defect")
     assert law(canonical.scene(2, {}), DT, canonical.measure) is None
@@ -278,7 +278,7 @@ def test_single_numbers_keep_the_momentum_of_a_spinning_bar_and_a_ball_within_th
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_law_of_what_is_booked_rounds_one_number_at_a_time_at_the_end_of_the_scene(dimension):
+def test_one_rounded_number_at_a_time_in_the_booking_law(dimension):
     """Every coordinate of both velocities once, by roundings of a single of the fastest, one after another."""
     canonical = CATALOGUE["off_centre"]
     scene, shown = canonical.scene(dimension, {"whirl": -2.0}), []
@@ -442,7 +442,7 @@ def test_impacts_count_the_digits_of_pi(ratio, count):
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0])
-def test_the_closed_form_is_what_springs_between_ball_ball_and_wall_make(ratio):
+def test_closed_form_of_ball_ball_and_wall_against_springs(ratio):
     _, scene, truth = made("galperin", ratio=ratio)
     balls = scene.bodies[1:]
     found = spring_line(
@@ -472,7 +472,7 @@ def test_one_impact_too_few_and_a_soft_one_fail():
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 16.0, 100.0])
-def test_the_balls_touch_each_other_or_the_wall_whenever_they_are_told_to_meet(ratio):
+def test_balls_touch_at_their_stated_meeting_times(ratio):
     """Straight on between impacts: one gap, of the balls and of the wall in turn, is nothing at each of the times."""
     params = CATALOGUE["galperin"].complete({"ratio": ratio, "gap": 0.7, "v": 1.3})
     time, wall, between = 0.0, params["gap"], params["v"] * params["delay"]
@@ -505,7 +505,7 @@ def stepped_balls(params, dt, phase):
 
 @pytest.mark.parametrize(("ratio", "e"), [(3.0, 0.9), (1.0, 0.5), (3.0, 0.5)])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
-def test_a_method_of_steps_finds_the_last_blow_of_stacked_balls_no_later_than_told(ratio, e, dt):
+def test_last_blow_of_stacked_balls_by_step_methods(ratio, e, dt):
     params = CATALOGUE["stacked_balls"].complete({"ratio": ratio, "e": e})
     last = stacked_balls.impacts(params)[-1][0]
     late = [stepped_balls(params, dt, phase) - phase * dt - last for phase in np.linspace(0.0, 0.99, 7)]
@@ -514,7 +514,7 @@ def test_a_method_of_steps_finds_the_last_blow_of_stacked_balls_no_later_than_to
     assert max(abs(each) for each in late) > dt  # impacts before it have moved it by more than its own step
 
 
-def test_stacked_balls_go_on_until_a_step_of_the_suites_has_found_the_last_blow():
+def test_duration_of_stacked_balls_after_the_last_blow():
     canonical = CATALOGUE["stacked_balls"]
     slow, usual = (canonical.scene(2, {"ratio": r, "e": 0.9}) for r in (3.0, 10.0))
     ends = [s.duration - stacked_balls.impacts(s.params)[-1][0] for s in (slow, usual)]

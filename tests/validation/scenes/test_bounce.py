@@ -121,7 +121,7 @@ def test_a_ball_that_does_not_rise_again_has_no_apex_and_says_which():
     assert found["apex_interval_ratio"] == (0.0, "there are only 0 apexes, three are needed")
 
 
-def test_growth_is_the_largest_rise_of_an_apex_over_the_one_before_in_drops():
+def test_growth_as_the_largest_rise_of_an_apex():
     made = scene(e=1.0, height=2.0)
 
     def arcs(t):
@@ -142,7 +142,7 @@ def apexes(*heights):
     return {f"apex[{n}]": (h, "") for n, h in enumerate(heights, 1)}
 
 
-def test_the_apex_error_is_the_largest_of_those_that_are_resolved_relative_to_the_drop():
+def test_apex_error_over_resolved_apexes_relative_to_the_drop():
     """Speeds are 4, 2, 1, .5 m/s; twenty steps of gravity at 1/256 s are .625 m/s: two arcs count, a third does not."""
     made = scene()
     exact = (0.25, 0.0625, 0.015625, 0.0, 0.0)
@@ -170,7 +170,7 @@ def test_an_apex_shows_a_restitution(apex, e):
     assert bounce.rebound({"height": 2.0}, apex) == e
 
 
-def test_the_standard_suite_drops_from_sixteen_heights_and_at_four_restitutions():
+def test_standard_suite_of_sixteen_heights_and_four_restitutions():
     standard = [dict(variation.params) for variation in CATALOGUE["bounce"].standard]
     assert standard == [{"e": 0.8, "height": pytest.approx(1.0 + 0.01 * k)} for k in range(16)] + [
         {"e": e, "height": 1.0} for e in (0.5, 0.95, 1.0)

@@ -118,7 +118,7 @@ def test_a_tent_touches_the_floor_and_itself_and_its_cards_are_uniform(params):
 
 
 @pytest.mark.parametrize("params", SHAPES)
-def test_a_tent_stands_with_the_loads_of_its_balance_and_just_where_friction_is_as_large(params):
+def test_loads_and_friction_threshold_of_a_standing_tent(params):
     canonical, scene = made("card_tent", **params)
     assert failing(canonical, scene, standing(scene)) == set()
     least, q = needed(scene.params), start_of(scene)
@@ -126,7 +126,7 @@ def test_a_tent_stands_with_the_loads_of_its_balance_and_just_where_friction_is_
     assert accelerations(scene, q, np.zeros(6), 1.001 * least, 9.81)[2] > 0.0
 
 
-def test_thin_cards_need_half_the_tangent_of_their_angle_against_the_upright():
+def test_friction_threshold_of_thin_cards():
     p = CATALOGUE["card_tent"].complete({"aspect": 1e-9, "lean": 65.0})
     assert needed(p) == pytest.approx(0.5 * math.tan(math.radians(25.0)), rel=1e-8)
 
@@ -152,7 +152,7 @@ def test_feet_and_heads_push_as_forces_at_them_say_all_the_way(params):
         assert loads == pytest.approx([foot, foot, heads], rel=1e-5)
 
 
-def test_an_end_that_is_found_a_step_late_passes_and_one_that_is_three_late_does_not():
+def test_tent_end_one_step_late_and_three_steps_late():
     canonical, scene = made("card_tent", ratio=0.8)
     for steps, said in ((1.0, set()), (3.0, {"let_go"})):
         found = sliding(scene, 1 / 60)
@@ -201,7 +201,7 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
             assert failing(canonical, stands, crept) == {"moved"}
 
 
-def test_a_tent_that_stands_where_it_slides_or_slides_where_it_stands_fails():
+def test_tent_standing_or_sliding_against_its_threshold():
     canonical, slides = made("card_tent", ratio=0.8)
     names = {f"passing_{what}[{side}]" for what in ("time", "spin") for side in ("left", "right")}
     assert failing(canonical, slides, standing(slides)) == names
@@ -217,6 +217,6 @@ def test_a_tent_of_which_one_card_stays_fails():
     assert failing(canonical, slides, half) == {"passing_time[right]", "passing_spin[right]", "let_go"}
 
 
-def test_cards_that_let_go_of_each_other_on_their_way_are_refused_by_name():
+def test_cards_that_separate_on_the_way_refused():
     with pytest.raises(SceneError, match=r"card_tent\.ratio"):
         made("card_tent", ratio=0.01, lean=20.0)

@@ -47,7 +47,7 @@ def test_a_column_that_rests_measures_as_its_truth_and_says_nothing(dimension):
     assert {said for _, said in measured.values()} == {""}
 
 
-def test_loads_are_those_of_the_last_second_each_relative_to_its_own_weight():
+def test_column_loads_of_the_last_second_relative_to_weight():
     scene, late = column(), np.arange(STEPS + 1) * DT > 2.0
     shares = [
         np.where(late, 0.5, 9.0),
@@ -66,7 +66,7 @@ def test_loads_that_were_not_recorded_are_missing_with_their_reasons():
     assert measured["impulse_scatter"] == (None, UNAVAILABLE)
 
 
-def test_an_interface_without_impulses_leaves_the_scatter_of_all_unknown():
+def test_scatter_without_impulses_at_an_interface():
     """The one that is missing may be the one that shakes."""
     scene = column()
     measured = columns.measure(scene, resting(scene, [1.0, math.nan, 1.0]))
@@ -75,7 +75,7 @@ def test_an_interface_without_impulses_leaves_the_scatter_of_all_unknown():
     assert measured["impulse_scatter"] == (None, UNAVAILABLE)
 
 
-def test_energy_is_the_mean_of_the_last_second_and_rest_begins_after_the_last_motion():
+def test_mean_energy_and_rest_time_of_a_column():
     scene = column(n=1)
     trajectory = resting(scene)
     twist = trajectory.twist.copy()
@@ -90,7 +90,7 @@ def test_energy_is_the_mean_of_the_last_second_and_rest_begins_after_the_last_mo
     assert found["settle_time"] == 130 * DT
 
 
-def test_rest_is_judged_by_the_fastest_body_at_a_hundredth_of_a_step_of_gravity():
+def test_rest_by_the_fastest_body_at_a_hundredth_of_a_gravity_step():
     scene = column()
     trajectory = resting(scene)
     twist = trajectory.twist.copy()
@@ -114,7 +114,7 @@ def test_contacts_are_recorded_over_the_last_second_at_every_step():
     assert columns.sampling(replace(column(), duration=0.5)) == Sampling(1, 0.0)
 
 
-def test_overlaps_are_rounded_relative_to_the_height_of_the_topmost_body():
+def test_overlap_rounding_by_the_height_of_the_column():
     found = {check.metric: check.bound for check in columns.checks(column(n=3), DT, columns.exact(column(n=3)))}
     assert found["penetration"] == pytest.approx(G * DT**2 + 1e-12 * 2.5, rel=1e-13, abs=0.0)
 

@@ -38,7 +38,7 @@ def ridden(scene, dt=DT, mu=None, belt=None, offset=0.0):
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 @pytest.mark.parametrize(("dimension", "heading"), [(2, 0.0), (3, 0.0), (3, 30.0)])
-def test_coulomb_s_law_integrated_in_the_room_passes_in_every_step_order(dimension, heading, dt, offset):
+def test_conveyor_by_coulomb_s_law_in_every_step_order(dimension, heading, dt, offset):
     canonical, scene = made("conveyor", dimension, heading=heading)
     trajectory = ridden(scene, dt, offset=offset)
     assert failing(canonical, scene, trajectory) == set()
@@ -54,7 +54,7 @@ def test_the_ghost_of_the_replay_goes_where_the_box_goes():
         assert track.position(trajectory.t[k]) == pytest.approx(trajectory.pose[k, 1, :3], abs=1e-5)
 
 
-def test_a_belt_that_is_taken_for_a_floor_and_one_that_runs_backwards_fail():
+def test_conveyor_taken_for_a_floor_or_running_backwards():
     canonical, scene = made("conveyor")
     still = ridden(scene, belt=0.0)
     assert {"slipped", "pull", "slip_speed"} == failing(canonical, scene, still)
@@ -81,7 +81,7 @@ def test_wrong_friction_a_wrong_belt_a_hop_a_turn_or_a_bend_fails(size):
     assert failing(canonical, scene, replace(good, pose=turned)) == {"turned"}
 
 
-def test_the_belt_stays_where_it_is_and_its_surface_runs_along_the_heading():
+def test_fixed_belt_with_a_surface_along_its_heading():
     _, scene = made("conveyor", 3, heading=30.0)
     belt = scene.bodies[0]
     assert belt.motion == "fixed" and not any(belt.twist)

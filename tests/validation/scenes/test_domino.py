@@ -127,7 +127,7 @@ def test_feet_that_are_said_to_hold_do_so_in_the_blow(params):
     assert max(needed) <= p["mu"]
 
 
-def test_feet_that_need_more_in_the_blow_than_friction_gives_are_refused():
+def test_domino_feet_that_would_slip_in_the_blow_refused():
     _, scene = made("domino")
     _, needed = blow(scene.params, math.asin(0.6), 1.0)
     made("domino", mu=1.02 * max(needed))
@@ -163,7 +163,7 @@ def test_wrong_restitution_gravity_or_inertia_and_feet_that_slip_fail(size):
     assert failing(canonical, back, touched) == {"next_moved"}
 
 
-def test_a_domino_that_is_not_pushed_far_enough_or_goes_through_the_next_one_fails():
+def test_domino_pushed_too_little_or_passing_through_the_next():
     canonical, scene = made("domino")
     still = motion(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0), twist=0.0 * still.twist)

@@ -59,7 +59,7 @@ def test_numbers_are_those_of_the_end_and_of_the_whole_contact(dimension):
 
 
 @pytest.mark.parametrize(("impulses", "defect"), [([10.0], 0.25), ([7.0, 7.0], 0.25), ([], 1.5)])
-def test_momentum_that_no_impulse_accounts_for_is_a_defect_relative_to_what_came_in(impulses, defect):
+def test_momentum_defect_without_an_impulse(impulses, defect):
     scene = scene_of()
     measured = impact.measure(scene, run(scene, 2.0, impulses))
     assert measured["impulse"] == (sum(impulses), "") and measured["momentum_defect"] == (defect, "")
@@ -80,7 +80,7 @@ def test_the_track_goes_straight_in_and_straight_out(dimension):
     assert [track.position(t) for t in (0.0, 0.125, 0.25, 0.75)] == [(*across, z) for z in (1.75, 1.25, 0.75, 1.75)]
 
 
-def test_the_error_is_the_distance_from_e_or_the_reason_why_there_is_none():
+def test_impact_error_as_distance_from_e_or_a_reason():
     scene = scene_of()
     assert impact.rebound_error(scene, DT, {"rebound_ratio": (0.25, "")}) == (0.25, "")
     assert impact.rebound_error(scene, DT, {"rebound_ratio": (None, "it never came")}) == (None, "it never came")

@@ -107,7 +107,7 @@ def coulomb(ratio):
     ],
 )
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_threshold_is_the_middle_of_the_last_that_sticks_and_the_first_that_slides(answers, value, said, dimension):
+def test_incline_threshold_between_last_stick_and_first_slide(answers, value, said, dimension):
     found, why, check = incline.threshold([member(ratio, a, dimension) for ratio, a in answers.items()])
     assert (found, why) == (pytest.approx(value), said)
     usable = [ratio for ratio, a in answers.items() if a not in (None, ...)]

@@ -90,7 +90,7 @@ LEANS = [{}, {"lean": 45.0}, {"lean": 75.0}, {"aspect": 0.2}]
 
 
 @pytest.mark.parametrize("params", LEANS)
-def test_a_ladder_stands_with_the_loads_of_its_balance_and_just_where_friction_is_as_large(params):
+def test_loads_and_friction_threshold_of_a_standing_ladder(params):
     canonical, scene = made("ladder", **params)
     assert failing(canonical, scene, standing(scene)) == set()
     start = scene.bodies[2].pose[2]
@@ -136,7 +136,7 @@ def test_wrong_friction_gravity_inertia_and_loads_fail(size):
     assert failing(canonical, stands, crept) == {"moved"}
 
 
-def test_a_ladder_that_stands_where_it_slides_or_slides_where_it_stands_fails():
+def test_ladder_standing_or_sliding_against_its_threshold():
     canonical, slides = made("ladder", ratio=0.8)
     assert failing(canonical, slides, standing(slides)) == {"passing_time", "passing_spin"}
     canonical, stands = made("ladder")

@@ -95,7 +95,7 @@ def test_blows_that_know_too_little_of_the_plate_or_of_e_fail(size):
     assert speeds <= failing(canonical, scene, thrown(scene, swept=True, gain=size))
 
 
-def test_times_fail_from_a_step_on_and_a_ball_that_is_not_thrown_back_has_none():
+def test_blow_times_from_one_step_on_and_without_a_rebound():
     canonical, scene = made("closing_wall")
     late = thrown(scene, swept=True)
     shifted = replace(late, t=late.t + 1.5 * DT)
@@ -177,7 +177,7 @@ def test_a_box_whose_other_edge_would_land_too_is_refused_by_name():
 
 
 @pytest.mark.parametrize(("meets", "told"), [(-0.3, 0.0), (0.0, 0.0), (0.4, 0.4), (1.0, 1.0), (1.7, 1.0)])
-def test_a_ball_turns_back_where_its_two_ways_meet_but_within_the_samples_between_which_it_does(meets, told):
+def test_turning_point_of_a_ball_within_its_two_samples(meets, told):
     """Ways x = t - meets and -(t - meets) cross at ``meets``; it is sampled at -1, 0, 1 and 2 s."""
     t = np.array([-1.0, 0.0, 1.0, 2.0])
     velocity = np.array([1.0, 1.0, -1.0, -1.0])

@@ -150,7 +150,7 @@ def test_a_step_of_first_order_passes(params, dt):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_friction_gravity_or_inertia_and_ends_that_slip_or_lift_fail(size):
+def test_painleve_rod_with_wrong_friction_gravity_or_inertia(size):
     canonical, slides = made("painleve", ratio=0.6)
     dt = DT if size > 0.05 else 1 / 3840
     wrong = failing(canonical, slides, moved(slides, dt, mu=0.6 * critical(slides.params) * (1.0 - size)))
@@ -183,7 +183,7 @@ def test_what_neither_slides_nor_stays_jammed_is_refused_by_name(params, named):
         made("painleve", **params)
 
 
-def test_a_turn_that_does_not_get_there_is_none_and_others_are_integrated():
+def test_duration_of_a_turn_reached_and_not_reached():
     assert turn(lambda angle, square: (-1.0, 0.0), 0.0, 1.0) is None
 
     def rates(angle, square):

@@ -75,7 +75,7 @@ def test_impacts_that_would_grip_are_refused():
         made("pair_matrix", v=1.0)
 
 
-def test_a_record_that_ends_before_the_second_impact_has_no_coefficients_of_the_ceiling():
+def test_short_record_without_a_ceiling_coefficient():
     canonical, scene = made("pair_matrix")
     whole = bouncing(scene, materials(scene.params))
     (first, _), _ = times(scene.params)
@@ -100,7 +100,7 @@ def slips_at_all(v, p, spinning):
 
 
 @pytest.mark.parametrize(("dimension", "spinning"), [(2, 0.5), (3, 0.4)])
-def test_the_slowest_ball_that_is_a_scene_is_the_slowest_that_slips_at_every_face(dimension, spinning):
+def test_slowest_ball_that_slips_at_every_face(dimension, spinning):
     """A disc's and a sphere's own moments; the speed between is found by halves, down to a millionth of it."""
     canonical, scene = made("pair_matrix", dimension)
 

@@ -115,7 +115,7 @@ def test_a_step_of_first_order_passes(params, dt):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_fall_with_wrong_gravity_inertia_a_slipping_edge_or_a_twist_fails(size):
+def test_pivoting_fall_with_wrong_gravity_inertia_slip_or_twist(size):
     canonical, scene = made("pivot", 3)
     assert failing(canonical, scene, fallen(scene)) == set()
     assert size < 0.05 or "passing_time" in failing(canonical, scene, fallen(scene, g=9.81 * (1.0 - size)))
@@ -255,7 +255,7 @@ def test_landings_that_are_found_late_pass(params, dt, late):
 
 @pytest.mark.parametrize("dt", [1 / 30, 1 / 60, 1 / 960])
 @pytest.mark.parametrize("params", [{"aspect": 0.1, "tilt": 0.5}, {"aspect": 0.1, "tilt": 0.95}])
-def test_however_coarse_the_steps_no_tilt_is_allowed_at_which_a_block_would_not_come_back(params, dt):
+def test_largest_tilt_allowed_at_coarse_steps(params, dt):
     """A tilt between upright and balance is as far off as either of them at most."""
     canonical, scene = made("rocking_block", **params)
     truth, alpha = canonical.exact(scene), math.atan(params["aspect"])

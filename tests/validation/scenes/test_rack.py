@@ -52,7 +52,7 @@ def broken(scene, dt=DT, e=1.0):
 
 
 @pytest.mark.parametrize("params", [{"rows": 1.0}, {"apart": 0.05}, {"rows": 3.0, "apart": 0.2, "v": 5.0}])
-def test_pairs_that_collide_one_after_the_other_keep_momentum_energy_and_mirror(params):
+def test_rack_collisions_in_pairs_keep_momentum_energy_and_mirror(params):
     canonical, scene = made("rack", **params)
     trajectory = broken(scene)
     assert failing(canonical, scene, trajectory) == set()

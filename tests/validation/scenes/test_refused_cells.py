@@ -47,7 +47,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("params", "said"), REFUSED, ids=[said.partition(":")[0] for _, said in REFUSED])
-def test_a_cell_that_the_law_does_not_cover_is_refused_by_name_and_with_what_was_asked(params, said):
+def test_cell_outside_the_law_refused_by_name(params, said):
     canonical = CATALOGUE[said.partition(".")[0]]
     with pytest.raises(SceneError) as refused:
         canonical.scene(canonical.dimensions[0], params)
@@ -55,7 +55,7 @@ def test_a_cell_that_the_law_does_not_cover_is_refused_by_name_and_with_what_was
 
 
 @pytest.mark.parametrize("count", [0, 2])
-def test_a_blow_with_no_answer_or_two_is_refused_by_the_friction_that_makes_it_so(monkeypatch, count):
+def test_blow_with_no_answer_or_two_refused_by_its_friction(monkeypatch, count):
     """Within its limits the rod always has one, so that others are put in the place of what the law finds."""
     law = kane.answers
     monkeypatch.setattr(kane, "answers", lambda *given: law(*given) * count)

@@ -139,7 +139,7 @@ CASES = ({}, {"load": 0.0}, {"load": 9.0, "shear": 4.9}, {"load": 3.0, "shear": 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("params", CASES)
-def test_coulomb_s_law_integrated_passes_and_its_mean_acceleration_is_the_formula_s(params, order, dimension):
+def test_slide_by_coulomb_s_law_with_the_formula_s_acceleration(params, order, dimension):
     canonical, scene = made("pressed_box", dimension, **params)
     trajectory = pushed(scene, order=order)
     assert failing(canonical, scene, trajectory) == set()
@@ -149,7 +149,7 @@ def test_coulomb_s_law_integrated_passes_and_its_mean_acceleration_is_the_formul
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("params", CASES)
-def test_a_floor_that_bears_too_little_and_a_box_that_creeps_or_slides_wrong_fail(params, size):
+def test_weak_floor_creeping_box_and_wrong_slide_fail(params, size):
     canonical, scene = made("pressed_box", **params)
     good = pushed(scene)
     assert failing(canonical, scene, scaled(good, 1.0 - size, -1)) == {"carried"}

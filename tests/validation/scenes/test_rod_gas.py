@@ -81,7 +81,7 @@ def stepped(scene, dt):
 @pytest.mark.parametrize(
     "params", [{}, {"n": 1.0}, {"n": 3.0, "room": 3.0}, {"n": 10.0, "v": 7.0}, {"n": 40.0, "room": 8.0}]
 )
-def test_rods_that_meet_one_after_the_other_are_where_sorted_free_flights_are(params):
+def test_rod_gas_against_sorted_free_flights(params):
     canonical, scene = made("rod_gas", **params)
     x, v, count = meeting(scene)
     p = scene.params
@@ -109,7 +109,7 @@ def test_meetings_say_which_rods_meet_and_how_fast():
 
 @pytest.mark.parametrize("dt", [1 / 121, 1 / 160, DT, 1 / 960])
 @pytest.mark.parametrize("k", range(0, 16, 3))
-def test_a_method_of_fixed_steps_that_finds_meetings_late_stays_within_the_bounds(dt, k):
+def test_rod_gas_by_fixed_steps_within_the_bounds(dt, k):
     dt = 3.75 / math.ceil(3.75 / dt)  # whole steps
     canonical, scene = made("rod_gas", **phases(dt)[k])
     assert any(check.bound is not None for check in canonical.checks(scene, dt))
@@ -187,7 +187,7 @@ def rounded(scene, off, seed):
 
 
 @pytest.mark.parametrize("params", [{}, {"room": 10.0, "duration": 7.5}, {"n": 10.0, "room": 20.0, "duration": 2.5}])
-def test_round_ends_spread_what_normals_are_rounded_by_and_no_farther_than_allowed(params, monkeypatch):
+def test_spread_of_round_ends_by_rounded_normals(params, monkeypatch):
     """With roundings a million times as coarse, so that nothing else is as large."""
     _, scene = made("rod_gas", **params)
     p = scene.params

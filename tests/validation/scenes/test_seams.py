@@ -39,7 +39,7 @@ def sliding(scene, dt=DT, mu=None, offset=0.0):
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("name", NAMES)
-def test_coulomb_s_law_integrated_stops_where_the_formula_says_in_every_step_order(name, dimension, dt, offset):
+def test_seams_stopping_distance_by_coulomb_in_every_order(name, dimension, dt, offset):
     canonical, scene = made(name, dimension)
     trajectory = sliding(scene, dt, offset=offset)
     assert failing(canonical, scene, trajectory) == set()

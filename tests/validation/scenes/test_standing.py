@@ -181,7 +181,7 @@ def told(impulse, each):
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize(("dimension", "heading"), [(2, 0.0), (3, 0.0), (3, 30.0)])
-def test_coulomb_s_law_integrated_stops_where_the_formula_says_in_every_step_order(dimension, heading, dt, offset):
+def test_standing_box_stopping_distance_by_coulomb_in_every_order(dimension, heading, dt, offset):
     canonical, scene = made("slide", dimension, heading=heading)
     trajectory = sliding(scene, dt, offset=offset)
     assert failing(canonical, scene, trajectory) == set()

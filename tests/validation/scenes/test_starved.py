@@ -97,7 +97,7 @@ def test_forty_sweeps_are_a_factor_of_e_for_ten_balls():
 
 
 @pytest.mark.parametrize("dt", [1 / 60, DT])
-def test_contacts_that_are_found_a_step_late_are_allowed_and_two_steps_are_not(dt):
+def test_starved_contacts_one_step_late_and_two_steps_late(dt):
     """The press acts for one step on a ball that nothing holds; for two it goes 3 g dt^2 deep."""
     canonical, scene = made("starved")
     fallen = scene.params["press"] / scene.params["mass"] * dt * dt
@@ -145,7 +145,7 @@ def test_a_row_gave_way_or_held():
 @pytest.mark.few(6)
 @pytest.mark.parametrize("rate", [60, 120, 240, 480, 960])
 @pytest.mark.parametrize("n", [*range(1, 11), 15, 20, 30])
-def test_our_solver_is_certified_for_a_row_that_only_its_last_ball_is_pressed_in(n, rate):
+def test_certificate_of_a_row_pressed_at_its_last_ball(n, rate):
     params = CATALOGUE["starved"].minimal({"n": float(n), "duration": 1.0})
     observation = execute(Slot("starved", params, 2, "reference", "reference", 1.0 / rate))
     assert observation.outcome is Outcome.OK, observation.reason

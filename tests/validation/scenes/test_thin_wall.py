@@ -55,7 +55,7 @@ def test_a_ball_that_passes_fails_both():
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("v", [20.0, 33.0, 60.0, 100.0, 200.0, 500.0])
-def test_the_law_says_which_balls_pass_a_method_that_does_not_sweep_and_where_they_end(v, dt):
+def test_passage_through_a_thin_wall_without_sweeping(v, dt):
     canonical, scene = made("thin_wall", v=v)
     measured = canonical.measure(scene, thrown(scene, dt, swept=False))
     passes = measured["rebound_ratio"][0] == -1.0

@@ -71,7 +71,7 @@ def test_the_hand_lies_on_the_table_and_against_the_stop():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"v": 1.0}, {"mu": 0.1, "mass": 3.0}, {"mu": 1.0, "g": 3.7}])
 @pytest.mark.parametrize("late", [0, 1])
-def test_coulomb_s_law_stepped_passes_whether_contacts_are_found_at_once_or_a_step_late(dimension, dt, params, late):
+def test_wipe_by_coulomb_s_law_with_contacts_a_step_late(dimension, dt, params, late):
     canonical, scene = made("wipe", dimension, **params)
     trajectory = held(scene, dt, late)
     measured, truth = canonical.measure(scene, trajectory), canonical.exact(scene)
@@ -79,7 +79,7 @@ def test_coulomb_s_law_stepped_passes_whether_contacts_are_found_at_once_or_a_st
     assert {name: measured[name][0] for name in ALL} == pytest.approx({name: truth[name] for name in ALL})
 
 
-def test_bounds_are_two_hundredths_of_the_weight_at_any_step_and_a_step_of_fall_and_drag():
+def test_wipe_bounds_by_weight_step_of_fall_and_drag():
     canonical, scene = made("wipe", mu=0.25, g=8.0)
     allowed = {check.metric: (check.unit, check.truth, check.bound) for check in canonical.checks(scene, 1 / 64)}
     expected = {"moved": ("m", 0.0, pytest.approx(1.5 * 8.0 / 64**2, rel=1e-9))}
@@ -107,7 +107,7 @@ def test_forces_that_come_and_go_fail_although_every_mean_is_right():
     } | {"friction[mean]"}
 
 
-def test_a_contact_that_is_left_out_a_sign_and_a_friction_that_is_off_fail():
+def test_wipe_with_a_missing_contact_wrong_sign_or_friction():
     canonical, scene = made("wipe", 3)
     good = held(scene)
     of = {force: {f"{force}[{by}]" for by in ("mean", "least", "greatest")} for force in wipe.FORCES}

@@ -45,7 +45,7 @@ def test_two_balls_start_inside_each_other_and_move_side_by_side(dimension):
     assert (scene.pairs[0].restitution, scene.pairs[0].friction) == (0.0, 0.0)
 
 
-def test_an_overlap_is_forgiven_the_round_off_of_what_takes_it_out_in_a_step():
+def test_round_off_of_an_overlap_removed_in_a_step():
     """1/4 m in 1/64 s are 16 m/s, beside 2 m/s; places reach 1/2 m and the 1 m of the way."""
     canonical, scene = made("overlap", **INSIDE)
     assert stated(canonical.checks(scene, DT)) == {
@@ -202,7 +202,7 @@ def test_a_ball_that_stands_between_two_ways_has_turned_once():
     assert found["time[1]"][0] == pytest.approx(2.0) and found["time[2]"][0] is None
 
 
-def test_speeds_are_told_halfway_to_the_wall_and_at_the_end_of_what_ended_early():
+def test_speeds_halfway_to_the_wall_and_at_an_early_end():
     canonical, scene = made("closing_wall", **CLOSING)
     record = still(scene, 330)  # 5.156 s: before the middle of the second way back
     record.twist[:, 2, 0] = -np.arange(331.0)
@@ -212,7 +212,7 @@ def test_speeds_are_told_halfway_to_the_wall_and_at_the_end_of_what_ended_early(
     }  # fmt: skip
 
 
-def test_the_ways_that_meet_are_those_of_the_two_samples_around_the_blow():
+def test_ways_of_the_two_samples_around_a_blow():
     """What the ball did two samples before is no part of it: it was faster then, and somewhere else."""
     canonical, scene = made("closing_wall", **CLOSING)
     record = thrown_once(scene, (6.0, 6.0 - 0.5 / 64), (1.0, -1.0))

@@ -121,7 +121,7 @@ def test_the_error_of_a_rocking_board_is_that_of_its_time_over_it():
     assert canonical.primary.error(scene, DT, {"swing_time": (None, "never")}) == (None, "never")
 
 
-def test_the_time_of_a_swing_is_twice_the_integral_from_the_side_to_level():
+def test_swing_time_as_twice_the_integral_to_level():
     """Between the side, taken out by theta = start (1 - u^2), and level."""
     canonical, scene = made("rocker", **BOARD)
 

@@ -137,7 +137,7 @@ def test_the_ghost_goes_the_parabola_and_stays_where_it_ends():
     assert CATALOGUE["far_origin"].track(far).position(0.5) == pytest.approx((start[0] + 1.5, start[1]), rel=1e-15)
 
 
-def test_the_error_of_a_slide_is_the_distance_from_where_it_should_stop_over_the_way():
+def test_slide_error_relative_to_the_stopping_distance():
     canonical, scene = made("slide", 3)
     error = canonical.primary.error
     assert error(scene, DT, {"stopping_distance": (2.3, ""), "astray": (0.4, "")}) == (pytest.approx(0.25), "")
@@ -146,7 +146,7 @@ def test_the_error_of_a_slide_is_the_distance_from_where_it_should_stop_over_the
     assert error(scene, DT, {"stopping_distance": (None, "lost")}) == (None, "lost")
 
 
-def test_places_are_told_to_the_round_off_of_the_way_or_of_the_farthest_plate():
+def test_place_round_off_by_distance_or_farthest_plate():
     """A step of 10 ns sinks by 1e-15 m: what is left of a bound on height is 1e-12 of the largest coordinate."""
     for name, params, place in (("slide", {"v": 0.1}, 0.01 / (0.8 * 9.81)), ("seam", {"v": 10.0, "plate": 5.0}, None)):
         canonical = CATALOGUE[name]
