@@ -71,6 +71,19 @@ def row(count: int, check: Check) -> Check:
     return whole_row
 
 
+def rows(*checks: Check) -> Check:
+    """Rows of values, each of which the check in its place accepts."""
+
+    def whole_rows(value: Any) -> str:
+        told = isinstance(value, tuple | list) and all(
+            isinstance(each, tuple | list) and len(each) == len(checks) for each in value
+        )
+        fits = told and not any(check(said) for each in value for check, said in zip(checks, each, strict=True))
+        return "" if fits else f"rows of {len(checks)} values: {'; '.join(check(object()) for check in checks)}"
+
+    return whole_rows
+
+
 def words(*known: str) -> Check:
     """A selection of these words."""
 

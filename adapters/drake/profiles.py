@@ -15,7 +15,7 @@ from typing import Any
 
 from adapters import settings
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
 
 #: Names of the engine's own approximations.
@@ -73,11 +73,5 @@ PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
     """Settings with valid names and values for the engine; see `adapters.settings.checked`. `OWN` may be missing."""
-    found = settings.checked("drake", KINDS, {name: value for name, value in asked.items() if name != OWN})
-    for row in asked.get(OWN, ()):
-        if not isinstance(row, tuple) or len(row) != len(_KINDS_OF_A_ROW):
-            raise EngineError(f"{OWN}: {row!r} must be a row of {len(_KINDS_OF_A_ROW)} values")
-        for check, value in zip(_KINDS_OF_A_ROW, row, strict=True):
-            if wanted := check(value):
-                raise EngineError(f"{OWN}: {value!r} must be {wanted}")
-    return found | ({OWN: asked[OWN]} if OWN in asked else {})
+    kinds = {**KINDS, OWN: settings.rows(*_KINDS_OF_A_ROW)} if OWN in asked else KINDS
+    return settings.checked("drake", kinds, asked)

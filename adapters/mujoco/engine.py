@@ -34,7 +34,7 @@ from adapters.needs import Needs
 from adapters.probes import LANDING_LEAD, LANDING_SPEED, MOST_FRICTION, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
 from adapters.scene import Scene
-from adapters.settings import Check
+from adapters.settings import Check, checked_step
 from adapters.stepping import step_count
 
 #: Phases of a step over which a rebound is declared.
@@ -157,8 +157,7 @@ class MujocoEngine(Engine):
         return MujocoSimulation(scene, dt, settings)
 
     def _check(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        if not (math.isfinite(dt) and dt > 0.0):
-            raise EngineError(f"dt: {dt!r} must be a positive, finite number of seconds")
+        checked_step(dt)
         refusal = self.refuses(scene, "")
         if refusal:
             raise EngineError(refusal)

@@ -35,7 +35,13 @@ ENUMERATED = {
 }
 #: Their words that a setting has in other than lower case.
 SPELT = {"euler": "Euler", "rk4": "RK4", "pgs": "PGS", "cg": "CG", "newton": "NEWTON"}
-_ANY, _POSITIVE = number(-math.inf, math.inf), number(0.0, math.inf)
+_ANY, POSITIVE = number(-math.inf, math.inf), number(0.0, math.inf)
+
+
+def softness_of(value: Any) -> str:
+    """A time constant [s] and a damping ratio, or, both negative, a stiffness [1/s^2] and a damping [1/s]."""
+    fits = not row(2, POSITIVE)(value) or not row(2, number(-math.inf, 0.0))(value)
+    return "" if fits else "2 values with commas between them, finite and both at least 0 or both at most 0"
 
 
 @cache
@@ -55,11 +61,13 @@ def own_kinds() -> dict[str, Check]:
         elif isinstance(value, np.ndarray):
             kinds[name] = row(value.size, _ANY)
         else:
-            kinds[name] = whole(0, LARGEST_INT) if isinstance(value, int) else _POSITIVE
+            kinds[name] = whole(0, LARGEST_INT) if isinstance(value, int) else POSITIVE
     disabled = [each for each in members_of(mujoco, "mjtDisableBit", "mjDSBL_") if each in CARRIED]
     flags = {"disabled": words(*disabled), "enabled": words(*members_of(mujoco, "mjtEnableBit", "mjENBL_"))}
-    softness = {"solref": row(2, _ANY), "solimp": row(5, _POSITIVE), "solreffriction": either(row(2, _ANY), None)}
-    return kinds | flags | softness | {"margin": _POSITIVE, "smooth_condim": one_of(1, 3)}
+    softness = {"solref": softness_of, "solimp": row(5, POSITIVE), "solreffriction": either(softness_of, None)}
+    # 0 iterations solve nothing, and MuJoCo divides by impratio.
+    least = {"impratio": number(1e-6, math.inf), "iterations": whole(1, LARGEST_INT)}
+    return kinds | flags | softness | least | {"margin": POSITIVE, "smooth_condim": one_of(1, 3)}
 
 
 def members_of(mujoco: Any, kind: str, prefix: str) -> dict[str, int]:

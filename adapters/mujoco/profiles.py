@@ -14,10 +14,10 @@ from typing import Any
 
 from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.mujoco.matched import AGREED
-from adapters.mujoco.options import CARRIED, ENUMERATED, own_kinds
+from adapters.mujoco.options import POSITIVE, own_kinds, softness_of
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, ITERATIONS, SOLIMP, SOLREF, TOLERANCE
 from adapters.needs import Needs
-from adapters.settings import LARGEST_INT, finite
+from adapters.settings import LARGEST_INT, checked, either, row, rows, whole
 
 MANUAL = f"{DOC}, modeling: solver parameters"
 FRICTION = f"{DOC}, modeling: friction, slow slippage"
@@ -44,22 +44,25 @@ SOLVED = 1e-15
 FEWEST_ROUNDS = 100
 
 
+#: As shipped; both geoms of a pair get its friction.
+SHIPPED = (
+    Setting("integrator", "Euler", "as shipped", DOC),
+    Setting("cone", "pyramidal", "as shipped", DOC),
+    Setting("impratio", 1.0, "as shipped", DOC),
+    Setting("iterations", ITERATIONS, "as shipped: largest number of Newton steps", DOC),
+    Setting("tolerance", TOLERANCE, "as shipped", DOC),
+    Setting("noslip_iterations", 0, "as shipped", DOC),
+    Setting("smooth_condim", 3, "as shipped: a pair with mu = 0 keeps friction rows, of mu = 1e-5", DOC),
+    Setting("solref", SOLREF, "as shipped: time constant [s] and damping ratio; no restitution", MANUAL),
+    Setting("solimp", SOLIMP, "as shipped", MANUAL),
+    Setting("solreffriction", None, "as shipped: friction is damped like the normal", FRICTION),
+    Setting("margin", 0.0, "as shipped [m]: contact starts when bodies overlap", DOC),
+)
+
+
 def default(needs: Needs, dt: float) -> list[Setting]:
-    """As shipped, for every scene; both geoms of a pair get its friction."""
-    shipped = "as shipped"
-    return [
-        Setting("integrator", "Euler", shipped, DOC),
-        Setting("cone", "pyramidal", shipped, DOC),
-        Setting("impratio", 1.0, shipped, DOC),
-        Setting("iterations", ITERATIONS, f"{shipped}: largest number of Newton steps", DOC),
-        Setting("tolerance", TOLERANCE, shipped, DOC),
-        Setting("noslip_iterations", 0, shipped, DOC),
-        Setting("smooth_condim", 3, f"{shipped}: a pair with mu = 0 keeps friction rows, of mu = 1e-5", DOC),
-        Setting("solref", SOLREF, f"{shipped}: time constant [s] and damping ratio; no restitution", MANUAL),
-        Setting("solimp", SOLIMP, shipped, MANUAL),
-        Setting("solreffriction", None, f"{shipped}: friction is damped like the normal", FRICTION),
-        Setting("margin", 0.0, f"{shipped} [m]: contact starts when bodies overlap", DOC),
-    ]
+    """As shipped, for every scene."""
+    return [*SHIPPED]
 
 
 def tuned(needs: Needs, dt: float) -> list[Setting]:
@@ -160,33 +163,19 @@ def _replaced(settings: list[Setting], *changes: Setting) -> list[Setting]:
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"default": default, "tuned": tuned, "matched": matched})
 
 
-#: Settings with one of these words as value.
-WORDS = {
-    "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
-    "cone": ("pyramidal", "elliptic"),
-    "smooth_condim": (1, 3),
-}
-#: Settings that are one number: smallest value, and whether it must be whole.
-NUMBERS = {
-    "impratio": (1e-6, False),
-    "iterations": (1, True),
-    "tolerance": (0.0, False),
-    "margin": (0.0, False),
-    "noslip_iterations": (0, True),
-    "kappa_elastic": (0.0, False),
-    "kappa_plastic": (0.0, False),
-    "rounds": (1, True),
-    "agreed": (0.0, False),
-    "push_out": (0.0, False),
-    "push_out_speed": (0.0, False),
-}
-NAMES = frozenset({*WORDS, *NUMBERS, "solref", "solimp", "solreffriction"})
-ONLY_REFLECT = frozenset({"kappa_elastic", "kappa_plastic"})
-ONLY_MATCHED = frozenset({"rounds", "agreed", "push_out", "push_out_speed"})
+#: Settings of our own: of a rebound by target velocity, and of the loop around the solver.
+_REFLECT = {"kappa_elastic": POSITIVE, "kappa_plastic": POSITIVE}
+_MATCHED = {"rounds": whole(1, LARGEST_INT), "agreed": POSITIVE, "push_out": POSITIVE, "push_out_speed": POSITIVE}
+#: Values beside the engine's own.
+_WORDS = {"solref": either(softness_of, "reflect"), "solreffriction": either(softness_of, None, "stick")}
+#: Softness of a pair of bodies (indices): solref, solimp, solreffriction and margin.
+_INDEX = whole(0, LARGEST_INT)
+_PAIR = (_INDEX, _INDEX, softness_of, row(5, POSITIVE), either(softness_of, None), POSITIVE)
+#: Settings that each profile has.
+NEEDED = frozenset(setting.name for setting in SHIPPED)
 #: Settings of models only (`adapters.mujoco.options`, `adapters.mujoco.model`): the solver, flags that are
-#: switched off, and pairs (indices of bodies) with a softness of their own.
+#: switched off, and pairs with a softness of their own.
 BROUGHT = frozenset({"solver", "disabled", "apart"})
-SOLVERS = ("PGS", "CG", "NEWTON")
 
 
 def check_settings(settings: Mapping[str, Any]) -> None:
@@ -197,72 +186,15 @@ def check_settings(settings: Mapping[str, Any]) -> None:
     EngineError
         Naming the setting.
     """
-    wanted = NAMES if settings.get("solref") == "reflect" else NAMES - ONLY_REFLECT
-    wanted = wanted if ONLY_MATCHED & set(settings) else wanted - ONLY_MATCHED
-    own = own_settings(settings)
-    for name in sorted((set(settings) - BROUGHT - set(own)) ^ wanted):
-        raise EngineError(f"{name}: {'mujoco has no such setting here' if name in settings else 'is missing'}")
-    for name, words in WORDS.items():
-        # The installed release may have a word that no profile uses.
-        if settings[name] not in words and (name not in ENUMERATED or own_kinds()[name](settings[name])):
-            raise EngineError(f"{name}: {settings[name]!r} must be one of {', '.join(map(str, words))}")
-    for name, (low, whole) in NUMBERS.items():
-        if name in settings:
-            _check_number(name, settings[name], low, whole)
-    for name, value in own.items():
-        if said := own_kinds()[name](value):
-            raise EngineError(f"{name}: {value!r} must be {said}")
-    _check_brought(settings)
-    _check_row("solimp", settings["solimp"], 5)
-    if settings["solref"] != "reflect":
-        _check_solref("solref", settings["solref"])
-    if settings["solreffriction"] not in (None, "stick"):
-        _check_solref("solreffriction", settings["solreffriction"])
-        if settings["cone"] != "elliptic":
-            raise EngineError("solreffriction: acts on elliptic cones only")
+    reflect = _REFLECT if settings.get("solref") == "reflect" else {}
+    loop = _MATCHED if set(_MATCHED) & set(settings) else {}
+    kinds = own_kinds() | _WORDS | {"apart": rows(*_PAIR)} | reflect | loop
+    named = {*NEEDED, *reflect, *loop, *settings}
+    checked("mujoco", {name: check for name, check in kinds.items() if name in named}, settings)
+    if settings["solreffriction"] not in (None, "stick") and settings["cone"] != "elliptic":
+        raise EngineError("solreffriction: acts on elliptic cones only")
 
 
 def own_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings outside profiles and models: options of the installed release."""
-    others = set(settings) - NAMES - BROUGHT
-    return {name: settings[name] for name in sorted(others) if name in own_kinds()}
-
-
-def _check_brought(settings: Mapping[str, Any]) -> None:
-    """Settings of a model; a file may have anything under their names."""
-    if settings.get("solver", "NEWTON") not in SOLVERS:
-        raise EngineError(f"solver: {settings['solver']!r} must be one of {', '.join(SOLVERS)}")
-    for name in settings.get("disabled", ()):
-        if name not in CARRIED:
-            raise EngineError(f"disabled: {name!r} must be one of {', '.join(sorted(CARRIED))}")
-    for row in settings.get("apart", ()):
-        if not (isinstance(row, tuple | list) and len(row) == 6):
-            raise EngineError(f"apart: {row!r} must be two bodies and their softness")
-        _check_number("apart", row[0], 0, True)
-        _check_number("apart", row[1], 0, True)
-        _check_solref("apart", row[2])
-        _check_row("apart", row[3], 5)
-        if row[4] is not None:
-            _check_solref("apart", row[4])
-        _check_number("apart", row[5], 0.0, False)
-
-
-def _check_solref(name: str, values: Any) -> None:
-    """A time constant and a damping ratio, or, both negative, a stiffness and a damping."""
-    direct = isinstance(values, tuple | list) and all(isinstance(v, int | float) and v <= 0.0 for v in values)
-    _check_row(name, tuple(-v for v in values) if direct else values, 2)
-
-
-def _check_number(name: str, value: Any, low: float, whole: bool) -> None:
-    number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-    if number and whole and value > LARGEST_INT:
-        raise EngineError(f"{name}: {value!r} must be a whole number of at most {LARGEST_INT}")
-    if not (number and finite(value) and value >= low):
-        raise EngineError(f"{name}: {value!r} must be a {'whole ' if whole else ''}number of at least {low:g}")
-
-
-def _check_row(name: str, values: Any, length: int) -> None:
-    if not (isinstance(values, tuple | list) and len(values) == length):
-        raise EngineError(f"{name}: {values!r} must have {length} numbers")
-    for value in values:
-        _check_number(name, value, 0.0, False)
+    return {name: settings[name] for name in sorted(set(settings) - NEEDED - BROUGHT) if name in own_kinds()}

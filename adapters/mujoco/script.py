@@ -8,7 +8,6 @@ from typing import Any
 from adapters.engine import EngineError
 from adapters.mujoco.matched import SECOND_HALF, loop_lines
 from adapters.mujoco.moving import is_moved_face, script_lines
-from adapters.mujoco.profiles import check_settings
 from adapters.mujoco.releases import Mjcf
 from adapters.mujoco.spec import Spec, has_joint, start
 from adapters.scene import Scene
@@ -34,7 +33,6 @@ def mjcf(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> st
 def _model(scene: Scene, dt: float, settings: Mapping[str, Any], key: bool) -> str:
     import mujoco
 
-    check_settings(settings)
     written = Mjcf(mujoco)
     Spec(scene, dt, settings, written)
     if key:

@@ -262,7 +262,7 @@ def test_settings_of_the_loop_are_checked(changes: dict[str, Any], said: str) ->
         ENGINE.build(scene, DT, settings(scene, **changes))
     lacking = settings(scene)
     del lacking["push_out"]
-    with pytest.raises(EngineError, match="push_out: is missing"):
+    with pytest.raises(EngineError, match="push_out: this setting is missing"):
         ENGINE.build(scene, DT, lacking)
 
 

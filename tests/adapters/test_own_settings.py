@@ -6,7 +6,7 @@ import pytest
 from adapters import registry
 from adapters.engine import EngineError, Setting
 from adapters.own_settings import given, near, own, read, suffix_of
-from adapters.settings import either, flag, like, number, one_of, row, text_of, whole, word, words
+from adapters.settings import either, flag, like, number, one_of, row, rows, text_of, whole, word, words
 from validation.cells import Slot, prepare, settings_of
 
 HERE = [name for name in registry.names() if registry.find(name).engine is not None]
@@ -49,6 +49,7 @@ def test_two_values_of_one_setting_are_refused_and_names_are_sorted():
 @pytest.mark.parametrize(
     ("check", "takes", "refuses"),
     [
+        (rows(whole(0, 9), flag), [(), [(3, True)]], [5, (3, True), [(3,)], [(3, 1)], "3"]),
         (row(2, number(0.0, 1.0)), [(0.0, 1.0), [0.5, 1]], [(0.5,), (0.5, 2.0), 0.5, "0.5,1", (0.1, 0.2, 0.3)]),
         (words("a", "b"), [("a",), ("b", "a")], ["a", (), ("c",), ("a", "c")]),
         (one_of(1, 3), [1, 3], [2, True, 1.0, "1"]),
