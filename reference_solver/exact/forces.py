@@ -12,7 +12,7 @@ from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
 #: Speeds below this are none [m/s], and slips below this have no direction.
-STILL, SLIPPING = 1e-10, 1e-9
+STILL, SLIPPING = 1e-12, 1e-9
 #: Share of the largest load or acceleration that is round-off where a mode ends, and one that is a breach of a law.
 NONE = 1e-9
 
@@ -71,10 +71,14 @@ class Held:
         problem = Problem.of(contacts, contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel(), directions)
         rows, columns = problem.equations(answer.modes, directions)
         matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]
-        if self._is_redundant(matrix):
-            found = problem.with_modes(answer.modes, directions, answer.forces)
-            return answer.forces if found is None else found.forces
-        return problem.spread(answer.modes, directions, rows, np.asarray(np.linalg.solve(matrix, wanted), np.float64))
+        if not self._is_redundant(matrix):
+            try:
+                found = np.asarray(np.linalg.solve(matrix, wanted), np.float64)
+                return problem.spread(answer.modes, directions, rows, found)
+            except np.linalg.LinAlgError:  # loads can be shared here, and not where the piece began
+                pass
+        nearest = problem.with_modes(answer.modes, directions, answer.forces)
+        return answer.forces if nearest is None else nearest.forces
 
     def _is_redundant(self, matrix: Array) -> bool:
         """Whether loads can be shared: asked once for all of a piece."""
