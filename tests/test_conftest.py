@@ -71,7 +71,7 @@ def test_swallowed_exceptions_reported_by_their_test(pytester):
     result.stdout.fnmatch_lines([f"ERROR *test_planted.py::test_{k}*" for k in range(len(SWALLOWED))])
 
 
-def test_what_is_set_up_or_ends_around_tests_is_told_as_well(pytester):
+def test_swallowed_exceptions_in_set_up_and_tear_down(pytester):
     """Of a fixture that the test asks for by that test; of one that ends after the last by that."""
     shared = """
 @pytest.fixture(scope="module", autouse=True)

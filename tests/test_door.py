@@ -29,7 +29,7 @@ def test_the_readme_snippet_says_so_as_well(tmp_path):
     assert f"'reports' at {tmp_path / 'reports'}" in result.stderr.splitlines()[-1]
 
 
-def test_a_foreign_neighbour_stops_our_own_modules_too(tmp_path):
+def test_foreign_package_stops_our_own_modules(tmp_path):
     (tmp_path / "adapters").mkdir()
     (tmp_path / "adapters" / "__init__.py").write_text("")
     result = start(tmp_path, "-c", "import reports.exports")

@@ -77,7 +77,7 @@ def test_each_package_imports_only_what_stands_to_its_left(package):
         assert not forbidden & set(imported(path)), path
 
 
-def test_only_reports_asks_the_front_whose_packages_are_on_the_path():
+def test_front_imported_only_by_reports():
     asking = {path for package in LINE for path in (ROOT / package).rglob("*.py") if FRONT in set(imported(path))}
     assert asking == {ROOT / "reports" / "__init__.py"}
 
@@ -86,7 +86,7 @@ def test_only_reports_asks_the_front_whose_packages_are_on_the_path():
 VERIFYING = {"reports/command/certifying.py", "reports/command/fuzzing.py"}
 
 
-def test_only_the_command_that_prints_them_imports_the_solver_s_tests():
+def test_tests_of_the_solver_imported_only_by_their_command():
     room = ROOT / "reference_solver" / "verification"
     importing = {
         path.relative_to(ROOT).as_posix()
@@ -128,7 +128,7 @@ def test_the_rooms_of_validation_stand_in_a_line():
     assert upwards == set(LOW)
 
 
-def test_what_a_scene_from_outside_leans_on_stays_where_it_is():
+def test_interface_of_outside_scenes_stays_in_place():
     """Their packages import these; a room may be divided, the ground floor not without an heir at its old name."""
     ground = {path.stem for path in (ROOT / "validation").glob("*.py")} - {"__init__"}
     assert ground == {"canonical", "catalogue", "posed", "bounds", "metrics", "geometry", "solids", "cells", "identity"}
@@ -392,7 +392,7 @@ def rooms_of_the_solver():
     return rooms, lines
 
 
-def test_the_rooms_of_the_solver_grow_only_where_somebody_says_so():
+def test_solver_size_limit_by_room():
     """Prints the table with today's counts (pytest -s)."""
     rooms, lines = rooms_of_the_solver()
     for room, most in rooms.items():
@@ -459,7 +459,7 @@ def _all_tests():
                 yield f"{path.relative_to(ROOT)}::{node.name}", node
 
 
-def test_no_test_ends_before_it_has_asserted_anything():
+def test_tests_that_end_before_their_first_assertion():
     """An early `return` is a case that passes whatever happens: `assume` it away, or do not ask for it."""
     found = [name for name, test in all_tests() for each in own(test.body) if isinstance(each, ast.If)
              and any(isinstance(last, ast.Return) for last in each.body) and not asserts(each.body)]  # fmt: skip
@@ -473,6 +473,12 @@ def test_every_drawn_example_is_asserted_about():
     assert len(drawn) > 20
     called = {name for name, test in drawn.items() if not any(isinstance(each, ast.Assert) for each in ast.walk(test))}
     assert not [name for name, test in drawn.items() if name not in called and not asserts(test.body)]
+
+
+def test_length_of_the_name_of_a_test():
+    """`FAILED file::name` of pytest fits one line of 120 columns, as our code does (but for the solver's own tests)."""
+    names = [f"FAILED {name}" for name, _ in all_tests() if not name.startswith("tests/reference_solver/")]
+    assert [name for name in names if len(name) > 120] == []
 
 
 def test_documents_that_tests_cite_are_in_the_repository():

@@ -273,7 +273,7 @@ def test_an_engine_of_one_s_own_is_asked_like_any_other_and_warns_once(own):
         assert "in this process only" in result.explain()
 
 
-def test_an_engine_that_is_written_anew_takes_the_place_of_the_old_one(own):
+def test_rewritten_own_engine_replaces_the_old_one(own):
     class Later(ToyEngine):
         def version(self):
             return "2.0"
@@ -305,7 +305,7 @@ def test_an_error_of_an_engine_of_one_s_own_is_the_outcome_of_its_case(own):
         result.plot("z")
 
 
-def test_whoever_interrupts_a_case_interrupts_all_of_it(own):
+def test_interrupt_of_one_case_stops_all(own):
     class Interrupted(ToyEngine):
         def build(self, scene, dt, settings):
             raise KeyboardInterrupt
@@ -326,7 +326,7 @@ def test_what_cannot_be_made_is_one_line(own):
     assert str(caught.value) == "engine: cannot be made: ValueError: first line"
 
 
-def test_an_engine_of_another_package_runs_where_it_may_die(plugins):
+def test_engine_of_another_package_in_a_process_of_its_own(plugins):
     result = cc.run("impact", engine="evil", profile="abort")
     assert result.observation.outcome.value == "crashed" and "SIGABRT" in result.observation.reason
 

@@ -91,7 +91,7 @@ def test_balls_meet_when_their_distance_is_the_sum_of_their_radii():
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
-def test_what_touches_and_does_not_part_touches_now_at_any_size(size):
+def test_separating_and_resting_contacts_at_any_size(size):
     """Within `TOUCHING` of each other; what parts no faster than roundings make it counts as touching still."""
     reach = 2.0 * size
     for gap, speed, wait in (
@@ -115,13 +115,13 @@ def test_what_touches_and_does_not_part_touches_now_at_any_size(size):
         assert found is None or found[0] == pytest.approx(wait, rel=1e-6, abs=1e-12)
 
 
-def test_what_is_exactly_as_far_as_touching_reaches_touches():
+def test_touch_at_exactly_the_largest_gap():
     """The least balls there are to have such a gap: their radii are a half of it."""
     half = 0.5 * TOUCHING
     assert meeting(ball("a", (0, 0, 0), (1.0, 0, 0), half), ball("b", (4.0 * half, 0, 0), (0, 0, 0), half))[0] == 0.0
 
 
-def test_rubbing_turns_and_stops_a_ball_by_coulomb_s_law():
+def test_rubbing_ball_spin_and_stop_by_coulomb_s_law():
     """A ball that slides comes down: its friction is mu times the blow, or 2/7 of its slip if that is less."""
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
     for mu, rub in ((0.1, 0.1 * 1.5), (10.0, 2.0 / 7.0 * 3.0)):

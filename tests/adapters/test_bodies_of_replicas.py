@@ -52,7 +52,7 @@ def test_name_of_an_unplaceable_element_without_a_line(text, said):
     assert str(refused.value).startswith(f"model: {said}"), str(refused.value)
 
 
-def test_where_they_may_be_left_out_what_has_no_element_cannot_be():
+def test_unplaceable_element_that_cannot_be_left_out():
     with pytest.raises(SceneError, match=r"^model: body: b0: its joint has stiffness"):
         reading.read(twice(SPHERE, '<joint name="j" type="free" stiffness="1"/>'), True)
     wrong = SPHERE.replace("sphere", "ellipsoid").replace('".1"', '".1 .1 .1"')
@@ -60,7 +60,7 @@ def test_where_they_may_be_left_out_what_has_no_element_cannot_be():
         reading.read(twice(wrong), True)
 
 
-def test_two_replicas_are_two_bodies_by_names_of_their_own():
+def test_names_of_replicas():
     found = reading.read(twice(SPHERE), False)
     assert [(body.name, body.motion, body.pose[2]) for body in found.scene.bodies] == [
         ("b0", "free", 0.0), ("b1", "free", 1.0)]  # fmt: skip

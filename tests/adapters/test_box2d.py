@@ -35,7 +35,7 @@ def test_conformance(item):
     item.hold()
 
 
-def test_default_is_what_a_fresh_world_and_polygon_hold():
+def test_default_of_a_fresh_world_and_polygon():
     import Box2D
 
     chosen, world = settings(resting(), "default"), Box2D.b2World()
@@ -140,7 +140,7 @@ def test_law_silent_about_loads_and_successive_blows():
     assert rounded_law("speed[1]", Method(textbook))(cradle, 0.05, CATALOGUE["cradle"].measure) is None
 
 
-def test_the_threshold_is_in_the_law_and_in_the_engine():
+def test_threshold_of_the_law_equal_to_the_engine_s():
     impact = CATALOGUE["impact"]
     for v, expected in ((1.0, 0.0), (1.001, 1.0)):
         scene = impact.scene(2, {"v": v, "e": 1.0})
@@ -151,7 +151,7 @@ def test_the_threshold_is_in_the_law_and_in_the_engine():
         assert abs(found - value) <= band
 
 
-def test_a_planted_fault_of_a_thousandth_leaves_the_law_s_band():
+def test_law_band_against_a_planted_fault_of_a_thousandth():
     impact = CATALOGUE["impact"]
     scene = impact.scene(2, {"v": 6.0, "e": 0.8})
     wrong = replace(scene, pairs=(Pair(restitution=0.8 * 0.999),))

@@ -44,7 +44,7 @@ def test_default_is_what_a_fresh_world_holds():
     assert chosen["maximum_speed"] == told.maximum_linear_speed and chosen["continuous"] == world.continuous_enabled
 
 
-def test_the_push_speed_of_default_is_the_one_that_is_not_told_again():
+def test_push_speed_of_default_stated_once():
     """A deep overlap of a world without any tuning comes out as one that is tuned to 3 m/s, and not to another."""
     import pyb2d3
 
@@ -125,7 +125,7 @@ def test_contacts_name_their_bodies_in_a_wall_of_boxes(unit):
         assert point[1] == pytest.approx(heights[int(a)], abs=1e-3)
 
 
-def test_what_is_drawn_of_impulses_is_no_momentum_so_they_are_not_told():
+def test_drawn_impulses_not_reported_as_momentum():
     """The reason of the families without values: twice the weight at rest, and of a blow what stops it."""
     rest = ENGINE.build(resting(), DT, settings(resting(), "default"))
     rest.advance(120)
@@ -176,7 +176,7 @@ def test_law_against_a_restitution_off_by_a_hundredth(canonical, scene, profile)
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("params", [{}, {"e": 0.5}, {"height": 1.03}], ids=str)
-def test_a_bouncing_ball_comes_to_rest_when_its_law_says(params, profile):
+def test_rest_time_of_a_bouncing_ball_by_its_law(params, profile):
     canonical = CATALOGUE["bounce"]
     scene = canonical.scene(2, params)
     law = next(each for each in DEVIATIONS if each.scene == "bounce" and each.profiles == (profile,))
@@ -186,7 +186,7 @@ def test_a_bouncing_ball_comes_to_rest_when_its_law_says(params, profile):
     assert abs(canonical.exact(scene)["rest_time"] - value) > 10.0 * band  # far from the truth that it explains
 
 
-def test_with_small_steps_the_law_of_a_ball_is_the_textbook_s():
+def test_ball_law_at_small_steps_as_in_the_textbook():
     """It is computed here step by step, the truth by the scene: independent of each other."""
     canonical = CATALOGUE["oblique"]
     scene = canonical.scene(2, {"e": 0.0})
@@ -196,7 +196,7 @@ def test_with_small_steps_the_law_of_a_ball_is_the_textbook_s():
         assert value == pytest.approx(truth, abs=1e-4), metric
 
 
-def test_the_law_of_a_ball_is_silent_about_loads_boxes_and_company():
+def test_ball_law_silent_about_loads_boxes_and_other_bodies():
     canonical = CATALOGUE["oblique"]
     scene = canonical.scene(2)
     plane, ball = scene.bodies
@@ -215,7 +215,7 @@ def test_the_law_of_a_ball_is_silent_about_loads_boxes_and_company():
         assert said(other) is None
 
 
-def test_every_law_speaks_about_a_metric_that_its_scene_has():
+def test_laws_only_about_metrics_of_their_scene():
     for scene, metrics in (*BLOWS.items(), *ON_A_PLANE.items()):
         canonical = CATALOGUE[scene]
         stated = {check.metric for variation in canonical.variations("standard")
@@ -230,7 +230,7 @@ def test_every_law_speaks_about_a_metric_that_its_scene_has():
 
 
 @pytest.mark.parametrize(("unit", "stopped"), [(1.0, True), (64.0, False)])
-def test_the_side_of_the_next_plate_is_a_contact_before_the_seam(unit, stopped):
+def test_side_of_the_next_plate_as_a_contact_before_the_seam(unit, stopped):
     seam = CATALOGUE["seam"]
     scene = seam.scene(2)
     names = [body.name for body in scene.bodies]
@@ -246,7 +246,7 @@ def test_the_side_of_the_next_plate_is_a_contact_before_the_seam(unit, stopped):
     assert (simulation.twist()[box, 0] < 1.0) == stopped
 
 
-def test_small_steps_lose_a_sixth_of_what_touching_balls_have():
+def test_loss_of_a_sixth_of_touching_balls_at_small_steps():
     """v/3 each when all are stopped, and the first pair alone rebounds: -1/6, 5/6 and 1/3 of the speed."""
     cradle = CATALOGUE["cradle"]
     scene = cradle.scene(2, {"n": 3.0, "apart": 0.0})

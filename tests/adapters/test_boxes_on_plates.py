@@ -38,7 +38,7 @@ def asked(scene, metric="way", answer=(2.0, 0.25)):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_box_is_told_from_the_top_of_its_plate_and_keeps_all_else(dimension):
+def test_box_relative_to_the_top_of_its_plate(dimension):
     scene = on_plate(dimension)
     found, ((flat, dt, measure),) = asked(scene)
     ground, box = flat.bodies
@@ -55,7 +55,7 @@ def test_the_box_is_told_from_the_top_of_its_plate_and_keeps_all_else(dimension)
     assert asked(on_plate(dimension, (0.0, 1e6, -1e6)))[0][1] == pytest.approx(0.25 + math.ulp(1e6) / 0.01 * 1.5)
 
 
-def test_what_is_no_box_on_a_level_plate_is_none_of_it():
+def test_bodies_other_than_a_box_on_a_level_plate():
     scene = on_plate(3)
     plate, box = scene.bodies
     tilted = replace(plate, pose=(*plate.pose[:3], math.cos(0.1), math.sin(0.1), 0.0, 0.0))

@@ -112,7 +112,7 @@ def test_unnamed_settings_as_shipped_and_settings_in_the_law():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 1000])
 @pytest.mark.parametrize("v", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("e", [0.3, 0.8, 1.0])
-def test_tuned_rebound_is_e_to_round_off_at_any_step_and_phase(dt, v, e):
+def test_tuned_rebound_equal_to_e_at_any_step_and_phase(dt, v, e):
     for phase in (0.13, 0.5, 0.87):
         end = drive(hit((3.0 + phase) * v * dt, v, e), dt=dt).twist[-1, 1, 2]
         assert end / v == pytest.approx(e, abs=1e-14)  # a handful of operations of 2e-16 each
@@ -124,7 +124,7 @@ def test_worked_example_speed_and_impulse():
     assert record.contacts.impulse_between(0, 1).sum(axis=0)[2] == pytest.approx(5.4, abs=1e-14)
 
 
-def test_default_law_first_seen_apart_takes_gap_over_dt_off_the_rebound():
+def test_default_rebound_short_by_gap_over_dt_when_first_apart():
     v, e, gap = 8.0, 0.8, 0.004  # seen apart at once, and (1 + e) v dt > gap: it bounces in the first step
     record = drive(hit(gap, v, e), "default", linearDamping=0.0)
     # 1e-11: a gap known to 2e-15 m (a few ulp of the floor's 20 m half depth) over dt.
@@ -399,7 +399,7 @@ def test_every_pair_gets_its_own_coefficients():
     assert end[2, 0] - end[1, 0] == pytest.approx(0.3 * 2.0, abs=1e-12)
 
 
-def test_pair_of_zero_is_given_to_a_body_that_touches_nothing_rough():
+def test_friction_zero_for_a_body_without_rough_pairs():
     names = ("floor", "a", "b")
     pairs = (Pair("floor", "a", friction=0.5), Pair("floor", "b"), Pair("a", "b"))
     scene = scene_of(FLOOR, *(ball(5.0, name=n, x=k) for k, n in enumerate(names[1:])), pairs=pairs)
@@ -458,7 +458,7 @@ def test_equal_bits_of_two_builds_despite_another_client(profile):
     assert first.pose[-1, 3, 2] > 2.4  # and it stands
 
 
-def test_worlds_built_side_by_side_do_not_share_anything():
+def test_worlds_built_side_by_side_share_nothing():
     def build(scene):
         return ENGINE.build(scene, DT, {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)})
 
@@ -471,7 +471,7 @@ def test_worlds_built_side_by_side_do_not_share_anything():
         simulation.close()
 
 
-def test_loads_of_worlds_built_side_by_side_act_each_in_its_own():
+def test_loads_of_worlds_built_side_by_side():
     def build(force, torque):
         scene = scene_of(replace(ball(3.0, inertia=0.05), force=(force, 0.0, 0.0), torque=(0.0, torque, 0.0)))
         return ENGINE.build(scene, DT, {s.name: s.value for s in ENGINE.settings("tuned", needs(scene), DT)})
@@ -522,7 +522,7 @@ def test_bad_steps_are_refused(dt):
         (scene_of(FLOOR, ball(2.0), gravity=(0.0, 0.0, -9.81), duration=2.0, mu=11.0), "friction: "),
     ],
 )
-def test_what_bullet_cannot_hold_is_refused_with_a_reason(scene, message):
+def test_scenes_beyond_bullet_refused_with_a_reason(scene, message):
     assert ENGINE.refuses(scene, "tuned").startswith(message)
     assert ENGINE.refuses(hit(0.02, 1.0, 0.5), "tuned") is None
 
@@ -544,7 +544,7 @@ def test_settings_follow_the_scenes_needs_and_carry_their_reasons():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("e", [0.0, 0.4, 0.9])
 @pytest.mark.parametrize("profile", ["default", "one"])
-def test_declared_rebound_holds_at_phases_it_was_not_derived_from(profile, e, dt):
+def test_declared_rebound_at_other_phases(profile, e, dt):
     declared = ENGINE.declares(profile, needs(hit(0.1, 2.0, e)), dt)["restitution"]
     phases = np.array([0.0137, 0.21, 0.333, 0.4999, 0.71, 0.8311, 0.98])  # none is (k + 1/2)/64
     balls = [
@@ -706,7 +706,7 @@ def on_the_grid(vertices):
     [("arch", {}, "moved"), ("arch", {"ratio": 1.02}, "moved"), ("arch", {"ratio": 0.8}, "off_the_faces"),
      ("wedge", {"ratio": 100.0}, "acceleration"), ("wedge", {"ratio": 100.0}, "out_of_plane")],
 )  # fmt: skip
-def test_what_clipped_hulls_get_wrong_is_the_grid_of_their_vertices(name, params, metric, monkeypatch):
+def test_rounded_vertices_as_the_error_of_clipped_hulls(name, params, metric, monkeypatch):
     """Families `arch-hull-grid` and `wedge-hull-grid`: where vertices lie on the grid already, the check passes."""
     canonical = CATALOGUE[name]
     scene = canonical.scene(2, params)
@@ -728,7 +728,7 @@ def test_what_clipped_hulls_get_wrong_is_the_grid_of_their_vertices(name, params
     assert error() < check.bound < cut
 
 
-def test_a_hull_is_cut_to_its_grid_by_a_whole_cell_or_not_at_all():
+def test_hull_rounded_by_whole_grid_cells():
     """A hull hovers where its lowest vertices are cut: round-off decides for each whether they are."""
     rng, cells = np.random.default_rng(1), []
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed")

@@ -51,13 +51,13 @@ def test_a_world_gets_what_was_checked():
     (replace(SCENE, bodies=(FLOOR, replace(BALLS[0], mass=1e-31), BALLS[1])), 0.01, {},
      "a.mass: 1e-31 cannot be represented in single precision"),
 ])  # fmt: skip
-def test_what_is_wrong_is_refused_before_a_world_is_made(scene, dt, changes, said):
+def test_faults_refused_before_a_world_is_built(scene, dt, changes, said):
     with pytest.raises(EngineError) as refused:
         Planar().build(scene, dt, {**SETTINGS, **changes})
     assert str(refused.value) == said
 
 
-def test_light_bodies_have_a_place_in_double_precision():
+def test_light_bodies_kept_in_double_precision():
     class Double(Planar):
         facts = replace(Planar.facts, precision="double")
 
@@ -65,7 +65,7 @@ def test_light_bodies_have_a_place_in_double_precision():
     assert Planar().refuses(light, "") and Double().refuses(light, "") is None
 
 
-def test_a_version_is_that_of_a_package_that_can_be_imported():
+def test_version_of_an_importable_package():
     assert Planar().version() == np.__version__
     absent = type("Absent", (Planar,), {"module": "no_such_engine"})()
     with pytest.raises(ImportError):

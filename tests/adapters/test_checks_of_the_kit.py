@@ -76,7 +76,7 @@ ASKED = [
 
 
 @pytest.mark.parametrize(("kind", "check"), ASKED)
-def test_a_check_builds_for_each_profile_the_worlds_that_it_says(kind, check):
+def test_worlds_that_a_check_builds_per_profile(kind, check):
     engine = kind()
     assert CHECKS[check](engine) == ""
     wanted = {Listening: WORLDS, Discs: WITHOUT_BOXES, Dull: WITHOUT_REBOUNDS}[kind][check]
@@ -93,7 +93,7 @@ def test_completeness_of_the_list_of_checks():
     assert set(WORLDS) == set(CHECKS) - others
 
 
-def test_steps_that_are_none_are_asked_of_each_profile():
+def test_invalid_steps_tried_on_each_profile():
     engine = Listening()
     assert CHECKS["bad_numbers"](engine) == CHECKS["refusals"](engine) == CHECKS["profiles"](engine) == ""
     assert engine.built == [] and engine.asked - {""} == set(SWEEPS)
@@ -108,7 +108,7 @@ def test_receipts_per_profile_at_both_steps_with_worlds_closed():
 
 
 @pytest.mark.parametrize("check", [*WORLDS, "refusals", "bad_numbers"])
-def test_a_check_whose_scenes_are_all_refused_is_not_asked_and_says_why(check):
+def test_check_with_all_scenes_refused_skipped_with_a_reason(check):
     class Idle(Listening):
         def refuses(self, scene, profile):
             super().refuses(scene, profile)
@@ -121,7 +121,7 @@ def test_a_check_whose_scenes_are_all_refused_is_not_asked_and_says_why(check):
 
 
 @pytest.mark.parametrize("check", [name for name in WORLDS if name != "states"])
-def test_a_world_is_closed_whatever_is_wrong_with_it(check):
+def test_world_closed_after_any_fault(check):
     """An engine with a licence or a window for each world would run out of them."""
 
     class Failing(Listening):

@@ -341,7 +341,7 @@ def test_a_box_on_an_incline_sinks_along_the_floors_normal(theta: float) -> None
     assert np.allclose(trajectory.pose[0, 1, :2], (0.5 - START) * n, rtol=0.0, atol=1e-9)
 
 
-def test_two_supports_and_a_bridge_all_get_their_overlap() -> None:
+def test_overlap_of_a_bridge_on_two_supports() -> None:
     bodies = (FLOOR, unit_box("l", -0.6, 0.5), unit_box("r", 0.6, 0.5), unit_box("top", 0.0, 1.5))
     start = drive(make(*bodies, mu=0.5, gravity=(0.0, -9.81), T=DT), "tuned").pose[0]
     assert np.allclose(start[1:, 1], [0.5 - START, 0.5 - START, 1.5 - 2.0 * START], rtol=0.0, atol=1e-9)
@@ -376,7 +376,7 @@ def test_bodies_apart_or_already_overlapping_are_not_moved() -> None:
     assert shift is not None and not shift.any()
 
 
-def test_bodies_that_will_hit_are_not_made_to_overlap() -> None:
+def test_no_initial_overlap_of_bodies_that_will_collide() -> None:
     chain = [Body(f"b{i}", Disc(0.5), 1.0, 0.125, (float(i), 0.0, 0.0)) for i in range(3)]
     trajectory = drive(make(*chain, e=1.0, T=DT), "tuned")
     assert trajectory.pose[0, :, 0].tolist() == [0.0, 1.0, 2.0] and trajectory.initial_change == ()
@@ -426,7 +426,7 @@ def test_contacts_are_ordered_by_pair() -> None:
 
 
 @pytest.mark.parametrize(("sweeps", "error"), [(1, 1.8e-1), (2, 7.2e-3), (4, 1.2e-5), (10, 5e-14)])
-def test_a_flat_landing_is_iterative_and_as_wrong_as_was_measured(sweeps: int, error: float) -> None:
+def test_flat_landing_error_of_the_iterative_solver_as_measured(sweeps: int, error: float) -> None:
     box = unit_box("box", 0.0, 0.5 + 2.5 * 5.0 * DT, twist=(0.0, -5.0, 0.0))
     trajectory = drive(make(FLOOR, box, e=0.5, T=5 * DT), "default", iterations=sweeps)
     # Relative to the approach speed; two digits were measured.
@@ -446,7 +446,7 @@ def test_impulse_over_report_with_default_persistence_and_tuned() -> None:
     assert abs(excess["tuned"]) < 1e-12
 
 
-def test_receipts_of_impulses_allow_what_kept_ones_add_and_nothing_else() -> None:
+def test_impulse_receipts_with_kept_impulses() -> None:
     box = unit_box("box", 0.0, 0.5)
     resting, bouncing = (needs(make(FLOOR, box, e=e, mu=0.1, gravity=(0.0, -9.81))) for e in (0.0, 1.0))
     told = ENGINE.declares("default", bouncing, DT)["impulse"]
@@ -508,14 +508,14 @@ def test_tuned_column_drift_and_sinking(n: int, dt: float) -> None:
 
 
 @pytest.mark.parametrize(("mu", "g", "dt"), [(0.5, 9.81, 1 / 240), (0.3, 1.62, 1 / 100), (0.1, 24.8, 1 / 700)])
-def test_a_single_touching_box_is_caught_one_step_of_fall_deep(mu: float, g: float, dt: float) -> None:
+def test_touching_box_caught_one_step_of_fall_deep(mu: float, g: float, dt: float) -> None:
     """What two landings at g dt leave unsolved: 4.7e-4 of the speed, and half a side from the centre 4.5e-4 rad/s."""
     fall = g * dt * dt
     depth = sunk({"n": 1, "mu": mu, "g": g, "mass": 3.0}, "default", dt)
     assert abs(depth - fall) <= 2.0 * 2.0 * (4.7e-4 + 0.5 * 4.5e-4) * fall
 
 
-def test_the_stick_threshold_is_as_sharp_as_was_measured() -> None:
+def test_sharpness_of_the_stick_threshold_as_measured() -> None:
     for ratio, slides in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
         theta = math.atan(0.5 * ratio)
         gravity = (9.81 * math.sin(theta), -9.81 * math.cos(theta))

@@ -31,7 +31,7 @@ def worlds_in_time(request):
         request.getfixturevalue("few_worlds")
 
 
-def test_an_engine_that_refuses_every_scene_passes_nothing(toy_class):
+def test_conformance_of_an_engine_that_refuses_every_scene(toy_class):
     class Idle(toy_class):
         def refuses(self, scene, profile):
             return "not today"
@@ -59,7 +59,7 @@ def test_findings_are_one_line_each(toy):
 
 
 @pytest.mark.usefixtures("few_worlds")
-def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
+def test_exception_of_an_engine_as_a_finding(toy_class):
     class Broken(toy_class):
         def build(self, scene, dt, settings):
             raise RuntimeError("no world today\nand none tomorrow")
@@ -72,7 +72,7 @@ def test_an_engine_that_raises_is_a_finding_and_not_an_exception(toy_class):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
-def test_expected_failures_are_told_and_an_unexpected_pass_is_a_failure(toy_class):
+def test_expected_failures_told_and_unexpected_pass_as_failure(toy_class):
     class Known(Spoilt):
         expected = (Expected("states", "it starts late", "its manual"), Expected("contacts", "no", "nowhere"))
 
@@ -160,7 +160,7 @@ def test_a_fault_that_no_receipt_sees_is_found(toy):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
-def test_an_impulse_on_the_wrong_body_is_found_by_check_and_receipts(toy):
+def test_impulse_on_the_wrong_body_found(toy):
     found = failing(check_adapter(toy("impulse of the wrong body")))
     assert "impulse" in found
     receipts = {name for name in found if name.startswith("receipt")}

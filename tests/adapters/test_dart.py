@@ -63,7 +63,7 @@ def test_loads_act_in_every_step_and_contacts_carry_the_weight():
     assert found.contacts.impulse_between(0, 1)[-20:, 2].mean() / DT == pytest.approx(3.0 * 9.81, rel=1e-4)
 
 
-def test_what_cannot_be_said_in_numbers_of_single_bodies_is_refused():
+def test_materials_that_no_single_body_values_give_refused():
     a, b, c = (
         Body(n, Sphere(0.5), 1.0, (1.0, 1.0, 1.0), (2.0 * k, 0, 0, 1.0, 0, 0, 0), (1.0, 0, 0, 0, 0, 0))
         for k, n in enumerate("abc")
@@ -105,7 +105,7 @@ def test_rebound_speed_between_its_threshold_and_100(profile, e, speed, leaves):
 
 @pytest.mark.parametrize("profile", ["default", "pgs", "nsgs", "fbf"])
 @pytest.mark.parametrize("params", [{}, {"e": 0.0}, {"v": 0.1}, {"v": 50.0, "e": 1.0}], ids=str)
-def test_a_blow_is_what_its_law_says_and_a_millionth_more_is_not(profile, params):
+def test_blow_law_against_a_fault_of_a_millionth(profile, params):
     impact = CATALOGUE["impact"]
     scene = impact.scene(3, params)
     found = impact.measure(scene, drive(scene, profile))
@@ -116,7 +116,7 @@ def test_a_blow_is_what_its_law_says_and_a_millionth_more_is_not(profile, params
             assert band < 1e-8 and (metric == "momentum_defect" or abs(found[metric][0] * 1.000001 - value) > band)
 
 
-def test_what_no_step_finds_in_a_thin_wall_passes_it_as_its_law_says():
+def test_pass_through_a_thin_wall_by_the_law():
     wall = CATALOGUE["thin_wall"]
     for params, passes in (({}, False), ({"v": 200.0}, True)):
         scene = wall.scene(2, params)
@@ -153,7 +153,7 @@ def judged(name, dimension, params, profile="default", **changes):
         ("overlap", 2, {}, {"thrown"}, 1e-4),
     ],
 )
-def test_what_a_law_says_is_what_comes_out_and_a_little_more_is_not(name, dimension, params, metrics, sharp):
+def test_law_against_a_slightly_larger_value(name, dimension, params, metrics, sharp):
     for profile in ("default",) if name == "flat_box" else ("default", "nsgs"):
         seen = set()
         for metric, value, predicted, band in judged(name, dimension, params, profile):
@@ -189,7 +189,7 @@ def test_failure_between_pyramid_axes_cured_by_the_exact_cone(name, params, metr
 
 
 @pytest.mark.parametrize(("e", "height", "duration"), [(0.0, 1.0, 1.0), (0.8, 1.0, 5.0), (0.0, 0.001, 2.0)])
-def test_every_height_of_a_ball_that_falls_is_that_of_the_recurrence(e, height, duration):
+def test_heights_of_a_falling_ball_by_the_recurrence(e, height, duration):
     """Rest included: an overlap of a landing is pushed out by a hundredth of it a step, at 1 mm/s at most."""
     scene = replace(CATALOGUE["bounce"].scene(2, {"e": e, "height": height}), duration=duration)
     found = drive(scene)
@@ -202,7 +202,7 @@ def test_every_height_of_a_ball_that_falls_is_that_of_the_recurrence(e, height, 
 
 @pytest.mark.parametrize("profile", ["default", "pgs", "nsgs", "fbf"])
 @pytest.mark.parametrize("params", [{}, {"e": 1.0, "tilt": 30.0}], ids=str)
-def test_corners_that_share_a_blow_give_way_by_their_own_response(profile, params):
+def test_compliance_of_corners_that_share_a_blow(profile, params):
     """Not by 1e-5 of the whole blow: that is far outside what is predicted."""
     told = {metric: (value, said, band) for metric, value, said, band in judged("edge_drop", 3, params, profile)}
     assert set(told) == {"impulse", "rise", "spin"}
@@ -214,7 +214,7 @@ def test_corners_that_share_a_blow_give_way_by_their_own_response(profile, param
         assert profile == "fbf" or abs(said - truth[metric] / 1.00001) > 3.0 * band, metric
 
 
-def test_a_box_that_turns_or_rubs_has_no_law_of_landing():
+def test_no_landing_law_for_a_turning_or_rubbing_box():
     scene = CATALOGUE["edge_drop"].scene(3, {})
     floor, box = scene.bodies
     law = landing_law("rise", "default")
@@ -226,7 +226,7 @@ def test_a_box_that_turns_or_rubs_has_no_law_of_landing():
 
 @pytest.mark.parametrize("profile", ["default", "pgs", "nsgs", "fbf"])
 @pytest.mark.parametrize("params", [{"mu": 0.1}, {"mu": 0.1, "heading": 30.0}, {"mu": 1.0, "spin": -10.0, "v": 1.0}])
-def test_friction_of_a_blow_is_a_pyramid_or_a_cone_as_its_law_says(profile, params):
+def test_blow_friction_pyramid_or_cone_by_the_law(profile, params):
     dimension = 3 if "heading" in params else 2
     told = {metric: (value, said, band) for metric, value, said, band in judged("oblique", dimension, params, profile)}
     assert set(told) >= {"forward_speed", "spin_speed"}
@@ -241,7 +241,7 @@ def test_a_slip_that_the_blow_stops_has_no_law():
 
 
 @pytest.mark.parametrize("length", [0.001, 1000.0])
-def test_a_ball_beside_a_box_that_moves_away_falls_as_if_it_were_alone(length):
+def test_ball_beside_a_box_that_moves_away_in_free_fall(length):
     """A rebound of 3 mm/s is none, and one of 3 km/s is cut to 100 m/s."""
     ((_, value, said, band),) = [each for each in judged("scales", 2, {"length": length}) if each[0] == "apex"]
     assert abs(value - said) <= band and said < 1e-4
@@ -266,7 +266,7 @@ def test_a_ball_beside_a_box_that_moves_away_falls_as_if_it_were_alone(length):
         ("masse", {"back": 4.0, "side": 1.0}, "turned", 0.1),
     ],
 )
-def test_what_slips_between_the_axes_of_a_pyramid_goes_as_its_law_says(profile, name, params, metric, off):
+def test_slip_between_pyramid_axes_by_the_law(profile, name, params, metric, off):
     """Within a fiftieth of what tells the pyramid from a cone; the exact cone's solvers have no such law."""
     told = {each[0]: each[1:] for each in judged(name, 3, params, profile)}
     value, said, band = told[metric]
@@ -275,7 +275,7 @@ def test_what_slips_between_the_axes_of_a_pyramid_goes_as_its_law_says(profile, 
     assert not [d for d in DEVIATIONS if d.covers("dart", "6.20.0", "nsgs", name, metric)]
 
 
-def test_what_is_pushed_turned_or_lifted_has_no_law_of_the_pyramid():
+def test_no_pyramid_law_for_pushed_turned_or_lifted_bodies():
     slide = CATALOGUE["slide"]
     scene = slide.scene(3, {"heading": 45.0})
     floor, box = scene.bodies

@@ -33,7 +33,7 @@ def ratio(start):
 
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-4, 1e-2])
-def test_a_band_is_what_starts_that_are_off_by_the_tolerance_end_apart(tolerance):
+def test_declared_friction_band_by_starts_off_by_the_tolerance(tolerance):
     """Newton's cost is good to the tolerance: accelerations to its root, and a start to that over a step."""
     without, found = declared(tolerance=0.0), declared(tolerance=tolerance)
     assert set(found) == {"friction", "friction_impulse"} and found["friction"] == found["friction_impulse"]
@@ -44,5 +44,5 @@ def test_a_band_is_what_starts_that_are_off_by_the_tolerance_end_apart(tolerance
     assert apart > 0.0 and told.band - exact.band == pytest.approx(2.0 * apart, rel=1e-6)
 
 
-def test_a_box_that_stays_on_its_face_has_the_friction_that_is_asked():
+def test_requested_friction_of_a_box_that_stays_on_its_face():
     assert declared(replace(NEEDS, friction=0.5), tolerance=1e-2) == {}

@@ -36,7 +36,7 @@ def test_conformance(item):
     item.hold()
 
 
-def test_numbers_that_are_called_shipped_are_the_engine_s_own():
+def test_shipped_numbers_equal_to_the_engine_s_own():
     from pydrake.geometry import SceneGraphConfig
     from pydrake.multibody.plant import MultibodyPlantConfig
 
@@ -52,7 +52,7 @@ def test_numbers_that_are_called_shipped_are_the_engine_s_own():
     ("name", "params"), [("impact", {"e": 0.0}), ("impact", {"e": 0.0, "v": 50.0}), ("bounce", {"e": 0.0})], ids=str
 )
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_springs_throw_back_is_what_the_law_says(name, params, dimension, profile):
+def test_spring_rebound_by_the_law(name, params, dimension, profile):
     canonical = CATALOGUE[name]
     scene = canonical.scene(dimension, params)
     found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), canonical.sampling(scene)))
@@ -76,7 +76,7 @@ def test_what_springs_throw_back_is_what_the_law_says(name, params, dimension, p
 @pytest.mark.parametrize("profile", ENGINE.profiles)
 @pytest.mark.parametrize("params", [{}, {"depth": 0.01, "ratio": 100.0}], ids=str)
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_balls_that_overlap_part_as_fast_as_the_law_says(params, dimension, profile):
+def test_separation_speed_of_overlapping_balls_by_the_law(params, dimension, profile):
     canonical = CATALOGUE["overlap"]
     scene = canonical.scene(dimension, params)
     found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), canonical.sampling(scene)))
@@ -96,7 +96,7 @@ def test_a_point_of_contact_lies_half_way_into_the_overlap():
     assert abs(value - told[0]) < 1e-9 < 1e-4 < abs(value - others[0])
 
 
-def test_a_ball_that_rebounds_or_spins_has_no_law_here():
+def test_no_law_for_a_rebounding_or_spinning_ball():
     impact = CATALOGUE["impact"]
     law = landing_law("rebound_speed", "default")
     scene = impact.scene(3, {"e": 0.0})
@@ -116,14 +116,14 @@ def test_friction_of_tamsi_is_a_cone(heading):
 
 
 @pytest.mark.parametrize(("profile", "told"), [("sap", True), ("similar", True), ("tamsi", True), ("default", False)])
-def test_a_receipt_sees_friction_that_is_more_than_was_asked_for(profile, told):
+def test_receipt_of_too_much_friction(profile, told):
     """Half as much again: what is declared of the two that glide has an end upwards, though none is known downwards."""
     declared = ENGINE.declares(profile, needs(resting(0.5)), DT).get("friction")
     found = 0.75
     assert (declared is None or abs(found - declared.value) > declared.band) == told
 
 
-def test_a_box_slides_on_its_face_by_a_surface_and_tips_on_a_point():
+def test_sliding_box_on_a_surface_and_tipping_on_a_point():
     slid = resting(0.3, twist=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     level = abs(drive(slid, "tamsi").twist[-20:, 1, 3:]).max()
     tipped = abs(drive(slid, "tamsi", boxes="point").twist[-20:, 1, 3:]).max()
@@ -175,7 +175,7 @@ def test_friction_of_a_pair_is_a_harmonic_mean():
     assert "harmonic" in ENGINE.refuses(odd, "default")
 
 
-def test_what_has_no_place_here_is_refused_in_one_line():
+def test_unsupported_scenes_refused_in_one_line():
     bouncing = replace(resting(), pairs=(Pair(restitution=0.5),))
     assert ENGINE.refuses(bouncing, "default").startswith("pairs: ")
     moved = replace(resting(), bodies=(FLOOR, replace(BOX, motion="prescribed")))
@@ -194,7 +194,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
 
-def test_the_facets_of_a_surface_do_not_mirror_each_other():
+def test_facets_of_a_surface_not_mirror_symmetric():
     """Of a box that lies flat in the lift: the four large ones mirror each other, slivers between them do not."""
     floor, box = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed"), Body("box", Box((0.5, 0.25)), 1.0, 0.1)
     scene = Scene(

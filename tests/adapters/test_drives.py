@@ -88,7 +88,7 @@ def test_mujoco_s_conveyor_in_both_of_its_cones(cone):
 
 
 @pytest.mark.parametrize(("engine", "profile"), [("chipmunk", "tuned"), ("mujoco", "tuned")])
-def test_running_box_drags_along_its_top_and_does_not_push_with_its_end(engine, profile):
+def test_drag_on_top_of_a_running_box_without_end_push(engine, profile):
     belt = Body("belt", Box((2.0, 0.5)), pose=(0.0, -0.5, 0.0), motion="fixed", surface_velocity=(1.0, 0.0))
     found = driven(engine, profile, scene(belt, box(), 0.3))
     assert found.twist[-1, 1, 0] == pytest.approx(1.0, abs=1e-3)
@@ -107,7 +107,7 @@ def test_refusal_of_a_running_box_on_a_moving_half_space():
 
 
 @pytest.mark.parametrize(("engine", "profile"), ENGINES)
-def test_rising_floor_takes_a_box_along_and_throws_an_elastic_ball(engine, profile):
+def test_rising_floor_with_a_box_and_an_elastic_ball(engine, profile):
     rising = floor(motion="prescribed", twist=(0.0, 0.5, 0.0))
     found = driven(engine, profile, scene(rising, box(), 0.3))
     assert found.pose[-1, 0] == pytest.approx([0.0, 0.4, 0.0], abs=1e-12)
@@ -119,7 +119,7 @@ def test_rising_floor_takes_a_box_along_and_throws_an_elastic_ball(engine, profi
 
 @pytest.mark.parametrize(("engine", "profile"), DRIVEN)
 @pytest.mark.parametrize("shape", ["half-space", "box"])
-def test_course_is_where_it_says_at_every_step_and_carries_what_sticks(engine, profile, shape):
+def test_course_positions_at_every_step_with_sticking_bodies(engine, profile, shape):
     """A (2 pi f)^2 = 3.2 m/s^2 < mu g: the box sticks, and is where the table is but for what it slips at the start."""
     course = Harmonic((0.02, 0.0), 2.0, 0.4)
     plate = HalfSpace((0.0, 1.0)) if shape == "half-space" else Box((3.0, 0.5))
@@ -143,7 +143,7 @@ def test_course_is_where_it_says_at_every_step_and_carries_what_sticks(engine, p
 
 
 @pytest.mark.parametrize(("engine", "profile"), DRIVEN)
-def test_shaken_up_and_down_a_box_is_thrown_off_above_g_alone(engine, profile):
+def test_shaken_box_thrown_off_above_g(engine, profile):
     for amplitude, leaves in ((0.03, False), (0.12, True)):  # A (4 pi)^2 = 4.7 and 18.9 m/s^2
         course = Harmonic((0.0, amplitude), 2.0)
         found = driven(engine, profile, scene(floor(motion="prescribed", course=course), box(), 0.5, 1.0))
@@ -151,7 +151,7 @@ def test_shaken_up_and_down_a_box_is_thrown_off_above_g_alone(engine, profile):
         assert (gap.max() > 0.02) == leaves, gap.max()
 
 
-def test_scene_keeps_its_hash_and_its_form_where_nothing_drives():
+def test_scene_hash_without_drives_unchanged():
     plain = scene(floor(), box(), 0.3)
     assert "surface_velocity" not in plain.as_dict()["bodies"][0] and "course" not in plain.as_dict()["bodies"][1]
     running = scene(floor(surface_velocity=(1.0, 0.0)), box(), 0.3)
@@ -176,12 +176,12 @@ def test_scene_keeps_its_hash_and_its_form_where_nothing_drives():
         (replace(box(), name="belt", surface_velocity=(1.0, 0.0)), "not free can have a surface velocity"),
     ],
 )
-def test_what_is_no_drive_is_refused_by_the_name_of_its_field(ground, said):
+def test_wrong_drive_refused_by_its_field(ground, said):
     with pytest.raises(SceneError, match=said):
         scene(ground, box(), 0.3)
 
 
-def test_an_adapter_that_claims_nothing_gets_nothing_new():
+def test_adapter_without_declared_abilities():
     bare = replace(load("chipmunk").facts, abilities=frozenset())
     engine = type("Bare", (type(load("chipmunk")),), {"facts": bare})()
     asked = scene(floor(surface_velocity=(1.0, 0.0)), box(), 0.3)
@@ -213,7 +213,7 @@ def test_a_prescribed_body_is_where_its_velocities_have_taken_it(course):
         gone += DT * np.array(velocity_over(body, DT, k))
 
 
-def test_lift_takes_drives_along_and_a_course_is_not_lowered():
+def test_lift_of_drives_and_no_lowering_of_a_course():
     asked = scene(floor(surface_velocity=(1.0, 0.0)), box(), 0.3)
     raised = lift(asked)
     assert raised.bodies[0].surface_velocity == (1.0, 0.0, 0.0)

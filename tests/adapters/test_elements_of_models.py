@@ -47,7 +47,7 @@ def test_a_tree_written_is_read_back_with_its_lines():
     assert text_of(late) == "\n\n<mujoco><body></body>\n<body></body></mujoco>", "none begins before what holds it"
 
 
-def test_an_element_is_taken_out_wherever_it_is_and_only_itself():
+def test_removal_of_a_nested_element_alone():
     root = read("<mujoco><body><geom/><geom/></body><geom/></mujoco>")
     inner = root.children[0].children[1]
     assert root.without(inner) and tags(root) == ["mujoco", "body", "geom", "geom"]
@@ -96,7 +96,7 @@ def clean(text, drop=False):
     return root, mjcf.cleaned(root, drop)
 
 
-def test_what_only_draws_or_measures_goes_silently_and_colours_with_it():
+def test_visual_and_sensor_elements_dropped_silently():
     silent = "".join(f"<{tag}><deep/></{tag}>" for tag in sorted(mjcf.SILENT))
     geom = '<geom name="g" rgba="1" material="m" user="1" group="2" size="1"/>'
     root, dropped = clean(f"{silent}<worldbody>{silent}{geom}</worldbody>")
@@ -129,7 +129,7 @@ def test_references_outside_the_text_always_refused(tag):
         )
 
 
-def test_a_mesh_stays_where_it_is_the_hull_of_its_vertices():
+def test_mesh_kept_only_as_the_hull_of_its_vertices():
     root, dropped = clean('<asset><mesh name="m" vertex="0 0 0" scale="1 1 1" class="c"/></asset>')
     assert tags(root) == ["mujoco", "asset", "mesh"] and dropped == []
     no_hull = f"line 1: <mesh>: {mjcf.NO_PLACE['mesh']}"
@@ -152,7 +152,7 @@ def test_length_and_visibility_of_a_name(call):
     assert refused(call, '<body name="&#8203;"/>').endswith("cannot be a name")
 
 
-def test_bodies_and_geoms_are_named_in_the_world_alone():
+def test_bodies_and_geoms_named_only_in_the_world():
     root, _ = clean("<default><geom/></default><worldbody><body><geom/></body></worldbody>")
     assert "name" not in root.children[0].children[0].attributes
     assert [e.attributes.get("name") for e in root.children[1].walk()] == [None, "body@1", "geom@1"]

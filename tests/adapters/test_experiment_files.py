@@ -63,7 +63,7 @@ def test_values_are_read_in_their_order_and_with_their_kinds(read):
         (CURED + "dimension = 1\n", "cured 1: dimension must be 2 or 3"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_one_line_that_names_file_and_field(read, tmp_path, text, said):
+def test_error_line_with_file_and_field(read, tmp_path, text, said):
     with pytest.raises(EngineError) as caught:
         read(text)
     assert str(caught.value) == f"{tmp_path / 'tuning.toml'}: {said}"

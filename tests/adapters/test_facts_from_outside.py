@@ -52,7 +52,7 @@ def test_a_fact_that_is_wrong_is_named_with_what_is_possible(field, wrong, said)
     assert str(error.value) == f"facts: ValueError: {said}"
 
 
-def test_what_are_no_facts_settings_or_refusals_is_told_by_its_type():
+def test_wrong_facts_settings_and_refusals_by_their_type():
     needed = "given, a Setting with a name is needed"
     for asked, given, said in (
         (foreign.checked_facts, {"name": "toy"}, "facts: a dict was given, EngineFacts are needed"),
@@ -151,7 +151,7 @@ def test_facts_and_settings_of_an_engine_that_answers(child):
             ask(*[None] * (2 if ask == engine.refuses else 3))
 
 
-def test_an_engine_that_does_not_answer_is_told_with_why(child):
+def test_engine_without_an_answer_told_with_its_reason(child):
     own = child({"version": "", "reason": "ImportError: no", "trace": "line", "facts": None, "fatal": True})
     found = foreign.probe(ENTRY)
     assert (found.engine, found.version, found.reason, found.facts, found.fatal, found.trace, own.stopped) == (

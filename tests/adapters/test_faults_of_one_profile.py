@@ -15,7 +15,7 @@ OF_ONE = [name for name, fault in FAULTS.items()
 
 
 @pytest.mark.parametrize("name", OF_ONE)
-def test_a_fault_of_the_second_profile_is_found_as_its_own(name):
+def test_fault_of_the_second_profile_found(name):
     fault = FAULTS[name]
     engine = Listening(name, min(fault.sizes, default=math.nan))
     said = CHECKS[fault.check](engine)
@@ -23,7 +23,7 @@ def test_a_fault_of_the_second_profile_is_found_as_its_own(name):
     assert all(world.closed == 1 for world in engine.built)
 
 
-def test_a_setting_that_nobody_knows_is_asked_of_the_first_profile():
+def test_unknown_setting_tried_on_the_first_profile():
     assert CHECKS["refusals"](Listening("unknown settings ignored", at="first")) == "an unknown setting is accepted"
     assert (
         CHECKS["bad_numbers"](Listening("count below 1 is accepted", at="first")) == "first: iterations = 0 is accepted"

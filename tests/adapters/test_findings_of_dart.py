@@ -37,7 +37,7 @@ def told(name, profile, metric, dimension=2, params=None):
 @pytest.mark.parametrize(
     ("name", "params"), [("rod_gas", {}), ("rod_gas", {"n": 3.0}), ("rack", {}), ("rack", {"apart": 0.01})], ids=str
 )
-def test_balls_that_meet_lose_what_compliance_takes_of_every_blow(name, params, profile):
+def test_loss_of_colliding_balls_by_compliance(name, params, profile):
     found, metrics = measured(name, profile, params=params), ("energy_defect", "wrong_speed", "penetration")
     seen = {metric: (found[metric], *told(name, profile, metric, 2, params)) for metric in metrics if metric in found}
     assert len(seen) == 2
@@ -46,7 +46,7 @@ def test_balls_that_meet_lose_what_compliance_takes_of_every_blow(name, params, 
         assert value * 1e-3 > band and (abs(value * 1.001 - said) > band), metric
 
 
-def test_balls_that_rub_spin_or_fall_have_no_law_of_meeting():
+def test_no_collision_law_for_rubbing_spinning_or_falling_balls():
     canonical = CATALOGUE["rack"]
     scene = canonical.scene(2, {"rows": 2.0})
     law = meeting_law("energy_defect", 1e-8, 1e-8)
@@ -79,7 +79,7 @@ def test_friction_limit_of_pivoting_and_of_the_other_solvers():
     assert abs(measured("kane", "fbf", params=params)["rise"] - followed[0]) <= followed[1]
 
 
-def test_a_box_that_turns_or_falls_has_no_law_of_rubbing():
+def test_no_friction_law_for_a_turning_or_falling_box():
     scene, measure = CATALOGUE["kane"].scene(2, {}), CATALOGUE["kane"].measure
     floor, rod = scene.bodies
     law = rubbing_law("rise", "default")
@@ -98,7 +98,7 @@ def test_compliance_of_the_corners_of_a_flat_box(profile, params):
         assert abs(found[metric] - said) <= band < 1e-4, metric
 
 
-def test_sweeps_that_are_asked_for_are_the_sweeps_that_answer():
+def test_requested_sweeps_reported():
     """As shipped the second choice's 30 sweeps answered for 200 and for 2000 alike: bit for bit."""
     params = {"ratio": 100.0}
     few, many = (measured("heavy_on_light", "pgs", 2, params, iterations=count)["penetration"] for count in (30, 2000))
@@ -114,7 +114,7 @@ def test_complete_sweeps_as_second_choice_after_pivoting():
 
 
 @pytest.mark.parametrize("profile", CONES)
-def test_piles_are_refused_by_solvers_that_take_minutes_for_them(profile):
+def test_piles_refused_by_solvers_that_take_minutes(profile):
     for count, refused in ((float(MOST_BOXES), False), (MOST_BOXES + 1.0, True)):
         scene = CATALOGUE["stack"].scene(3, {"n": count})
         said = ENGINE.refuses(scene, profile)

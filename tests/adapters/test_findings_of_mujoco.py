@@ -20,7 +20,7 @@ def test_matched_strike_of_a_rod_at_half_the_overlap(params, delay):
     assert np.abs(found - textbook(params)).max() > 1e-5
 
 
-def test_tuned_strikes_there_as_well_and_falls_short_by_its_impedance():
+def test_tuned_strike_short_by_its_impedance():
     """Of a change of 2.5 rad/s at most 1e-4, which the impedance lacks."""
     found, depth = struck("mujoco", "tuned", {})
     assert np.abs(found - textbook({}, 0.5 * depth)).max() < 2.5e-4

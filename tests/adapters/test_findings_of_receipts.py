@@ -86,7 +86,7 @@ def test_quantity_measured_nowhere_refused_and_partly_measured_told(measured):
     assert told["receipt mass"] == Finding("receipt mass", "ok", good)
 
 
-def test_a_probe_that_fails_is_a_finding_of_its_own_and_others_go_on(measured):
+def test_failing_probe_as_a_finding_of_its_own(measured):
     def rule(profile, needs, dt):
         if profile == "second":
             raise ArithmeticError("no\nnumber")

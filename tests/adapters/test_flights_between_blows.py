@@ -44,14 +44,14 @@ def test_step_of_a_blow_on_a_sample():
     assert rows.normal.tolist() == [[1.0, 0.0, 0.0]] and rows.impulse == pytest.approx(np.array([[2.25, 0.0, 0.0]]))
 
 
-def test_where_nothing_meets_before_the_end_there_is_no_motion_to_tell():
+def test_no_motion_told_without_a_meeting():
     assert _motion(Held(scene(ball("left", 0.0, 1.0), ball("right", 1.0))), DT, EXACT) is None  # at the end itself
     assert _motion(Held(scene(ball("left", 0.0, -1.0), ball("right", 1.0))), DT, EXACT) is None
     assert _motion(Held(scene(ball("left", 0.0, 1.0625), ball("right", 1.0))), DT, EXACT) is not None
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(0.0, True), (1.0, True), (1.0 + 2.0**-20, False), (2.0, False)])
-def test_what_is_apart_by_no_more_than_the_least_gap_touches(monkeypatch, gap, touches):
+def test_touch_within_the_least_gap(monkeypatch, gap, touches):
     monkeypatch.setattr(single_precision, "TOUCHING", 2.0**-30)
     flight = _Flight(scene(ball("left", 0.0), ball("right", 0.5 + gap * 2.0**-30)), EXACT)
     met = flight._meeting(0, 1)

@@ -6,7 +6,7 @@ import pytest
 from adapters.impulses import along_normal
 
 
-def test_a_smooth_contact_is_told_whole_by_its_part_along_the_normal():
+def test_smooth_contact_from_its_normal_part():
     normal = np.array([0.6, 0.0, -0.8])
     told = along_normal(2.5, normal.tolist(), rough=False)
     assert told == pytest.approx([1.5, 0.0, -2.0])
@@ -14,7 +14,7 @@ def test_a_smooth_contact_is_told_whole_by_its_part_along_the_normal():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_of_a_rough_one_only_what_lies_along_an_axis_is_known(side):
+def test_rough_contact_known_only_along_an_axis(side):
     told = along_normal(2.5, [0.0, side, 1e-6], rough=True)
     assert told[1] == pytest.approx(2.5 * side) and np.isnan(told[::2]).all()
     assert np.isnan(along_normal(2.5, [0.6, 0.0, -0.8], rough=True)).all()

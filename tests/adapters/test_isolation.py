@@ -76,7 +76,7 @@ def within(seconds, is_so):
     return is_so()
 
 
-def test_a_child_answers_as_often_as_it_is_asked_until_it_is_stopped(child):
+def test_child_answers_until_stopped(child):
     assert [asked(child, f"answer({k} + 1)") for k in range(3)] == ["1", "2", "3"]
     assert not child.ended()
     assert child.stop() == child.stop() == "the process closed its connection"
@@ -111,7 +111,7 @@ def test_how_a_child_ended_is_said_however_it_did(child, order, said, timeout):
     assert str(lost.value) == said == child.stop()
 
 
-def test_a_child_that_has_been_waited_for_has_ended_as_it_did(child):
+def test_exit_status_of_a_child(child):
     """`multiprocessing` waits for all that have ended when it starts another process."""
     child.send(b"os.abort()")
     assert within(PATIENCE, child.ended)
@@ -139,7 +139,7 @@ def test_child_lost_with_its_guardian_despite_an_open_connection(child):
         os.kill(pid, signal.SIGKILL)
 
 
-def test_an_answer_may_be_as_large_as_is_said_and_no_larger(child, monkeypatch):
+def test_largest_answer_of_a_child(child, monkeypatch):
     monkeypatch.setattr(isolation, "MOST_BYTES", 1000)
     assert asked(child, "answer('x' * 1000)") == "x" * 1000
     child.send(b"answer('x' * 1001); time.sleep(600)")
@@ -148,7 +148,7 @@ def test_an_answer_may_be_as_large_as_is_said_and_no_larger(child, monkeypatch):
 
 
 @pytest.mark.parametrize("leaves", [False, True])
-def test_nothing_that_a_child_has_started_outlives_it(child, leaves):
+def test_processes_started_by_a_child_ended_with_it(child, leaves):
     """Whether it is stopped, or leaves by itself, and whatever session that is in."""
     pids = [int(asked(child, "answer(start(600))")) for _ in range(2)]
     assert all(map(is_running, pids))
@@ -278,7 +278,7 @@ def test_last_lines_of_a_child_s_long_output_kept(child):
     assert child.tail() == "to the other stream, and the last words"
 
 
-def test_who_waits_for_a_child_wakes_when_it_answers_writes_or_ends(child):
+def test_wait_for_a_child_ends_on_answer_output_or_exit(child):
     assert asked(child, "answer(1)") == "1"  # it has begun
     assert not wait(child.sentinels, 0.0) and not child.has_answer()
     child.send(b"answer(2)")
@@ -309,7 +309,7 @@ def test_ctrl_c_while_a_child_starts(child):
 ROOM = "answer(*resource.getrlimit(resource.RLIMIT_AS), *resource.getrlimit(resource.RLIMIT_CORE))"
 
 
-def test_a_child_leaves_no_core_and_has_the_room_that_it_is_given(serve):
+def test_child_without_core_dump_and_with_its_memory_limit(serve):
     import resource
 
     free, given = Child(serve), Child(serve, 2**32)
@@ -329,7 +329,7 @@ def test_a_child_leaves_no_core_and_has_the_room_that_it_is_given(serve):
 @pytest.mark.parametrize(
     ("error", "said"), [(OSError(11, "no more"), r"\[Errno 11\] no more"), (MemoryError(), "MemoryError")]
 )
-def test_where_no_process_can_be_started_it_is_said_why(serve, monkeypatch, error, said):
+def test_reason_when_no_process_can_be_started(serve, monkeypatch, error, said):
     def refuses(process):
         raise error
 

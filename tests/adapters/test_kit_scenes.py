@@ -48,7 +48,7 @@ def test_what_lies_touches_what_it_lies_on():
     [("striking", "light", "heavy"), ("glancing", "light", "heavy"), ("rolling", "left", "right"),
      ("carried", "piston", "ball"), ("resting", "floor", "ball"), ("rolling", "floor", "ball")],
 )  # fmt: skip
-def test_who_shall_meet_is_apart_and_meets_before_the_end(name, one, other):
+def test_colliding_bodies_of_a_kit_scene_apart_at_the_start(name, one, other):
     scene = MADE[name]
     assert gap(scene, one, other) > 1e-6
     assert min(gap(scene, one, other, t) for t in np.linspace(0.0, scene.duration, 200)) < 0.0

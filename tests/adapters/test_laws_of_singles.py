@@ -87,7 +87,7 @@ def told(metric, method, scene, dt=DT):
 
 
 @pytest.mark.parametrize("name", BLOWS)
-def test_blows_event_by_event_end_in_the_scene_s_own_truth(name):
+def test_event_by_event_blows_end_in_the_exact_truth(name):
     """In doubles, with the restitution that is asked for: as near as the scene's check asks of anybody."""
     canonical, exact, said = CATALOGUE[name], Method(lambda e, speed: e, 200, 2.0**-53), 0
     for dimension in canonical.dimensions:
@@ -102,7 +102,7 @@ def test_blows_event_by_event_end_in_the_scene_s_own_truth(name):
     assert said >= 4
 
 
-def test_the_band_is_that_of_the_roundings_and_grows_with_their_unit():
+def test_law_band_in_proportion_to_the_rounding_unit():
     scene = CATALOGUE["head_on"].scene(3)
     bands = [told("impulse", Method(lambda e, speed: e, 0, unit), scene)[1] for unit in (UNIT, 2.0 * UNIT)]
     assert bands[1] == pytest.approx(2.0 * bands[0], rel=1e-3) and 1e-6 < bands[0] < 1e-3
@@ -139,7 +139,7 @@ def test_a_mass_that_singles_cannot_hold_is_named():
     assert math.isclose(UNIT, 2.0**-24)
 
 
-def test_a_plane_is_kept_to_a_thousand_roundings_of_the_largest_numbers():
+def test_plane_kept_to_a_thousand_roundings():
     """Of every planar scene the same multiple of the round-off that its check grants doubles."""
     for name, canonical in CATALOGUE.items():
         if 2 not in canonical.dimensions:
@@ -156,7 +156,7 @@ def test_a_plane_is_kept_to_a_thousand_roundings_of_the_largest_numbers():
 
 
 @pytest.mark.parametrize(("share", "standing"), [(0.99, "explained"), (1.01, "drifted"), (100.0, "drifted")])
-def test_what_leaves_its_plane_by_more_than_roundings_is_not_explained(share, standing):
+def test_departure_from_the_plane_beyond_round_off_not_explained(share, standing):
     scene = CATALOGUE["flat_box"].scene(2)
     law = Deviation("toy", ("default",), "flat_box", "out_of_plane", plane_law, "numbers are singles", "source")
     value, band = law.says(scene, DT, CATALOGUE["flat_box"].measure)

@@ -81,7 +81,7 @@ def test_a_disc_keeps_its_own_moment_not_that_of_a_sphere() -> None:
 @pytest.mark.parametrize("axis", [0, 2], ids=["about x", "about z"])
 @pytest.mark.parametrize("angle", [1e-9, 0.3, 3.0])
 @pytest.mark.parametrize("turned", [0.0, 0.7])
-def test_a_tilt_takes_the_outermost_point_out_of_the_plane_by_its_chord(axis: int, angle: float, turned: float) -> None:
+def test_outermost_point_of_a_tilted_body_off_the_plane(axis: int, angle: float, turned: float) -> None:
     """Whatever the body's own turn in the plane: the axis that stood across the plane is tilted by the angle."""
     half = np.zeros(3)
     half[axis] = math.sin(0.5 * angle)
@@ -105,7 +105,7 @@ def test_largest_distance_from_the_plane_over_bodies_and_samples() -> None:
     assert out_of_plane(pose, reach) == 1.0
 
 
-def test_what_is_no_number_hides_nothing_of_what_left_the_plane() -> None:
+def test_departure_from_the_plane_beside_a_nan() -> None:
     """A run that ends in NaN says how far it was out of the plane before; one of nothing else was never seen to be."""
     pose = np.zeros((3, 1, 7))
     pose[..., 3] = 1.0
@@ -195,7 +195,7 @@ def test_a_spatial_scene_in_the_plane_is_planar() -> None:
     assert (box.twist, box.force, box.torque) == ((3.0, 4.0, -5.0), (6.0, 7.0), (-8.0,))
 
 
-def test_what_does_not_move_freely_may_have_one_moment_and_keeps_it() -> None:
+def test_moment_of_a_body_that_does_not_move_freely() -> None:
     scene = spatial_scene()
     fixed = replace(scene.bodies[1], inertia=0.7, motion="fixed", twist=(0.0,) * 6)
     flat = lowered(replace(scene, bodies=(scene.bodies[0], fixed)))
@@ -216,7 +216,7 @@ def test_what_does_not_move_freely_may_have_one_moment_and_keeps_it() -> None:
         {"torque": (0.0, 8.0, 1.0)},
     ],
 )
-def test_what_lies_moves_or_is_pulled_out_of_the_plane_is_not_planar(changes: dict[str, object]) -> None:
+def test_bodies_motions_and_loads_out_of_the_plane_not_planar(changes: dict[str, object]) -> None:
     assert lowered(spatial_scene(**changes)) is None
 
 

@@ -66,7 +66,7 @@ def test_stored_run_shown_with_law_and_finding(call):
 
 
 @pytest.mark.long
-def test_scene_engine_and_findings_run_and_no_value_has_changed_since(call):
+def test_old_scene_engine_and_findings_with_unchanged_values(call):
     call("run", "bounce", "drop", "my-scene.toml", "--engine", "lossy", "--dim", "2", "--jobs", "1", "--out", "now")
     changes = json.loads(call("compare", "before", "now", "--out", "now", "--json"))["changes"]
     assert {each["kind"] for each in changes} == {"only in B"}  # checks of ours that are newer

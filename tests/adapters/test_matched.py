@@ -160,7 +160,7 @@ def test_box_stopping_distance_by_coulomb_in_any_heading(mu: float, heading: flo
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.5, 1.0])
-def test_it_sticks_below_mu_and_slides_above_within_a_thousandth(mu: float) -> None:
+def test_stick_below_mu_and_slide_above_within_a_thousandth(mu: float) -> None:
     for ratio in (0.999, 1.001):
         lean = math.atan(ratio * mu)
         scene = scene_of(FLOOR, slab(), mu=mu, g=(G * math.sin(lean), 0.0, -G * math.cos(lean)), T=1.0)
@@ -237,7 +237,7 @@ def test_shared_motion_differs_only_by_round_off(ratio: float) -> None:
 # ---- what it is --------------------------------------------------------------------------------------------------
 
 
-def test_it_is_matched_has_no_rank_and_flies_like_tuned() -> None:
+def test_matched_profile_without_rank_and_in_flight_like_tuned() -> None:
     assert ENGINE.facts.roles["matched"] == "matched"
     assert not is_ranked("mujoco", "matched")
     assert is_ranked("mujoco", "tuned") and is_ranked("mujoco", "default") and is_ranked("nobody", "matched")
@@ -294,7 +294,7 @@ def test_running_surface_carries_a_box_to_its_speed() -> None:
     assert np.abs(found.twist[:, 1, 0] - speeds).max() <= SUMS and np.abs(found.pose[:, 1, 2] - 0.1).max() <= SUMS
 
 
-def test_steps_of_which_the_rounds_do_not_settle_are_counted_and_said(monkeypatch):
+def test_steps_with_unsettled_rounds_counted(monkeypatch):
     """Where they run out they may miss what they end at; where they end before, a thousandth."""
     from adapters.mujoco import matched
 

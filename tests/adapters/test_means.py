@@ -45,12 +45,12 @@ def six(floor_a=0.5, others=0.5):
     return {(a, b): (floor_a if (a, b) == ("floor", "a") else others,) * 2 for a, b in itertools.combinations(NAMES, 2)}
 
 
-def test_where_all_pairs_are_alike_so_are_all_bodies():
+def test_equal_pairs_give_equal_bodies():
     assert means(scene(six()), "restitution") == [0.5] * 4 == means(scene(six()), "friction")
 
 
 @pytest.mark.parametrize("coefficient", ["restitution", "friction"])
-def test_one_pair_unlike_the_others_has_no_numbers_where_all_can_meet(coefficient):
+def test_no_body_values_for_one_deviating_pair(coefficient):
     assert means(scene(six(0.25)), coefficient) is None
 
 
@@ -69,7 +69,7 @@ def test_a_restitution_above_one_or_a_negative_number_is_no_material():
     assert means(bodies, "restitution") is None
 
 
-def test_pairs_that_cannot_meet_while_the_scene_lasts_may_be_anything():
+def test_any_value_for_pairs_that_cannot_meet():
     """Three discs a kilometre apart on a floor: only the floor meets each."""
     far = scene(six(0.25), duration=0.1, places=(0.0, 1e3, 2e3))
     found = means(far, "restitution")

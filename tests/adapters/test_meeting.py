@@ -29,7 +29,7 @@ def pair(*names):
     return frozenset(names)
 
 
-def test_what_lies_far_apart_never_meets_and_what_comes_near_does():
+def test_distant_bodies_never_meet_and_near_ones_do():
     assert met(ball("a", 0.0), ball("b", 10.0)) == set()
     assert met(ball("a", 0.0, v=5.0), ball("b", 10.0)) == {pair("a", "b")}
     assert met(ball("a", 0.0, v=4.0), ball("b", 10.0)) == set()
@@ -37,7 +37,7 @@ def test_what_lies_far_apart_never_meets_and_what_comes_near_does():
     assert met(ball("a", 0.0, y=9.0), FLOOR, gravity=9.81) == {pair("a", "floor")}
 
 
-def test_spin_load_and_gravity_are_speed_that_contacts_may_make_of_them():
+def test_spin_load_and_gravity_as_possible_speed():
     assert met(ball("a", 0.0, spin=20.0), ball("b", 10.0)) == {pair("a", "b")}
     assert met(ball("a", 0.0, force=(6.0, 0.0)), ball("b", 10.0)) == {pair("a", "b")}
     assert met(ball("a", 0.0, torque=(3.0,)), ball("b", 10.0)) == {pair("a", "b")}
@@ -84,7 +84,7 @@ TABLE = (Pair("a", "b", 0.0, 0.5), Pair("b", "c", 0.0, 0.5), Pair("a", "c", 0.0,
 
 
 @pytest.mark.parametrize("engine", ["chipmunk", "bullet"])
-def test_a_table_is_refused_for_pairs_that_meet_and_for_no_others(engine):
+def test_table_refused_only_for_pairs_that_meet(engine):
     adapter = load(engine) if pytest.importorskip({"chipmunk": "pymunk", "bullet": "pybullet"}[engine]) else None
     for x, refused in ((4.0, True), (400.0, False)):
         scene = Scene("toy", 1, 2, (ball("a", 0.0, v=1.0), ball("b", 1.5), ball("c", x)), TABLE, (0.0, 0.0), 1.0)
@@ -96,7 +96,7 @@ def test_a_table_is_refused_for_pairs_that_meet_and_for_no_others(engine):
     assert not adapter.refuses(scene if engine == "chipmunk" else lift(scene), "tuned")
 
 
-def test_all_pairs_are_tried_first_and_none_needs_no_number():
+def test_all_pairs_tried_before_single_ones():
     scene = Scene("toy", 1, 2, (ball("a", 0.0), ball("b", 10.0)), (Pair(),), (0.0, 0.0), 1.0)
     asked = []
 

@@ -44,7 +44,7 @@ def test_worlds_of_the_memory_check_after_warm_up(monkeypatch):
     assert all(world.closed == 1 for world in engine.built)
 
 
-def test_memory_is_what_grew_most_of_pages_and_heap_in_bytes_of_a_world(monkeypatch):
+def test_memory_growth_per_world_by_pages_or_heap(monkeypatch):
     """Memory that an engine maps for itself shows in the pages alone, small blocks among others in the heap alone."""
     for before, after, grown in (((5.0, 7.0), (8.0, 8.0), 3.0), ((5.0, 7.0), (6.0, 12.0), 5.0)):
         states, asked = iter((before, after)), []
@@ -69,7 +69,7 @@ def told():
 
 
 @pytest.mark.usefixtures("told")
-def test_a_hundred_megabytes_that_are_taken_are_told_and_given_back():
+def test_memory_of_a_hundred_megabytes_told_and_freed():
     """Of the system and of the heap alike: both are bytes, and count what this process holds."""
     before = worlds._settled()
     held = np.ones(100 * MEGABYTE // 8)
@@ -85,7 +85,7 @@ def test_a_hundred_megabytes_that_are_taken_are_told_and_given_back():
 
 
 @pytest.mark.usefixtures("told")
-def test_what_hangs_in_circles_is_freed_before_memory_is_looked_at():
+def test_cyclic_garbage_freed_before_memory_is_measured():
     class Link:
         pass
 
@@ -112,7 +112,7 @@ def test_a_system_that_tells_nothing_holds_nothing(monkeypatch):
     assert worlds.taken() is None and worlds._settled() == (0.0, 0.0)
 
 
-def test_worlds_that_are_never_freed_are_seen_in_a_heap_full_of_holes(monkeypatch):
+def test_leaked_worlds_seen_in_a_fragmented_heap(monkeypatch):
     """Blocks of 3 kB fit between blocks that stay: twice a hundred worlds then take no page more."""
     for name, value in {"WARM": 20, "BUILDS": 100, "STEADY": worlds.STEADY / 10}.items():
         monkeypatch.setattr(worlds, name, value)

@@ -140,7 +140,7 @@ def test_hostile_and_wrong_models_are_one_line(text, said):
     ("<option/>", '<option gravity="0 0 nan"/>', "<option>: gravity is not a number"),
     ("<option/>", "<option/>", ""),
 ])  # fmt: skip
-def test_a_value_that_is_no_number_and_a_step_that_is_none_are_refused(old, new, said):
+def test_nan_value_and_invalid_step_refused(old, new, said):
     """MuJoCo takes nan for a value that is not given: a body of mass nan would weigh what its density says."""
     text = (
         f'<mujoco><option/><worldbody>{PLANE}\n<body name="nan" pos="0 0 1"><freejoint/>\n'
@@ -168,7 +168,7 @@ def test_body_with_a_joint_other_than_free_named(what, bad):
         reading.read(model_of("".join(bodies)), False)
 
 
-def test_names_that_steer_a_terminal_never_reach_one():
+def test_control_characters_in_names_not_printed():
     text = model_of(BALL.replace('name="ball"', 'name="a&#x9;b"'))
     with pytest.raises(SceneError, match="cannot be a name"):
         reading.read(text, False)
@@ -330,7 +330,7 @@ def test_what_leaves_the_plane_is_not_planar(out):
     assert lowered(reading.read(model_of(box), False).scene) is None
 
 
-def test_it_is_read_in_another_process_and_comes_back_whole():
+def test_model_read_in_another_process():
     text = (MODELS / "soft_and_hard.xml").read_text()
     assert reader_of(".XML") == "mujoco" and reader_of(".toml") is None
     found = read("mujoco", ".xml", text, False)
@@ -357,7 +357,7 @@ INERTIAL = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
         ({"inertial": INERTIAL, "box": ' friction=".5"', "floor": ' friction=".5"'}, []),
     ],
 )
-def test_friction_and_density_that_a_model_leaves_to_mujoco_are_said(given, said):
+def test_default_friction_and_density_of_a_model_told(given, said):
     text = BOX_AND_FLOOR.format(**{"default": "", "floor": "", "inertial": "", "box": ""} | given)
     notes = [note for note in reading.read(text, False).notes if note.startswith(("friction", "density"))]
     assert len(notes) == len(said)
@@ -374,7 +374,7 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("other", OTHERS)
-def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
+def test_no_massless_body_after_elements_are_left_out(other):
     """The mesh lies in a file that is not read: its geom goes with it, and the body that had nothing else."""
     text = (
         f'<mujoco><asset><mesh name="gone" file="a.stl"/></asset><worldbody>{PLANE}<body name="ball" pos="0 0 1">'
@@ -386,7 +386,7 @@ def test_what_is_left_out_leaves_no_body_without_a_mass_behind(other):
     assert any("'part'" in line for line in found.dropped)
 
 
-def test_a_refusal_names_drop_where_it_helps_and_nowhere_else():
+def test_drop_option_named_in_a_refusal_only_where_it_helps():
     text = f'<mujoco><worldbody>{PLANE}<body><freejoint/><geom size=".1" density="1"/></body></worldbody>{{}}</mujoco>'
     with pytest.raises(SceneError, match=r"; run --drop leaves it out$"):
         read("mujoco", ".xml", text.format("<tendon/>"), False)

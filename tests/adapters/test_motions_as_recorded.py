@@ -63,7 +63,7 @@ def test_planar_motion_turn_from_heading_to_vertical():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_can_only_move_up_and_down_is_vertical_and_nothing_else(dimension):
+def test_vertical_condition_of_a_motion(dimension):
     given, d = scene(dimension), dimension
     floor, low, high = given.bodies
     assert is_vertical(given) and is_vertical(replace(given, bodies=(floor,)))
@@ -101,7 +101,7 @@ def test_free_fall_until_touch_then_push_by_the_law():
     assert pushed[0] == pytest.approx(0.4375 + DT * pushed[1])
 
 
-def test_a_column_of_one_is_a_body_that_falls_on_a_face_of_four_corners():
+def test_column_of_one_as_a_body_on_four_corners():
     one = column(law(softness=1.0), (0.46875,), (1.0,), (2.0,), -1.0, 4, 0.0)
     told = fall(law(softness=0.25), 0.46875, 0.0, 0.5, -1.0, 4)
     assert one[:, :2, 0] == pytest.approx(told[:, :2], abs=1e-14)
@@ -124,7 +124,7 @@ def test_loads_of_stacked_boxes_by_neighbours_only():
     assert shallow[1, 2, 0] == 0.0, "what overlaps by less than the edge does not touch"
 
 
-def test_an_engine_says_how_well_it_solved_and_what_it_was_warned_of():
+def test_solver_accuracy_and_warnings_of_an_engine():
     pytest.importorskip("mujoco")
     from adapters.mujoco import MujocoEngine
     from adapters.needs import needs

@@ -57,7 +57,7 @@ def test_face_velocity_in_the_rows_of_both_bodies(side, geom):
     assert entered([contact(dim=4)], given, 1)[:6] == [0.0, side * 1.0, side * 2.0, side * 4.0, 0.0, 0.0]
 
 
-def test_a_surface_that_runs_into_itself_lifts_nothing():
+def test_surface_running_into_itself_without_lift():
     assert entered([contact()], {1: (NONE, SURFACE)}, 1)[:5] == [0.0, 0.0, 16.0, 32.0, 0.0]
     assert entered([contact(dim=1)], {1: (NONE, SURFACE)}, 1) == [0.0] * 12
     assert entered([contact()], {1: (FACE, SURFACE)}, 1)[:4] == [0.0, 1.0, 18.0, 36.0]
@@ -87,7 +87,7 @@ def test_moving_faces_and_running_surfaces_by_body_index():
     assert motions(given, DT, 3) == {2: (NONE, (2.0, -1.0, 0.0)), 3: ((0.5, 0.0, 0.0), NONE)}
 
 
-def test_faces_are_moved_on_by_what_their_contacts_were_told():
+def test_faces_moved_on_as_their_contacts():
     given = scene(STILL, WALL, BELT)
 
     class Model:
@@ -129,7 +129,7 @@ def test_a_script_moves_what_the_adapter_moves():
 # ---- who goes with the belt ------------------------------------------------------------------------------------------
 
 
-def test_whoever_goes_with_the_belt_sees_it_stand_and_all_else_slower():
+def test_slower_motion_seen_from_the_belt():
     seen = belts._from_the_belt(scene(BELT, BOX))
     assert seen == scene(replace(BELT, surface_velocity=()), replace(BOX, twist=(-1.0, 3.0, 3.0, 4.0, 5.0, 6.0)))
     for other in (STILL, replace(BELT, motion="prescribed"), replace(BELT, shape=Box((1.0, 1.0, 1.0)))):
@@ -152,7 +152,7 @@ def test_in_the_room_all_but_the_belt_go_with_it(run):
 @pytest.mark.parametrize(
     ("metric", "asked"), [("slipped", "stopping_distance"), ("pull", "braking"), ("turned", "turned")]
 )
-def test_a_law_of_a_belt_asks_that_of_a_slide_and_measures_in_the_room(monkeypatch, metric, asked):
+def test_belt_law_by_the_slide_law_in_room_coordinates(monkeypatch, metric, asked):
     heard = []
 
     def inner(profile, name):
@@ -174,7 +174,7 @@ def test_a_law_of_a_belt_asks_that_of_a_slide_and_measures_in_the_room(monkeypat
     assert heard == [("tuned", asked, NONE, DT, told)]
 
 
-def test_a_disc_on_a_planar_belt_is_seen_slower_along_it_alone():
+def test_disc_on_a_planar_belt_slower_along_it_alone():
     belt = Body("belt", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
     disc = Body("disc", Disc(0.5), 1.0, 0.1, (0.0, 0.5, 0.0), (1.0, 2.0, 3.0))
     seen = belts._from_the_belt(Scene("belts", 1, 2, (belt, disc), (), (0.0, -1.0), 1.0))

@@ -147,7 +147,7 @@ def test_receipts_measure_what_is_declared(scene: Scene, profile: str, dt: float
     assert slips and not [slip for slip in slips if not slip.holds]
 
 
-def test_default_declares_a_rebound_that_does_not_depend_on_e() -> None:
+def test_default_rebound_declared_independent_of_e() -> None:
     declared = [ENGINE.declares("default", needs(make(FLOOR, ball("b", 1.0), e=e)), DT) for e in (0.0, 0.5, 1.0)]
     assert declared[0] == declared[1] == declared[2] and "restitution" in declared[0]
     assert "restitution" not in ENGINE.declares("tuned", needs(make(FLOOR, ball("b", 1.0), e=0.5)), DT)
@@ -482,7 +482,7 @@ def test_two_builds_give_the_same_bits(profile: str) -> None:
     assert drive(scene, profile).state_hash() == drive(scene, profile).state_hash()
 
 
-def test_a_state_that_is_not_finite_diverges_in_silence(tmp_path, monkeypatch, capfd) -> None:
+def test_silent_divergence_of_a_state_that_is_not_finite(tmp_path, monkeypatch, capfd) -> None:
     monkeypatch.chdir(tmp_path)
     scene = make(ball("ball", 1.0, 1.0, 1e-9, force=(1e300, 0.0, 0.0)), T=0.1)
     trajectory = drive(scene, "default")
@@ -548,7 +548,7 @@ def test_moments_that_no_body_has_are_refused() -> None:
 @pytest.mark.parametrize(
     ("mass", "said"), [(1e-30, "mass: 1e-30"), (0.9e-15, "mass: 9e-16"), (5e-15, "inertia: 5e-16")]
 )
-def test_masses_that_count_as_none_are_refused_by_name(mass: float, said: str) -> None:
+def test_negligible_masses_refused_by_name(mass: float, said: str) -> None:
     """A ball of radius .5: its moments are a tenth of its mass. At 2e-14 kg it falls like any other."""
     scene = make(FLOOR, ball("ball", 1.0, 0.0, mass, inertia=(0.1 * mass,) * 3))
     assert ENGINE.refuses(scene, "default") == f"ball.{said} is less than 1e-15, the minimum of a moving body"
@@ -557,7 +557,7 @@ def test_masses_that_count_as_none_are_refused_by_name(mass: float, said: str) -
     assert drive(make(FLOOR, ball("ball", 1.0, 0.0, 2e-14, inertia=(2e-15,) * 3)))
 
 
-def test_what_mujoco_itself_refuses_becomes_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mujoco_s_own_errors_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = make(FLOOR, ball("ball", 1.0, 0.0, 1e-30))
     monkeypatch.setattr(type(ENGINE), "refuses", lambda *asked: None)
     with pytest.raises(EngineError, match="MuJoCo does not compile it") as caught:

@@ -57,7 +57,7 @@ def test_touching_pairs_found_once_and_in_order(dimension, seed, spread, samples
                 assert (i, j) in found
 
 
-def test_a_body_whose_place_is_no_number_may_touch_all():
+def test_body_with_a_nan_position_may_touch_all():
     scene = cloud(2, 6, 5, 1e6, fixed=0.0)
     pose = moving(scene, 2, 5, 0.0)
     pose[1, 0, 0] = math.nan

@@ -152,7 +152,7 @@ def by_hand(pairs, free):
     return found
 
 
-def test_values_of_all_pairs_are_those_of_each_pair_looked_at_alone():
+def test_values_of_all_pairs_equal_to_those_of_single_pairs():
     """Bodies that no entry tells apart are looked at together; that must never change what is found."""
     dice = random.Random(12)
     agreed = refused = 0
@@ -175,7 +175,7 @@ def test_values_of_all_pairs_are_those_of_each_pair_looked_at_alone():
     assert agreed > 500 and refused > 500
 
 
-def test_two_entries_for_no_one_in_particular_must_agree():
+def test_conflicting_default_entries_of_materials():
     free = {"a": True, "b": False}
     assert Materials((Pair(friction=0.5), Pair(friction=0.5))).materials(free) == {(0.0, 0.5)}
     with pytest.raises(SceneError, match="pair a-b: 2 entries contradict each other; give an entry that names both"):
@@ -184,7 +184,7 @@ def test_two_entries_for_no_one_in_particular_must_agree():
     assert Materials(named).materials(free) == {(0.75, 0.0)}
 
 
-def test_the_pair_that_is_refused_is_one_that_nothing_names():
+def test_refused_pair_named_by_no_entry():
     """a-b and a-c are named and agree; b-c is what two entries say different things of."""
     pairs = (Pair("a", "b", 0.5), Pair("a", "c", 0.5), Pair("b", "*", 0.25), Pair("c", "*", 0.75), Pair("a", "*", 0.25))
     with pytest.raises(SceneError, match="pair b-c: 2 entries"):
@@ -194,7 +194,7 @@ def test_the_pair_that_is_refused_is_one_that_nothing_names():
         Materials(alone).materials(dict.fromkeys("abc", True))
 
 
-def test_entries_of_both_one_and_none_are_asked_in_that_order():
+def test_order_of_entries_with_both_one_and_no_name():
     said = Materials((Pair("*", "*", 0.125), Pair("a", "*", 0.25), Pair("*", "b", 0.25), Pair("a", "b", 0.5))).said
     assert said("a", "b") == said("b", "a") == {(0.5, 0.0)}
     assert said("a", "c") == said("c", "b") == {(0.25, 0.0)}

@@ -19,7 +19,7 @@ def make(tmp_path, name):
     return CliRunner().invoke(main, ["new-adapter", name, "--into", str(tmp_path)])
 
 
-def test_a_folder_below_one_that_is_not_there_is_made(tmp_path):
+def test_missing_parent_folder_created(tmp_path):
     done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path / "far" / "away")])
     assert done.exit_code == 0 and (tmp_path / "far/away/mine/tests/test_conformance.py").is_file()
 
@@ -31,7 +31,7 @@ def test_json_names_the_files_that_were_written(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "a" * 200])
-def test_a_name_that_cannot_be_one_is_refused_in_one_line(tmp_path, name):
+def test_invalid_name_of_an_adapter_refused(tmp_path, name):
     done = make(tmp_path, name)
     assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
 

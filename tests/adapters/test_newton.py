@@ -49,7 +49,7 @@ def test_conformance(item):
     item.hold()
 
 
-def test_numbers_that_are_called_shipped_are_the_engine_s_own():
+def test_shipped_numbers_equal_to_the_engine_s_own():
     import inspect
 
     _, newton = imported()
@@ -82,7 +82,7 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
 
-def test_what_is_set_is_what_the_model_and_its_solver_hold():
+def test_settings_in_the_model_and_its_solver():
     changes = {"iterations": 7, "relaxation": 0.5, "weighted": False, "rebounds": True, "rebound_iterations": 3}
     held = drive(resting(duration=DT), gap=0.25, torsional=0.125, rolling=0.5, **changes).readback
     assert {name: held[name] for name in changes} == changes
@@ -96,7 +96,7 @@ def test_contacts_carry_the_weight_and_are_where_bodies_touch(profile):
     assert abs(found.contacts.rows.point[:, 2]).max() < 1e-3 and (found.contacts.rows.normal[:, 2] == 1.0).all()
 
 
-def test_impulses_are_unknown_where_rebounds_are_solved():
+def test_impulses_unknown_with_solved_restitution():
     told = drive(struck(0.5, 2.0, 1.3 * 2.0 * DT)).contacts.rows.impulse
     assert len(told) and np.isnan(told).all()
 
@@ -106,7 +106,7 @@ def test_a_ball_rebounds_as_its_pair_says(e):
     assert drive(struck(e, 2.0, 1.3 * 2.0 * DT)).twist[-1, 1, 2] == pytest.approx(2.0 * e, rel=1e-5)
 
 
-def test_without_being_asked_it_does_not_rebound_at_all():
+def test_no_rebound_without_the_restitution_setting():
     """The quirk that is stated: as shipped restitution is ignored, but for what two sweeps leave of an overlap."""
     scene = struck(0.8, 2.0, 1.3 * 2.0 * DT)
     left = (1.0 - RELAXATION) ** ITERATIONS
@@ -141,7 +141,7 @@ def test_capsules_and_hulls_land_on_their_surface(shape):
     assert end[2] == pytest.approx(0.2, abs=1e-3) and abs(end[4:]).max() < 1e-2
 
 
-def test_tables_that_are_no_means_are_refused_in_one_line():
+def test_tables_that_are_no_means_refused():
     three = [
         replace(BOX, name=n, pose=(2.0 * k, 0, 0, *UPRIGHT), twist=(1.0, 0, 0, 0, 0, 0)) for k, n in enumerate("abc")
     ]
@@ -237,7 +237,7 @@ def test_roundings_are_counted_by_hand():
     assert counted.speed == pytest.approx(2.0**-24 * pressed * (6 + 2 * 26) * 2.0, rel=1e-12)
 
 
-def test_where_sweeps_stop_a_body_roundings_of_its_places_are_momentum(monkeypatch):
+def test_momentum_from_rounded_positions_at_the_end_of_sweeps(monkeypatch):
     """Fifty sweeps stop a ball that two leave moving: what was stopped is told by overlaps, 12 roundings a step.
 
     Without the stop no more than roundings of velocities is missing.
@@ -262,7 +262,7 @@ def test_where_sweeps_stop_a_body_roundings_of_its_places_are_momentum(monkeypat
 
 
 @pytest.mark.parametrize(("dimension", "v"), [(2, 0.1), (3, 0.1), (2, 1.0), (3, 1.0)])
-def test_momentum_that_a_stop_takes_is_what_roundings_of_places_leave(dimension, v):
+def test_momentum_of_a_stop_by_rounded_positions(dimension, v):
     """The engine's own: it is what the recurrence draws, and a small part of it 500 times nearer to the origin."""
     impact = CATALOGUE["impact"]
 
@@ -278,13 +278,13 @@ def test_momentum_that_a_stop_takes_is_what_roundings_of_places_leave(dimension,
     assert missing(2.0**-10)[0] < max(0.05 * found, 8.0 * 2.0**-24) < found
 
 
-def test_a_scene_that_starts_at_rest_has_no_balance_of_shares():
+def test_scene_at_rest_without_a_balance_of_shares():
     rest = resting()
     counted = roundings_of(rest, moved(rest, DT, "default"), DT, settings_of(rest, DT, "default", None))
     assert counted.start == 0.0 and LIMITS["momentum_defect"](counted) == LIMITS["energy_lost"](counted) == 0.0
 
 
-def test_a_balance_that_scatters_by_more_than_its_roundings_has_no_law(monkeypatch):
+def test_no_law_for_a_scattered_balance(monkeypatch):
     """A planted fault: with a limit of a tenth of what is drawn nothing is said."""
     from adapters.newton import motion
 
@@ -307,24 +307,24 @@ TWO = Scene("two", 1, 3, (FLOOR, BOX, replace(BOX, name="upper", pose=(0, 0, 0.7
      {"twist": (0.1, 0, 0, 0, 0, 0)}, {"force": (0, 1.0, 0)}, {"shape": Capsule(0.2, 0.25)}],
     ids=lambda each: "-".join(each),
 )  # fmt: skip
-def test_scenes_of_which_the_recurrence_knows_nothing_are_left_alone(upper):
+def test_scenes_outside_the_recurrence_without_a_law(upper):
     other = replace(TWO, bodies=(*TWO.bodies[:2], replace(TWO.bodies[2], **upper)))
     assert followed(resting()) and not followed(other) and moved(other, DT, "default") is None
 
 
-def test_a_column_whose_boxes_throw_back_is_left_alone():
+def test_column_of_rebounding_boxes_without_a_law():
     assert moved(TWO, DT, "default") is not None
     assert moved(replace(TWO, pairs=(Pair(restitution=0.5),)), DT, "default") is None
 
 
-def test_a_column_that_sinks_through_its_own_boxes_is_left_alone():
+def test_column_sinking_through_its_boxes_without_a_law():
     """A heavy box goes down to the floor through a light one: faces of neighbours are not all that touches then."""
     heavy = CATALOGUE["heavy_on_light"].scene(3, {"ratio": 1e4})
     assert moved(heavy, DT, "tuned") is not None and moved(heavy, DT, "default") is None
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_boxes_of_a_column_are_where_its_recurrence_has_them(profile):
+def test_column_positions_by_the_recurrence(profile):
     """Other sizes, masses and names than a scene's: a wide box on a slim one, in another order, thrown upwards.
 
     The bound is what roundings of a place add up to in as many steps, 2^-24 of 1 m each, by 1/dt for a speed.
@@ -341,7 +341,7 @@ def test_boxes_of_a_column_are_where_its_recurrence_has_them(profile):
         assert np.abs(held[0]).max() > 0.02 * mass and np.abs(held[0] - held[1]).max() < 8.0 * mass * bound / DT
 
 
-def test_corners_that_feel_more_would_be_another_column(monkeypatch):
+def test_corner_loads_change_the_column(monkeypatch):
     """A planted fault: a column's law hangs on what its corners feel, by more than its band."""
     from adapters.newton import column, motion
 
@@ -376,7 +376,7 @@ def test_column_contacts_told_as_the_mean_of_two_bodies(dimension, profile):
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_a_box_too_far_away_stays_where_it_is_while_its_speed_grows(profile):
+def test_distant_box_at_rest_with_growing_speed(profile):
     far = CATALOGUE["far_origin"]
     scene = far.scene(3, {})
     found = far.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), far.sampling(scene)))
@@ -408,7 +408,7 @@ NORMALS = [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (math.sin(0.3), 0, math.cos(0.3)), 
 
 
 @pytest.mark.parametrize("normal", NORMALS, ids=str)
-def test_a_plane_leans_as_the_engine_has_it_bit_by_bit(normal):
+def test_tilted_plane_bit_by_bit_as_in_the_engine(normal):
     plane = Body("plane", HalfSpace(tuple(map(float, normal)), 0.7), motion="fixed")
     world = ENGINE.build(Scene("plane", 1, 3, (plane, BOX), (Pair(),), (0.0,) * 3, DT), DT, settings(resting()))
     x, y, z, w = world.model.shape_transform.numpy()[0, 3:]
@@ -527,7 +527,7 @@ def test_card_tent_creep_by_few_sweeps_and_limited_friction():
 
 
 @pytest.mark.parametrize(("profile", "lost"), [("default", 4.0), ("tuned", 2.0)])
-def test_cards_that_slide_get_away_in_the_first_instant(profile, lost):
+def test_sliding_cards_separate_in_the_first_instant(profile, lost):
     """By steps, from rest. Begun a twentieth of a degree down, with the spin of the truth, they lose less than one.
 
     From there on a step's slip is more than all that friction could take back of it.
@@ -575,7 +575,7 @@ def test_drift_of_a_rolling_and_spinning_ball(dt):
 
 
 @pytest.mark.parametrize("height", [1.03, 1.04])
-def test_a_ball_rests_early_because_its_blows_are_late(height):
+def test_early_rest_of_a_ball_by_late_blows(height):
     """Gravity over half a step is lost a bounce, in the mean, where a blow takes the speed of the step's end.
 
     A recurrence of a few lines ends within the last arc that counts (ten steps, which roundings decide); where each

@@ -62,7 +62,7 @@ ENABLED = flags_of(mujoco.mjtEnableBit, "mjENBL_")
 
 
 @pytest.mark.parametrize("flag", DISABLED)
-def test_a_flag_that_is_switched_off_is_silent_handed_on_or_refused(flag):
+def test_disabled_flag_silent_handed_on_or_refused(flag):
     try:
         found = told("", f'{flag}="disable"')
     except SceneError as error:
@@ -78,7 +78,7 @@ def test_a_flag_that_is_switched_off_is_silent_handed_on_or_refused(flag):
 
 
 @pytest.mark.parametrize("flag", ENABLED)
-def test_a_flag_that_is_switched_on_measures_or_is_refused(flag):
+def test_enabled_flag_that_measures_or_is_refused(flag):
     try:
         found = told("", f'{flag}="enable"')
     except SceneError as error:

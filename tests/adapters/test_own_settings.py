@@ -61,12 +61,12 @@ def test_two_values_of_one_setting_are_refused_and_names_are_sorted():
         (like((0.1, 1.0)), [(3, 4)], [(3,), 3]),
     ],
 )
-def test_each_kind_takes_what_it_says_and_says_what_it_takes(check, takes, refuses):
+def test_allowed_values_of_each_kind_of_setting(check, takes, refuses):
     assert not any(map(check, takes))
     assert all(map(check, refuses)) and len({check(value) for value in refuses}) == 1
 
 
-def test_near_names_have_the_asked_one_in_them_or_look_like_it():
+def test_near_names_by_substring_or_similarity():
     known = ("collision_slop", "cone", "iterations", "contactSlop")
     assert near("slop", known) == "; near it: collision_slop, contactSlop"
     assert near("Cones", known) == "; near it: cone"
@@ -94,7 +94,7 @@ PROFILE = [Setting("sweeps", 2, ""), Setting("slop", 1.0, ""), Setting("word", "
     [("sweeps=3", 3), ("slop=10", 10.0), ("word=10", "10"), ("cone=square", "Square"), ("off=a", ("a",)),
      ("off=b,a", ("b", "a")), ("warm=true", True)],
 )  # fmt: skip
-def test_a_value_becomes_of_the_kind_that_the_engine_takes(text, expected):
+def test_value_converted_to_the_engine_s_kind(text, expected):
     ((_, found),) = own(Toy(), given([text]), PROFILE)
     assert found == expected and type(found) is type(expected)
 
@@ -108,14 +108,14 @@ def test_a_value_becomes_of_the_kind_that_the_engine_takes(text, expected):
      (["off=a,c"], "set: off=a,c: must be some of a, b, with commas between them"),
      (["warm=true", "sweeps=6"], "set: warm: needs fewer sweeps")],
 )  # fmt: skip
-def test_what_an_engine_cannot_take_is_one_line_that_names_the_setting(texts, said):
+def test_value_beyond_the_engine_refused_by_setting(texts, said):
     with pytest.raises(EngineError) as error:
         own(Toy(), given(texts), PROFILE)
     assert str(error.value) == said
 
 
 @pytest.mark.parametrize("engine", HERE)
-def test_every_setting_of_every_profile_can_be_set_to_what_it_is(engine):
+def test_every_setting_set_to_its_own_value(engine):
     found = registry.load(engine)
     for profile in found.profiles:
         settings = stock(engine, profile)
@@ -191,7 +191,7 @@ def test_flags_of_mujoco_are_switched_by_their_names():
 
 
 @pytest.mark.parametrize("engine", [name for name in HERE if name in ("bullet", "chipmunk")])
-def test_settings_that_no_profile_states_reach_the_engine(engine, monkeypatch):
+def test_settings_of_no_profile_reach_the_engine(engine, monkeypatch):
     """Each is set alone; a call with it must leave another world, or be among what the engine was called with."""
     found = registry.load(engine)
     profile = next(iter(found.profiles))

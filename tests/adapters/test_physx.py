@@ -122,7 +122,7 @@ def test_friction_of_a_blow_by_gap_and_length_scale(solver, share, length):
     assert 6.0 - found.twist[-1, 1, 0] == pytest.approx(0.05 * 9.0 if share < 1.0 else 0.0, abs=1e-3)
 
 
-def test_a_world_for_another_size_is_refused_while_one_lives():
+def test_world_of_another_size_refused_while_one_exists():
     scene = resting()
     one = ENGINE.build(scene, DT, settings(scene))
     with pytest.raises(EngineError, match=r"^tolerance_length: 2 m, while another world .* 0\.1 m$"):
@@ -193,7 +193,7 @@ def _balls(table):
     return Scene("table", 1, 3, balls, pairs, (0, 0, 0), 9.0)
 
 
-def test_numbers_of_bodies_are_those_of_which_pairs_are_means():
+def test_body_values_whose_means_are_the_pairs():
     table = {("a", "b"): (0.9, 0.1), ("b", "c"): (0.5, 0.3), ("a", "c"): (0.6, 0.2)}
     scene = _balls(table)
     for which, name in enumerate(("restitution", "friction")):
@@ -208,7 +208,7 @@ def test_numbers_of_bodies_are_those_of_which_pairs_are_means():
     [(((0.9, 0.0), (0.9, 0.0), (0.0, 0.0)), "restitution"), (((0.0, 0.9), (0.0, 0.9), (0.0, 0.0)), None),
      (((0.0, 0.1), (0.0, 0.1), (0.0, 0.9)), "friction")],
 )  # fmt: skip
-def test_what_no_numbers_of_single_bodies_give_is_refused(values, field):
+def test_tables_without_body_values_refused(values, field):
     """a-b, b-c and a-c; b would need a restitution of 1.8, which is none, or a friction below zero."""
     scene = _balls(dict(zip((("a", "b"), ("b", "c"), ("a", "c")), values, strict=True)))
     found = ENGINE.refuses(scene, "default")
@@ -252,7 +252,7 @@ def test_law_of_a_blow_against_a_fault_of_a_hundred_thousandth(profile, params):
     assert (found["rebound_ratio"][0] > 0.0) is rebounds
 
 
-def test_nothing_is_said_of_a_blow_that_tgs_finds_in_an_overlap():
+def test_no_law_for_a_blow_found_in_an_overlap_by_tgs():
     """50 m/s make 0.2 m a step, contacts are made 0.02 m ahead; PGS rebounds from an overlap as from a touch."""
     impact = CATALOGUE["impact"]
     scene = impact.scene(2, {"e": 1.0, "v": 50.0})
@@ -265,7 +265,7 @@ def test_nothing_is_said_of_a_blow_that_tgs_finds_in_an_overlap():
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_what_no_step_finds_in_a_thin_wall_passes_it_as_its_law_says(profile):
+def test_pass_through_a_thin_wall_by_the_law(profile):
     wall = CATALOGUE["thin_wall"]
     scene = wall.scene(2, {"v": 200.0})
     found = wall.measure(scene, drive(scene, profile))

@@ -67,7 +67,7 @@ def cyclic():
     ],
     ids=["odd", "array", "large array", "deep", "cyclic", "wide", "table", "bytes", "object"],
 )
-def test_whatever_it_is_it_becomes_small_json_and_stays_so(value):
+def test_arbitrary_object_as_small_json(value):
     made = plain(value)
     text = json.dumps(made, allow_nan=False)
     assert len(text) < 3 * SIZE
@@ -93,7 +93,7 @@ def test_what_is_plain_stays_as_it_is():
         (np.float64(math.inf), "inf"),
     ],
 )
-def test_a_number_that_json_readers_cannot_hold_is_its_text(value, made):
+def test_number_too_large_for_json_as_text(value, made):
     assert plain(value) == made and type(plain(value)) is type(made)
 
 
@@ -126,7 +126,7 @@ def test_list_of_a_large_or_unsized_collection():
 
 
 @pytest.mark.parametrize("nest", [lambda inner: [inner], lambda inner: {"a": inner}])
-def test_levels_are_counted_one_by_one_from_the_outermost(nest):
+def test_nesting_levels_counted_from_the_outermost(nest):
     value = 1.5
     for _ in range(LEVELS):
         value = nest(value)
@@ -176,7 +176,7 @@ def test_first_line_of_a_long_text_without_reading_its_end():
     assert one_line("\n" * (8 * REASON - 4) + "late") == "late"
 
 
-def test_text_of_the_longest_length_is_whole_and_keys_are_names():
+def test_longest_text_uncut_and_keys_as_names():
     assert one_line("x" * REASON) == "x" * REASON
     assert one_line("x" * (REASON + 1)) == "x" * (REASON - 4) + " ..."
     assert list(plain({"k" * (NAME + 1): 1})) == ["k" * (NAME - 4) + " ..."]
@@ -193,7 +193,7 @@ def test_a_text_is_what_it_holds_whatever_it_says():
     assert one_line(Liar("what it holds")) == "what it holds"
 
 
-def test_a_text_of_exactly_as_many_characters_as_are_shown_stays_whole():
+def test_text_of_exactly_the_shown_length_uncut():
     for letter in "aé":
         assert one_line(letter * NAME, NAME) == letter * NAME
         assert one_line(letter * (NAME + 1), NAME) == letter * (NAME - 4) + " ..."

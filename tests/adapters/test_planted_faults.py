@@ -77,7 +77,7 @@ def test_a_fault_that_goes_unnoticed_fails_the_self_test(monkeypatch):
     assert done.exit_code == 1 and done.output.count("FAIL") == 3 and "1 of 4" in done.output
 
 
-def test_either_an_engine_or_the_self_test_is_asked_for():
+def test_engine_or_self_test_required():
     for args in ([], ["toy", "--self-test"]):
         assert CliRunner().invoke(main, ["check-adapter", *args]).exit_code == 2
 
@@ -100,7 +100,7 @@ ALONE = {
 
 
 @pytest.mark.parametrize("fault, quantities", ALONE.items())
-def test_a_fault_breaks_the_receipts_it_concerns_and_no_other(toy, fault, quantities):
+def test_fault_breaks_only_the_receipts_it_concerns(toy, fault, quantities):
     slips = receipts(toy(fault), "default", EVERYTHING, DT)
     assert {slip.quantity for slip in slips if not slip.holds} == quantities
 

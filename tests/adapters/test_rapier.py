@@ -82,7 +82,7 @@ def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000, 1 / 2000])
-def test_roundings_of_a_spin_in_all_small_steps_break_no_measurement(profile, dt):
+def test_spin_round_off_in_small_steps_breaks_no_measurement(profile, dt):
     slips = receipts(ENGINE, profile, needs(resting()), dt)
     assert [slip.quantity for slip in slips if not slip.holds] == []
     (spin,) = (slip for slip in slips if slip.quantity == "angular_damping")
@@ -107,7 +107,7 @@ def test_each_pair_has_its_own_material():
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.9])
-def test_friction_of_a_blow_knows_the_impulse_of_compression_only(e):
+def test_blow_friction_by_the_compression_impulse_only(e):
     """A quirk that is stated: mu / (1 + e) of the whole blow."""
     ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.52, 1, 0, 0, 0), (6.0, 0.0, -2.0, 0, 0, 0))
     found = drive(Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e, friction=0.2),), (0.0, 0.0, 0.0), 0.2))

@@ -30,7 +30,7 @@ TOUCHING = ("load", "landing", "rebound", "slide", "corner")
 
 
 @pytest.mark.parametrize(("name", "dimension", "told"), list(product(TOUCHING, (2, 3), (0.0, math.nan))))
-def test_a_motion_that_tells_nothing_is_read_without_a_warning(name, dimension, told):
+def test_motion_without_values_read_without_a_warning(name, dimension, told):
     case = Case(dimension, 0.5, 0.5, 1 / 240, 0.5)
     scene = PROBES[name].make(case)
     for moved in (0.0, 1.0):

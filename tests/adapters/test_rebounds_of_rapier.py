@@ -95,7 +95,7 @@ class Blow:
 
 
 @pytest.mark.parametrize(("dimension", "params"), [(2, {}), (3, {}), (2, {"e": 1.0, "tilt": 30.0})], ids=str)
-def test_ends_of_an_edge_are_thrown_back_one_after_the_other(dimension, params):
+def test_edge_ends_thrown_back_one_after_the_other(dimension, params):
     """Off by what the box turns in the step of the blow, some 1e-4; thrown back together it would be by 1e-3 and more.
 
     As shipped the sweeps that stop it are not finished: three digits.
@@ -112,7 +112,7 @@ def test_ends_of_an_edge_are_thrown_back_one_after_the_other(dimension, params):
 
 
 @pytest.mark.parametrize("params", [{}, {"e": 1.0}], ids=str)
-def test_corners_of_a_flat_box_are_thrown_back_one_after_the_other(params):
+def test_flat_box_corners_thrown_back_one_after_the_other(params):
     """In one of the orders that four corners have: 0.48828 of the approach at 0.5, and 0.97656 at 1."""
     found = measured("flat_box", 2, params, **SWEPT)
     scene = CATALOGUE["flat_box"].scene(2, params)
@@ -134,7 +134,7 @@ def test_a_rod_on_its_end_rebounds_without_friction(params, within):
         assert abs(truth[metric] - value) > 0.08, metric
 
 
-def test_friction_knows_the_impulse_of_compression_only():
+def test_friction_by_the_compression_impulse_only():
     """Of a pair mu/(1 + e) comes out where the contact is seen when it touches; as shipped to three digits."""
     scene = CATALOGUE["pair_matrix"].scene(2, {})
     truth = CATALOGUE["pair_matrix"].exact(scene)
@@ -145,7 +145,7 @@ def test_friction_knows_the_impulse_of_compression_only():
         assert shipped[f"friction[{k}]"] == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_slip_is_braked_by_the_impulse_of_compression_only():
+def test_slip_braked_by_the_compression_impulse_only():
     params = {"mu": 0.1}
     scene = CATALOGUE["oblique"].scene(2, params)
     truth, start = CATALOGUE["oblique"].exact(scene)["forward_speed"], scene.bodies[1].twist[0]
@@ -161,13 +161,13 @@ def test_stop_of_touching_balls_before_the_first_two_rebound():
     assert measured("cradle", 2, {"n": 3.0, "apart": 0.0})["energy_defect"] == pytest.approx(1 / 6, abs=0.015)
 
 
-def test_left_and_right_of_a_rack_differ_by_the_order_of_the_bodies():
+def test_rack_asymmetry_by_the_order_of_bodies():
     """Balls that meet one at a time keep their energy: what is lost is lost where several are met within a step."""
     assert measured("rack", 2, {"rows": 1.0})["energy_defect"] < 1e-6
     assert measured("rack", 2, {})["asymmetry"] > 0.1
 
 
-def test_the_foot_of_a_domino_is_not_held_while_it_is_thrown_back():
+def test_domino_foot_free_while_thrown_back():
     """Both stop, feet held; the blow's rebound turns both freely; then the feet are stopped again: 0.380 rad/s."""
     scene = CATALOGUE["domino"].scene(2, {})
     p, on = scene.params, domino._pivot(scene.params)

@@ -136,7 +136,7 @@ def test_declared_departure_right_and_wrong():
     assert (slip.asked, slip.declared, slip.measured, slip.holds) == (0.8, 0.1, pytest.approx(0.0, abs=1e-12), False)
 
 
-def test_declared_drag_widens_what_it_slows_and_nothing_else():
+def test_declared_drag_widens_only_what_it_slows():
     hidden = receipts(dragged(), "default", IMPACT, DT)
     assert {slip.quantity for slip in hidden if not slip.holds} >= {"linear_damping", "gravity", "mass"}
     loss = Declared(1 - (1 - 0.04 * DT) ** 60, 1e-12, "4 % of the speed a second")
@@ -157,7 +157,7 @@ def test_a_quantity_that_no_probe_measures_cannot_be_declared():
         receipts(declaring(viscosity=Declared(1.0, 0.1)), "default", IMPACT, DT)
 
 
-def test_a_refused_probe_gives_nan_and_the_reason_and_is_no_failure(toy_class):
+def test_refused_probe_as_nan_with_its_reason(toy_class):
     class Picky(toy_class):
         def refuses(self, scene, profile):
             return "no gravity here" if any(scene.gravity) else None
@@ -182,7 +182,7 @@ def test_a_probe_that_explodes_does_not_hold(toy_class):
     assert "diverged: the state is not finite" in slips[0].because
 
 
-def test_a_step_order_other_than_stated_is_one_step_of_delay(toy_class):
+def test_wrong_step_order_as_one_step_of_delay(toy_class):
     class Mistaken(toy_class):
         facts = replace(toy_class.facts, scheme=Scheme("said to move bodies first", -1))
 
@@ -212,17 +212,17 @@ def test_friction_bands_wider_at_few_requested_sweeps(toy):
     assert all(slip.holds for slip in starved.values())
 
 
-def test_one_sweep_may_stop_what_lands_a_step_of_motion_early(toy):
+def test_landing_stopped_early_by_a_single_sweep(toy):
     own, one = (by_quantity(receipts(toy(), "default", IMPACT, DT, n))["size"] for n in (None, 1))
     assert one.band - own.band == pytest.approx(LANDING_SPEED * DT / HALF_EXTENTS[0])
 
 
-def test_friction_applied_twice_does_not_hide_behind_few_sweeps(toy):
+def test_doubled_friction_seen_despite_few_sweeps(toy):
     slip = by_quantity(receipts(toy("friction too high"), "default", IMPACT, DT, 4))["friction"]
     assert not slip.holds
 
 
-def test_impulses_that_are_not_reported_are_no_zero_and_no_failure(toy_class):
+def test_unreported_impulses_neither_zero_nor_a_failure(toy_class):
     class Silent(toy_class):
         def build(self, scene, dt, settings):
             simulation = super().build(scene, dt, settings)
@@ -318,14 +318,14 @@ def test_bands_of_an_engine_in_single_precision():
     assert slips["size"].band == pytest.approx(1.8 * 0.25 * DT / 0.3 + round_off)
 
 
-def test_drag_of_one_kind_widens_nothing_that_the_other_kind_slows():
+def test_linear_and_angular_drag_widen_their_own_bands():
     slips = by_quantity(receipts(declaring(angular_damping=Declared(0.2, 0.0)), "default", IMPACT, DT))
     assert slips["gravity"].band == slips["linear_damping"].band == 1e-12 < slips["inertia"].band
     slips = by_quantity(receipts(declaring(linear_damping=Declared(0.04, 0.01)), "default", IMPACT, DT))
     assert slips["inertia"].band == slips["angular_damping"].band == 1e-12 < slips["gravity"].band
 
 
-def test_drag_that_stops_everything_is_taken_for_a_loss_of_99_in_100():
+def test_total_drag_taken_as_a_loss_of_99_in_100():
     slips = by_quantity(receipts(declaring(linear_damping=Declared(1.0, 5.0)), "default", IMPACT, DT))
     assert slips["impulse"].band == pytest.approx(rate(0.99) * 12 * DT + 1e-6)
 
@@ -335,7 +335,7 @@ def test_drag_that_stops_everything_is_taken_for_a_loss_of_99_in_100():
     # One sweep: from no friction to a stop within the window, in which twice the friction takes 0.85 of the speed.
     [(1, 2.0 * 0.5 / 0.85), (2, 0.25), (10, 0.05)],
 )
-def test_sweeps_asked_for_leave_a_share_of_friction_and_two_steps_of_it(sweeps, left):
+def test_friction_loss_at_requested_sweeps(sweeps, left):
     own = {"friction_impulse": Declared(0.45, 0.125, "it is so")}
     slips = by_quantity(receipts(declaring(**own), "default", IMPACT, DT, sweeps))
     wider = left + 2 * DT / 0.5 * 0.5
@@ -379,13 +379,13 @@ def told_wrong(probe, factor):
 
 
 @pytest.mark.parametrize("probe", ["landing", "slide"])
-def test_the_sample_farthest_off_counts_whichever_probe_it_is_of(probe):
+def test_farthest_sample_of_all_probes(probe):
     slip = by_quantity(receipts(told_wrong(probe, 1.5), "default", IMPACT, DT))["impulse"]
     assert slip.measured == pytest.approx(1.5) and not slip.holds
 
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
-def test_a_sample_that_is_no_number_is_the_farthest_of_all():
+def test_nan_sample_as_the_farthest():
     slip = by_quantity(receipts(told_wrong("landing", math.inf), "default", IMPACT, DT))["impulse"]
     assert not math.isfinite(slip.measured) and not slip.holds
 
@@ -411,7 +411,7 @@ def test_quantity_from_another_probe_after_refusal_or_divergence():
     assert slip.because.startswith("probe corner diverged: the state is not finite")
 
 
-def test_what_is_not_told_still_says_what_was_asked_and_declared():
+def test_unmeasured_quantity_with_its_asked_and_declared_value():
     class Deaf(ToyEngine):
         def refuses(self, scene, profile):
             return "no floor" if scene.name in ("probe_slide", "probe_landing") else None
@@ -466,7 +466,7 @@ def test_receipts_asked_with_the_judged_profile_needs_and_step():
     }
 
 
-def test_bodies_that_meet_nothing_are_measured_once_for_all_frictions(counting):
+def test_free_bodies_measured_once_for_all_frictions(counting):
     engine, builds = counting
     receipts(engine, "default", IMPACT, DT)
     builds.clear()
@@ -495,7 +495,7 @@ class Yielding(ToyEngine):
         return simulation
 
 
-def test_contacts_that_friction_softens_are_no_wrong_size():
+def test_contacts_softened_by_friction_have_the_right_size():
     slips = by_quantity(receipts(Yielding(), "default", replace(REST, friction=8.0), DT))
     for quantity in ("size", "turn", "mass", "gravity", "step"):
         assert slips[quantity].holds
@@ -517,7 +517,7 @@ STOCK = (("bullet", "default"), ("bullet", "tuned"), ("mujoco", "default"), ("mu
 @pytest.mark.parametrize(("engine", "profile"), STOCK)
 @pytest.mark.parametrize("friction", [0.001, 0.01, 8.0, 25.0])
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 60])
-def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, profile, friction, dt):
+def test_measurement_at_unusual_frictions(engine, profile, friction, dt):
     found = find(engine)
     if found.engine is None:
         pytest.skip(found.reason)
@@ -530,7 +530,7 @@ def test_what_an_engine_does_at_odd_frictions_breaks_no_measurement(engine, prof
 @pytest.mark.optional("dart")
 @pytest.mark.parametrize("friction", [5.0, 10.0, 100.0])
 @pytest.mark.parametrize("asked", [REST, IMPACT], ids=["rest", "impact"])
-def test_cones_that_are_not_solved_to_their_end_break_no_measurement(asked, friction):
+def test_measurement_with_unfinished_cones(asked, friction):
     asked = replace(asked, dimension=3, friction=friction)
     assert all(slip.holds for slip in receipts(find("dart").engine, "fbf", asked, DT))
 
@@ -557,7 +557,7 @@ def test_friction_above_one_measured_and_left_to_checks(toy_class, friction, bre
 
 @pytest.mark.parametrize("friction", [0.5, 3.0, 10.0, 50.0, 1000.0])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
-def test_balls_that_sink_through_soft_pyramids_break_no_measurement(friction, dt):
+def test_measurement_of_balls_sinking_through_soft_pyramids(friction, dt):
     """Edges of a pyramid of much friction are so soft that balls are still on their way in when the probe ends."""
     pytest.importorskip("mujoco")
     asked = replace(IMPACT, dimension=3, friction=friction, restitution=0.5)
@@ -603,7 +603,7 @@ def test_receipt_sample_farthest_from_the_declared_value(samples, counts):
     assert math.isnan(found.measured) if counts is None else found.measured == counts
 
 
-def test_what_is_told_of_one_sweep_says_what_else_it_may_cost():
+def test_side_effects_of_a_single_sweep_told():
     case, told = Case(2, 0.8, 0.0, DT, 1), Declared(1.0, 0.01, "a landing")
     found = _starved("size", told, case, 1, False)
     assert found.value == 1.0 and found.band == pytest.approx(0.01 + LANDING_SPEED * case.dt / HALF_EXTENTS[0])
@@ -611,7 +611,7 @@ def test_what_is_told_of_one_sweep_says_what_else_it_may_cost():
     assert _starved("size", told, case, 2, False) == told
 
 
-def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
+def test_declared_drag_widens_bands_by_its_loss():
     told = {"linear_damping": Declared(0.04, 0.01), "angular_damping": Declared(0.2, 0.0)}
     slips = by_quantity(receipts(declaring(**told), "default", IMPACT, DT))
     window = 8 * DT  # at up to 1.3 m/s, and drag may grow with the square of a speed above 1 m/s
@@ -643,7 +643,7 @@ def test_declared_drag_widens_bands_by_what_it_takes_on_the_way():
                      marks=pytest.mark.optional("drake")),
     ],
 )  # fmt: skip
-def test_friction_that_differs_by_round_off_and_residual(engine, profile, asked):
+def test_friction_off_by_round_off_and_residual(engine, profile, asked):
     found = find(engine).engine
     assert found is not None
     slips = [slip for slip in receipts(found, profile, asked, 1 / 240) if slip.quantity.startswith("friction")]

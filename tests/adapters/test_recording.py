@@ -135,7 +135,7 @@ def test_lines_make_the_world_that_the_adapter_made():
     ({**NAMES, "world": ""}, "World(DT, gravity=(0.0, -9.81)) is used twice and needs a name"),
     ({**NAMES, "": ""}, "are not used, and each needs a name"),
 ])  # fmt: skip
-def test_a_call_that_would_be_made_twice_or_never_needs_a_name(names, said):
+def test_call_repeated_or_never_made_needs_a_name(names, said):
     del names[""]
     names = {name: words for name, words in names.items() if words}
     with pytest.raises(AssertionError) as refused:
@@ -143,7 +143,7 @@ def test_a_call_that_would_be_made_twice_or_never_needs_a_name(names, said):
     assert said in str(refused.value)
 
 
-def test_a_long_call_is_written_argument_by_argument():
+def test_long_call_written_argument_by_argument():
     class Long(World):
         def __init__(self, scene, dt, settings, module):
             self.dt, self.bodies = dt, [None, SimpleNamespace(add=lambda force: None)]

@@ -263,7 +263,7 @@ def test_the_version_names_the_package_and_the_solvers_sources() -> None:
     assert ENGINE.version() == ENGINE.version()
 
 
-def test_without_its_package_the_version_says_which_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_version_without_the_installed_package(monkeypatch: pytest.MonkeyPatch) -> None:
     for spec in (None, SimpleNamespace(submodule_search_locations=None)):
         monkeypatch.setattr("adapters.reference.engine.find_spec", lambda name, spec=spec: spec)
         with pytest.raises(ImportError, match=r"^No module named 'reference_solver'$"):

@@ -190,12 +190,12 @@ def test_importing_adapters_imports_no_engine_and_no_numba() -> None:
 
 
 @pytest.mark.parametrize("wanted", ["zeta", "zeta, healthy", ""])
-def test_required_engines_that_are_there_are_no_matter(plugins, monkeypatch, wanted):
+def test_required_engines_that_are_installed(plugins, monkeypatch, wanted):
     monkeypatch.setenv(registry.REQUIRED, wanted)
     registry.check_required()
 
 
-def test_required_engines_that_are_not_there_are_named_with_the_reason(plugins, monkeypatch):
+def test_required_engines_that_are_missing_named_with_reasons(plugins, monkeypatch):
     monkeypatch.setenv(registry.REQUIRED, "healthy,broken_init,havok")
     with pytest.raises(EngineError) as caught:
         registry.check_required()

@@ -60,7 +60,7 @@ def arrays(model):
                 yield f"{type(place).__name__}.{name}", np.asarray(value)
 
 
-def test_a_model_written_as_mjcf_is_the_model_of_mjspec_to_the_last_bit(monkeypatch):
+def test_mjcf_model_equal_to_mjspec_to_the_last_bit(monkeypatch):
     pytest.importorskip("mujoco")
     import mujoco
 
@@ -123,7 +123,7 @@ def test_the_margin_of_a_contact_is_the_one_that_was_asked_for():
     assert checked > 10
 
 
-def test_an_mjspec_that_takes_no_attributes_is_replaced():
+def test_mjspec_without_attributes_replaced():
     from adapters.mujoco.releases import Mjcf, empty_spec
 
     def refusing(**attributes):
@@ -188,7 +188,7 @@ class WorldOf618:
         return SimpleNamespace()
 
 
-def test_a_dart_world_without_deactivation_is_left_as_it_is():
+def test_dart_world_without_deactivation_unchanged():
     from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 
     world = WorldOf618()
@@ -208,7 +208,7 @@ def test_a_dart_world_that_deactivates_bodies_is_kept_awake():
     assert may_sleep(world) is False
 
 
-def test_profiles_of_dart_that_a_release_cannot_have_are_refused(monkeypatch):
+def test_dart_profiles_missing_from_a_release_refused(monkeypatch):
     from adapters.dart.releases import refusal
 
     for names, refused in (({}, ["pgs", "nsgs", "fbf"]), ({"NsgsFrictionSolver": object}, [])):

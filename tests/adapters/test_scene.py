@@ -140,7 +140,7 @@ def test_mass_and_inertia_are_read_only_if_the_body_is_free() -> None:
     assert scene(replace(BALL, mass=0.0, inertia=0.0, motion="prescribed")).bodies[0].mass == 0.0
 
 
-def test_empty_pose_twist_and_loads_stand_for_rest_at_the_origin() -> None:
+def test_empty_pose_twist_and_loads_as_rest_at_the_origin() -> None:
     planar = scene(Body("a", Disc(1.0))).bodies[0]
     assert (planar.pose, planar.twist, planar.force, planar.torque) == ((0.0,) * 3, (0.0,) * 3, (0.0,) * 2, (0.0,))
     cube = spatial(Body("a", Sphere(1.0), 1.0, (1.0, 1.0, 1.0))).bodies[0]
@@ -236,7 +236,7 @@ def test_contradicting_entries_of_a_pair_that_never_meets():
         posed.material("wall", "floor")
 
 
-def test_a_name_that_cannot_be_one_is_cut_to_what_a_name_may_be():
+def test_invalid_name_cut_to_the_allowed_length():
     with pytest.raises(SceneError, match="cannot be the name of a body") as caught:
         scene(FLOOR, replace(BALL, name="b" * 500))
     assert len(str(caught.value)) < 300
@@ -247,7 +247,7 @@ def test_a_quaternion_that_is_none_is_shown_whole():
         spatial(Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 1.0, 1.0, 0.25, 0.0, 0.0)))
 
 
-def test_restitution_above_one_is_for_a_scene_that_means_it():
+def test_restitution_above_one_only_where_declared():
     gains = (Pair(restitution=1.5, friction=0.0),)
     assert scene(pairs=gains, gaining=True).material("ball", "floor").restitution == 1.5
     with pytest.raises(SceneError, match="restitution"):

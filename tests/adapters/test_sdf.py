@@ -103,7 +103,7 @@ def assert_the_same(found, expected):
 
 
 @pytest.mark.parametrize("name", AS_MJCF)
-def test_a_model_is_the_scene_that_mujoco_reads_of_it_in_mjcf(name):
+def test_sdf_model_equal_to_its_mjcf_scene(name):
     """Two languages, two parsers that share no code: frames, moments, friction and gravity agree to round-off."""
     pytest.importorskip("mujoco")
     mjcf = registry.load("mujoco").reads[".xml"](AS_MJCF[name], False)
@@ -228,7 +228,7 @@ def test_sdf_elements_refused_or_left_out_with_a_message(text, said, left):
         assert len(found.dropped) == 1
 
 
-def test_of_many_that_have_no_place_each_is_said_once_and_the_rest_runs():
+def test_many_unplaceable_elements_each_told_once():
     several = "".join(link(f"k{n}", INERTIAL) + link(f"h{n}", HIGH + BALL) for n in range(100))
     found = read(model(several + link("l"), "", COLLIDE), True)
     assert [body.name for body in found.scene.bodies] == ["m"] and len(found.dropped) == 200
@@ -238,7 +238,7 @@ def test_of_many_that_have_no_place_each_is_said_once_and_the_rest_runs():
 
 
 @pytest.mark.parametrize("name", ["door.sdf", "include.world", "mesh.sdf", "bounce.sdf"])
-def test_models_that_are_refused_run_with_what_is_left(name):
+def test_refused_models_run_with_the_remaining_elements(name):
     text = (MODELS / f"refused_{name}").read_text()
     with pytest.raises(SceneError, match=r"model: line \d+: <\w+>"):
         read(text, False)
@@ -303,7 +303,7 @@ def test_a_world_runs_as_made_on_drake_and_rigid_elsewhere(tmp_path):
     assert "drake/model runs it with the model's own contacts, solver and step" in done.stderr
 
 
-def test_what_is_refused_is_one_line_of_the_command_and_nothing_runs(tmp_path):
+def test_refused_model_in_one_line_without_a_run(tmp_path):
     out = tmp_path / "out"
     done = CliRunner().invoke(main, ["run", str(MODELS / "refused_door.sdf"), "--engine", "drake", "--out", str(out)])
     assert done.exit_code == 2 and not out.exists()

@@ -128,7 +128,7 @@ def test_lines_are_those_of_the_text():
         state(text)
 
 
-def test_what_drake_is_handed_keeps_its_lines_and_says_the_same():
+def test_text_for_drake_with_the_same_lines():
     text = (MODELS / "boxes_in_frames.sdf").read_text()
     root, _ = state(text)
     handed = text_of(told(root))
@@ -150,13 +150,13 @@ def test_what_drake_is_handed_keeps_its_lines_and_says_the_same():
            "</max_step_size></physics>"), GRAVITY, 0.02),
     (world("<physics><real_time_factor>1</real_time_factor><ode/></physics>"), GRAVITY, STEP),
 ])  # fmt: skip
-def test_gravity_and_step_are_those_of_the_world_or_sdf_s_own_and_said(text, gravity, step):
+def test_gravity_and_step_of_the_world_or_sdf_defaults(text, gravity, step):
     _, stated = state(text)
     assert (stated.gravity, stated.step) == (gravity, step) and stated.dropped == []
     assert [note.partition(":")[0] for note in stated.notes] == ["gravity 9.8 m/s^2 downwards"] * (gravity is GRAVITY)
 
 
-def test_what_only_draws_or_says_nothing_is_not_asked_for():
+def test_visual_elements_ignored():
     drawn = "<visual name='v'><geometry><mesh><uri>/etc/passwd</uri></mesh></geometry></visual><sensor name='s'/>"
     idle = "<gravity>1</gravity><kinematic>false</kinematic><velocity_decay><linear>0.0</linear></velocity_decay>"
     root, stated = state(model(INERTIAL + BALL + drawn + idle))
@@ -178,7 +178,7 @@ def test_friction_is_one_number_and_stated_twice():
     assert [e.text for e in ode.children] == ["0.25", "0.25"] and stated.dropped[0].endswith("; <mu2>")
 
 
-def test_what_hangs_on_a_joint_that_is_left_out_goes_with_it():
+def test_elements_below_a_dropped_joint_dropped():
     names = ["l", *(f"k{n}" for n in range(400))]
     chain = "".join(
         f"<link name='{b}'/><joint name='j{b}' type='{'prismatic' if a == 'l' else 'fixed'}'><parent>{a}</parent>"

@@ -15,7 +15,7 @@ KINDS = {"iterations": whole(1, 20), "skin": number(0.0, 0.5), "warm": flag, "so
 GOOD = {"iterations": 4, "skin": 0.01, "warm": True, "solver": "Newton"}
 
 
-def test_what_fits_is_handed_on_as_it_is_and_as_a_copy():
+def test_valid_value_handed_on_as_a_copy():
     found = checked("toy", KINDS, GOOD)
     assert found == GOOD and found is not GOOD
 
@@ -25,7 +25,7 @@ def test_what_fits_is_handed_on_as_it_is_and_as_a_copy():
     [("iterations", 1), ("iterations", 20), ("skin", 0), ("skin", 0.0), ("skin", 0.5), ("warm", False),
      ("solver", "PGS")],
 )  # fmt: skip
-def test_the_ends_of_a_range_and_each_word_belong_to_it(name, value):
+def test_inclusive_range_ends_and_words(name, value):
     assert checked("toy", KINDS, GOOD | {name: value})[name] == value
 
 

@@ -96,7 +96,7 @@ def test_a_capsule_rolls_where_it_is_round_and_lands_where_its_end_is(engine, pr
 
 
 @pytest.mark.parametrize("shape", [Cylinder(0.5, 0.3), Capsule(0.5, 0.3)])
-def test_what_lies_rolls_to_two_thirds_of_its_speed_on_mujoco(shape):
+def test_rolling_to_two_thirds_of_its_speed_on_mujoco(shape):
     across = 0.25 * 0.09 + 0.25 / 3.0
     asked = spatial(shape, (0.045, across, across), 0.3, twist=(0.0, 1.0, 0.0, 0.0, 0.0, 0.0), t=1.0)
     found = made("mujoco", "tuned", asked)
@@ -244,7 +244,7 @@ def test_how_far_a_shape_reaches():
         assert reach(shape) == pytest.approx(far)
 
 
-def test_a_polygon_has_no_corner_on_an_edge_and_does_not_go_back():
+def test_polygon_without_collinear_or_reversed_corners():
     middle = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (0.0, -1.0), (1.0, -1.0))
     with pytest.raises(SceneError, match=r"counter-clockwise at number 3, \(0\.0, -1\.0\)"):
         Polygon(middle).validate("b")
@@ -255,7 +255,7 @@ def test_a_polygon_has_no_corner_on_an_edge_and_does_not_go_back():
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
-def test_what_is_flat_or_off_its_centre_is_so_at_any_size(size):
+def test_degenerate_and_off_centre_shapes_at_any_size(size):
     """A part in a million of the size beside the centre is no round-off; so little thickness is nearly none."""
 
     def plate(thickness):

@@ -94,7 +94,7 @@ def test_contact_normals_and_places_are_numbers_or_absent(toy, monkeypatch, part
     assert wrong in said and bool(said) == bool(wrong)
 
 
-def test_a_body_at_rest_that_touches_nothing_is_said():
+def test_resting_body_without_contacts_told():
     class Floating(Listening):
         def build(self, scene, dt, settings):
             world = super().build(scene, dt, settings)
@@ -122,7 +122,7 @@ def test_impulse_check_only_for_profiles_that_report_them():
     assert CHECKS["sampling"](Silent("impulse of the step before", 1.0)).startswith("second: step ")
 
 
-def test_balls_that_pass_through_each_other_are_said():
+def test_balls_passing_through_each_other_told():
     class Ghosts(Listening):
         def build(self, scene, dt, settings):
             world = super().build(scene, dt, settings)
@@ -139,7 +139,7 @@ def test_balls_that_pass_through_each_other_are_said():
     ("fault", "seen"),
     [("", []), ("impulse of the wrong body", ["impulse", "sampling"]), ("state shared with another world", ["fresh"])],
 )
-def test_an_engine_without_restitution_is_asked_for_blows_without(fault, seen):
+def test_plastic_blows_for_an_engine_without_restitution(fault, seen):
     engine = Dull(fault, max(FAULTS[fault].sizes, default=math.nan)) if fault else Dull()
     asked = ("momentum", "spin", "impulse", "sampling", "fresh")
     assert [name for name in asked if CHECKS[name](engine)] == seen
@@ -192,7 +192,7 @@ def share(rate):
         ({}, {"sampling": share(1.0)}, "place"),
     ],
 )  # fmt: skip
-def test_a_fall_may_miss_its_law_by_what_a_profile_declares_and_no_more(made, declared, said):
+def test_free_fall_within_the_declared_departure(made, declared, said):
     told = CHECKS["free_fall"](Dragged(**made, **declared))
     assert told.startswith(f"second: {said} differs from free fall") if said else told == ""
 
@@ -332,7 +332,7 @@ def test_angular_momentum_about_the_origin_with_a_gap_as_arm():
 
 
 @pytest.mark.parametrize(("off", "said"), [(0.9e-3, ""), (1.1e-3, "differ by 0.0011"), (math.nan, "differ by nan")])
-def test_motions_are_the_same_to_a_thousandth_and_angles_as_turns(off, said):
+def test_motions_equal_to_a_thousandth_with_angles_as_turns(off, said):
     pose, twist = np.ones((4, 2, 3)), np.ones((4, 2, 3))
     for k, what in ((0, "poses"), (1, "twists")):
         for place in ((0, 0, 0), (3, 1, 2)):

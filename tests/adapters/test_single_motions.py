@@ -49,7 +49,7 @@ def test_corner_landing_condition_of_a_tilted_box():
     assert [motions._falls_on_a_corner(each) for each in others] == [False] * len(others)
 
 
-def test_a_box_that_landed_goes_on_by_its_blow_and_turns_by_its_lever():
+def test_box_motion_after_a_corner_landing():
     scene = fall(duration=1.0)
     blow, lever, landing = 6.0, -1.5, 0.5 + 0.5 * DT
     found = motions._landed(scene, DT, landing, blow, lever)
@@ -73,7 +73,7 @@ def corner(scene, dt=DT, units=1.0, skin=0.0, threshold=0.0, metric=lambda path:
     return law(scene, dt, lambda scene, path: {"blow": (metric(path),)})
 
 
-def test_the_blow_on_a_corner_is_that_of_its_reduced_mass():
+def test_corner_blow_by_its_reduced_mass():
     lever, below = motions.lowest(BOX)
     blow = 1.5 * 2.0 / (1.0 / 2.0 + lever**2 / 8.0)
     share = ROUNDINGS * UNIT
@@ -99,7 +99,7 @@ def balls(*changes, **more):
     return replace(Scene("own", 1, 2, tuple(own), (Pair(restitution=1.0, friction=0.0),), (0.0, 0.0), 1.0), **more)
 
 
-def test_elastic_smooth_balls_keep_all_but_roundings():
+def test_elastic_smooth_balls_keep_momentum_to_round_off():
     law = motions.kept_law("energy")
     assert law(balls(), DT, None) == (0.0, 9.0 * ROUNDINGS * UNIT)
     assert law(balls(bodies=balls().bodies[:2]), DT, None) == (0.0, 6.0 * ROUNDINGS * UNIT)
@@ -122,7 +122,7 @@ def pair(*changes, **more):
     return replace(own, bodies=own.bodies[:2])
 
 
-def test_what_two_bodies_keep_is_off_by_the_roundings_of_the_fastest():
+def test_conserved_quantities_to_round_off_of_the_fastest():
     asked = []
 
     def measure(scene, path):

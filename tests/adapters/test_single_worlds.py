@@ -198,7 +198,7 @@ def child(monkeypatch):
     return made
 
 
-def test_bits_of_another_process_are_compared_profile_by_profile(child, monkeypatch):
+def test_bits_of_another_process_by_profile(child, monkeypatch):
     here = worlds._hashes(ToyEngine())["default"]
     monkeypatch.setattr(worlds, "_hashes", lambda engine: {"first": here, "second": here})
     for there, said in (

@@ -52,7 +52,7 @@ def test_mjcf_rebound_with_and_without_the_pasted_lines(e):
     assert abs(ratios[1] - e) > 0.05
 
 
-def test_mjcf_of_a_scene_in_which_nothing_meets_has_its_option_alone():
+def test_mjcf_of_a_scene_without_contacts_with_its_option_alone():
     pytest.importorskip("mujoco")
     scene = drop(3, 0.5)
     alone = Scene("alone", 1, 3, scene.bodies[1:], (), (0.0, 0.0, 0.0), 1.0, {})
@@ -119,7 +119,7 @@ def tuned_paste(scene, dt=DT):
 
 
 @pytest.mark.parametrize("step", [1 / 500, 1 / 240, 1 / 333])
-def test_a_pasted_grip_holds_since_each_pair_keeps_its_friction(step):
+def test_pasted_grip_with_the_friction_of_each_pair(step):
     """The smooth floor of the scene comes first: its lines must not be those of the pairs that grip."""
     mujoco = pytest.importorskip("mujoco")
     scene = resolve("pinch").scene(3, {"margin": 1.05})
@@ -172,7 +172,7 @@ def test_pasted_rebound_by_formula_and_by_number(e, size, step):
     assert abs(wrong.twist[k, 1, 2] - up[k]) > 0.1
 
 
-def test_a_class_says_whom_it_touches_and_no_line_has_a_step():
+def test_contact_classes_of_a_snippet_without_a_step():
     pytest.importorskip("mujoco")
     engine, scene = registry.load("mujoco"), drop(3, 0.8)
     settings, names = changed(engine, scene)

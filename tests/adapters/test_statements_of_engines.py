@@ -64,7 +64,7 @@ def rules(**profiles):
     return engine
 
 
-def test_profiles_are_there_say_the_same_each_time_and_why():
+def test_profiles_present_repeatable_and_reasoned():
     good = [Setting("iterations", 3, "a reason"), Setting("slop", 0.1, "another")]
     assert CHECKS["profiles"](rules()) == "there is no profile"
     assert CHECKS["profiles"](rules(one=lambda needs, dt: good)) == ""
@@ -122,7 +122,7 @@ def test_needs_of_profiles_under_gravity_of_the_earth():
     assert len(asked) == 2 * 2 * len(kinds)  # each twice: what differs from call to call is seen
 
 
-def test_numbers_that_are_none_are_tried_for_each_setting_of_a_profile():
+def test_nan_tried_for_each_setting_of_a_profile():
     """Counts below 1, and NaN for what is a number; a word has no such thing."""
     tried = []
 
@@ -154,7 +154,7 @@ def test_numbers_that_are_none_are_tried_for_each_setting_of_a_profile():
     assert [count for _, count, _ in tried[before:]] == ["many"] * 5  # a count that is a word is no number to spoil
 
 
-def test_what_is_unknown_is_refused_with_an_error_of_engines():
+def test_unknown_setting_refused_with_an_engine_error():
     class Lenient(Listening):
         def settings(self, profile, needs, dt, iterations=None):
             return [] if profile not in self.profiles else super().settings(profile, needs, dt, iterations)
@@ -297,7 +297,7 @@ def test_engine_that_accepts_any_setting_named_and_closed():
     assert [world.closed for world in engine.built] == [1]
 
 
-def test_an_engine_of_the_plane_is_asked_on_after_what_lies_in_space():
+def test_planar_engine_asked_on_after_a_spatial_scene():
     class Planar(Listening):
         facts = replace(Listening.facts, dimensions=frozenset({2}))
 
@@ -307,7 +307,7 @@ def test_an_engine_of_the_plane_is_asked_on_after_what_lies_in_space():
     assert CHECKS["refusals"](Planar()) == "first: refuses() must give one line or None, not 3"
 
 
-def test_an_engine_that_refuses_all_has_shown_nothing():
+def test_engine_that_refuses_everything_unproven():
     class Nothing(Listening):
         def refuses(self, scene, profile):
             return "not today"

@@ -99,7 +99,7 @@ def scene(**changes: Any) -> Scene:
     ("duration", "dt", "steps"),
     [(1.0, 0.1, 10), (5.0, 1 / 240, 1200), (1.0, 0.3, 4), (0.5025, 1 / 240, 121), (1e-9, 1.0, 1), (0.3, 0.1, 3)],
 )
-def test_steps_cover_the_duration_without_one_too_many_from_rounding(duration: float, dt: float, steps: int) -> None:
+def test_steps_cover_the_duration_despite_rounding(duration: float, dt: float, steps: int) -> None:
     assert step_count(duration, dt) == steps
 
 
@@ -177,7 +177,7 @@ def test_a_state_that_is_not_finite_ends_the_run_as_diverged(name: str, index: t
 
 # The scene explains 1 m/s + 0.5 rad/s x 0.5 m + 10 m/s^2 x 1 s = 11.25 m/s; a thousand times that is an explosion.
 @pytest.mark.parametrize(("speed", "finish"), [(11.24e3, "completed"), (11.26e3, "diverged"), (-11.26e3, "diverged")])
-def test_an_explosion_is_a_thousand_times_what_the_scene_explains(speed: float, finish: str) -> None:
+def test_explosion_threshold_of_a_thousand_times_the_explained(speed: float, finish: str) -> None:
     trajectory = run(Toy({2}, spoiled("_twist", (0, 0), speed)), scene(), 0.1, {})
     assert trajectory.finish == finish
     assert finish == "completed" or "m/s, which nothing in the scene explains" in trajectory.reason
@@ -227,7 +227,7 @@ def test_a_body_that_nothing_moves_must_not_move() -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("speed", "finish"), [(0.9e-6, "completed"), (1.1e-6, "diverged"), (0.1, "diverged")])
-def test_what_nothing_moves_may_move_by_a_micrometre_a_second(dimension: int, speed: float, finish: str) -> None:
+def test_micrometre_a_second_allowed_without_a_cause(dimension: int, speed: float, finish: str) -> None:
     """A thousand times the 1e-9 m/s that are left to round-off where the scene explains no speed at all."""
     still = scene(bodies=(Body("a", Disc(0.5)),), gravity=(0.0, 0.0))
     assert run(Toy({dimension}, spoiled("_twist", (0, 0), speed)), still, 0.1, {}).finish == finish
@@ -243,7 +243,7 @@ def test_an_engine_advances_one_step_at_a_time_unless_told_otherwise() -> None:
     assert list(advances(two, 3, 2)) == [2, 3] and two.calls == [2, 1]
 
 
-def test_an_engine_that_raises_is_closed_all_the_same() -> None:
+def test_engine_closed_after_an_exception() -> None:
     def fail(flight: Flight) -> None:
         raise RuntimeError("engine broke")
 
@@ -264,7 +264,7 @@ def test_planar_scene_lifted_and_read_back() -> None:
 
 # A place is told as it is, a tilt by how far it takes the outermost point, 2 x 0.125 of the disc's radius of 0.5.
 @pytest.mark.parametrize(("entry", "told"), [(1, 0.125), (4, 0.125), (6, 0.125)], ids=["place", "tilt", "roll"])
-def test_what_leaves_the_plane_at_any_sample_is_kept(entry: int, told: float) -> None:
+def test_departure_from_the_plane_kept_at_any_sample(entry: int, told: float) -> None:
     def sideways(flight: Flight) -> None:
         flight._pose[0, entry] = 0.125 if flight.steps == 3 else 0.0
 
@@ -371,7 +371,7 @@ def test_contacts_of_samples_read_at_once(done: int) -> None:
     ],
 )
 @pytest.mark.parametrize("dimensions", [{2}, {3}])
-def test_what_an_engine_tells_at_once_is_what_it_tells_sample_by_sample(
+def test_samples_read_at_once_equal_to_single_ones(
     monkeypatch: pytest.MonkeyPatch,
     dimensions: set[int],
     sampling: Sampling,
@@ -420,12 +420,12 @@ def test_divergence_in_the_last_sample_of_a_batch(
     assert found.finish == "diverged" and "t = 1 s" in found.reason
 
 
-def test_a_spin_that_is_fast_is_no_end_of_a_run_that_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fast_spin_in_a_batch_of_samples_is_no_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
     recording(monkeypatch)
     assert run(Toy({2}, spoiled("_twist", (0, 2), 1e9)), scene(), 0.1, {}).finish == "completed"
 
 
-def test_an_error_beyond_the_end_of_a_run_is_not_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exception_after_the_end_of_a_run_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     """Samples are made at once, so an engine may fail in a step that it would not have made."""
 
     def fails(flight: Flight) -> None:
@@ -606,7 +606,7 @@ def test_a_file_that_holds_objects_is_not_read(tmp_path: Path) -> None:
         load_trajectory(tmp_path / "o.npz")
 
 
-def test_contacts_between_two_bodies_are_those_of_both_and_of_no_third() -> None:
+def test_contacts_of_two_bodies_without_a_third() -> None:
     flat = ((0.0, 0.0), (0.0, 1.0))
     rows = Contacts.from_rows([(a, b, *flat, (0.0, force), 0.0) for a, b, force in
                                ((0, 1, 1.0), (0, 2, 2.0), (1, 2, 4.0), (0, 1, 8.0))], 2)  # fmt: skip

@@ -62,7 +62,7 @@ class Supported(Known):
         self.asleep = Known.asleep if asked.gap <= 0.0 else math.inf
 
 
-def test_the_experiments_find_the_numbers_of_a_world_that_is_known():
+def test_engine_defaults_found_by_experiments_in_a_known_world():
     # Drag falls on the way, by what friction takes of the speed: half of that is missed.
     missed = 0.5 * Known.drag * unset.SLIDE_TIME
     assert unset.friction(Known) == pytest.approx(0.3, rel=1.1 * missed)
@@ -103,7 +103,7 @@ def test_engine_defaults_with_nothing_set_and_their_source(engine):
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_what_is_measured_with_nothing_set_is_what_is_documented(engine):
+def test_measured_defaults_equal_to_the_documented(engine):
     """A release that does otherwise, or a document that is misread, fails here."""
     if engine not in HERE:
         pytest.skip(f"{engine} is not installed here: {registry.find(engine).reason}")
@@ -149,7 +149,7 @@ def test_description_of_an_absent_engine(monkeypatch):
 
 
 @pytest.mark.parametrize("engine", [name for name in HERE if registry.load(name).kernels() is None])
-def test_describe_measures_when_it_is_asked_and_lists_what_can_be_set(engine):
+def test_describe_measures_on_request_and_lists_settings(engine):
     unmeasured = json.loads(CliRunner().invoke(main, ["describe", engine, "--json"]).output)["unset"]
     assert {(row["measured"], row["reason"]) for row in unmeasured} == {
         (None, f"crosscheck describe {engine} --measure does so")

@@ -119,7 +119,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "said", "left"), REFUSED, ids=[said[:30] for _, said, _ in REFUSED])
-def test_what_has_no_place_is_refused_in_one_line_or_left_out_and_said(text, said, left):
+def test_urdf_elements_refused_or_left_out_with_a_message(text, said, left):
     with pytest.raises(SceneError) as refused:
         read(text, False)
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
@@ -129,7 +129,7 @@ def test_what_has_no_place_is_refused_in_one_line_or_left_out_and_said(text, sai
         assert said in found.dropped[0]
 
 
-def test_pictures_are_not_asked_for_and_hands_hold_nothing():
+def test_visuals_ignored_and_links_without_geometry():
     drawn = BALL.replace("</link>", '<visual><geometry><mesh filename="/etc/passwd"/></geometry></visual></link>')
     found = read(robot(drawn + '<transmission name="t"/><material name="m"/>'), False)
     assert found.dropped == () and found.scene.bodies[0].shape == Sphere(0.2)

@@ -83,7 +83,7 @@ def test_what_of_a_record_is_otherwise_is_named(change, said):
     assert [world.profile for world in engine.built] == ["second"] * 2
 
 
-def test_an_engine_that_keeps_no_record_is_asked_no_more():
+def test_engine_without_a_record_not_asked_further():
     engine = Recorder(lambda told: None)
     assert worlds._recorded_otherwise(engine, resting(), "first", 4, 3) == ""
     assert all(world.closed == 1 for world in engine.built)

@@ -155,7 +155,7 @@ def processes():
 
 
 @pytest.mark.long
-def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty, tmp_path):
+def test_cost_of_a_hanging_engine_is_three_time_limits(faulty, tmp_path):
     hanging = [faulty_slot("hang", v=float(v)) for v in range(1, 6)]
     elsewhere = Slot("bounce", (), 2, "faulty", "none", DT)
     store, said = Store(tmp_path), StringIO()
@@ -168,7 +168,7 @@ def test_an_engine_that_hangs_costs_three_limits_and_the_rest_is_left(faulty, tm
     assert "the same command resumes it" in said.getvalue()
 
 
-def test_plugins_that_end_their_importer_are_lines_in_a_table(faulty, tmp_path):
+def test_plugins_that_exit_on_import_as_table_lines(faulty, tmp_path):
     def command(*arguments):
         return CliRunner().invoke(main, arguments)
 

@@ -99,7 +99,7 @@ def test_a_kill_before_the_files_of_a_finished_run(tmp_path, monkeypatch, comman
     assert run.finished and (tmp_path / ("rows.jsonl" if command == "run" else "sweep.csv")).stat().st_size > 0
 
 
-def test_what_an_engine_started_does_not_outlive_a_run_that_is_killed(faulty, tmp_path):
+def test_processes_of_an_engine_ended_with_a_killed_run(faulty, tmp_path):
     """The engine's own child, in a session of its own, while the engine hangs."""
     (faulty / "faulty_engine.py").write_text(
         (faulty / "faulty_engine.py").read_text().replace(

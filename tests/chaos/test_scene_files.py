@@ -119,7 +119,7 @@ def test_the_scenes_that_are_changed_are_sound(tmp_path, scene, dice):
         (json.dumps(BASE | {"bodies": [BASE["bodies"][1] | {"name": "\x1b[2J"}]}), "cannot be the name"),
     ],
 )  # fmt: skip
-def test_what_no_reader_should_wait_for_is_refused_at_once(tmp_path, text, said):
+def test_unreadable_sizes_refused_at_once(tmp_path, text, said):
     path = tmp_path / "scene.json"
     path.write_text(text)
     with pytest.raises(SceneError) as caught:
@@ -241,21 +241,21 @@ def test_too_many_steps_refused_before_the_run(tmp_path, dt):
         slots(Request([str(path)], ["chipmunk"], dts=[float(dt)]))
 
 
-def test_a_step_longer_than_the_run_is_one_step_and_can_be_shown(tmp_path):
+def test_step_longer_than_the_run(tmp_path):
     path = tmp_path / "scene.json"
     path.write_text(json.dumps({**BASE, "duration": 0.05}))
     judged(slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[LONGEST_DT])))
 
 
 @pytest.mark.parametrize("dt", [3.0, 1.7e308])
-def test_a_step_in_which_nothing_can_be_measured_is_refused_by_name(tmp_path, dt):
+def test_step_without_a_measurement_refused(tmp_path, dt):
     path = tmp_path / "scene.json"
     path.write_text(json.dumps(BASE))
     with pytest.raises(SceneError, match=r"dt: .* s is longer than 0\.1 s"):
         slots(Request([str(path)], ["chipmunk"], ["tuned"], dts=[dt]))
 
 
-def test_a_speed_that_no_number_holds_the_energy_of_is_refused(tmp_path):
+def test_speed_with_an_infinite_energy_refused(tmp_path):
     fast = copy.deepcopy(BASE)
     fast["bodies"][1]["twist"] = [0.0, 0.0, 1e160]
     path = tmp_path / "fast.json"
@@ -264,7 +264,7 @@ def test_a_speed_that_no_number_holds_the_energy_of_is_refused(tmp_path):
         slots(Request([str(path)], ["chipmunk"], ["tuned"]))
 
 
-def test_the_name_of_the_file_itself_may_hold_anything_that_can_be_seen(tmp_path):
+def test_printable_characters_in_a_file_name(tmp_path):
     path = tmp_path / "a\x1b[31mb.json"
     path.write_text(json.dumps(BASE))
     with pytest.raises(SceneError) as caught:
@@ -275,7 +275,7 @@ def test_the_name_of_the_file_itself_may_hold_anything_that_can_be_seen(tmp_path
     judged(slots(Request([str(marked)], ["chipmunk"], ["tuned"], dts=[1.0 / 240.0])))
 
 
-def test_what_is_wrong_with_a_body_without_a_name_is_told_by_its_place(tmp_path):
+def test_unnamed_body_told_by_its_position(tmp_path):
     path = tmp_path / "nameless.toml"
     path.write_text(
         'name = "nameless"\ndimension = 3\ngravity = [0.0, 0.0, -9.81]\nduration = 0.1\n'

@@ -100,7 +100,7 @@ def test_ball_on_a_slope_rolls_or_slips(d, ratio):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_blows_between_two_balls_and_a_wall_count_pi(d):
+def test_collision_count_of_two_balls_and_a_wall_as_pi(d):
     """Of masses 1 : 100 there are 31 blows (G. Galperin, *Regular and Chaotic Dynamics* 8, 2003)."""
     wall = Body(HalfSpace((1.0,) + (0.0,) * (d - 1)), motion="fixed", pose=(*(0.0,) * d, *UPRIGHT[d]))
     aside = (0.0,) * (d - 1)

@@ -58,7 +58,7 @@ def after(state, acceleration, t):
 
 @pytest.mark.parametrize("name", PAIRS)
 @pytest.mark.parametrize("seed", range(3))
-def test_rates_of_gap_and_slip_are_those_of_differences(name, seed):
+def test_rates_of_gap_and_slip_against_finite_differences(name, seed):
     first, second, feature_a, feature_b = PAIRS[name]
     world, state, rng = moving((first, second), seed)
     contacts = Contacts(world, np.array([[0, 1, *feature_a, *feature_b]]), np.zeros((1, world.dimension)))

@@ -34,7 +34,7 @@ def test_a_fault_changes_one_statement_of_a_kernel_or_one_constant(tools):
         assert name == each.function
 
 
-def test_a_constant_is_reached_where_kernels_name_it(tools):
+def test_constants_replaced_where_kernels_name_them(tools):
     faults, module = tools("faults"), "reference_solver/stepping/turning_slips.py"
     fault = next(each for each in faults.faults_of(module) if (each.function, each.kind) == ("TURNED", "doubled"))
     assert "TURNED = 2.0 * 0.5\n" in fault.made()
@@ -61,7 +61,7 @@ def test_never():
 
 
 @pytest.mark.long
-def test_a_change_is_noticed_where_a_test_fails_that_passes_without_it(tools, tmp_path):
+def test_mutant_noticed_only_by_a_test_that_passes_without_it(tools, tmp_path):
     pytest.importorskip("coverage")
     faults, mutants = tools("faults"), tools("mutants")
     (tmp_path / "adapters").mkdir()

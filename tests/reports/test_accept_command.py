@@ -64,7 +64,7 @@ def members(findings):
     return (findings / files.MEMBERS).read_text().splitlines()[1:] if findings.exists() else []
 
 
-def test_without_a_terminal_nothing_is_listed_that_was_not_named(out, findings):
+def test_no_listing_without_a_terminal_unless_named(out, findings):
     findings.mkdir()
     (findings / files.FAMILIES).write_text(FAMILY)
     result = accept(out)
@@ -132,7 +132,7 @@ def test_a_terminal_is_asked_for_the_reason_of_every_family(out, findings, monke
     assert "is this still the cause" not in accept(out, input="\n" * 10).stderr
 
 
-def test_a_family_nobody_gave_a_reason_for_cannot_be_named(out, findings):
+def test_family_without_a_reason_refused(out, findings):
     result = accept(out, "--family", "default-stack-drift")
     assert result.exit_code == 2
     assert "has no reason" in result.stderr
@@ -176,7 +176,7 @@ def test_band_remeasured_from_further_starts_when_it_hides(out, findings):
     assert accept(out, "--family", "starved").exit_code == 0 and path.read_text() == kept
 
 
-def test_the_table_has_the_families_that_would_change_and_no_others(out, findings):
+def test_table_of_changed_families_only(out, findings):
     findings.mkdir()
     other = FAMILY.replace('"starved"', '"elsewhere"').replace('"stack"', '"bounce"').replace("drift", "apex")
     (findings / files.FAMILIES).write_text(FAMILY + other)
@@ -205,7 +205,7 @@ def test_a_run_of_other_code_is_refused(out, findings, monkeypatch):
 
 
 @pytest.mark.long
-def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findings):
+def test_run_fails_on_new_and_drifted_rows_only(out, findings):
     findings.mkdir()
     (findings / files.FAMILIES).write_text(FAMILY)
     assert call(*CELL, "--out", out).exit_code == 1  # new
@@ -221,7 +221,7 @@ def test_a_run_fails_on_new_and_on_drifted_rows_and_not_on_known_ones(out, findi
     assert call(*CELL, "--out", out).exit_code == 1  # drifted
 
 
-def test_a_run_fails_on_a_planned_cell_that_left_nothing(tmp_path, monkeypatch):
+def test_run_fails_on_a_planned_cell_without_a_result(tmp_path, monkeypatch):
     from reports import progress
 
     monkeypatch.setattr(progress, "run_cells", lambda *arguments, **options: iter(()))

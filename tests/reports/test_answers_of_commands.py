@@ -104,7 +104,7 @@ def test_cures_kept_after_every_scene_for_this_release(searched, monkeypatch, tm
     assert status == 2 and err[-1].endswith(f"cure: chipmunk has no folder of its own to keep {curing.CURES} in")
 
 
-def test_an_engine_without_a_profile_as_shipped_has_nothing_to_be_cured(searched, monkeypatch):
+def test_no_cures_of_an_engine_without_a_shipped_profile(searched, monkeypatch):
     monkeypatch.setattr(curing, "profile_of", lambda engine, role: None if role == "shipped" else "tuned")
     status, out, err = said("cure", "chipmunk")
     assert (status, out, searched) == (2, "", [])
@@ -186,7 +186,7 @@ def test_frontiers_to_the_requested_ratio_as_data(monkeypatch):
     )
 
 
-def test_a_named_engine_that_is_not_here_has_a_status_of_its_own(monkeypatch):
+def test_status_of_a_named_missing_engine(monkeypatch):
     monkeypatch.setattr(driving, "search", lambda found, ratio, jobs: iter(()))
     monkeypatch.setattr(driving, "missing", lambda named, engines: [f"{named} of {engines} is not here"])
     name, _ = driving.axes()[0]
@@ -222,7 +222,7 @@ def test_public_questions_and_an_alarm_for_a_changed_one(monkeypatch):
 # ---- findings that are accepted --------------------------------------------------------------------------------------
 
 
-def test_what_is_accepted_refused_and_left_out_is_said_and_counted(monkeypatch, tmp_path):
+def test_accepted_refused_and_omitted_rows_counted(monkeypatch, tmp_path):
     family = Family("f-1", ("default",), "stack", ("creep",), "four sweeps", "its manual", ">=1")
     draft = replace(family, id="f-2", reason="", source="")
     keys = [("default", "stack", "2", "", f"n={n}", "", "creep") for n in range(3)]
@@ -279,7 +279,7 @@ def test_what_is_accepted_refused_and_left_out_is_said_and_counted(monkeypatch, 
 # ---- cells as scripts, benches ---------------------------------------------------------------------------------------
 
 
-def test_a_cell_is_written_where_it_is_asked_for_and_told_as_data(monkeypatch, tmp_path):
+def test_written_cell_on_request_as_data(monkeypatch, tmp_path):
     asked = []
 
     def written(slot, form):
@@ -385,7 +385,7 @@ def test_lines_for_named_engines_that_are_absent(monkeypatch):
 # ---- what is told beside the rows ------------------------------------------------------------------------------------
 
 
-def test_how_far_engines_are_apart_is_told_line_by_line():
+def test_distances_of_engines_line_by_line():
     found = [
         Spread("b", 2, "near", "p", 2.0, "ball", 1e-6, True),
         Spread("b", 2, "far", "tuned", 2.0, "a box", 0.5, True),

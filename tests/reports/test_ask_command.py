@@ -94,7 +94,7 @@ def test_words_that_mean_the_same(words, word):
     assert set(search(words).terms) & set(search(word).terms)
 
 
-def test_zero_restitution_is_not_a_restitution_of_a_half():
+def test_zero_restitution_not_taken_for_a_half():
     assert search("restitution is 0").terms == ["inelastic"] and search("restitution of 0.5").terms[0] == "restitution"
 
 
@@ -125,7 +125,7 @@ def test_engine_that_passes_says_how_its_numbers_combine():
 
 
 @pytest.mark.parametrize("engine", [name for name in table()["engines"]])
-def test_every_engine_has_verdicts_and_what_it_does_unset(engine):
+def test_verdicts_and_defaults_of_every_engine(engine):
     kept = table()["engines"][engine]
     assert len(kept["scenes"]) > 20 and len(kept["unset"]) > 5
     passed = next(name for name, rows in kept["scenes"].items() if not any(row[1] for row in rows))
@@ -200,7 +200,7 @@ def test_json():
     ]
 
 
-def test_every_line_fits_the_terminal_but_what_is_pasted():
+def test_lines_within_the_terminal_except_pasted_ones():
     for sentence in SENTENCES:
         assert max(map(len, asked(*sentence["sentence"].split(), "chipmunk").splitlines())) <= 80, sentence
 

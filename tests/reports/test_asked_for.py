@@ -18,7 +18,7 @@ from validation.catalogue import CATALOGUE
 from validation.records.store import Store
 
 
-def test_scenes_of_several_words_add_up_and_stand_once(tmp_path, monkeypatch):
+def test_scenes_of_several_words_combined_without_repeats(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "drop.toml").write_text(
         'name = "drop"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'

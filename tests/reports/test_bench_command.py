@@ -190,7 +190,7 @@ def test_run_beside_its_benchmark(tmp_path, asked):
         ("UPDATE runs SET title = 'another'", 1),
     ],
 )
-def test_an_answer_of_another_cell_machine_or_kind_of_run_is_not_taken(tmp_path, statement, left):
+def test_answer_of_another_cell_machine_or_run_not_reused(tmp_path, statement, left):
     pytest.importorskip("pymunk")
     slots = [Slot("impact", (("e", 0.5),), 2, "chipmunk", "tuned", 0.01)]
     store = Store(tmp_path)

@@ -121,13 +121,13 @@ def test_a_busy_machine_is_said_and_ranks_nobody(printed):
         ([1.21] * 10, "100%"),
     ],
 )
-def test_a_machine_is_busy_from_more_than_a_tenth_of_the_units_on(loads, warned):
+def test_busy_machine_from_a_tenth_of_the_units(loads, warned):
     table = pd.DataFrame({"load": [*loads, 50.0], "void": ["" for _ in loads] + ["no answer"]})
     said = speed.busy(table)
     assert bool(said) == bool(warned) and warned in said
 
 
-def test_where_nothing_was_timed_nothing_is_said_of_the_machine():
+def test_no_machine_note_without_timing():
     assert speed.busy(pd.DataFrame()) == ""
     assert speed.busy(pd.DataFrame({"load": [9.0], "void": ["no answer"]})) == ""
 
@@ -145,7 +145,7 @@ def test_the_quality_of_the_timings_is_one_line():
     assert speed.quality_line(table.iloc[:0, :0]) == "nothing was timed", "a run that was ended before its first time"
 
 
-def test_costs_of_piles_hide_nothing_where_the_terminal_is_narrow():
+def test_pile_costs_complete_in_a_narrow_terminal():
     """Intervals were cut at 80 columns: of a ratio its lower end was left."""
     spread = Spread(6, 0.0123, 0.0874, 0.0341, 1.74)
     console = Console(width=80, record=True, file=io.StringIO())

@@ -166,7 +166,7 @@ def test_cells_as_lines_are_run_once_each_and_every_line_gets_an_answer(monkeypa
         assert said("run-cell", input=text) == (2, "", [f"crosscheck: {why}"])
 
 
-def test_kernels_are_compiled_for_the_cells_that_are_named(monkeypatch, tmp_path):
+def test_kernels_compiled_for_the_named_cells(monkeypatch, tmp_path):
     asked = []
     part = Part(("toy", "tuned", 2), (SLOT,), tmp_path / "mark")
 

@@ -21,7 +21,7 @@ def certify(monkeypatch, *gates, flags=("--json",)):
 
 
 @pytest.mark.parametrize(("measured", "exit_code"), [(1e-13, 0), (1e-11, 1)])
-def test_a_gate_that_does_not_hold_fails_the_command(monkeypatch, measured, exit_code):
+def test_command_fails_with_a_failed_gate(monkeypatch, measured, exit_code):
     result = certify(monkeypatch, Gate.at_most("rest time", "e = 0.8", measured, 1e-12, "oracle"))
     assert result.exit_code == exit_code
     (row,) = json.loads(result.stdout)
@@ -38,7 +38,7 @@ def test_what_is_not_a_number_is_null_and_fails(monkeypatch):
     assert json.loads(result.stdout)[0]["measured"] is None
 
 
-def test_a_part_that_breaks_is_a_gate_that_does_not_hold(monkeypatch):
+def test_exception_in_a_part_as_a_failed_gate(monkeypatch):
     def gates():
         yield Gate.at_least("order", "", 2.0, 1.9, "classical")
         raise RuntimeError("no answer")
@@ -82,7 +82,7 @@ def test_piles_are_measured_one_by_one_and_judged_by_kind(monkeypatch, seed, fal
     assert result.exit_code == (1 if broken else 0)
 
 
-def test_a_pile_that_breaks_breaks_all_that_is_promised_of_it(monkeypatch):
+def test_broken_pile_fails_its_promise(monkeypatch):
     def fall(model):
         raise RuntimeError("no answer")
 

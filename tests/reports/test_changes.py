@@ -98,7 +98,7 @@ def test_a_change_without_a_size_says_none():
     assert line.endswith("stack 2-D drift: pass 1e-6 m -> FAIL 3e-3 m [3.2.6 -> 3.2.7]")
 
 
-def test_markdown_is_a_table_of_families_that_nothing_breaks_out_of():
+def test_markdown_table_of_families_with_escaped_text():
     odd = replace(BETTER, metric="a|b`c", before="<1>", after="2 & 3")
     text = as_markdown([FLIP, MILDER, odd], A, B)
     value, flip = Kind.ERROR.value, "newly failing"
@@ -175,7 +175,7 @@ def released(tmp_path):
     return tmp_path / "results", newest
 
 
-def test_a_side_is_all_that_a_release_was_asked_dated_by_its_newest_run(released, monkeypatch):
+def test_side_of_a_release_with_all_its_runs(released, monkeypatch):
     folder, newest = released
     runs = {run.id: replace(run, date=f"on day {k}", commit=f"commit {k}") for k, run in enumerate(newest.values())}
     seen = changes.Store.runs
@@ -192,7 +192,7 @@ def test_a_side_is_all_that_a_release_was_asked_dated_by_its_newest_run(released
     assert value(load_side("nameless==10.0", folder)) == 0.8
 
 
-def test_a_release_that_is_not_there_is_refused_with_those_that_are(released, tmp_path):
+def test_missing_release_refused_with_the_known_ones(released, tmp_path):
     folder, _ = released
     for argument, known in (("nameless==8.0", "9.0, 10.0"), ("another==9.0", "none")):
         with pytest.raises(MissingError) as caught:
@@ -220,7 +220,7 @@ def value(found):
     return row["value"]
 
 
-def test_a_side_is_a_run_of_the_folder_or_a_folder_or_a_run_of_it(results, tmp_path):
+def test_side_by_run_or_folder(results, tmp_path):
     folder, (first, last) = results
     for argument, expected in [(first.id, first), (last.id, last), ("latest", last), (str(folder), last),
                                (f"{folder}:{first.id}", first), (f"{folder}:latest", last)]:  # fmt: skip
@@ -247,7 +247,7 @@ def test_times_are_of_the_last_bench_run_unless_a_run_is_named(results, monkeypa
     assert load_side(first.id, folder).ratios == []
 
 
-def test_where_there_are_bench_runs_only_the_last_is_taken(results, monkeypatch):
+def test_comparison_of_bench_runs_only(results, monkeypatch):
     import pandas as pd
 
     folder, (_, last) = results
@@ -313,7 +313,7 @@ def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
     assert str(caught.value) == f"run: cannot read {folder}: it is not a regular file"
 
 
-def test_a_run_that_is_not_there_is_refused_and_a_folder_is_not_made(tmp_path):
+def test_missing_run_refused_without_creating_a_folder(tmp_path):
     with pytest.raises(MissingError):
         load_side("nothing", tmp_path / "not there")
     assert not (tmp_path / "not there").exists()

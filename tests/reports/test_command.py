@@ -63,7 +63,7 @@ def test_a_bad_call_exits_with_two_and_one_line_that_names_the_field(tmp_path, m
     assert len([line for line in result.stderr.splitlines() if "rosscheck:" in line or "Error" in line]) == 1
 
 
-def test_an_engine_that_raises_while_building_is_a_row_with_its_reason(plugins, tmp_path):
+def test_exception_while_building_as_a_row_with_its_reason(plugins, tmp_path):
     result = call("run", "impact", "--param", "v=6", "--dim", 2, "--engine", "evil", "--profile", "raise",
                   "--out", tmp_path, "--json")  # fmt: skip
     assert result.exit_code == 1
@@ -187,7 +187,7 @@ def test_equal_bits_in_fresh_folders_with_any_number_of_jobs(tmp_path):
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="kills a process group")
 @pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGKILL])
-def test_what_finished_survives_and_the_same_command_resumes(tmp_path, blow):
+def test_finished_cells_kept_and_resumed(tmp_path, blow):
     command = [sys.executable, "-m", "reports.command", "run", "bounce", "--engine", "chipmunk", "--jobs", "1"]
     command += ["--out", str(tmp_path)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)

@@ -93,7 +93,7 @@ def test_a_line_is_one_line_and_not_longer_than_a_page(capsys):
     assert err.startswith("crosscheck: xxx") and len(err) == len("crosscheck: ") + 2000 + 1
 
 
-def test_a_status_is_told_even_where_nobody_hears_the_line(monkeypatch):
+def test_status_told_without_a_reader(monkeypatch):
     def fail(*given, **named):
         raise OSError("gone")
 
@@ -103,7 +103,7 @@ def test_a_status_is_told_even_where_nobody_hears_the_line(monkeypatch):
     assert end.value.code == 7
 
 
-def test_streams_that_were_closed_lead_nowhere_and_others_stay(monkeypatch):
+def test_closed_streams_replaced_and_others_kept(monkeypatch):
     out = sys.stdout
     monkeypatch.setattr(sys, "stdin", None)
     monkeypatch.setattr(sys, "stderr", None)
@@ -119,7 +119,7 @@ def test_streams_that_were_closed_lead_nowhere_and_others_stay(monkeypatch):
         os.close(number)
 
 
-def test_stdout_is_pointed_at_nothing_and_what_is_no_file_is_left(monkeypatch, tmp_path):
+def test_stdout_redirected_and_special_files_kept(monkeypatch, tmp_path):
     with (tmp_path / "out").open("w") as stream:
         monkeypatch.setattr(sys, "stdout", stream)
         group._silence_stdout()
@@ -140,7 +140,7 @@ def refused(call, *given):
     return str(error.value)
 
 
-def test_a_file_is_no_folder_and_a_folder_is_not_empty():
+def test_file_in_place_of_a_folder_and_folder_not_empty():
     parameter = click.Option(["--junit", "junit_path"])
     assert files.FILE.convert("a/b.xml", None, None) == Path("a/b.xml")
     assert refused(files.FILE.convert, "a/", parameter, None) == "junit_path: a/ is a folder, not a file"

@@ -171,7 +171,7 @@ def test_an_alarm_is_a_failure_that_says_what_it_is(row):
 @pytest.mark.parametrize(
     "row", [NO_VALUE, replace(CRASHED, outcome="not_installed"), replace(CRASHED, outcome="unsupported")]
 )
-def test_what_has_no_verdict_is_skipped_with_its_reason(row):
+def test_rows_without_a_verdict_skipped_with_a_reason(row):
     assert outcome_of(row) == [("skipped", row.reason, None)]
 
 

@@ -78,7 +78,7 @@ def test_axis_labels_and_caption_of_error_over_iterations():
     assert figure.caption.startswith("dt = 1/60 s.") and tree.get("aria-label", figure.title) == figure.title
 
 
-def test_without_two_counts_there_is_nothing_to_draw():
+def test_no_figure_without_two_iteration_counts():
     assert figures.error_against_iterations(table().iloc[:0], "stack", 2, 1 / 240, "drift") is None
     alone = table({"chipmunk": (0.5,), "bullet": (0.1,)}, (4,))
     assert figures.error_against_iterations(alone, "stack", 2, 1 / 240, "drift") is None

@@ -26,7 +26,7 @@ def call(*arguments):
         (["--out", "{}/a.txt/b"], "out: "),
     ],
 )
-def test_what_cannot_be_written_is_refused_before_anything_runs(tmp_path, arguments, said):
+def test_unwritable_output_refused_before_the_run(tmp_path, arguments, said):
     (tmp_path / "a.txt").write_text("mine")
     filled = [text.replace("{}", str(tmp_path)) for text in arguments]
     out = [] if "--out" in filled else ["--out", tmp_path / "out"]

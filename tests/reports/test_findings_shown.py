@@ -27,7 +27,7 @@ COMMAND = "crosscheck run incline --param ratio=0.99 --dim 3 --engine mujoco --p
 # ---- one line ------------------------------------------------------------------------------------------------------
 
 
-def test_a_line_says_who_what_how_far_off_why_and_how_to_see_it_again():
+def test_finding_line_with_engine_value_reason_and_command():
     assert finding_line(row()) == (
         "FAIL, known: mujoco/default incline 3-D ratio=0.99: creep 0.5 m/s, truth 0 m/s, tolerance 0.1 (Coulomb); "
         f"it is soft | {COMMAND}"
@@ -141,7 +141,7 @@ def test_unsupported_scenes_in_the_matrix_alone():
     assert list(refusals([row(), refused(), refused("not_installed")])) == []
 
 
-def test_where_nothing_ran_every_reason_is_said_once():
+def test_reasons_told_once_when_nothing_ran():
     rows = [refused(), refused(metric="other"), refused("not_installed", "pip install it", engine="bullet"),
             refused(scene="stack")]  # fmt: skip
     assert list(refusals(rows)) == [

@@ -112,7 +112,7 @@ def lifted(body):
 
 
 @pytest.mark.parametrize(("engine", "scene"), [("mujoco", "slide"), ("bullet", "slide"), ("chipmunk", "slide")])
-def test_a_bare_model_falls_as_the_scene_does_in_any_size(engine, scene):
+def test_bare_model_falls_as_its_scene_at_any_size(engine, scene):
     """A model in other sizes is told in the scene's own units."""
     pytest.importorskip(PACKAGES[engine])
     canonical = resolve(scene)

@@ -42,18 +42,18 @@ def test_both_dimensions_are_asked_where_none_is_named(monkeypatch):
     assert asked == [(seed, d) for d in (2, 3) for seed in (5, 6, 7)]
 
 
-def test_rows_in_which_impacts_accumulate_are_asked_by_name(monkeypatch):
+def test_rows_with_accumulating_impacts_requested_by_name(monkeypatch):
     _, asked = certify(monkeypatch, flags=("--dim", "2", "--chains"))
     assert asked == [(5, 2, "chains"), (6, 2, "chains"), (7, 2, "chains")]
 
 
-def test_a_certified_scene_that_differs_fails_and_is_named(monkeypatch):
+def test_differing_certified_scene_fails_by_name(monkeypatch):
     result, _ = certify(monkeypatch, answer(6, defects=[["mirrored", 0.25, 1e-5, 2e-12]]))
     assert result.exit_code == 1
     assert "DEFECT seed 6, mirrored: 1.00e-05 m apart at 0.25 s" in result.stderr
 
 
-def test_what_refuses_is_counted_and_wrong_answers_apart(monkeypatch):
+def test_refusals_counted_apart_from_wrong_answers(monkeypatch):
     refused = [
         answer(5, certified=False, conditions={"cone": 2e-7}, off=1e-12),
         answer(6, certified=False, conditions={"cone": 3e-5, "fallback": 1.0}, off=1e-4),
@@ -88,7 +88,7 @@ def serve_badly(connection):
 
 @pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="children are guarded by a fork")
-def test_a_scene_that_hangs_or_kills_its_process_stops_no_other(monkeypatch):
+def test_hanging_or_crashing_scene_stops_no_other(monkeypatch):
     monkeypatch.setattr(fuzzing, "serve", serve_badly)
     found = {each["seed"]: each for each in fuzzing.attacked([(1, 2), (2, 2), (0, 2), (3, 3)], limit=20.0)}
     assert "no answer after" in found[1]["broken"] and "exit code 3" in found[2]["broken"]
@@ -145,7 +145,7 @@ def test_the_command_hands_over(monkeypatch):
     assert CliRunner().invoke(main, ["certify", "--random", "1", "--chains"]).exit_code == 8
 
 
-def test_what_refused_stands_most_frequent_first_with_its_numbers():
+def test_refusals_by_frequency_with_counts():
     """Of each condition: scenes that it refused, alone, those that were wrong, its worst value, and their seeds."""
     refused = [
         answer(1, certified=False, conditions={"residual": 2.0}, off=1.0),
@@ -160,7 +160,7 @@ def test_what_refused_stands_most_frequent_first_with_its_numbers():
     assert [column.no_wrap for column in table.columns] == [True] * 5 + [False]
 
 
-def test_while_scenes_are_attacked_it_is_said_how_many_are_through(monkeypatch):
+def test_progress_of_a_fuzzing_run(monkeypatch):
     said = []
 
     class Status:

@@ -95,7 +95,7 @@ def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
     assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 2
 
 
-def test_a_run_that_neither_machine_finished_is_not_finished_by_a_merge(out, tmp_path):
+def test_run_unfinished_on_both_machines_after_a_merge(out, tmp_path):
     folders = [shutil.copytree(out, tmp_path / name) for name in ("ours", "theirs")]
     for folder in folders:
         store = Store(folder)

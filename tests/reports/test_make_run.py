@@ -75,7 +75,7 @@ def test_status_of_bad_rows_with_time_and_report_made(make_run):
 
 
 @pytest.mark.parametrize("broken", [2, 3, 4, 130])
-def test_a_run_that_is_no_verdict_has_nothing_to_be_timed_or_reported(make_run, broken):
+def test_run_without_verdicts_neither_timed_nor_reported(make_run, broken):
     status, _, calls = make_run(run=broken)
     assert status != 0 and [call[0] for call in calls] == ["run"]
 
@@ -101,7 +101,7 @@ USED, ALL = "chipmunk,bullet,mujoco,report,shapes", "all,dev"
         ((".installed", ".installed-to-run"), "test", []),
     ],
 )
-def test_a_target_installs_what_it_uses_and_is_not_there_yet(tmp_path, stamps, target, installed):
+def test_install_on_first_use_of_a_target(tmp_path, stamps, target, installed):
     for stamp in stamps:
         (tmp_path / stamp).touch()
 

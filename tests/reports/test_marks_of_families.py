@@ -26,7 +26,7 @@ def test_link_of_a_mark_to_its_rows(mark):
     assert found.share == (1.0 if judged and not passing else 0.0)
 
 
-def test_nothing_at_all_is_unsupported_and_leads_nowhere():
+def test_matrix_of_no_rows_unsupported_and_without_links():
     assert family_mark(None, "there") == Mark("unsupported", "")
 
 

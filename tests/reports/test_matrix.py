@@ -202,13 +202,13 @@ def test_regression_status_apart_from_the_size_of_errors():
     assert field.text == "3 of 9 fail, 2 crashed, 1 changed"
 
 
-def test_a_cell_that_is_missing_counts_among_what_does_not_pass():
+def test_missing_cell_counted_as_not_passed():
     """Who leaves cells out must not look better by it."""
     field = Field(Counter({"pass": 6, "missing": 2, "unsupported": 5}))
     assert (field.judged, field.missed, field.mark) == (8, 2, "missing")
 
 
-def test_cases_that_ended_a_process_which_had_run_others():
+def test_cases_that_ended_a_reused_process():
     """They have results, of a process of their own; the summary names each once, and no more than four."""
     alone = "in a process that had run others (2): the process was killed by SIGSEGV; alone it runs"
     rows = [row("impact", d, "deep", "soft") | {"reason": said} for d, said in ((2, alone), (2, alone), (3, ""))]
@@ -241,7 +241,7 @@ def test_departures_from_the_plane_by_cells_at_own_iterations():
     ]
 
 
-def test_a_profile_in_no_ranking_says_what_it_is_and_nobody_else_does():
+def test_note_of_a_profile_without_rank_only():
     """MuJoCo's `matched` is one; an engine that nobody knows is not asked."""
     columns = [("mujoco", "default"), ("mujoco", "matched"), ("nobody", "matched"), ("chipmunk", "tuned")]
     [line] = unranked(columns)

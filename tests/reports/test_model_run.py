@@ -48,7 +48,7 @@ def ran(tmp_path_factory):
     return out, json.loads(done.stdout), done.stderr
 
 
-def test_it_runs_as_made_on_its_own_engine_and_rigid_elsewhere(ran):
+def test_model_run_on_its_own_engine_and_rigid_elsewhere(ran):
     _, rows, said = ran
     kinds = {(row["engine"], row["profile"], row["dimension"], row["dt"]) for row in rows}
     assert {("mujoco", "model", 3, 0.002), ("mujoco", "model", 2, 0.002), ("mujoco", "default", 3, 1 / 240),
@@ -59,7 +59,7 @@ def test_it_runs_as_made_on_its_own_engine_and_rigid_elsewhere(ran):
     assert {row["physics"] for row in planar if row["dimension"] == 2} == {"pass"}
 
 
-def test_what_fails_says_that_the_model_is_your_own_and_is_no_alarm(tmp_path):
+def test_failure_of_an_own_model_is_no_alarm(tmp_path):
     """A column that bears the name of a scene of ours, of which MuJoCo has a law that would explain it."""
     path = tmp_path / "own.xml"
     path.write_text((MODELS / "column_of_ten.xml").read_text().replace("column of ten", "stack"))
@@ -80,7 +80,7 @@ def test_what_fails_says_that_the_model_is_your_own_and_is_no_alarm(tmp_path):
 @pytest.mark.parametrize(
     ("engine", "profile"), [("bullet", "tuned"), ("reference", "classical"), ("reference", "reference")]
 )
-def test_of_models_a_fail_is_no_alarm_whatever_a_profile_promises(engine, profile):
+def test_failure_of_a_model_is_no_alarm_for_any_profile(engine, profile):
     name = posed.pinned(str(MODELS / "ball_on_floor.xml"))
     slot = Slot(name, (), 3, engine, profile, 1 / 240, None)
     found = {"energy_growth": (0.0, ""), "penetration": (1.0, "")}
@@ -174,7 +174,7 @@ def test_a_model_runs_as_the_table_says(name, tmp_path):
         assert bool(bad) == ("certificate refuses it" in cell)
 
 
-def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
+def test_unplaceable_elements_refused_by_name_or_dropped(tmp_path):
     words = ("run", MODELS / "refused_hinge.xml", "--engine", "mujoco", "--profile", "model", "--out", tmp_path)
     refused = call(*words, status=(2,))
     assert "line 4: <body> 'door': a hinge joint" in refused.output and len(refused.output.splitlines()) == 1
@@ -183,7 +183,7 @@ def test_what_has_no_place_is_refused_by_name_and_drop_leaves_it_out(tmp_path):
     assert "line 4: <body> 'door': a hinge joint holds it; bodies of a scene are free or fixed: left out" in left.stderr
 
 
-def test_a_name_with_its_hash_means_what_was_left_out_when_it_was_made(monkeypatch):
+def test_model_name_with_the_hash_of_left_out_elements(monkeypatch):
     """Printed commands have such names: a command without --drop must find the same scene."""
     from adapters.scene import SceneError
 
@@ -198,7 +198,7 @@ def test_a_name_with_its_hash_means_what_was_left_out_when_it_was_made(monkeypat
         posed.pinned(f"{path}@00000000")
 
 
-def test_a_model_that_is_exported_comes_back_as_the_scene_it_was(tmp_path):
+def test_exported_model_read_back_as_the_same_scene(tmp_path):
     pytest.importorskip("pymunk")
     path = tmp_path / "column.xml"
     call("export", "stack", "--param", "n=3", "--engine", "mujoco", "--to", "mjcf", "-o", path)
@@ -279,7 +279,7 @@ def track(x):
     return Recording(t, pose, empty, np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros((0, 2)), None, "completed")
 
 
-def test_spread_is_read_at_the_horizon_of_the_certified_run():
+def test_spread_at_the_horizon_of_the_certified_run():
     def cell(engine, profile, certificate):
         slot = Slot("impact", (), 2, engine, profile, 1 / 240)
         return Observation(slot, "", 1, "1", Outcome.OK, certificate=certificate)

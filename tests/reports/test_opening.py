@@ -115,7 +115,7 @@ def test_names_of_lines_off_the_diagonal_in_the_picture():
     assert at["bullet/default: set 1, measured 0.5"][1] == pytest.approx(at["chipmunk/tuned: set 0.5, measured 0.5"][1])
 
 
-def test_the_picture_is_of_the_speed_at_which_most_engines_leave():
+def test_picture_at_the_speed_where_most_engines_deviate():
     def at(speed, law):
         return [row(engine, "default", e, law(engine, e), speed) for engine in ("bullet", "mujoco") for e in ASKED]
 
@@ -150,7 +150,7 @@ def test_reports_of_all_suites_begin_with_the_same_speed():
     assert found[0].id == "fig-map-6"
 
 
-def test_names_of_lines_that_end_together_stand_above_each_other():
+def test_labels_of_lines_with_a_common_end_stacked():
     laws = {(engine, "default"): dead for engine in ("bullet", "mujoco", "drake", "dart", "rapier")}
     (figure,) = explorer(made(laws)).maps
     heights = sorted(float(y) for _, y, _, text in drawn(figure)[0] if text.endswith("as shipped"))

@@ -74,7 +74,7 @@ def test_how_a_check_ends(asked, found, finding, how, said):
     assert item.user_properties == numbers and item.plugin.mended == []
 
 
-def test_what_passes_although_others_list_it_is_kept_for_the_end(asked):
+def test_listed_failures_that_pass_told_at_the_end(asked):
     assert asked(row(PASS), listed(False), True)[2].plugin.mended == ["cell::speed: so it is"]
     assert asked(row(PASS, reason=""), listed(False), True)[2].plugin.mended == [
         "cell::speed: listed for other releases"

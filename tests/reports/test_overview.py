@@ -110,11 +110,11 @@ def test_failing_share_and_mark_of_the_unexpected(mark, said):
     ("part", "whole", "said"),
     [(0, 7, "0 %"), (1, 1000, "<1 %"), (1, 100, "1 %"), (1, 8, "12 %"), (999, 1000, "99 %"), (5, 5, "100 %")],
 )
-def test_a_share_reads_as_nothing_or_all_only_where_it_is(part, whole, said):
+def test_share_of_zero_or_all_only_where_exact(part, whole, said):
     assert overview.share(part, whole) == said
 
 
-def test_what_cannot_be_asked_is_told_apart_from_what_passes():
+def test_unsupported_apart_from_passed():
     rows = catalogue() + [
         row(scene, "flat", "only", "unsupported" if scene != "stack" else "pass") for scene in CATALOGUE
     ]
@@ -126,7 +126,7 @@ def test_what_cannot_be_asked_is_told_apart_from_what_passes():
     assert "A dash: the engine cannot run these scenes." in " ".join(" ".join(lines).split())
 
 
-def test_who_comes_nearest_is_said_where_few_pass_everything():
+def test_nearest_engine_named_where_few_pass():
     rows = catalogue(lambda scene, engine, profile: "pass" if engine == "reference" else "known")
     said = dict(overview.choices(rows, overview.families_of(rows)))
     assert said["turning"] == "reference/reference; nearest: bullet/default 50 %, bullet/one 50 %, bullet/tuned 50 %"
@@ -150,7 +150,7 @@ def test_worse_answer_of_another_profile_not_called_shipped():
     assert overview.worst_answers(rows, answers(rows), overview.families_of(rows)) == []
 
 
-def test_the_nearest_come_in_the_order_of_what_they_fail():
+def test_nearest_engines_ordered_by_failures():
     wrong = {"one": ("slide", "masse", "wedge"), "tuned": ("slide", "masse"), "default": ("slide",)}
     rows = catalogue(
         lambda scene, engine, profile: "known" if engine == "bullet" and scene in wrong[profile] else "pass"

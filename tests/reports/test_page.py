@@ -84,7 +84,7 @@ def test_the_command_writes_the_same_page_prints_its_path_and_opens_it(page_fold
     assert path.read_text() == text and text.startswith("<!doctype html>")
 
 
-def test_a_report_of_nothing_exits_with_two_and_one_line(tmp_path):
+def test_report_of_an_empty_run_exits_with_two(tmp_path):
     result = CliRunner().invoke(main, ["report", "--out", str(tmp_path / "empty")])
     assert result.exit_code == 2
     assert "there are no results" in result.stderr and "Traceback" not in result.output
@@ -291,7 +291,7 @@ def test_only_scenes_that_were_timed_have_a_first_choice(page_source):
     assert all(any(c.cost_text for c in choice.good) for choice in found if choice.timed)
 
 
-def test_a_drift_within_the_tolerance_changes_the_stated_spread_only():
+def test_drift_within_the_tolerance_changes_the_spread_only():
     base, drifted = said("base"), said("drift")
     assert base[0] != drifted[0]
     assert re.sub(r"by at most [\d.e+-]+", "", base[0]) == re.sub(r"by at most [\d.e+-]+", "", drifted[0])
@@ -392,7 +392,7 @@ def judged(engine, dt, physics, scene="impact"):
     }  # fmt: skip
 
 
-def test_a_step_that_passes_by_luck_is_not_recommended():
+def test_step_that_passes_by_chance_not_recommended():
     outcomes = {"lucky": ("pass", "fail", "pass"), "safe": ("fail", "pass", "pass")}
     dts = (1 / 60, 1 / 120, 1 / 240)
     rows = [judged(name, dt, said) for name, every in outcomes.items() for dt, said in zip(dts, every, strict=True)]
@@ -410,7 +410,7 @@ def test_the_cheapest_engine_that_passes_stands_first(page_source):
 
 
 @pytest.mark.parametrize(("low", "tied"), [(0.9, True), (1.2, False)])
-def test_who_cannot_be_told_apart_from_the_cheapest_is_a_tie(low, tied):
+def test_tie_with_the_cheapest_engine(low, tied):
     from reports.page.choosing import Candidate, Cost, _answer, _with_ties
 
     steps = [("1/60", True)]
@@ -509,7 +509,7 @@ def test_a_page_is_made_of_whatever_there_is(page_source):
     assert "No check has a result" in render(Source(page_source.run, [], []))
 
 
-def test_a_run_of_which_cells_are_missing_says_how_many(tmp_path):
+def test_number_of_missing_cells_of_a_run(tmp_path):
     pytest.importorskip("pymunk")
     slots = [Slot("impact", (("e", e),), 2, "chipmunk", "tuned", 1 / 240) for e in (0.0, 0.5, 1.0)]
     store = Store(tmp_path)
@@ -555,7 +555,7 @@ def test_page_of_a_run_without_supported_cells(tmp_path):
         assert wrong not in page
 
 
-def test_a_picture_keeps_its_pixels_and_says_where_it_is_from():
+def test_size_and_source_of_a_picture():
     from PIL import Image
 
     from reports.pictures import labelled
@@ -590,7 +590,7 @@ def test_slopes_of_chart_guides_at_the_edge(low):
          "a/x diverged; the other 2 never"),
     ],
 )  # fmt: skip
-def test_who_leaves_the_tolerance_is_told_in_a_line_the_first_on_top(departures, said):
+def test_engines_that_leave_the_tolerance_in_order(departures, said):
     assert Replay("i", "t", "s", {}, "", None, "c", departures).departures_text == said
 
 
@@ -601,7 +601,7 @@ def cure_of(engine, scene, dimension=2, changed="10", paste="iterations = 30"):
                 [Change("iterations", changed, "30", "fewer leave more")], paste, "to paste:", "")  # fmt: skip
 
 
-def test_equal_cures_are_said_once_and_others_point_at_the_first():
+def test_equal_cures_told_once_with_references():
     """One per engine and scene; the same settings of one engine stand with the first scene that has them."""
     first, flat, space = cure_of("chipmunk", "stack"), cure_of("chipmunk", "rack"), cure_of("chipmunk", "stack", 3)
     other, pasted = cure_of("chipmunk", "pinch", changed="20"), cure_of("chipmunk", "arch", paste="iterations = 31")

@@ -38,7 +38,7 @@ def until(page, condition):
     raise AssertionError(condition)
 
 
-def test_the_page_asks_for_nothing_and_complains_about_nothing(browser, page_file):
+def test_page_without_requests_or_console_errors(browser, page_file):
     with opened(browser, page_file) as page:
         for summary in page.locator("summary").all():
             summary.evaluate("node => node.parentElement.open = true")
@@ -174,7 +174,7 @@ def test_both_layouts_show_every_engine(browser, page_file):
 
 
 @pytest.mark.parametrize("layout", ["over", "beside"])
-def test_the_replay_draws_at_every_width_and_when_nothing_of_it_is_seen(browser, page_file, layout):
+def test_replay_drawn_at_every_width_and_while_hidden(browser, page_file, layout):
     with opened(browser, page_file, "#replay") as page:
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
         page.select_option("#replay-layout", layout)

@@ -34,7 +34,7 @@ def told(engine, **changed):
     return plain | changed
 
 
-def test_the_cheapest_cell_names_one_its_cost_and_who_is_not_told_apart():
+def test_cheapest_cell_with_cost_and_ties():
     cell = cost._cheapest_cell([told("chipmunk"), told("bullet"), told("mujoco", profile="default")])
     assert (cell.text, cell.best, cell.ties) == ("chipmunk/tuned", True, ("bullet/tuned", "mujoco/default"))
     assert cell.detail == "2 ms, dt 1/240" and "crosscheck run impact" in cell.title
@@ -92,13 +92,13 @@ def test_a_logarithmic_scale_has_room_at_both_ends_and_ticks_inside(values):
     assert ticks and all(low <= tick <= high for tick in ticks)
 
 
-def test_scenes_are_named_while_a_sentence_can_hold_them():
+def test_scenes_named_up_to_the_length_of_a_sentence():
     few, many = [f"s{k}" for k in range(NAMED)], [f"s{k}" for k in range(NAMED + 1)]
     assert all(name in scenes_text(few, 51) for name in few) and "of 51" not in scenes_text(few, 51)
     assert scenes_text(many, 51) == f"{NAMED + 1} of 51 scenes"
 
 
-def test_the_farthest_of_a_scene_stands_first_under_its_own_heading():
+def test_farthest_value_of_a_scene_first():
     found = [
         Spread("a", 2, "near", "p", 2.0, "ball", 1e-6, True),
         Spread("a", 2, "far", "p", 2.0, "box", 0.5, True),

@@ -38,7 +38,7 @@ def asked_by(command):
         "'{}/a b.toml' --engine mujoco --dim 2",
     ],
 )
-def test_a_page_says_how_all_of_its_own_run_is_asked_again_and_no_more(line, tmp_path):
+def test_command_that_repeats_the_run_of_a_page(line, tmp_path):
     """It named scenes and suite alone: of a run of one profile at one step the command made another run."""
     (tmp_path / "a b.toml").write_text(
         'name = "b"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'

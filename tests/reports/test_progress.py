@@ -99,7 +99,7 @@ def test_a_run_with_missing_cases_is_not_finished(planned):
     assert asked == SLOTS[3:] and again.id == run.id and again.finished
 
 
-def test_ctrl_c_says_that_nothing_is_lost_and_loses_nothing(planned):
+def test_ctrl_c_during_a_run_loses_nothing(planned):
     def cells(todo, leave):
         yield answer(todo[0])
         raise KeyboardInterrupt

@@ -78,7 +78,7 @@ def test_a_reason_is_proven_on_its_engine(engine, reason):
     assert all(cell in in_vain for cell in cells)
 
 
-def test_a_reason_that_is_refuted_is_said_and_has_a_status(monkeypatch):
+def test_refuted_reason_with_its_status(monkeypatch):
     (experiment, *_) = experiments_on("chipmunk")
     slot = Slot(experiment.scene, tuple(dict(experiment.params).items()), 2, "chipmunk", experiment.profile, 1 / 240)
     check = Check(experiment.metric, "m", 0.0, 1e-3, "because", "a law")
@@ -108,7 +108,7 @@ def test_a_ratio_is_told_without_its_unit_of_one():
 
 
 @pytest.mark.parametrize(("option", "name"), [("--engine", "mujoco"), ("--scene", "slide"), ("--profile", "soft")])
-def test_who_is_not_in_the_run_is_said_and_not_that_nothing_fails(page_folder, option, name):
+def test_engine_absent_from_the_run_told(page_folder, option, name):
     result = run("--out", str(page_folder), option, name)
     assert result.exit_code == 2 and result.stdout == ""
     (line,) = result.stderr.strip().splitlines()

@@ -66,14 +66,14 @@ def counts(output):
     return {word: int(number) for number, word in re.findall(r"(\d+) (passed|failed|xfailed|skipped|error)", line)}
 
 
-def test_without_the_option_nothing_is_added_or_loaded(repository):
+def test_pytest_without_the_option_unchanged(repository):
     assert counts(repository()) == {"passed": 1}
     code = "import contact_crosscheck, sys; print([m for m in ('numpy', 'reports', 'adapters') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]"
 
 
-def test_a_sound_engine_passes_and_what_it_cannot_be_asked_is_skipped(repository):
+def test_sound_engine_passed_and_unsupported_checks_skipped(repository):
     output = repository(options=ASK)
     found = counts(output)
     assert found["passed"] > 20 and found["skipped"] >= 5 and "failed" not in found
@@ -88,13 +88,13 @@ def test_known_finding_as_xfail_and_new_one_as_failure(repository):
 
 
 @pytest.mark.long
-def test_a_finding_of_this_release_that_passes_fails(repository):
+def test_finding_of_this_release_that_passes_as_a_failure(repository):
     output = repository(listed=SLOW, releases="<=1.0", options=ASK, status=1)
     assert counts(output)["failed"] == 3 and "passes, but on record with 0.5" in output
 
 
 @pytest.mark.long
-def test_a_finding_of_other_releases_that_passes_is_mended(repository):
+def test_finding_of_other_releases_that_passes_as_mended(repository):
     output = repository(listed=SLOW, releases="<1.0", options=ASK)
     assert "failed" not in counts(output)
     assert "crosscheck: fixed" in output and "rebound_ratio" in output.partition("crosscheck: fixed")[2]

@@ -43,7 +43,7 @@ def test_the_readme_is_short_and_counts_the_scenes_that_there_are():
     assert set(map(int, re.findall(r"(\d+) scenes", README))) == {len(CATALOGUE)}
 
 
-def test_the_answer_that_the_readme_shows_is_what_a_run_says(tmp_path):
+def test_answer_in_the_readme_equal_to_a_run(tmp_path):
     """How wrong MuJoCo's rebound is and what cures it, in the words of the terminal."""
     pytest.importorskip("mujoco")
     shown = re.search(r"^    mujoco/default bounce: .*?(?=\n\n)", README, re.M | re.S)[0]

@@ -106,7 +106,7 @@ def test_moved_starts_only_for_changed_values(monkeypatch, tmp_path):
     assert [each.version for each in asked.floors[0]] == ["1.0", "1.1", "2.0"]
 
 
-def test_what_is_interrupted_goes_on_with_the_same_command(monkeypatch, tmp_path):
+def test_interrupted_releases_resumed_by_the_same_command(monkeypatch, tmp_path):
     def ratio(version, slot):
         raise KeyboardInterrupt
 
@@ -129,7 +129,7 @@ def test_what_is_interrupted_goes_on_with_the_same_command(monkeypatch, tmp_path
          "check: impact has no check 'rebound_ratio[1]'"),
     ],
 )  # fmt: skip
-def test_a_wrong_call_is_one_line_before_anything_is_asked(monkeypatch, tmp_path, words, said):
+def test_wrong_call_refused_before_a_release_is_asked(monkeypatch, tmp_path, words, said):
     asked = Asked(monkeypatch, lambda version, slot: 0.5)
     done = CliRunner().invoke(main, [*words, "--out", str(tmp_path)])
     assert (done.exit_code, asked.driven) == (2, [])

@@ -34,7 +34,7 @@ def stored(tmp_path):
     store.close()
 
 
-def test_a_run_that_has_been_judged_is_not_judged_again(stored, monkeypatch):
+def test_judged_run_not_judged_again(stored, monkeypatch):
     store, run, seen = stored
     rows = rows_of(run.id, seen)
     failing = sum(row.physics == "fail" for row in rows)
@@ -105,7 +105,7 @@ def test_a_row_is_judged_by_laws_and_lists_of_known_failures_too(tmp_path, monke
     assert len(set(codes)) == len(codes)
 
 
-def test_a_failure_that_a_moved_start_mends_is_not_sure():
+def test_failure_mended_by_a_moved_start_not_sure():
     moved = cell(replace(SLOT, ulp=3), ratio=0.5)
     alone, both = (summarise(cells).cells[PANEL][SLOT.key()] for cells in ([cell()], [cell(), moved]))
     assert both[:3] == alone[:3] and both[3] < alone[3]
@@ -121,7 +121,7 @@ def test_cells_at_other_steps_or_settings_are_not_shown(other):
     assert list(summarise([cell(replace(SLOT, **other)), cell()]).cells) == [PANEL]
 
 
-def test_what_crashed_has_no_error_and_counts_no_check():
+def test_crashed_cell_without_error_or_check():
     lost = Observation(SLOT, "c", CATALOGUE["impact"].version, "7.2", Outcome.CRASHED, "signal 11")
     assert summarise([lost]) == Summary({}, {"chipmunk": "7.2"})
     assert brief._error(cell(outcome=Outcome.DIVERGED)) == pytest.approx(0.25)
@@ -148,7 +148,7 @@ def test_summary_of_other_code_or_damaged_replaced(tmp_path, monkeypatch):
     kept.close()
 
 
-def test_where_nothing_can_be_kept_nothing_is_and_nothing_ends(tmp_path):
+def test_no_kept_summary_in_a_read_only_folder(tmp_path):
     kept = Kept(tmp_path / "nowhere")
     kept.put("run", Summary({}, {}))
     assert kept.get("run") is None

@@ -161,7 +161,7 @@ def test_a_script_ends_in_the_bits_of_its_cell(engine, package, dimension, scene
 
 
 @pytest.mark.parametrize(("engine", "scene", "params", "dimension", "profile"), cases(APART))
-def test_so_does_one_for_an_engine_that_is_set_apart(engine, scene, params, dimension, profile, tmp_path):
+def test_script_of_an_engine_set_apart(engine, scene, params, dimension, profile, tmp_path):
     installed(engine)
     assert_same_bits(slot_of(engine, scene, params, profile, dimension), tmp_path)
 
@@ -245,7 +245,7 @@ def test_no_setting_is_left_out(engine):
 
 @pytest.mark.optional("drake")
 @pytest.mark.parametrize("name", ["rollers", "soft_surfaces"])
-def test_so_does_one_of_a_model_with_its_own_surfaces(name, tmp_path):
+def test_script_of_a_model_with_its_own_surfaces(name, tmp_path):
     assert_same_bits(slot_of("drake", pinned(str(MODELS / f"{name}.sdf")), {}, "model", 3), tmp_path)
 
 
@@ -256,14 +256,14 @@ def test_so_does_one_whose_bodies_come_from_files(tmp_path):
 
 
 @pytest.mark.parametrize(("scene", "params"), [("oblique", {"e": 0.5}), ("pinch", {}), ("tumble", {})])
-def test_so_does_one_that_carries_the_loop_of_a_matched_profile(scene, params, tmp_path):
+def test_script_with_the_loop_of_a_matched_profile(scene, params, tmp_path):
     pytest.importorskip("mujoco")
     assert_same_bits(slot_of("mujoco", scene, params, "matched", 3), tmp_path)
 
 
 @pytest.mark.parametrize("engine", cases((name,) for name in (*USUAL, *sorted(OPTIONAL))))
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
-def test_so_does_one_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
+def test_script_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
     found = installed(engine)
     if values["d"] == 3 and found.facts.dimensions == {2}:
         pytest.skip(f"{engine} is planar: it has no spatial script")
@@ -379,7 +379,7 @@ def test_so_does_one_of_other_shapes(engine, values, tmp_path):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["default", "tuned"])
-def test_mjcf_starts_from_its_keyframe_and_ends_in_the_bits_of_its_cell(dimension, profile):
+def test_mjcf_from_its_keyframe_to_the_bits_of_its_cell(dimension, profile):
     mujoco = pytest.importorskip("mujoco")
     slot = slot_of("mujoco", "masse", {}, profile, dimension) if dimension == 3 else slot_of(
         "mujoco", "off_centre", {}, profile, 2
@@ -455,7 +455,7 @@ def test_script_head_with_scene_file_path_and_judge(tmp_path):
         assert word == "run" or CliRunner().invoke(main, words[1:]).exit_code == 0
 
 
-def test_hostile_names_end_neither_comment_nor_string(tmp_path):
+def test_hostile_names_within_comments_and_strings(tmp_path):
     """A body's name is data in a script and in a model, whatever it holds."""
     pytest.importorskip("pymunk")
     path = tmp_path / "hostile.toml"
@@ -494,7 +494,7 @@ def test_every_format_of_ours_is_tried_here():
     assert forms == {(name, "python") for name in tried} | {("mujoco", "mjcf")}
 
 
-def test_what_is_posed_for_an_engine_is_what_is_written():
+def test_transformed_scene_as_written():
     pytest.importorskip("pybullet")
     slot = slot_of("bullet", "impact", {}, "default", 2)
     engine, prepared = registry.load("bullet"), prepare(slot)

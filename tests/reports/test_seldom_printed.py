@@ -58,7 +58,7 @@ BLIND = [
 ]
 
 
-def test_what_checks_see_and_are_blind_to_stands_in_two_tables():
+def test_two_tables_of_seen_faults_and_blind_spots():
     entries = [{"name": "stack/creep", "e": "", "mu": "1 %", "g": "0.1 %"}, {"name": "receipt damping", "e": ""}]
     said = printed(lambda console: tables.sensitivity(entries, {"spin": ["inertia", "spin"]}, BLIND, console))
     assert [line.split("   ")[0] for line in said[2:4]] == ["stack/creep", "receipt damping"]
@@ -270,7 +270,7 @@ def test_one_transformed_cell_per_profile():
     assert posing.cells_of(slots, False) == [plain, replace(plain, profile="default")]
 
 
-def test_what_changed_an_answer_is_said_and_as_data_has_its_cell(monkeypatch, capsys):
+def test_cause_of_a_changed_answer_as_text_and_data(monkeypatch, capsys):
     slot = Slot("stack", (("n", 2.0),), 2, "chipmunk", "tuned", 1 / 240)
     changes = [invariance.Change("again"), invariance.Change("mirrored", "drift", 1e-3, 1e-6)]
     monkeypatch.setattr(posing, "compare", lambda slot: changes)

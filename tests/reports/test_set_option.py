@@ -85,7 +85,7 @@ def test_lines_per_setting_under_a_long_scene_name():
         assert "".join(text.split("mujoco")[1].split()).startswith(name.partition("+")[0])
 
 
-def test_findings_and_explain_find_it_by_name_and_by_set(ran):
+def test_row_with_own_settings_found_by_name_and_by_set(ran):
     out, rows = ran
     (failing, *_) = [row for row in rows if row["physics"] == "fail"]
     found = json.loads(call("findings", "--profile", PROFILE, "--json", "--out", out, status=0).output)

@@ -36,7 +36,7 @@ def test_a_line_is_never_broken_nor_read_as_markup(console):
     assert said(console) == "[red] " + "x" * 60 + "\n"
 
 
-def test_a_stage_says_what_it_took_by_a_clock_that_nobody_sets_back(console, monkeypatch):
+def test_stage_duration_by_a_monotonic_clock(console, monkeypatch):
     ticks = iter([100.0, 285.0])
     monkeypatch.setattr(stages.time, "monotonic", lambda: next(ticks))
     monkeypatch.setattr(stages.time, "time", lambda: 0.0)
@@ -67,7 +67,7 @@ def test_compilation_announced_with_time_and_parts(console, monkeypatch, beside,
     ]  # fmt: skip
 
 
-def test_where_nothing_is_left_to_compile_nothing_is_said(console):
+def test_no_message_without_kernels_to_compile(console):
     stages.compiling([], console)
     assert said(console) == ""
 

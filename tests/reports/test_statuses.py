@@ -53,7 +53,7 @@ def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
     "command",
     [name for name in main.list_commands(None) if "jobs" in {p.name for p in main.get_command(None, name).params}],
 )
-def test_more_workers_than_any_machine_has_cores_are_a_wrong_call(command):
+def test_more_workers_than_cores_refused(command):
     """A number that was meant for another option started processes until the machine had none left."""
     (jobs,) = (each for each in main.get_command(None, command).params if each.name == "jobs")
     assert jobs.type.max == selection.MOST_JOBS <= 4096
@@ -88,7 +88,7 @@ def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "field"), [(["merge", ""], "sources"), (["export", "--parquet", ""], "parquet")])
-def test_a_folder_without_a_name_is_none_to_merge_or_to_write_to(tmp_path, arguments, field):
+def test_folder_without_a_name_refused_for_merge_and_output(tmp_path, arguments, field):
     result = call(*arguments, "--out", tmp_path / "out")
     assert result.exit_code == statuses.WRONG_CALL
     assert one_line(result) == f"crosscheck: {field}: is empty; `.` is the folder that you are in"
@@ -111,13 +111,13 @@ def test_repeated_parameter_refused_with_the_list_form(tmp_path):
     assert one_line(result) == "crosscheck: param: e is given twice; crosscheck sweep --grid runs several values"
 
 
-def test_results_that_are_not_there_are_a_wrong_call(tmp_path):
+def test_missing_results_as_a_wrong_call(tmp_path):
     result = call("report", "--out", tmp_path)
     assert result.exit_code == statuses.WRONG_CALL
     assert "there are no results" in (line := one_line(result)) and "crosscheck run makes them" in line
 
 
-def test_an_engine_that_is_not_there_is_called_so_by_tune():
+def test_missing_engine_named_by_tune():
     result = call("tune", "nosuch")
     assert result.exit_code == statuses.WRONG_CALL
     assert "there is no engine called 'nosuch'" in one_line(result)
@@ -132,7 +132,7 @@ def test_a_store_of_a_later_version_is_said_in_one_line(tmp_path, command):
     assert f"version {VERSION + 1}" in one_line(result)
 
 
-def test_a_named_engine_that_is_missing_is_said_and_has_a_status(plugins, tmp_path):
+def test_status_of_a_named_missing_engine(plugins, tmp_path):
     result = call("run", "impact", "--param", "v=6", "--dim", 2, "--engine", "broken", "--out", tmp_path)
     assert result.exit_code == statuses.INCOMPLETE, result.output
     assert "broken did not run" in result.stderr
@@ -152,7 +152,7 @@ def test_a_full_stdout_is_said_in_one_line(arguments):
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no broken pipes on Windows")
 @pytest.mark.few(1)
 @pytest.mark.parametrize("arguments", [["list", "scenes"], ["describe", "bounce", "--json"], ["describe", "nothing"]])
-def test_a_reader_that_goes_away_does_not_change_the_status(arguments):
+def test_status_after_a_closed_pipe(arguments):
     """``crosscheck show --all | head``: 3 would say that results are lost, 0 after an alarm that there is none."""
     read, write = os.pipe()
     os.close(read)  # nobody reads any more
@@ -234,7 +234,7 @@ sys.meta_path.insert(0, Hidden())
         (["profile", "impact"], statuses.INCOMPLETE, "numba"),
     ],
 )
-def test_what_is_not_installed_is_one_line_and_a_status(tmp_path, arguments, status, said):
+def test_missing_package_in_one_line_with_a_status(tmp_path, arguments, status, said):
     (tmp_path / "sitecustomize.py").write_text(HIDING.format(names=("numba", "pymunk")))
     out = ["--out", str(tmp_path / "out")] if arguments[0] in ("bench", "run") else []
     # What CI demands of its own engines must not be demanded here, where one is hidden.

@@ -191,7 +191,7 @@ def test_a_profile_that_ran_at_another_step_cures_nothing(dt):
     assert answers(rows)[0].cure == "profile tuned fixes it"
 
 
-def test_a_profile_that_ran_another_case_is_not_nearer():
+def test_profile_that_ran_another_case_not_compared():
     rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
     rows += [row("incline", 2, "bullet", "tuned", "pass", 0.0, 0.0, ratio=0.5)]
     (answer,) = answers(rows)
@@ -207,7 +207,7 @@ def test_what_is_nearer_is_no_cure():
     assert answer.cure.startswith("profile tuned is nearer (1 of 2 fail): creeps at 0.01")
 
 
-def test_a_time_that_the_end_cut_off_is_never_shown_as_a_time():
+def test_time_cut_off_by_the_end_not_shown():
     cut = row("stack", 2, "bullet", "default", "known", 5.0, 0.0, n=10) | {
         "unit": "s", "reason": "never settled: still moving at the end of the run"}  # fmt: skip
     assert measured(cut) == "never settled"
@@ -221,7 +221,7 @@ def test_a_ratio_has_no_unit_and_everything_else_has_one():
     assert quantity(None, "m") == "-"
 
 
-def test_who_passes_is_named_by_cost_and_by_the_dimensions_it_knows():
+def test_passing_engines_by_cost_and_dimension():
     rows = [row("stack", d, e, "tuned") for d, e in ((2, "mujoco"), (3, "mujoco"), (2, "chipmunk"))]
     rows += [row("stack", 2, "bullet", "tuned", "known", 0.1)]
     costs = {("stack", 2, "mujoco", "tuned"): 2e-3, ("stack", 2, "chipmunk", "tuned"): 1e-3}
@@ -231,7 +231,7 @@ def test_who_passes_is_named_by_cost_and_by_the_dimensions_it_knows():
     assert choice.line == "none passes every check; nearest: bullet/tuned (1 of 1 fail)"
 
 
-def test_later_apexes_that_fail_alone_are_told_as_they_are():
+def test_failures_of_later_apexes_alone():
     late = row("bounce", 2, "bullet", "one", "known", 0.5, 0.4) | {"metric": "apex[2]"}
     (answer,) = answers([row("bounce", 2, "bullet", "one"), late])
     assert "0.5" in answer.wrong and "0.4" in answer.wrong
@@ -247,7 +247,7 @@ def test_alarms_stand_before_the_answers():
 REFUSED = {"outcome": "unsupported", "reason": "chipmunk is planar", "value": None, "physics": None}
 
 
-def test_a_run_in_which_nothing_could_be_asked_says_so_and_why():
+def test_run_without_supported_cells_with_its_reasons():
     rows = [row("impact", 3, "chipmunk", profile, "unsupported") | REFUSED for profile in ("default", "tuned")]
     text = " ".join(" ".join(shown(rows, 100)).split())
     assert "UNSUPPORTED: chipmunk impact: chipmunk is planar" in text
@@ -619,7 +619,7 @@ def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
         (-1e-6, "moves on with 1.0e-6 of its speed; true: rebounds at 1"),
     ],
 )
-def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, words):
+def test_values_below_a_millionth_of_the_truth_told_as_zero(value, words):
     (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
     assert answer.wrong == f"{words} (e=1 v=1)"
 
@@ -635,7 +635,7 @@ def test_what_is_less_than_a_millionth_of_the_truth_is_told_as_nothing(value, wo
          "comes back at 4.0e-9 less than -0.5 of its speed (below 0: it has passed)"),
     ],
 )  # fmt: skip
-def test_of_numbers_that_are_alike_at_a_glance_the_difference_is_told(scene, metric, value, truth, words):
+def test_difference_told_for_nearly_equal_numbers(scene, metric, value, truth, words):
     known = row("impact", 2, "bullet", "default", "known", value, truth, e=1.0, v=1.0)
     (answer,) = answers([known | {"scene": scene, "metric": metric}])
     assert answer.wrong == f"{words} (e=1 v=1)"
@@ -650,7 +650,7 @@ def test_final_commands_find_the_shown_results(tmp_path):
         assert said or not any("--out" in line for line in lines)
 
 
-def test_what_is_shown_says_which_run_it_is_and_names_a_larger_one(tmp_path):
+def test_run_named_in_the_output_beside_a_larger_one(tmp_path):
     """A small run after a whole one is the latest, and is not taken for the whole one."""
     pytest.importorskip("pymunk")
     cells = [Slot("impact", (("e", e),), 2, "chipmunk", "tuned", 1 / 240) for e in (0.0, 0.5)]

@@ -134,7 +134,7 @@ def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
     results.close()
 
 
-def test_a_fail_is_what_a_study_looks_for_and_a_crash_is_an_alarm(tmp_path, plugins):
+def test_failure_of_a_study_without_alarm_and_crash_with_one(tmp_path, plugins):
     pytest.importorskip("pybullet")
     words = ("sweep", "impact", "--list", "v=3", "--dim", "2", "--jobs", 1)
     call(*words, "--engine", "bullet", "--profile", "default", "--out", tmp_path / "a")

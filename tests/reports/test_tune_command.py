@@ -49,7 +49,7 @@ def test_tuning_of_all_groups_in_all_dimensions(tune):
     assert asked == [("bullet", "one", "slide", 1, (3,))]
 
 
-def test_where_nothing_is_better_that_is_said_and_the_status_is_0(tune):
+def test_no_better_tuning_with_status_0(tune):
     done, _ = tune("chipmunk", "--group", "slide")
     said = lines(done.stderr)
     assert done.exit_code == 0 and done.stdout == ""

@@ -60,7 +60,7 @@ def junit(row):
 
 
 @pytest.mark.parametrize("name", ALARMING)
-def test_what_makes_the_command_fail_is_a_failure_everywhere(name):
+def test_failure_everywhere_for_what_fails_the_command(name):
     row = ALARMING[name]
     assert row.alarming
     assert junit(row)
@@ -69,7 +69,7 @@ def test_what_makes_the_command_fail_is_a_failure_everywhere(name):
 
 
 @pytest.mark.parametrize("name", QUIET)
-def test_what_does_not_make_the_command_fail_is_a_failure_nowhere(name):
+def test_failure_nowhere_for_what_does_not_fail_the_command(name):
     row = QUIET[name]
     assert not row.alarming
     assert not junit(row)
@@ -113,7 +113,7 @@ def field_of(*rows):
     return field
 
 
-def test_a_field_counts_what_does_not_pass_of_what_is_judged():
+def test_failed_share_of_judged_rows_in_a_field():
     known = QUIET["known"]
     assert field_of(PASS, PASS, PASS).text == "3 pass"
     assert field_of(PASS, known, known).text == "2 of 3 fail"

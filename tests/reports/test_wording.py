@@ -54,7 +54,7 @@ def test_digits_are_four_unless_somebody_asks():
      (-1.751000003, -1.751, "rad/s", "fail", "-1.751 - 3.0e-9 rad/s"), (1.752, 1.751, "rad/s", "fail", "1.752 rad/s"),
      (1.751000003, 1.751, "rad/s", "pass", "1.751 rad/s"), (1.751, 1.751, "rad/s", "fail", "1.751 rad/s")],
 )  # fmt: skip
-def test_a_failing_value_that_prints_as_its_truth_is_told_by_its_error(value, truth, unit, physics, said):
+def test_failing_value_printed_like_its_truth_with_its_error(value, truth, unit, physics, said):
     row = {"value": value, "truth": truth, "error": value - truth, "unit": unit, "physics": physics, "reason": ""}
     assert measured(row) == said
 
@@ -95,7 +95,7 @@ def test_markdown_of_a_person_s_name():
 
 
 @pytest.mark.parametrize("begin", ["=", "+", "-", "@", "\t", "\r"])
-def test_what_a_spreadsheet_takes_for_a_formula_is_quoted(begin):
+def test_spreadsheet_formulas_quoted(begin):
     assert cell(f"{begin}cmd") == f"'{begin}cmd"
 
 

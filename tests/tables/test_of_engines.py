@@ -8,5 +8,5 @@ INSTALLED = of_installed()
 
 
 @pytest.mark.parametrize("name", INSTALLED)
-def test_what_profiles_set_and_declare_is_as_it_was_kept(name):
+def test_profile_settings_and_declarations_as_kept(name):
     check(name, INSTALLED[name])

@@ -10,5 +10,5 @@ OWN = [name for name in LAWS if name.startswith(tuple(f"laws/{engine}-" for engi
 
 @pytest.mark.few(20)
 @pytest.mark.parametrize("name", OWN)
-def test_what_a_law_of_another_engine_predicts_is_as_it_was_kept(name):
+def test_predictions_of_outside_laws_as_kept(name):
     check(name, LAWS[name], share=1e-7, nothing=1e-10)

@@ -21,7 +21,7 @@ PARTS = ("place", "turn", "speed", "spin", "impulse")
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_what_is_measured_of_wrong_motions_is_as_it_was_kept(name):
+def test_measures_of_wrong_motions_as_kept(name):
     check(name, MOTIONS[name], share=1e-7, nothing=1e-9)
 
 

@@ -39,7 +39,7 @@ def test_what_differs_is_told_with_both_values():
     assert differences(CELLS, CELLS) == []
 
 
-def test_a_table_that_is_not_as_it_was_kept_fails_and_names_the_command():
+def test_changed_table_fails_with_its_command():
     name = "scenes/hilltop"
     kept = from_text((KEPT / f"{name}.txt").read_text(encoding="utf-8"))
     check(name, lambda: kept)
@@ -54,7 +54,7 @@ def test_two_lines_of_one_name_are_an_error():
         section(**{"a": {"b": 1}, "a.b": 2})
 
 
-def test_every_table_that_is_kept_is_made_by_something():
+def test_every_kept_table_has_a_generator():
     kept = {str(path.relative_to(KEPT).with_suffix("")) for path in KEPT.rglob("*.txt")}
     made = set(tables()) | set(SCREENS)
     assert made <= kept
@@ -62,7 +62,7 @@ def test_every_table_that_is_kept_is_made_by_something():
     assert {name.partition("/")[0] for name in kept - made} <= {"settings"}
 
 
-def test_what_the_first_spatial_cell_changes_is_expected_of_later_ones():
+def test_changes_of_the_first_spatial_cell_expected_of_later_ones():
     cells = {
         "2-D": {"gravity": "(0, -1)", "place": "(0, 0.5)", "turn": "0"},
         "3-D": {"gravity": "(0, 0, -1)", "place": "(0, 0, 0.5)", "axes": "4"},
@@ -83,7 +83,7 @@ def test_screen_agreement_to_last_digits_and_other_lines():
     assert screen_differences("row a\nend\n", kept) == ["-error 1.00000001e-3 m"]
 
 
-def test_a_band_is_kept_in_its_size_however_narrow_it_is():
+def test_width_of_a_narrow_band_kept():
     def same(told, kept="0.5 +- 1e-13"):
         return agree(told, kept, share=1e-7, nothing=1e-10)
 

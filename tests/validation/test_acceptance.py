@@ -65,7 +65,7 @@ def test_drifted_row_keeps_its_entry_until_accepted():
     assert accepted(proposal, ["creeps"])[KEY].value == 0.5
 
 
-def test_a_row_within_its_band_stays_as_it_is_listed_and_asks_nothing():
+def test_row_within_its_band_kept_without_a_question():
     old = Finding(FAMILY, 0.5009, 1e-3)
     proposal = propose(rows(), "nameless", listed(FAMILY, creep=old))
     assert not proposal.changes[0].asks
@@ -83,14 +83,14 @@ def test_passing_row_dropped_only_after_its_family_is_accepted():
 @pytest.mark.parametrize(
     "outcome", ["unsupported", "invalid", "refused", "crashed", "timed_out", "not_installed", "missing"]
 )
-def test_entries_of_cells_without_an_answer_are_never_dropped(outcome):
+def test_entries_of_unanswered_cells_kept(outcome):
     old = Finding(FAMILY, 0.5, 1e-3)
     proposal = propose(rows(outcome=Outcome(outcome)), "nameless", listed(FAMILY, creep=old))
     assert accepted(proposal, ["creeps"]) == {KEY: old}
     assert bool(proposal.refused) == (outcome in ("invalid", "refused", "unsupported"))
 
 
-def test_entries_of_cells_that_the_run_does_not_have_stay():
+def test_entries_of_cells_outside_the_run_kept():
     old = Finding(FAMILY, 0.5, 1e-3)
     other = rows(replace(SLOT, dimension=3))
     proposal = propose(other, "nameless", listed(FAMILY, creep=old))
@@ -107,7 +107,7 @@ def test_entries_of_another_cell_kept_without_their_check(part):
     assert key in proposal.kept and not any(change.gone for change in proposal.changes)
 
 
-def test_an_entry_of_a_check_that_its_cell_no_longer_states_goes():
+def test_entry_of_a_check_no_longer_stated_dropped():
     key = row_key(SLOT, "slides")
     family = replace(FAMILY, metrics=("creep", "slides"))
     findings = Findings("nameless", {"creeps": family}, (), {key: Finding(family, 1.0, 0.1)})
@@ -115,7 +115,7 @@ def test_an_entry_of_a_check_that_its_cell_no_longer_states_goes():
     assert list(proposal.changes[0].gone) == [key]
 
 
-def test_a_row_without_a_value_is_listed_as_having_none():
+def test_row_without_a_value_listed_so():
     proposal = propose(rows(creep=None, moved=0.0), "nameless", listed(FAMILY))
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, None)}
 
@@ -171,7 +171,7 @@ def refusals(proposal):
     return {why for _, why in proposal.refused}
 
 
-def test_a_row_that_a_law_covers_and_misses_is_refused(monkeypatch):
+def test_row_contradicting_its_law_refused(monkeypatch):
     law = Deviation(
         "nameless", ("default",), "incline", "creep", lambda scene, dt, measure: (0.4, 0.01), "by design", "manual"
     )
@@ -201,7 +201,7 @@ def test_law_at_requested_iterations_only_if_it_follows_them(monkeypatch, follow
     assert explained(10, 0.5) == follows and not explained(10, 0.4)
 
 
-def test_rows_whose_receipts_do_not_hold_are_refused():
+def test_rows_with_failed_receipts_refused():
     (why,) = refusals(propose(rows(outcome=Outcome.INVALID), "nameless", listed(FAMILY)))
     assert why.startswith("invalid: ")
 
@@ -215,7 +215,7 @@ def test_failures_of_an_engine_that_realises_another_restitution():
     assert {why for _, why in found} == {"its property checks do not hold"}
 
 
-def test_rows_of_the_profile_that_promises_a_solution_are_refused():
+def test_rows_of_the_solver_profile_refused():
     slot = replace(SLOT, engine="reference", profile="reference")
     family = replace(FAMILY, profiles=("reference",))
     findings = Findings("reference", {"creeps": family}, (), {})
@@ -223,7 +223,7 @@ def test_rows_of_the_profile_that_promises_a_solution_are_refused():
     assert "fixed, not listed" in why
 
 
-def test_a_row_of_another_release_than_its_family_holds_for_is_refused():
+def test_row_of_a_release_outside_its_family_refused():
     (why,) = refusals(propose(rows(version="2.0"), "nameless", listed(FAMILY)))
     assert "holds for >=1,<2, not for 2.0" in why
 
@@ -276,7 +276,7 @@ def test_student_is_what_it_is():
 
 
 @pytest.mark.parametrize("spread", [0.05, 0.4, 1.0])
-def test_one_more_draw_leaves_a_band_as_rarely_as_it_says(spread):
+def test_coverage_of_a_band_for_one_more_start(spread):
     """Of 4000 rows whose values are multiplied at random, 4 come nearer, on average; no more go away than of four."""
     dice = np.random.default_rng(2026)
     draws = np.exp(spread * dice.normal(size=(4000, 18)))
@@ -295,7 +295,7 @@ def test_band_of_starts_on_both_sides_of_the_truth():
     assert (low, high) == pytest.approx((np.mean(draws) - half, np.mean(draws) + half))
 
 
-def test_one_start_that_differs_is_held_and_the_least_of_bands_is_kept():
+def test_single_deviating_start_and_least_band():
     assert wide((3.0, *(1.0,) * 16))[1][3][1] > 3.0
     ends = wide((3.0, *(3.0,) * 16))[1][3]
     assert ends == pytest.approx((3.0 - 1e-3, 3.0 + 1e-3))
@@ -318,7 +318,7 @@ def test_what_a_band_hides(ends, physics, hidden):
     assert acceptance.hides(replace(row, value=-1.0), (-ends[1], -ends[0])) is hidden
 
 
-def test_a_band_that_reaches_the_tolerance_hides_that_a_row_passes():
+def test_band_that_reaches_the_tolerance_hides_a_pass():
     row = row_of(truth=0.0, tolerance=0.1, value=0.11, physics="fail")
     assert acceptance.hides(row, (0.1, 0.12)) and not acceptance.hides(row, (0.101, 0.12))
     assert not acceptance.hides(replace(row, value=0.09, physics="pass"), (0.08, 0.1))
@@ -366,7 +366,7 @@ def test_band_that_hides_replaced_when_its_family_is_accepted():
     assert not propose(judged, "nameless", listed(FAMILY, creep=found), draws=draws).changes[0].asks
 
 
-def test_cells_that_fail_or_nearly_fail_are_moved_and_no_others():
+def test_moved_starts_of_failing_and_nearly_failing_cells_only():
     cells = [observed(SLOT, creep=0.5), observed(replace(SLOT, dimension=3), creep=0.0)]
     moved = slots_to_move(rows_of("run", cells), "nameless")
     assert moved == [replace(SLOT, ulp=n) for n in MOVES]
@@ -494,7 +494,7 @@ NONE, EXPLODED = Finding(FAMILY, None), Finding(FAMILY, None, diverged=True)
         (Finding(FAMILY, 0.5, 1e-3), {"outcome": Outcome.DIVERGED, "creep": None, "moved": 0.0}),
     ],
 )
-def test_a_value_that_comes_or_goes_or_explodes_has_drifted(old, found):
+def test_value_that_appears_vanishes_or_explodes_has_drifted(old, found):
     (change,) = propose(rows(**found), "nameless", listed(FAMILY, creep=old)).changes
     ((before, now),) = change.drifted.values()
     assert before == old and (now.value is None, now.diverged) != (old.value is None, old.diverged)
@@ -502,7 +502,7 @@ def test_a_value_that_comes_or_goes_or_explodes_has_drifted(old, found):
 
 
 @pytest.mark.parametrize(("old", "found"), [(NONE, {"creep": None}), (EXPLODED, {"outcome": Outcome.DIVERGED})])
-def test_what_still_has_no_value_or_still_explodes_is_the_same(old, found):
+def test_missing_and_exploded_values_that_stay_unchanged(old, found):
     found = {"creep": None, "moved": 0.0, **found}
     (change,) = propose(rows(**found), "nameless", listed(FAMILY, creep=old)).changes
     assert change.same == {KEY: old} and not change.asks
@@ -515,7 +515,7 @@ def test_a_row_at_the_edge_of_its_band_is_the_same(value, same):
     assert (change.same == {KEY: old}, KEY in change.drifted) == (same, not same)
 
 
-def test_rows_that_say_nothing_do_not_hide_those_that_come_after_them():
+def test_rows_after_rows_without_a_message():
     silent = rows(replace(SLOT, dimension=3), outcome=Outcome.CRASHED)
     foreign = rows(replace(SLOT, engine="another"))
     outside = rows(replace(SLOT, dt=1 / 1000))
@@ -558,7 +558,7 @@ def row_of(**fields):
          ("its profile is exact: a failure there must be fixed, not listed", None)),
     ],
 )  # fmt: skip
-def test_what_a_row_would_be_listed_as_or_why_it_is_refused(fields, entry):
+def test_listing_or_refusal_of_a_row(fields, entry):
     given = {"truth": 1.0, "tolerance": 0.125, "value": 1.5, "physics": "fail", "floor": 0.0}
     why, found = acceptance._entry(row_of(**{**given, **fields}))
     assert why == entry[0]
@@ -632,7 +632,7 @@ def test_band_half_width_of_four_times_the_moves_or_the_floor(draws, floor, scat
     assert acceptance._width(row, draws) == max(4.0 * scatter, 2e-6)
 
 
-def test_values_and_tolerances_of_nothing_are_nothing():
+def test_zero_values_and_tolerances():
     """A law that is exact has a tolerance of 0, and what stands still a value of 0: no band is made of either."""
     still = row_of(value=0.0, truth=1.0, tolerance=0.0, floor=0.0)
     assert acceptance._width(still, ()) == 0.0 and acceptance._ends(still, (0.0,)) == (0.0, 0.0)
@@ -648,7 +648,7 @@ def test_what_is_no_number_is_no_draw():
         assert acceptance.draws_of(seen) == {KEY: (0.5,)}
 
 
-def test_distances_are_from_the_truth_wherever_that_is():
+def test_distances_from_a_truth_of_any_value():
     near, far = acceptance.one_more(TWO_WAYS, 0.0)
     for shift in (-10.0, 10.0):
         moved = tuple(each + shift for each in TWO_WAYS)
@@ -663,7 +663,7 @@ def test_distances_are_from_the_truth_wherever_that_is():
     assert acceptance.hides(exact, (9.99, 10.01)) and not acceptance.hides(exact, (10.01, 10.02))
 
 
-def test_a_listed_value_of_nothing_has_a_band_about_nothing():
+def test_band_about_a_listed_value_of_zero():
     row = row_of(truth=0.4, tolerance=0.01, value=0.1, physics="fail")
     found = Finding(FAMILY, 0.1, ends=(0.05, 0.2))
     for band_of_it, asks in ((0.38, True), (0.2, False)):

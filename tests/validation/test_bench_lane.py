@@ -228,7 +228,7 @@ def test_the_error_of_a_fall_is_its_distance_from_the_parabola():
     assert own_error(scene, 0.5, start, fallen) == pytest.approx(0.01)
 
 
-def test_a_pile_errs_by_what_it_moves_not_by_how_its_start_was_declared():
+def test_pile_error_by_motion_and_not_by_the_declared_start():
     scene = scene_of(Slot("stack", (("n", 3.0),), 2, "reference", "classical", 1 / 240))
     start = np.array([body.pose for body in scene.bodies], float)
     start[1:, 1] -= [5e-4, 1e-3, 1.5e-3]  # overlaps that an adapter made

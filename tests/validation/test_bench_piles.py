@@ -51,7 +51,7 @@ def test_both_profiles_are_clocked_from_the_same_state(clocked, kind):
     assert all(lap.ratio == pytest.approx(3.0) for lap in found)
 
 
-def test_a_kind_that_has_used_its_time_gets_no_more_bodies(clocked):
+def test_no_larger_piles_after_the_time_limit(clocked):
     assert {lap.bodies for lap in piles.laps("discs", 80)} == {20, 40, 80}
     assert {lap.bodies for lap in piles.laps("discs", 80, patience=1e-3)} == {20}
 

@@ -48,7 +48,7 @@ def test_the_lower_envelope_is_what_nothing_beats():
                 assert ((cost == cost[k]) & (error == error[k]) & on).any()
 
 
-def test_what_has_no_error_or_no_cost_is_on_no_envelope():
+def test_no_envelope_without_error_or_cost():
     assert lower_envelope([1.0, np.nan, 2.0], [np.nan, 1.0, 3.0]).tolist() == [False, False, True]
 
 

@@ -90,7 +90,7 @@ def test_work_point_with_worst_phase_error_and_cost_per_second(store):
     assert point["rounds"] == 3
 
 
-def test_a_work_point_that_nobody_timed_has_no_rounds_and_says_so(store):
+def test_untimed_work_point_without_rounds(store):
     (point,) = work_points(store, filled(store, {("a", STEPS[0]): 0.4}, {})).to_dict("records")
     assert point["rounds"] == 0 and math.isnan(point["cost"]) and point["reason"] == "not timed"
 

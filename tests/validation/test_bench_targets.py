@@ -47,7 +47,7 @@ def test_fewest_iterations_known_when_time_ends():
     assert fewest_sweeps(lambda sweeps: {10: False, 20: False, 40: True, 30: True}.get(sweeps), 10, 640) == 30
 
 
-def test_what_is_found_reaches_an_error_that_rises_and_falls():
+def test_fewest_iterations_of_an_error_that_rises_and_falls():
     def reaches(sweeps):
         return sweeps % 16 == 0 or sweeps > 300
 
@@ -200,7 +200,7 @@ def test_marks_say_what_is_met():
     assert [row(x, 0.1, None, AT_END).mark for x in (0.1, 0.11, math.nan)] == ["floor", *["below floor"] * 2]
 
 
-def test_the_share_of_levels_counts_those_that_another_engine_reaches():
+def test_share_of_levels_that_another_engine_reaches():
     ours, theirs = registry.solver(), "chipmunk"
 
     def point(engine, profile, scene, cost, error):

@@ -108,7 +108,7 @@ OF_ONE_STEP = ("[least]", "[greatest]")
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_all_that_a_bound_allows_is_owed_to_the_step_or_to_round_off(name):
+def test_bound_terms_by_step_and_round_off_only(name):
     """Halving the step widens no bound but by round-off; of a step of 1 us a thousandth and round-off are left."""
     canonical = CATALOGUE[name]
     for dimension in canonical.dimensions:

@@ -86,13 +86,13 @@ def test_a_list_holds_for_its_release_its_profiles_and_its_cell_only(folder):
     assert standing_of(slot(iterations=7), "1.5", BROKEN) == (None, "")  # only representative cells have a list
 
 
-def test_what_holds_again_leaves_the_list_and_what_was_not_asked_stays(folder):
+def test_restored_relation_removed_and_unasked_kept(folder):
     keep(folder, (slot(), BROKEN), (slot(scene="impact"), BROKEN))
     keep(folder, (slot(), Change("renumbered", "speed", 0.0, 1e-9)))
     assert [key[1] for key in breaks_of("chipmunk").members] == ["impact"]
 
 
-def test_of_a_profile_that_promises_a_solution_nothing_is_listed(tmp_path):
+def test_nothing_listed_for_the_solver_profile(tmp_path):
     (tmp_path / "breaks.toml").write_text(FAMILY.replace('"default"', '"reference"'))
     with pytest.raises(FindingsError, match="is an exact profile"):
         read("reference", tmp_path)
@@ -130,7 +130,7 @@ def test_a_line_that_is_wrong_is_named(tmp_path, line):
         read("chipmunk", tmp_path)
 
 
-def test_where_nothing_may_change_a_change_has_a_size_still():
+def test_size_of_a_change_of_an_invariant():
     assert decades_of(Change("again", "count", 1.0, 0.0)) == pytest.approx(323.3, abs=0.1)
 
 

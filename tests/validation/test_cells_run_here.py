@@ -82,7 +82,7 @@ def test_frontier_cell_without_an_answer_and_its_reason(monkeypatch, given, outc
     ("answer", "outcome"),
     [("Timeout: 9 s", Outcome.TIMED_OUT), ("the process was killed by SIGSEGV", Outcome.CRASHED)],
 )
-def test_a_process_that_hangs_or_dies_over_a_cell_is_told_of_that_cell(answer, outcome):
+def test_process_lost_over_a_cell_told_of_that_cell(answer, outcome):
     asked = []
     found = _looked(SLOT, SimpleNamespace(ask=lambda *given: asked.append(given) or answer))
     assert found == Observation(SLOT, "", 0, "", outcome, answer) and asked == [(run_only, SLOT)]
@@ -125,7 +125,7 @@ def test_a_cell_is_nudged_as_far_as_it_is_told(monkeypatch):
         ({"raised": SystemExit(3)}, "SystemExit: 3"),
     ],
 )
-def test_a_cell_that_is_posed_otherwise_and_has_no_answer_says_why(monkeypatch, given, reason):
+def test_transformed_cell_without_an_answer_and_its_reason(monkeypatch, given, reason):
     Told(monkeypatch, invariance, **given)
     assert measured(SLOT, "again") == reason
 

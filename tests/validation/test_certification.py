@@ -67,7 +67,7 @@ CELLS = [
 
 @pytest.mark.parametrize(("slot", "metric"), CELLS)
 @pytest.mark.parametrize("phase", [0.05, 0.2, 0.45])
-def test_what_is_put_off_to_the_end_of_a_step_is_told(monkeypatch, slot, metric, phase):
+def test_deferred_events_told_at_the_end_of_a_step(monkeypatch, slot, metric, phase):
     """An event in the first half of a step that is taken for one at its start: half the step puts it there as well.
 
     A run whose steps end elsewhere puts it elsewhere; only by chance as far off, once in five times at most.
@@ -88,7 +88,7 @@ def test_what_is_put_off_to_the_end_of_a_step_is_told(monkeypatch, slot, metric,
 
 @pytest.mark.parametrize(("slot", "metric"), CELLS)
 @pytest.mark.parametrize("order", [1, 2, 4])
-def test_of_a_scheme_of_any_order_at_least_its_error_is_told(monkeypatch, slot, metric, order):
+def test_error_of_a_scheme_not_understated(monkeypatch, slot, metric, order):
     told = errors_of(monkeypatch, slot, lambda dt: 1e-3 * (dt / DT) ** order)
     assert 1e-3 <= told[metric] < 2e-3
 
@@ -105,7 +105,7 @@ def test_steps_of_the_other_run_end_elsewhere(samples, stride):
         assert samples - each * blocks <= max(3, 0.02 * samples)
 
 
-def test_a_metric_that_far_samples_do_not_have_is_told_by_the_halves(monkeypatch):
+def test_metric_without_far_samples_by_its_halves(monkeypatch):
     """A slide of 40 steps has no braking between samples 40 steps apart; at half the step it is 2 mm/s^2 off."""
     slot = Slot("slide", (("v", 40 * DT * 0.4 * 9.81),), 2, "reference", "reference", DT)
     monkeypatch.setattr(certification, "BLOCK", 40)

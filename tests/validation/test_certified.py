@@ -141,11 +141,11 @@ def test_undetermined_motion_judged_before_the_branch_and_by_invariants(tmp_path
     [("at[0.05 s][box.x]", 0.05), ("at[1e-05 s][a.b.omega]", 1e-5), ("final[box.x]", None), ("energy_growth", None),
      ("at[0.5 s][box.fx]", None), ("at[0.5 s][floor/box.fz]", None), ("least at[0.5 s][box.fz]", None)],
 )  # fmt: skip
-def test_only_a_state_at_an_instant_knows_nothing_of_what_comes_later(metric, at):
+def test_only_an_instantaneous_state_is_independent_of_the_future(metric, at):
     assert instant_of(metric) == at
 
 
-def test_before_it_meets_the_asphalt_all_of_it_is_judged(tmp_path):
+def test_motion_judged_in_full_before_the_ambiguity(tmp_path):
     assert {physics for physics, _ in on_ice(tmp_path, -0.7, 0.06).values()} == {"pass", None}
     assert on_ice(tmp_path, -0.7, 0.06)["final[box.x]"] == ("pass", "")
 

@@ -164,7 +164,7 @@ def test_resumed_run_after_a_dead_scheduler(cluster, undisturbed, tmp_path):
 
 
 @pytest.mark.long
-def test_a_parent_that_is_killed_goes_on_where_it_was(undisturbed, tmp_path):
+def test_resumed_study_after_a_killed_parent(undisturbed, tmp_path):
     out = tmp_path / "out"
     run = started(out, "local:1")
     wait_for(lambda: finished_cells(out) >= 3)

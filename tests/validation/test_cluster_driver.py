@@ -121,7 +121,7 @@ def test_cell_that_kills_its_worker_repeatedly_as_one_crash(driver):
     assert not driver.batches
 
 
-def test_cells_that_a_batch_left_are_left_and_not_asked_again(driver):
+def test_cells_left_by_a_batch_not_asked_again(driver):
     slots = cells(2)
     name = batch_of(driver, slots)
     driver.futures[name] = Future({"lines": [], "left": "left: it timed out 3 times", "said": "", "worker": "w"})
@@ -148,7 +148,7 @@ def test_a_batch_that_begins_a_second_time_is_in_the_journal(driver):
 
 
 @pytest.mark.parametrize("line", ["", "{", '{"slot": 1}', "[]", '{"line": 1, "error": "left"}'])
-def test_half_a_line_of_a_process_that_died_is_no_observation(driver, line):
+def test_partial_line_of_a_dead_process_is_no_observation(driver, line):
     name = batch_of(driver, cells(1))
     assert list(driver._line(driver.batches[name], line, "w")) == [] and len(driver.batches[name].slots) == 1
 
@@ -240,7 +240,7 @@ def test_leftovers_of_a_batch_with_reason_in_the_journal():
     assert (notes[-1]["event"], notes[-1]["reason"], len(notes[-1]["cells"])) == ("left", "left: it hung", 2)
 
 
-def test_a_scheduler_that_goes_ends_the_run_in_one_line(monkeypatch):
+def test_lost_scheduler_ends_the_run_in_one_line(monkeypatch):
     gone = "cluster: the scheduler is gone; finished cases are kept, the same command resumes"
     with pytest.raises(LimitError) as ended:
         driven(Busy([lambda slots: Future(status="cancelled")]), cells(1))

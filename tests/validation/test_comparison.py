@@ -78,7 +78,7 @@ def moved_to(value, **more):
     return {**ROW, "value": value, "error": value, **more}
 
 
-def test_a_value_counts_beyond_a_hundredth_of_its_tolerance_and_says_so():
+def test_change_beyond_a_hundredth_of_the_tolerance():
     assert compare_rows([moved_to(0.0)], [moved_to(0.01)]) == []
     found = change(moved_to(0.0), moved_to(0.5))
     note = f"more than a hundredth of its tolerance; {SAME}"
@@ -87,13 +87,13 @@ def test_a_value_counts_beyond_a_hundredth_of_its_tolerance_and_says_so():
         Kind.ERROR, False, "-0.5 m (pass)", "0.25 m (pass)", -0.25, note.replace(SAME, MOVED))  # fmt: skip
 
 
-def test_a_value_on_the_other_side_of_the_truth_changed_and_is_no_worse():
+def test_change_to_the_other_side_of_the_truth_is_not_worse():
     found = change(moved_to(-0.25), moved_to(0.25))
     assert (found.kind, found.regressed, found.size) == (Kind.ERROR, False, 0.0)
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_a_value_within_the_larger_floor_of_both_sides_is_noise(side):
+def test_change_within_the_larger_floor_is_noise(side):
     pair = [moved_to(0.0, floor=0.125), moved_to(0.25, floor=0.125)]
     pair[side]["floor"] = 0.25
     assert compare_rows(*[[row] for row in pair]) == []
@@ -114,7 +114,7 @@ def test_what_has_no_tolerance_changes_with_any_bit():
         f"has no tolerance: any changed bit counts; {SAME}")  # fmt: skip
 
 
-def test_rows_of_one_side_are_told_and_are_neither_better_nor_worse():
+def test_rows_of_one_side_neither_better_nor_worse():
     (removed,) = compare_rows([ROW], [])
     (added,) = compare_rows([], [ROW])
     assert brief(removed) == (Kind.REMOVED, False, "0.25 m (pass)", "-", 0.0, "")

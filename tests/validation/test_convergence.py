@@ -320,7 +320,7 @@ def test_undeclared_and_moved_cells_not_in_an_error():
     assert whole.errors == pytest.approx(DTS[:2], rel=1e-9)
 
 
-def test_an_order_of_nothing_over_few_steps_falls_nor_grows():
+def test_zero_order_over_few_steps_neither_falls_nor_grows():
     """Errors of exactly one have the order 0 with no scatter; the steps are too near each other for a level."""
     assert said([1.0] * 3, [0.1, 0.06, 0.05]) == (Limit.NOISY, "order 0.00 +- 0.00: neither falling nor constant")
 

@@ -27,7 +27,7 @@ def moved(points, by):
     [("polygon", SQUARE, (4.0, -2.0), "(4, -2)"), ("hull", BRICK, (0.0, 8.0, 0.125), "(0, 8, 0.125)"),
      ("polygon", SQUARE, (0.0, 1e-6), "(0, 1e-06)")],
 )  # fmt: skip
-def test_what_lies_elsewhere_is_moved_to_its_centroid_and_said(kind, points, by, said):
+def test_shapes_moved_to_their_centroid_with_a_message(kind, points, by, said):
     given, notes = body(kind, moved(points, by)), ["before"]
     centre(given, notes)
     assert np.array(given["shape"]["vertices"]) == pytest.approx(np.array(points), abs=1e-12)

@@ -100,7 +100,7 @@ def test_settings_with_mostly_failed_checks_not_recommended(monkeypatch):
     assert said.startswith("best settings found, 2-D: cone=elliptic") and "10 of 20 checks still fail" in said
 
 
-def test_what_was_measured_in_the_plane_is_not_told_of_space(monkeypatch):
+def test_planar_cures_not_told_in_space(monkeypatch):
     monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): CURE})
     assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 1
     assert told_cures("mujoco", "4.0.1", "pinch", "default", [3]) == []
@@ -209,7 +209,7 @@ def test_cure_of_an_engine_without_setting_lines_as_calls(monkeypatch):
     assert said in shown.file.getvalue()
 
 
-def test_no_fix_that_is_printed_has_a_word_that_its_engine_has_not():
+def test_printed_fixes_with_words_of_their_engine():
     ours = {"mujoco": "reflect|stick|kappa|smooth_condim", "chipmunk": "start_overlap", "bullet": r"\biterations\b"}
     for engine, words in ours.items():
         for cure in cures_of(engine).values():
@@ -288,7 +288,7 @@ def trials_of(monkeypatch, off, candidates, whole=None, handed=False, elsewhere=
     return (found, trials) if handed else found
 
 
-def test_one_setting_that_mends_all_is_found_and_its_equals_are_named(monkeypatch):
+def test_single_setting_that_mends_all_with_equivalents(monkeypatch):
     def off(s):
         return (0.5, 0.5) if s.get("b") == 2 or s.get("c") == 1 else (9.0, 9.0)
 
@@ -305,7 +305,7 @@ def test_what_breaks_a_check_that_passed_is_no_cure(monkeypatch):
     assert dict(best.changes[0]) == {"b": 1} and best.failing == 1
 
 
-def test_two_that_mend_together_are_found_where_none_does_alone(monkeypatch):
+def test_two_settings_that_mend_only_together(monkeypatch):
     def off(s):
         return (0.5 if s.get("a") else 9.0, 0.5 if s.get("a") and s.get("c") else 9.0)
 
@@ -313,7 +313,7 @@ def test_two_that_mend_together_are_found_where_none_does_alone(monkeypatch):
     assert dict(best.changes[0]) == {"a": 1, "c": 1} and best.failing == 0
 
 
-def test_a_profile_is_cut_down_to_what_cannot_be_left_out(monkeypatch):
+def test_profile_reduced_to_necessary_settings(monkeypatch):
     def off(s):
         return (0.5, 0.5) if s.get("a") and s.get("c") else (9.0, 9.0)
 
@@ -326,7 +326,7 @@ def test_where_nothing_helps_nothing_is_said_to(monkeypatch):
     assert best is None and singles == []
 
 
-def test_what_is_told_is_a_check_that_the_cure_mends(monkeypatch):
+def test_told_check_mended_by_its_cure(monkeypatch):
     def off(s):
         return (8.0, 0.5) if s.get("b") else (9.0, 5.0)  # the first check stays wrong
 
@@ -390,7 +390,7 @@ def test_a_real_engine_is_cured_by_what_its_sheet_says():
     assert isinstance(refuses, Unsearched) and not refuses.asked
 
 
-def test_what_passes_and_what_cannot_be_asked_are_told_apart(monkeypatch):
+def test_passed_and_unsupported_cells_told_apart(monkeypatch):
     pytest.importorskip("pymunk")
     monkeypatch.setattr(cures, "candidates_of", lambda engine: {"start_overlap": (0.0,)})
     monkeypatch.setattr(cures, "clocked", lambda slots: (None, None))
@@ -403,7 +403,7 @@ def test_what_passes_and_what_cannot_be_asked_are_told_apart(monkeypatch):
     assert "chipmunk slide 2-D: 1 of" in told.stdout
 
 
-def test_an_engine_or_a_scene_that_has_nothing_to_search_says_so(monkeypatch):
+def test_engine_or_scene_without_candidates_told(monkeypatch):
     monkeypatch.setattr(cures, "asked_of", lambda scene, dimension: ())
     assert search("chipmunk", "incline", 2) == Unsearched(
         False, "incline has no standard case in 2-D at a profile's own iterations"
@@ -444,7 +444,7 @@ def test_committed_cure_measured_with_today_s_checks(engine):
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
-def test_what_a_committed_cure_tells_failed_before_and_passes_with_it(engine):
+def test_committed_cure_failed_before_and_passes_after(engine):
     """A check that still fails is no cure, however near it came."""
     told = [cure for cure in read(inside(engine, CURES)) if cure.helps]
     assert told
@@ -454,7 +454,7 @@ def test_what_a_committed_cure_tells_failed_before_and_passes_with_it(engine):
         assert cure.after is not None and abs(cure.after - cure.truth) <= cure.tolerance, where
 
 
-def test_no_cure_has_the_settings_of_a_profile_without_a_rank():
+def test_no_cure_from_a_profile_without_a_rank():
     pytest.importorskip("mujoco")
     assert cures._profiles("mujoco") == ["default", "tuned"]
 

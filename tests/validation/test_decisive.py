@@ -42,7 +42,7 @@ def toy(enough):
         ([{"a", "b", "c"}], {"a", "b", "c"}),
     ],
 )
-def test_what_is_kept_is_enough_and_nothing_of_it_can_be_left_out(enough, kept):
+def test_decisive_settings_sufficient_and_minimal(enough, kept):
     names, badness = ["a", "b", "c", "d"], toy(enough)
     without = dict(zip(names, badness([[n for n in names if n != name] for name in names]), strict=True))
     found = smallest(names, without, badness)

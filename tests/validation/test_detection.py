@@ -60,7 +60,7 @@ def whole():
 
 
 @pytest.mark.long
-def test_every_fault_is_seen_from_one_per_cent_on_by_something(whole):
+def test_faults_seen_from_one_per_cent(whole):
     for fault in SIZED:
         sizes = [entry.size for entry in whole.seen if entry.fault == fault and entry.size is not None]
         assert min(sizes) <= 0.01, fault
@@ -147,7 +147,7 @@ def test_blind_spot_with_changed_values_and_step_allowance(detected):
 
 
 @pytest.mark.long
-def test_no_blind_spot_is_one_that_a_check_of_the_same_name_sees(whole):
+def test_blind_spots_not_seen_by_a_check_of_the_same_name(whole):
     sharp = {(e.scene, e.watcher, e.fault) for e in whole.seen if e.size is not None and e.size <= 0.01}
     assert whole.blind and not [b for b in whole.blind if (b.scene, b.metric, b.fault) in sharp]
     assert all(0.0 < b.moved <= 2.0 * b.allowed for b in whole.blind)  # with the fault and without it hold
@@ -171,7 +171,7 @@ def test_the_table_that_is_committed_has_every_check_of_every_scene():
     assert names == expected
 
 
-def test_the_table_s_blind_spots_are_those_that_a_step_hides():
+def test_blind_spots_within_the_step_error():
     """Planted in our solver, which has no step's error of its own: it changes what the law changes."""
     rows = [line.split() for line in committed()[1] if "/" in line and "%" in line]
     assert len(rows) > 20
@@ -189,7 +189,7 @@ def test_what_no_check_sees_is_said(whole):
 
 
 @pytest.mark.parametrize("fault", REPORTED)
-def test_a_fault_of_what_is_read_leaves_what_is_built_alone(fault):
+def test_reading_fault_leaves_the_built_world(fault):
     """The same world, read rightly and wrongly: what is off is what the fault says, by the size it says."""
     scene = CATALOGUE["stack"].scene(2, {"n": 1})
     size, steps = 0.125, 3

@@ -106,7 +106,7 @@ def test_tuned_plastic_drop_hop_by_the_overlap():
     assert overlap > 0.0 and path.velocity[first] == pytest.approx(0.08 * (overlap - 1e-5) * 240, rel=1e-12)
 
 
-def test_law_falls_silent_where_round_off_has_grown_through_the_impacts():
+def test_law_silent_after_grown_round_off():
     # Some fifty bounces, each of which multiplies an error of the gap by about 2 erp v/(g dt) = 4.
     rows = compare("bounce", {"e": 0.95, "height": 0.77}, "one", 1 / 480)
     assert rows["rest_time"][1] is None and rows["apex[1]"][1] is not None
@@ -131,7 +131,7 @@ def test_multibody_restitutes_gravity_and_rigid_body_does_not():
     assert REST.contact(-1e-5, before, free, 1.0, 1 / 240)[0] == pytest.approx(-before, rel=1e-15)
 
 
-def test_laws_say_nothing_about_scenes_they_do_not_describe():
+def test_laws_silent_about_other_scenes():
     stack = CATALOGUE["stack"].scene(2, {"n": 2})
     assert all(
         law.law(stack, 1 / 240, CATALOGUE["stack"].measure) is None for law in DEVIATIONS if law.scene != "incline"

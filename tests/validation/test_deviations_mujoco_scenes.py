@@ -44,7 +44,7 @@ CELLS = [
 
 @pytest.mark.few(12)
 @pytest.mark.parametrize(("name", "params", "profile", "dimension", "off"), CELLS)
-def test_a_law_predicts_what_the_engine_does_and_nothing_else(name, params, profile, dimension, off):
+def test_law_prediction_for_its_scene_only(name, params, profile, dimension, off):
     canonical = CATALOGUE[name]
     scene = canonical.scene(dimension, params)
     slot = Slot(name, canonical.minimal(params), dimension, "mujoco", profile, DT)
@@ -99,5 +99,5 @@ def test_energy_loss_of_a_spinning_bar_by_the_step_of_the_blow(delay, whirl, dim
     assert spin.law(scene, dt, canonical.measure) is None
 
 
-def test_a_bar_that_turns_under_a_soft_contact_is_not_predicted():
+def test_no_prediction_of_a_bar_turning_under_a_soft_contact():
     assert not list(covering("mujoco", "4.0.1", "default", "off_centre", "spin"))

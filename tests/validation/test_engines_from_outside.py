@@ -155,7 +155,7 @@ def test_wrong_tuning_file_named_by_doctor_and_tune(site):
         assert (done.exit_code, done.stderr) == (2, f"crosscheck: tune: toy: {said}\n")
 
 
-def test_what_was_measured_of_its_cures_is_read_from_its_folder(site):
+def test_cures_of_an_outside_engine_from_its_folder(site):
     lines = (ROOT / "adapters" / "chipmunk" / DECISIVE).read_text()
     (site / DECISIVE).write_text(lines.replace("chipmunk,", "toy,"))
     forget()
@@ -163,7 +163,7 @@ def test_what_was_measured_of_its_cures_is_read_from_its_folder(site):
     assert decisive.measured_of("toy")[0].text == decisive.measured_of("chipmunk")[0].text
 
 
-def test_its_rows_are_explained_by_its_laws_and_listed_in_its_folder(site, tmp_path):
+def test_rows_of_an_outside_engine_explained_and_listed(site, tmp_path):
     done, rows = run(tmp_path, "thin_wall", "--param", "v=200")
     assert done.exit_code == 0, done.output
     assert "explained" in rows and "it is late" in rows
@@ -223,7 +223,7 @@ def test_unreadable_laws_named_by_the_doctor_with_the_engine_run(site, tmp_path,
     [("1 / 0", "ZeroDivisionError"), ("(float('nan'), 1.0)", "predicts nan"), ("(1.0, -1.0)", "predicts 1 +- -1"),
      ("'much'", "ValueError"), ("(1.0,)", "ValueError")],
 )  # fmt: skip
-def test_a_law_that_fails_when_it_is_asked_is_said_on_its_row(site, tmp_path, answer, said):
+def test_exception_of_a_law_told_on_its_row(site, tmp_path, answer, said):
     (site / "laws.py").write_text(f"""
 from adapters.law import Deviation
 
@@ -242,7 +242,7 @@ DEVIATIONS = (Deviation("toy", ("default",), "stack", "penetration", lambda *ask
     [("raise RuntimeError('torn')", "torn"), ("EXPERIMENTS = ('one',)", "not of type Experiment"),
      ("CURED = (1,)", "not of type Cured"), ("CANDIDATES = [1]", "not a mapping")],
 )  # fmt: skip
-def test_experiments_that_cannot_be_had_are_named_and_there_are_none(site, code, said):
+def test_unreadable_experiments_of_an_outside_engine(site, code, said):
     (site / "experiments.py").write_text(code)
     forget()
     assert experiments_of("toy") == () == cured_of("toy") and candidates_of("toy") == {} == belongs_of("toy")
@@ -269,7 +269,7 @@ def test_a_plain_module_brings_an_adapter_only(site, tmp_path):
     assert done.exit_code == 2
 
 
-def test_a_colour_or_a_role_that_is_none_is_a_fault_of_that_engine(site):
+def test_invalid_colour_or_role_as_a_fault_of_the_engine(site):
     for text, said in (('COLOUR = "red"\n', "colour is 'red'"), ("COLOUR = 7\n", "colour is '7'")):
         (site / "numbers.py").write_text(text)
         forget()
@@ -301,7 +301,7 @@ def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engin
 
 
 @pytest.mark.parametrize("name", ["laws.py", "experiments.py", TUNING, "findings/families.toml"])
-def test_what_judges_is_no_part_of_a_cell_s_identity(site, name):
+def test_judging_code_outside_the_identity_of_a_cell(site, name):
     before = hashes()
     (site / name).write_text("# nothing")
     assert hashes() == before

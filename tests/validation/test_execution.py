@@ -78,7 +78,7 @@ def test_restitution_a_tenth_too_small(monkeypatch, listed):
 
 
 @pytest.mark.parametrize("settings", [(), (("damping", 0.5),)])
-def test_settings_of_a_user_have_no_check_of_what_is_realised(monkeypatch, settings):
+def test_own_settings_without_a_receipt(monkeypatch, settings):
     slot = replace(SLOT, params=(("e", 0.5),)).with_own(settings) if settings else SLOT
     monkeypatch.setattr(execution, "receipts", lambda *arguments: (BROKEN,))
     found = {row.metric for row in rows_of("run", [execute(slot)])}

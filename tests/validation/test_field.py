@@ -47,7 +47,7 @@ def observed(slot, value):
     ("before", "after", "says"),
     [(3.0, 0.5, CURED), (3.0, 2.0, REPRODUCED), (1.1, 1.1, REPRODUCED), (0.5, 0.5, NOT_SEEN), (0.5, 3.0, NOT_SEEN)],
 )
-def test_what_is_said_follows_from_the_check_with_and_without_the_cure(monkeypatch, before, after, says):
+def test_field_note_verdict_with_and_without_the_cure(monkeypatch, before, after, says):
     from validation import field
 
     monkeypatch.setattr(field, "find", lambda name: type("Found", (), {"engine": object()}))
@@ -59,7 +59,7 @@ def test_what_is_said_follows_from_the_check_with_and_without_the_cure(monkeypat
     assert found.now == says and found.as_said is (says == CURED)
 
 
-def test_an_engine_that_is_not_here_makes_no_note_false(monkeypatch):
+def test_field_note_of_an_absent_engine_unchanged(monkeypatch):
     from validation import field
 
     monkeypatch.setattr(field, "find", lambda name: type("Found", (), {"engine": None}))

@@ -260,7 +260,7 @@ MORE_UNSUPPORTED = UNSUPPORTED.replace('id = "planar"', 'id = "again"')
          "{members}:2: value nan and band 1e-3 must be finite, the band above 0"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_file_and_line_or_entry(findings, families, members, said):
+def test_wrong_finding_told_with_file_and_line_or_entry(findings, families, members, said):
     folder = findings(families, members)
     with pytest.raises(FindingsError) as caught:
         files.read("nameless", folder)
@@ -410,7 +410,7 @@ def test_families_are_appended_in_words_that_people_read(tmp_path):
 # ---- what is known of a row ----------------------------------------------------------------------------------------
 
 
-def test_what_is_known_of_a_row_and_what_is_said_of_it(findings):
+def test_known_facts_and_text_of_a_row(findings):
     findings()
     own = files.findings_of("nameless")
     listed = Finding(own.families["creeps"], 0.5, 1e-3)
@@ -454,13 +454,13 @@ def test_what_an_unsupported_entry_speaks_about(entry, covered):
     assert entry.covers(SLOT) is covered
 
 
-def test_whose_findings_they_are_is_told_from_who_registered_the_engine(monkeypatch):
+def test_findings_of_an_engine_by_its_registration(monkeypatch):
     ours, theirs = EntryPoint("a", "adapters.a:A", "g"), EntryPoint("b", "elsewhere.b:B", "g")
     monkeypatch.setattr(registry, "_entries", lambda: {"a": ours, "b": theirs})
     assert [files.brought_by_ours(name) for name in ("a", "b", "nobody")] == [True, False, False]
 
 
-def test_an_engine_that_is_no_folder_has_nowhere_to_keep_findings(monkeypatch):
+def test_engine_without_a_folder_has_no_findings_file(monkeypatch):
     monkeypatch.setattr(files, "folder_of", lambda engine: None)
     assert files.findings_folder("nameless") is None
 
@@ -477,6 +477,6 @@ def test_band_ends_inclusive_and_split_at_the_first_dots(findings, band, ends):
     assert found.ends == ends and found.holds(0.5)
 
 
-def test_an_end_is_as_short_as_the_whole_of_its_room_lets_it_be():
+def test_shortest_band_end_within_its_room():
     assert files._outwards(1.5, 1, 0.5) == "2" and files._outwards(-1.5, -1, 0.5) == "-2"
     assert files._outwards(1.5, 1, 0.49) == "1.5"

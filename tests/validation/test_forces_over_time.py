@@ -99,7 +99,7 @@ def test_each_contact_and_their_number():
     assert (unit("a/b.contact_fy"), unit("a/b.contacts"), unit("a/b.overlap_without_force")) == ("N", "1", "m")
 
 
-def test_a_contact_touches_or_pushes_and_what_is_near_is_none():
+def test_touching_and_pushing_contacts_without_near_ones():
     near, pushing = (FLOOR, BALL, NOTHING, 0.1), (FLOOR, BALL, (0.0, 0.1), 0.1)
     unknown = (FLOOR, BALL, NOTHING, math.nan)
     steps = [[near], [near, pushing], [(FLOOR, BALL, NOTHING, -0.1)] * 2, [unknown, near, (FLOOR, BALL, NOTHING, 0.0)]]
@@ -129,7 +129,7 @@ def test_overlap_without_force_at_both_ends_of_a_step():
     assert of(told(blank, np.full(17, 0.75)), name, "greatest") == (0.0, "")
 
 
-def test_what_an_engine_does_not_tell_has_no_value_and_says_why():
+def test_missing_force_of_an_engine_with_its_reason():
     blank = told([[(FLOOR, BALL, (math.nan, 1.0))]] * 4)
     for over in ("mean", "least", "greatest", "spread"):
         for name in ("floor/ball.fx", "ball.fx", "floor/ball.contact_fx"):
@@ -219,7 +219,7 @@ def fails(found):
 @pytest.mark.parametrize("speed", [0.1, 0.03, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 0.002, 1 / 1000])
 @pytest.mark.parametrize("profile", ["default", "tuned"])
-def test_a_hand_that_is_pushed_and_let_go_by_turns_fails_at_any_step(tmp_path, profile, dt, speed):
+def test_hand_with_flickering_force_fails_at_any_step(tmp_path, profile, dt, speed):
     """The mean alone is right to a thousandth at some of these, and the motion looks like rest."""
     found = ran(stated(tmp_path, HAND.replace("SPEED", str(speed))), "mujoco", profile, dt)
     name = "table/hand.fz"
@@ -261,7 +261,7 @@ def test_check_of_a_mean_a_number_or_an_instant(tmp_path):
     assert metrics == {name, f"least {name}", f"greatest {name}", f"spread {name}"}
 
 
-def test_forces_are_recorded_only_where_they_were_before(tmp_path):
+def test_forces_recorded_only_where_requested(tmp_path):
     """What no check asks for costs nothing: contacts of the last second, and no earlier, as before."""
     text = HAND.replace("SPEED", "0.1").partition("[[checks]]")[0]
     canonical = stated(tmp_path, text)

@@ -50,7 +50,7 @@ def asked(one, lasts, ratio, good, bad):
 
 @pytest.mark.parametrize("ratio", [QUICK_RATIO, FULL_RATIO])
 @pytest.mark.parametrize("limit", [1.5, 37.0, 800.0])
-def test_a_bracket_closes_on_where_the_engine_gives_up(limit, ratio):
+def test_bracket_around_the_failure_of_an_engine(limit, ratio):
     one = bracket("thin_wall", "impact speed")
     seen = asked(one, lambda v: v <= limit, ratio, BACK, THROUGH)
     assert one.survives.value <= limit < one.fails.value <= one.survives.value * ratio
@@ -78,7 +78,7 @@ def test_frontier_without_a_failure_or_without_a_pass():
     assert lost.text == "already 1 m/s tunnelled"
 
 
-def test_an_engine_that_cannot_be_asked_gives_its_reason():
+def test_reason_of_an_unsupported_engine():
     one = bracket("thin_wall", "impact speed")
 
     def look(slots):

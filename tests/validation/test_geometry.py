@@ -148,7 +148,7 @@ def test_bodies_at_one_place_overlap_and_nothing_is_divided_by_zero(pair):
     assert overlap(a, here, b, there) == pytest.approx(-exact, abs=1e-14)
 
 
-def test_what_is_apart_or_less_deep_than_what_was_found_is_not_measured(monkeypatch):
+def test_separate_and_shallower_pairs_not_measured(monkeypatch):
     """A run of 100 000 samples is measured where bodies can overlap, or a report would take minutes."""
     asked = []
 

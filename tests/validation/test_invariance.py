@@ -46,7 +46,7 @@ def start_of(scene):
 @pytest.mark.parametrize("relation", [each for each in RELATIONS if each.name not in ("again", "fresh process")],
                          ids=lambda each: each.name)  # fmt: skip
 @pytest.mark.parametrize(("name", "dimension"), LINES)
-def test_what_is_posed_otherwise_comes_back_as_it_was(name, dimension, relation):
+def test_transformed_motion_mapped_back(name, dimension, relation):
     scene = CATALOGUE[name].scene(dimension)
     posed = relation.pose(scene)
     if isinstance(posed, str):
@@ -174,7 +174,7 @@ def test_an_answer_is_json_whatever_numbers_a_measure_gives():
     assert json.dumps([found.holds, found.change, found.allowed]) == "[true, 0.0, 0.0010000000000284217]"
 
 
-def test_a_change_is_judged_by_what_moved_starts_change():
+def test_change_judged_against_moved_starts():
     floors = floor(BASE, [{"speed": (2.0 + 1e-9, ""), "count": (0.0, "")}, {"speed": (2.0, ""), "count": (0.0, "")}])
     assert floors == {"speed": pytest.approx(1e-9), "count": 0.0, "absent": 0.0}
     good = judged("mirrored", BASE, {"speed": (2.0 + 9e-9, ""), "count": (0.0, "")}, Allowances(floors))
@@ -188,19 +188,19 @@ def test_a_change_is_judged_by_what_moved_starts_change():
     assert Change("boosted", refused="it has fixed or driven bodies").holds
 
 
-def test_a_defect_of_nothing_may_change_by_what_no_check_could_see():
+def test_zero_defect_compared_at_the_resolution_of_checks():
     floors, answer = dict.fromkeys(BASE, 0.0), {"speed": (2.0, ""), "count": (1e-16, "")}
     assert not judged("mirrored", BASE, answer, Allowances(floors)).holds
     assert judged("mirrored", BASE, answer, Allowances(floors, {"count": 2e-13})).holds
     assert not judged("mirrored", BASE, answer, Allowances(floors, {"count": 0.9e-13})).holds
 
 
-def test_a_chaotic_scene_is_not_blamed_on_its_engine():
+def test_chaotic_scene_is_no_break_of_its_engine():
     floors = floor(BASE, ["no answer"])
     assert judged("mirrored", BASE, {"speed": (7.0, ""), "count": (3.0, "")}, Allowances(floors)).holds
 
 
-def test_moved_starts_are_rounded_as_coarsely_as_what_is_far_away():
+def test_moved_starts_rounded_as_distant_positions():
     scene = CATALOGUE["bounce"].scene(2)
     posed = BY_NAME["moved"].pose(scene)
     assert unit_of(scene, posed.shift) == np.spacing(posed.shift) > 100.0 * unit_of(scene, 0.0)
@@ -451,7 +451,7 @@ def test_pose_refused_and_pose_failed_by_an_engine():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_was_carried_along_comes_back_with_its_contacts(dimension):
+def test_bystanders_and_their_contacts_mapped_back(dimension):
     """A contact at one place of the scene, told where it was carried to at its time, is at that place again."""
     turn, inertia = ((0.0,), 1.0) if dimension == 2 else ((1.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     places = [(0.0,) * dimension, (1.0,) + (0.0,) * (dimension - 1)]

@@ -129,7 +129,7 @@ def test_growth_without_loads_to_round_off_of_the_energy(scale):
         assert verdicts(scene, moved(scene, (pose, twist)))["energy_growth"] is passes
 
 
-def test_a_constant_torque_feeds_energy_in_and_is_no_growth():
+def test_energy_of_a_constant_torque_is_no_growth():
     scene = over_floor(ball(torque=(3.0,)), gravity=(0.0, 0.0))
     rate = 3.0 / 0.09
     for order in (0.0, 1.0):  # spin before or after the step's torque
@@ -165,7 +165,7 @@ def test_restituting_gravity_s_own_step_is_growth():
         (Disc(0.5), 1.0, 0.5, True),
     ],
 )
-def test_energy_is_judged_unless_the_law_that_is_asked_for_may_add_some(shape, restitution, friction, judged):
+def test_energy_judged_unless_the_requested_law_adds_some(shape, restitution, friction, judged):
     floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
     body = Body("body", shape, pose=(0.0, 1.0, 0.0))
     scene = Scene("drop", 1, 2, (floor, body), (Pair("*", "*", restitution, friction),), (0.0, -9.81), 1.0)
@@ -356,7 +356,7 @@ def test_allowed_overlap_of_one_approach_step_and_of_the_start():
     assert beyond(-0.1, -0.1) == ((0.0, ""), (0.0, ""))
 
 
-def test_the_longest_step_since_an_overlap_began_counts_and_none_before():
+def test_longest_step_since_an_overlap_began():
     granted = invariants._granted(np.array([0.0, 0.1, 0.1, 0.0, 0.1]), np.array([1.0, 2.0, 1.5, 0.25, 0.125]), 0.0)
     assert granted.tolist() == [0.0, 2.0, 2.0, 0.0, 0.25]
     granted = invariants._granted(np.array([0.5, 0.1, 0.1, 0.0, 0.1]), np.array([0.5, 2.0, 1.5, 0.25, 0.125]), 0.0)
@@ -411,7 +411,7 @@ def test_growth_less_half_a_step_of_power():
 
 
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid value:RuntimeWarning")
-def test_energy_beyond_all_numbers_is_no_absence_of_growth():
+def test_infinite_energy_as_growth():
     """A body that explodes to 1e160 m/s: its energy and what round-off makes of it are both infinite."""
     scene = over_floor(ball(), gravity=(0.0, 0.0))
     speed = np.array([0.0, 1.0, 1e160, 1e160])

@@ -38,7 +38,7 @@ def contents(store):
     return rows | {"runs": sorted(db.execute("SELECT * FROM runs").fetchall())}
 
 
-def test_every_table_of_a_store_that_belongs_to_runs_is_merged(tmp_path):
+def test_merge_of_all_tables_of_runs(tmp_path):
     store = Store(tmp_path)
     query = "SELECT name FROM sqlite_master WHERE type = 'table'"
     names = {row[0] for row in sqlite3.connect(store.path).execute(query)}
@@ -106,7 +106,7 @@ def test_common_run_completed_and_ours_kept_at_differences(tmp_path, monkeypatch
     assert {o.slot: o.metrics["rebound_ratio"][0] for o in ours.observations(run)} == dict.fromkeys(SLOTS, 0.5)
 
 
-def test_what_cannot_be_merged_is_one_line_and_changes_nothing(tmp_path, monkeypatch):
+def test_store_that_cannot_be_merged_unchanged(tmp_path, monkeypatch):
     ours = filled(tmp_path / "a", "one", monkeypatch)
     before = contents(ours)
     with pytest.raises(StoreError, match="is the same store"):
@@ -217,7 +217,7 @@ RUNS = [run(1, days=40), run(2, days=30, finished=False), run(3, "bench: a", day
      (Rules(days=0), "124"), (Rules(unfinished=True), "2"), (Rules(recordings=True), ""),
      (Rules(days=35, keep=3), "1")],
 )  # fmt: skip
-def test_rules_let_go_what_they_say_and_never_the_newest_of_a_title(rules, going):
+def test_pruning_rules_and_newest_run_of_a_title(rules, going):
     assert "".join(each.id for each in doomed(RUNS, rules, NOW)) == going
 
 

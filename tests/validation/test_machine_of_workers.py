@@ -82,7 +82,7 @@ def test_memory_share_of_a_worker_within_limits(monkeypatch):
     assert str(error.value) == "memory: this shell allows 2 GiB of address space (ulimit -v), a worker needs 2 GiB"
 
 
-def test_the_shell_s_limit_is_the_lower_of_both_that_there_are(monkeypatch):
+def test_lower_of_both_memory_limits_of_the_shell(monkeypatch):
     resource = pytest.importorskip("resource")
     for found, least in (((-1, -1), None), ((5, -1), 5), ((-1, 7), 7), ((5, 7), 5), ((7, 5), 5)):
         own = SimpleNamespace(RLIMIT_AS="as", RLIM_INFINITY=-1, getrlimit={"as": found}.__getitem__)

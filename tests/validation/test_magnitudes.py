@@ -49,7 +49,7 @@ def written(tmp_path, name, text):
     return path
 
 
-def test_a_scene_file_with_the_inertia_of_a_desk_says_so(tmp_path):
+def test_scene_file_with_implausible_inertia_told(tmp_path):
     assert notes(written(tmp_path, "small.toml", FILE)) == [f"{SAID}, 1.25e-05 kg m^2"]
     possible = FILE.replace("[1.0, 1.0, 1.0]", "[2e-5, 1.25e-5, 1.25e-5]")
     assert notes(written(tmp_path, "possible.toml", possible)) == []
@@ -84,7 +84,7 @@ def test_moments_of_all_mass_at_the_surface_are_possible():
         ("duration = 1.0", "duration = 1e300", "duration: "),
     ],
 )
-def test_numbers_that_no_body_has_are_refused_in_one_line(tmp_path, old, new, named):
+def test_physically_impossible_numbers_refused(tmp_path, old, new, named):
     with pytest.raises(SceneError) as caught:
         resolve(str(written(tmp_path, "large.toml", FILE.replace(old, new))))
     assert named in str(caught.value) and "\n" not in str(caught.value)

@@ -245,7 +245,7 @@ MEASURED = [(engine, fact) for engine in ("chipmunk", "bullet", "mujoco") for fa
 @pytest.mark.parametrize(
     ("engine", "fact"), [pytest.param(*each, id=f"{each[0]}-{each[1].says}") for each in MEASURED if each[1].scene]
 )
-def test_our_cells_answer_what_was_measured_or_what_contradicts_it(engine, fact, seen):
+def test_our_cells_against_the_measured_facts(engine, fact, seen):
     """A fact that is shown stays between its ends, and each what it was found to be."""
     observation = seen[fact.slot(engine)]
     assert observation.outcome is Outcome.OK, observation.reason
@@ -257,7 +257,7 @@ def test_our_cells_answer_what_was_measured_or_what_contradicts_it(engine, fact,
 
 
 @pytest.mark.parametrize("engine", ["chipmunk", "bullet", "mujoco"])
-def test_facts_without_a_cell_name_a_test_that_there_is_or_say_why(engine):
+def test_facts_without_a_cell_name_an_existing_test(engine):
     assert len(facts_of(engine)) >= 30
     root = Path(__file__).parents[2]
     for fact in facts_of(engine):
@@ -267,7 +267,7 @@ def test_facts_without_a_cell_name_a_test_that_there_is_or_say_why(engine):
         assert fact.scene or fact.test or len(fact.unasked) > 20
 
 
-def test_what_agrees_by_a_choice_that_was_made_afterwards_is_told_so():
+def test_agreement_by_a_later_choice_told():
     """Fourteen agree since a step, a radius, an axis or a time was found with which they do."""
     chosen = {engine: [fact for fact in facts_of(engine) if fact.chosen] for engine in ("chipmunk", "bullet", "mujoco")}
     assert {engine: len(facts) for engine, facts in chosen.items()} == {"chipmunk": 1, "bullet": 6, "mujoco": 7}

@@ -360,7 +360,7 @@ def test_a_hop_is_the_largest_change_of_height_up_or_down():
         assert metrics.hop(moved(space, dimension=3)) == pytest.approx(size)
 
 
-def test_astray_is_the_level_distance_from_a_line_through_the_start():
+def test_astray_as_level_distance_from_a_line():
     line = np.array([0.6, 0.8])
     places = [(1.0, 2.0), (1.0 + 0.6 * 5.0, 2.0 + 0.8 * 5.0), (1.0 + 0.6 - 0.8 * 0.25, 2.0 + 0.8 + 0.6 * 0.25)]
     space = [(*p, 3.0 * k, 1.0, 0.0, 0.0, 0.0) for k, p in enumerate(places)]
@@ -445,7 +445,7 @@ def test_crossing_between_its_samples():
 
 @pytest.mark.parametrize("rate", [1.0, 1.3, 1.9, 3.0])
 @pytest.mark.parametrize("level", [0.0, 2.0])
-def test_what_only_just_gets_to_its_level_crosses_it_there(rate, level):
+def test_crossing_at_exactly_its_level(rate, level):
     """A double root, which round-off makes complex or moves beyond the sample."""
     (time, _), (speed, _) = metrics.crossing(
         np.array([3.0, 5.0]), level + np.array([-4.0, 0.0]), np.array([2.0 * rate, 0.0]), level
@@ -473,7 +473,7 @@ def test_late_impulses_of_the_pair_after_the_first_instant():
     assert last is not None and last.tolist() == [[0.0, 0.0]]
 
 
-def test_late_impulses_that_nobody_reported_are_none():
+def test_unreported_late_impulses_have_no_value():
     assert metrics.late_impulses(resting(3), 0, 1, 1.0) is None
     assert metrics.late_impulses(recorded(resting(9), [[(0, 1, (1.0, 1.0))]]), 0, 1, 0.2) is None  # all too early
     assert metrics.late_impulses(recorded(resting(2), [[(0, 1, (1.0, math.nan))]]), 0, 1, 1.0) is None
@@ -523,7 +523,7 @@ def test_largest_relative_error_and_a_missing_value():
 
 
 @pytest.mark.parametrize("place", range(3))
-def test_the_largest_of_values_is_none_where_one_of_them_is_no_number(place):
+def test_largest_of_values_with_a_nan(place):
     values = [1.0, 3.0, 2.0]
     assert metrics.largest(iter(values)) == 3.0
     values[place] = math.nan
@@ -532,7 +532,7 @@ def test_the_largest_of_values_is_none_where_one_of_them_is_no_number(place):
 
 @pytest.mark.parametrize("lost", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", range(3))
-def test_one_sample_that_is_no_number_refuses_a_search_for_events(lost, place):
+def test_search_for_events_with_a_nan_sample(lost, place):
     t, fine, broken = np.arange(3.0), np.array([-1.0, 0.5, 1.0]), np.array([-1.0, 0.5, 1.0])
     broken[place] = lost
     metrics.numbers()
@@ -545,7 +545,7 @@ def test_one_sample_that_is_no_number_refuses_a_search_for_events(lost, place):
 
 
 @pytest.mark.parametrize("place", range(3))
-def test_a_speed_that_is_no_number_has_no_last_motion(place):
+def test_last_motion_with_a_nan_speed(place):
     speed = np.array([3.0, 0.0, 0.0])
     assert metrics.last_motion(np.arange(3.0), speed, 1.0) == (1.0, "")
     speed[place] = math.nan
@@ -553,7 +553,7 @@ def test_a_speed_that_is_no_number_has_no_last_motion(place):
 
 
 @pytest.mark.parametrize("pair", range(2))
-def test_an_overlap_of_a_pair_whose_pose_is_no_number_is_none(pair):
+def test_overlap_of_a_pair_with_a_nan_pose(pair):
     """Whichever pair comes first: the other one overlaps by .5 m."""
     bodies = tuple(Body(name, Disc(0.5), 1.0, 0.125) for name in "abcd")
     pose = np.zeros((1, 4, 3))

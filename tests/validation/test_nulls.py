@@ -132,13 +132,13 @@ def test_who_does_nothing_has_no_speed_either():
     assert not found.twist.any() and (found.pose == found.pose[0]).all()
 
 
-def test_what_touches_moves_on_with_the_common_momentum():
+def test_touching_null_bodies_with_common_momentum():
     found = perfectly_inelastic(scene_of(disc("a", 0.0, 3.0, mass=1.0, spin=7.0), disc("b", 2.0, 0.0, mass=2.0)), DT)
     assert found.twist[-1, :, 0] == pytest.approx([1.0, 1.0]) and not found.twist[-1, :, 2].any()
     assert found.pose[-1, 1, 0] - found.pose[-1, 0, 0] == pytest.approx(1.0, abs=3.0 * DT)
 
 
-def test_three_in_a_row_end_as_one_and_a_wall_stops_them():
+def test_three_null_bodies_in_a_row_stopped_by_a_wall():
     row = [disc("a", 0.0, 4.0), disc("b", 1.5), disc("c", 3.0)]
     free = perfectly_inelastic(scene_of(*row, duration=3.0), DT)
     assert free.twist[-1, :, 0] == pytest.approx([4.0 / 3.0] * 3)
@@ -255,7 +255,7 @@ def test_no_null_for_combined_rows_and_rows_without_a_truth():
     assert {guess.outcome for guess in null_rows([replace(row, outcome="invalid", cells=["one"])])} == {"ok"}
 
 
-def test_a_null_without_an_answer_is_measured_against_none(monkeypatch):
+def test_null_without_an_answer_against_none(monkeypatch):
     pytest.importorskip("pymunk")
     row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT)) if r.metric == "rebound_ratio")
     monkeypatch.setattr(nulls, "nulls_of", lambda *asked: [Null("did nothing", None, None, "it has none")])
@@ -263,7 +263,7 @@ def test_a_null_without_an_answer_is_measured_against_none(monkeypatch):
     assert (guess.value, guess.skill, guess.null, guess.physics, guess.reason) == (None, None, "", None, "it has none")
 
 
-def test_as_many_cells_as_are_asked_at_most_are_asked(monkeypatch):
+def test_limit_on_the_number_of_asked_cells(monkeypatch):
     pytest.importorskip("pymunk")
     rows = judged(*(Slot("impact", (("e", e),), 2, "chipmunk", "tuned", DT) for e in (0.25, 0.5)))
     monkeypatch.setattr(nulls, "MOST_CELLS", 2)

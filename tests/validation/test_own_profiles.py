@@ -28,7 +28,7 @@ def asked(engine, *sets, scene="bounce", **more):
     return slots(Request([scene], [engine], sets=sets, **more))
 
 
-def test_a_profile_is_named_after_the_settings_and_knows_whose_it_is():
+def test_own_profile_named_after_its_settings():
     assert OWN.profile == "default+collision_slop=0.01+damping=0.5"
     assert OWN.is_own and OWN.base == "default" and OWN.stock == SLOT
     assert SLOT.with_own(()) == SLOT and not SLOT.is_own and SLOT.base == "default"
@@ -63,7 +63,7 @@ def test_profiles_that_are_named_are_asked_with_the_settings():
     assert {slot.profile for slot in found} == {"default+damping=0.5", "tuned+damping=0.5"}
 
 
-def test_what_a_request_is_after_json_asks_for_the_same():
+def test_request_through_json_unchanged():
     """A release is asked by another process."""
     request = Request(["bounce"], ["chipmunk"], sets=(("damping", 0.5), ("collision_slop", 1)))
     assert slots(Request(**json.loads(json.dumps(asdict(request))))) == slots(request)
@@ -90,7 +90,7 @@ def test_an_iteration_count_is_asked_for_once():
         asked("chipmunk", ("iterations", 7), iterations=[8])
 
 
-def test_engines_that_know_all_settings_are_asked_where_none_is_named():
+def test_engines_that_know_all_settings_asked_by_default():
     names = [name for name in registry.names() if registry.find(name).engine is not None]
     request = Request(["bounce"], names, sets=(("collision_slop", 0.01),))
     assert knowing(request) == ["chipmunk"]
@@ -138,7 +138,7 @@ def test_cell_with_own_settings_and_its_receipts():
     assert not execute(switched(SLOT, dict(OWN.switched))).receipts  # an experiment is about what it changes
 
 
-def test_a_row_has_a_verdict_and_no_standing_and_says_what_was_measured():
+def test_row_of_own_settings_with_verdict_and_no_standing():
     rows = rows_of("run", [execute(OWN), execute(SLOT)])
     own = [row for row in rows if row.profile == OWN.profile]
     plain = [row for row in rows if row.profile == "default"]

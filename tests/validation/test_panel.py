@@ -29,7 +29,7 @@ def reading(value, metric="creep"):
     ("before", "after", "breaks", "mends"),
     [(0.5, 1.5, 1, 0), (2.0, 0.5, 0, 1), (2.0, 5.9, 0, 0), (2.0, 6.1, 1, 0), (0.5, 0.9, 0, 0), (0.5, None, 1, 0)],
 )
-def test_a_check_that_passed_or_fails_three_times_as_much_is_broken(before, after, breaks, mends):
+def test_check_broken_after_pass_or_threefold_failure(before, after, breaks, mends):
     found = judged({("a grip", "creep"): [(reading(before), reading(after))]}, 1)
     assert (len(found.breaks), found.mends) == (breaks, mends)
 

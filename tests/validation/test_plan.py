@@ -69,7 +69,7 @@ def test_rows_of_an_absent_engine_under_its_profile(monkeypatch, name, profile):
     assert {slot.profile for slot in slots(Request(["impact"], [name]))} == {profile}
 
 
-def test_an_engine_of_which_nothing_is_known_has_its_rows_too(monkeypatch):
+def test_rows_of_an_unknown_engine(monkeypatch):
     monkeypatch.setattr(plan, "find", lambda engine: Found(engine, None, "", "nothing is called that"))
     monkeypatch.setattr(plan, "facts", lambda engine: None)
     assert {slot.profile for slot in slots(Request(["impact"], ["anything"]))} == {NOT_KNOWN}
@@ -103,7 +103,7 @@ def _from(node, package):
     ("field", "most", "least"),
     [("iterations", MOST_ITERATIONS, 1), ("ulp", MOST_ULPS, -MOST_ULPS)],
 )
-def test_a_slot_may_ask_as_much_as_it_is_told_and_no_more(field, most, least):
+def test_limits_of_a_slot(field, most, least):
     plain = Slot("impact", (), 2, "chipmunk", "default", 1 / 240).as_dict()
     for value in (least, most):
         assert getattr(slot_from_dict(plain | {field: value}), field) == value
@@ -170,7 +170,7 @@ def test_quick_suite_cells_of_a_profile_without_a_rank():
     assert asked(params={"mu": 0.25})["matched"] == {((("mu", 0.25),), None)}
 
 
-def test_a_scene_that_is_larger_than_an_engine_is_meant_for():
+def test_scene_larger_than_an_engine_is_meant_for():
     """It is told before anything runs, and for this engine alone."""
     request = Request(["stack"], ["reference", "chipmunk"], params={"n": 100.0}, dimensions=[2])
     with pytest.warns(Notice) as said:

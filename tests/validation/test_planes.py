@@ -117,7 +117,7 @@ def test_plane_growth_of_unstable_scenes_declared(scene, params, least):
     assert least < grown <= 1.005 * said < 1e4 * grown
 
 
-def test_a_saddle_that_lasts_is_a_number_and_not_judged():
+def test_lasting_saddle_shown_and_not_judged():
     assert bounds.saddle(0.0) == 1.0 and bounds.saddle(2.0) == pytest.approx(math.cosh(2.0))
     canonical = CATALOGUE["starved"]
     for params in ({"duration": 1000.0, "press": 1e6}, {"duration": 5.0}):
@@ -186,7 +186,7 @@ def observed(monkeypatch):
 
 @pytest.mark.parametrize("scene", ["impact", "slide", "stack"])
 @pytest.mark.parametrize("share", [1.01, 2.0, 100.0])
-def test_whoever_leaves_the_plane_by_more_fails_and_by_less_passes(observed, scene, share):
+def test_departure_from_the_plane_above_and_below_the_bound(observed, scene, share):
     canonical = CATALOGUE[scene]
     allowed = bounds.planar(canonical.scene(2), DT).bound
     for size, physics in ((share * allowed, "fail"), (0.5 * allowed, "pass")):
@@ -228,7 +228,7 @@ def test_a_scene_file_owes_its_plane_as_well(observed, tmp_path):
 
 
 @pytest.mark.parametrize(("engine", "owed"), [("mujoco", 1), ("chipmunk", 0), ("reference", 0)])
-def test_the_plugin_asks_those_who_live_in_space_alone(monkeypatch, engine, owed):
+def test_plane_checks_for_spatial_engines_alone(monkeypatch, engine, owed):
     if find(engine).engine is None:
         pytest.skip(f"{engine} is not installed")
     monkeypatch.setattr(testing._Check, "from_parent", lambda parent, **said: said["metric"])
@@ -286,7 +286,7 @@ def test_growth_factor_in_full_below_a_hundred_thousand():
         assert f"amplified {said} times" in bounds.planar(scene, DT, growth).because
 
 
-def test_a_saddle_beyond_all_numbers_is_told_as_the_last_that_has_one():
+def test_saddle_growth_beyond_floating_point():
     assert bounds.saddle(701.0) == bounds.saddle(1e9) == math.cosh(700.0)
 
 

@@ -106,13 +106,13 @@ def test_other_worker_s_answer_kept_when_a_restart_fails(run):
     assert found == slots[:3] and isinstance(raised, limits.LimitError)
 
 
-def test_a_trajectory_that_cannot_be_written_costs_no_other_answer(run):
+def test_unwritable_trajectory_costs_no_other_answer(run):
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0, 4.0)]
     found, raised = run(slots, {slots[0]: {"unwritten": [28, "No space left on device", "a.npz"]}}, 2, jobs=2)
     assert found == [slots[1]] and isinstance(raised, Unwritten) and raised.filename == "a.npz"
 
 
-def test_a_recording_that_cannot_be_kept_costs_no_other_answer(run, monkeypatch):
+def test_unwritable_recording_costs_no_other_answer(run, monkeypatch):
     """The cell itself is as if it had not run: a run that is resumed asks it again."""
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0, 4.0)]
     monkeypatch.setattr(pool, "recording_from_bytes", lambda text: text)
@@ -130,14 +130,14 @@ def test_finished_answer_kept_when_the_caller_is_full(run):
     assert found == slots[:1] and isinstance(raised, ZeroDivisionError)
 
 
-def test_a_process_that_a_cell_changed_is_renewed_and_its_answer_stands(run):
+def test_process_renewed_after_a_cell_changed_it(run):
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0)]
     assert run(slots, {}, 2) == (slots, None) and run.begun == 1
     assert run(slots, {slots[0]: {"changed": "open files"}}, 2) == (slots, None) and run.begun == 2
     assert run([*slots, cell("mujoco", 1.0)], {}, 2) == ([*slots, cell("mujoco", 1.0)], None)
 
 
-def test_a_case_that_ends_a_process_which_has_run_others(run):
+def test_case_that_ends_a_reused_process(run):
     """They may have left the cause there: it runs once more, in a new process, and its observation tells both."""
     slots = [cell("chipmunk", v) for v in (1.0, 2.0, 3.0)]
     assert run(slots, {slots[2]: "ends"}, 2) == (slots, None)
@@ -160,7 +160,7 @@ def test_a_worker_is_asked_by_one_engine_alone(run, jobs):
     assert all(len(engines) == 1 for engines in asked) and len(asked) >= 3
 
 
-def test_cells_of_a_plugin_that_ends_its_importer_reach_no_worker(monkeypatch):
+def test_plugin_that_exits_on_import_reaches_no_worker(monkeypatch):
     reason = "the plugin ended its process: SIGABRT"
     for module in (pool.registry, warming):
         monkeypatch.setattr(module, "find", lambda name: Found(name, None, "6.6", reason, fatal=True))
@@ -258,7 +258,7 @@ def test_all_workers_compile_where_all_cells_need_kernels(compiled):
     assert [kind for kind, _ in log[:2]] == ["compile"] * 2
 
 
-def test_nothing_is_compiled_twice_and_what_failed_is_tried_again(compiled):
+def test_compilation_once_and_retry_after_failure(compiled):
     """Cells whose kernels could not be compiled run all the same: they report why."""
     log = compiled(MIXED, 2, fails="first")
     assert [slots[0].profile for kind, slots in log if kind == "compile"] == ["first", "then"]

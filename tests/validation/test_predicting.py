@@ -61,14 +61,14 @@ def test_rows_are_judged_by_what_was_asked_ahead(few, monkeypatch):
     assert {row.standing for row in alone if row.metric in METRICS} == {"drifted"}
 
 
-def test_processes_that_die_leave_their_rows_to_this_one(few, monkeypatch):
+def test_rows_of_dead_processes_computed_here(few, monkeypatch):
     alone = rows_of("run", SEEN)
     monkeypatch.setattr(predicting, "_said", dies)
     assert foretold(ASKED, 2) == {}
     assert rows_of("run", SEEN) == alone
 
 
-def test_laws_that_cannot_be_had_are_left_to_where_they_are_missed(monkeypatch):
+def test_unreadable_laws_told_where_they_are_missing(monkeypatch):
     def gone(*row):
         raise EngineError("mujoco: its laws cannot be loaded: no such file")
 

@@ -8,7 +8,7 @@ from validation.settings.proofs import experiments_on, prove
 from validation.settings.switching import reading, side_by_side
 
 
-def test_a_fast_slide_of_bullet_blames_points_that_are_dropped_and_drag():
+def test_causes_of_a_fast_bullet_slide():
     """The others of these reasons are proven by the command (`tests/reports/test_proving_command.py`)."""
     pytest.importorskip("pybullet")
     own = [e for e in experiments_on("bullet") if e.family == "incline-contact-switching"]

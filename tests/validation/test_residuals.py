@@ -76,7 +76,7 @@ def test_a_contact_that_pulls_and_friction_that_drives_are_seen():
     assert driven["slip"] > 0.1 and driven["cone"] < 1e-12
 
 
-def test_what_is_not_reported_has_its_reason_and_no_number():
+def test_unreported_forces_with_a_reason_and_no_number():
     scene, found = sliding()
     silent = Trajectory(found.t, found.pose, found.twist, None, DT, "completed")
     assert residuals(scene, silent)[0]["pull"] == (None, "the engine reports no contacts")
@@ -148,7 +148,7 @@ def test_common_motion_without_slip_and_with_pair_friction():
     assert (found["slip"], found["cone"], found["separation"]) == (0.0, 0.0, 0.0)
 
 
-def test_what_rides_on_a_belt_does_not_slip_and_its_force_is_a_load():
+def test_no_slip_on_a_belt_and_its_force_as_a_load():
     """2 m/s on a belt of 2 m/s; a force of 4 N takes it to 2.02 m/s in the step."""
     belt = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
     rider = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0), force=(4.0, 0.0))
@@ -181,7 +181,7 @@ class Silent:
         return "no answer: killed"
 
 
-def test_a_cell_that_is_refused_breaks_or_is_lost_says_so_of_itself():
+def test_refused_broken_and_lost_cells_told():
     slot = Slot("impact", (), 2, "chipmunk", "tuned", 1 / 240)
     assert ask(slot, Silent()) == Residuals(slot, nothing("no answer: killed"), 0, "no answer: killed")
     unknown = Slot("impact", (), 2, "nobody", "tuned", 1 / 240)
@@ -255,7 +255,7 @@ def test_contacts_recorded_from_the_first_step(monkeypatch):
 
 @pytest.mark.filterwarnings("ignore:invalid value")
 @pytest.mark.parametrize("part", ["point", "normal", "impulse"])
-def test_a_contact_that_is_not_told_in_numbers_leaves_no_share_of_it(part):
+def test_contact_that_is_nan_has_no_share(part):
     """Contacts of other packages: infinite impulses are more than any share, a place that is none tells no slip."""
     scene, found = sliding()
     getattr(found.contacts.rows, part)[2, 0] = math.inf if part == "impulse" else math.nan

@@ -53,7 +53,7 @@ def test_a_row_as_plain_data_has_every_field():
     assert Row(**plain) == judged()
 
 
-def test_what_the_metric_says_stands_once_before_what_the_verdict_says():
+def test_metric_reason_before_the_verdict_reason():
     assert judged(metrics={"creep": (0.0, "")}).reason == ""
     assert judged(metrics={"creep": (0.0, "read late")}).reason == "read late"
     assert judged(metrics={"creep": (0.5, "the engine has no list of findings")}).reason == (
@@ -64,7 +64,7 @@ def test_what_the_metric_says_stands_once_before_what_the_verdict_says():
     assert judged(metrics={"creep": (0.0, "")}, reason="alone it runs").reason == "alone it runs"
 
 
-def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatch):
+def test_own_model_without_engine_laws_or_list(monkeypatch):
     class Brought:
         def brought(self, engine, profile):
             return "its softness" if (engine, profile) == ("nameless", "soft") else None
@@ -75,7 +75,7 @@ def test_what_a_model_brings_of_its_own_is_no_engines_and_has_no_list(monkeypatc
     assert rows._known(SEEN, SLOT, CHECK) == rows.Known(None, False, why)
 
 
-def test_a_listed_engine_is_told_why_a_value_is_missing(monkeypatch):
+def test_reason_of_a_missing_value_of_a_listed_engine(monkeypatch):
     monkeypatch.setattr(rows, "known_of", lambda *asked: rows.Known(None, True))
     monkeypatch.setattr(rows, "findings_of", lambda engine: None)
     said = "has no value; not on record; it never touched"
@@ -118,7 +118,7 @@ def test_an_unsupported_cell_of_a_listed_engine_says_why_as_well(monkeypatch):
     assert (row.standing, row.reason) == ("new", "only planar")
 
 
-def test_a_missing_cell_is_shown_with_nothing_that_it_has_not():
+def test_missing_cell_without_empty_fields():
     (row,) = rows_of("run1", [], [SLOT])
     said = "the run has no observation of this planned case"
     assert (row.run, row.outcome, row.engine_version, row.cells, row.reason) == ("run1", "missing", "", [""], said)
@@ -460,7 +460,7 @@ def test_engine_without_a_list_alarms_for_lost_cells_alone(tmp_path):
     assert alarms(plain) == [] and "* INVALID" not in as_markdown(plain) and "<failure" not in as_junit(plain)
 
 
-def test_a_force_that_an_engine_does_not_tell_is_no_failure_of_a_file(tmp_path):
+def test_missing_force_of_an_engine_is_no_failure_of_a_file(tmp_path):
     for why in UNTOLD:
         told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, why)})[OWN_CHECK]
         assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)

@@ -238,7 +238,7 @@ def test_a_wrong_statement_is_named_in_one_line(tmp_path, old, new, named):
     assert "\n" not in str(caught.value)
 
 
-def test_what_an_engine_refuses_is_unsupported_in_one_line_and_no_alarm(tmp_path):
+def test_refusal_by_an_engine_unsupported_and_no_alarm(tmp_path):
     path = tmp_path / "space.toml"
     path.write_text(
         GOOD.replace("dimension = 2", "dimension = 3")
@@ -328,7 +328,7 @@ def test_file_with_a_growth_factor_off_its_plane(tmp_path, stated, growth):
         ("growth = true", "growth"),
     ],
 )
-def test_a_growth_that_means_nothing_is_refused_with_its_name(tmp_path, stated, said):
+def test_invalid_growth_factor_refused_with_its_name(tmp_path, stated, said):
     path = tmp_path / "pile.toml"
     path.write_text(PILE.format(stated=stated))
     with pytest.raises(SceneError, match=re.escape(said)):

@@ -94,7 +94,7 @@ def test_a_fault_fails_the_recipe_s_check(drop):
     assert not _watchers(Planted(engine, "extent", 0.1), "tuned", "drop", {}, 2, 1 / 240)["rest_height"].holds
 
 
-def test_ours_come_first_and_only_its_own_code_is_in_a_scene_s_identity(drop, site):
+def test_own_code_alone_in_the_identity_of_a_scene(drop, site):
     assert list(CATALOGUE)[-1] == "drop"
     before = {name: identity.scene_code(name) for name in CATALOGUE}
     with (site / "mypackage" / "drop.py").open("a") as file:
@@ -104,7 +104,7 @@ def test_ours_come_first_and_only_its_own_code_is_in_a_scene_s_identity(drop, si
     assert {name for name in before if before[name] != after[name]} == {"drop"}
 
 
-def test_what_runs_and_measures_a_cell_is_in_its_identity(monkeypatch):
+def test_running_and_measuring_code_in_the_identity_of_a_cell(monkeypatch):
     """Else a cell that was stored stands for one that other code would run or measure."""
     hashed = set()
     monkeypatch.setattr(identity, "_hash_files", lambda paths: hashed.update(map(str, paths)) or "0" * 16)

@@ -122,7 +122,7 @@ def test_no_more_settings_are_changed_than_there_are_rounds(monkeypatch):
     assert len(found.changes) == tuning.ROUNDS and list(found.changes) == names[: tuning.ROUNDS]
 
 
-def test_a_score_counts_what_fails_and_how_far_what_is_seen_is_off():
+def test_score_by_failures_and_visible_errors():
     told = tuning.score([reading(bad) for bad in (0.0, INVISIBLE, 0.1, 1.0, 1.001, 1e5, math.inf)])
     assert told.failing == 3
     assert told.decades == pytest.approx(2.0 + 3.0 + math.log10(1001.0) + 6.0 + 6.0)
@@ -134,7 +134,7 @@ def test_a_score_counts_what_fails_and_how_far_what_is_seen_is_off():
         assert other.better_than(one) == better
 
 
-def test_what_broke_is_named_by_scene_parameters_and_metric():
+def test_broken_checks_by_scene_parameters_and_metric():
     plain = Slot("impact", (), 3, "toy", "tuned", 1 / 240)
     before = [reading(1.0), reading(0.5, "drift"), reading(2.0, "spin"), reading(0.1, "apex", plain)]
     after = [reading(1.01), reading(1.0, "drift"), reading(3.0, "spin"), reading(9.0, "apex", plain)]

@@ -136,7 +136,7 @@ def test_search_without_a_visible_gain_and_limit_of_rounds(monkeypatch):
     assert len(found.changes) == tuning.ROUNDS == 4 and found.after.failing == 0
 
 
-def test_an_engine_without_a_profile_as_shipped_has_nothing_needless(monkeypatch):
+def test_engine_without_a_shipped_profile_has_no_needless_settings(monkeypatch):
     asked = Asked(lambda slot: (0.5,))
     monkeypatch.setattr(tuning, "observe", asked)
     monkeypatch.setattr(tuning, "profile_of", lambda engine, role: None)
@@ -229,7 +229,7 @@ def test_equivalent_single_settings_and_profile_of_a_whole_cure(monkeypatch):
         (("creep",), 0.5, None),
     ],
 )
-def test_what_passes_is_not_searched_and_what_was_not_measured_fails(monkeypatch, unmeasured, off, answer):
+def test_passed_cells_not_searched_and_unmeasured_ones_failed(monkeypatch, unmeasured, off, answer):
     found, _, _ = cured(monkeypatch, lambda slot: (off,), {}, unmeasured=unmeasured)
     if answer:
         assert found == answer
@@ -269,7 +269,7 @@ class FakeLane:
         return SimpleNamespace(seconds=seconds, void=void)
 
 
-def test_cost_is_the_least_of_the_laps_that_count_over_their_steps(monkeypatch):
+def test_cost_as_the_least_valid_lap_per_step(monkeypatch):
     """Two scenes in turns, one of which has no lap that counts; half a second is clocked, or all of a shorter run."""
     FakeLane.made = []
     laps = [(0.36, ""), (0.24, ""), (0.12, "void: it hung"), (0.0, ""), (0.48, ""), (0.6, ""), (0.3, "")]
@@ -313,7 +313,7 @@ def measured(monkeypatch, enough, belongs=None, values=None, metrics=()):
     return decisive.measure("toy", target, jobs=2), asked, target
 
 
-def test_of_settings_of_which_each_is_enough_each_decides_alone(monkeypatch):
+def test_equally_sufficient_settings_each_decisive_alone(monkeypatch):
     found, asked, target = measured(monkeypatch, [{"a"}, {"b"}])
     assert (found.engine, found.version, found.shipped, found.better) == ("toy", "toy 2.1", "default", "tuned")
     assert (found.scene, found.dimension, found.cells, found.metrics) == ("impact", 2, target.cells, ())
@@ -343,7 +343,7 @@ def test_dependent_setting_switched_with_its_main_one(monkeypatch):
         ([], (), "toy impact: 3 tolerances as shipped, 2.25 with every change, so this is no fix"),
     ],
 )
-def test_what_passes_as_shipped_or_fails_with_every_change_is_no_cure(monkeypatch, enough, metrics, said):
+def test_checks_always_passed_or_always_failed_give_no_cure(monkeypatch, enough, metrics, said):
     with pytest.raises(ValueError, match="no fix") as refused:
         measured(monkeypatch, enough, metrics=metrics)
     assert str(refused.value) == said
@@ -369,7 +369,7 @@ def test_cure_without_effect_in_the_told_cell(monkeypatch):
     assert cures.search("toy", "pinch", 2) == Unsearched(False, "no check of its cases is judged")
 
 
-def test_what_is_left_a_little_above_its_tolerance_is_not_mended(monkeypatch):
+def test_value_slightly_above_its_tolerance_not_mended(monkeypatch):
     def off(slot):
         s, margin = dict(slot.switched), dict(slot.params).get("margin", 1.0)
         mended = s.get("a") == 1

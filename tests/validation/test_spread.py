@@ -94,7 +94,7 @@ def test_spread_against_the_same_scene_and_none_for_our_run():
     assert all(math.isfinite(s.distance) for s in found)
 
 
-def test_what_crashed_or_is_not_in_the_run_has_no_distance():
+def test_crashed_or_absent_engine_without_a_distance():
     assert told([slot()], [(0.01,)], outcome=Outcome.CRASHED) == []
     own, other = slot(*OURS), slot()
     assert spreads([answered(own)], [(own, recording(own)), (other, recording(other))]) == []

@@ -132,7 +132,7 @@ def test_process_state_cached_until_a_new_name(monkeypatch):
     assert state.still(before).sizes["json"] == before.sizes["json"] + 1
 
 
-def test_at_most_three_names_of_a_place_and_eight_in_all_are_told():
+def test_limit_of_named_changes_by_place_and_in_all():
     before = state.taken()
     names = {f"f{k}": len for k in range(5)}
     places = {f"place{k}": ({}, names) for k in range(4)} | {"whole": (names, names)}
@@ -143,7 +143,7 @@ def test_at_most_three_names_of_a_place_and_eight_in_all_are_told():
     )
 
 
-def test_the_library_of_numbers_is_asked_by_its_name_where_it_has_one(monkeypatch):
+def test_numerical_library_asked_by_its_name(monkeypatch):
     asked, tell = [], {"wrong": None}
 
     def library(name):

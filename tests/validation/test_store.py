@@ -13,7 +13,7 @@ def observed(slot, value=0.8):
     return Observation(slot, "cell", 1, "7.3.1", Outcome.OK, metrics={"rebound_ratio": (value, "")}, state_hash="ab")
 
 
-def test_what_was_added_comes_back_equal_and_in_the_order_of_the_plan(tmp_path):
+def test_stored_results_equal_and_in_plan_order(tmp_path):
     store = Store(tmp_path)
     run, done = store.start("test", SLOTS)
     assert done == set()
@@ -87,7 +87,7 @@ def test_missing_results_and_runs_are_said_in_one_line(tmp_path):
         store.run("x")  # not the one that is there
 
 
-def test_each_of_some_runs_is_had_by_its_id_and_the_last_one_without(tmp_path):
+def test_runs_by_id_and_the_last_without(tmp_path):
     store = Store(tmp_path)
     ids = [store.start(title, SLOTS, fresh=True)[0].id for title in ("one", "two", "three")]
     assert len(set(ids)) == 3

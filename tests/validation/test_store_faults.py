@@ -222,7 +222,7 @@ def test_a_file_cut_short_is_one_line(tmp_path):
         read_all(tmp_path)
 
 
-def test_a_full_disk_is_one_line_and_loses_nothing_that_was_there(tmp_path):
+def test_full_disk_in_one_line_without_loss(tmp_path):
     made = Store(tmp_path)
     run, _ = made.start("test", SLOTS)
     made.add(run, observed(SLOTS[0]))
@@ -333,7 +333,7 @@ def test_write_lock_taken_before_a_dependent_read(tmp_path, monkeypatch):
     assert asked == [UTC]
 
 
-def test_the_latest_run_is_the_one_started_last_whatever_the_clock_said(tmp_path, monkeypatch):
+def test_latest_run_by_start_order_despite_the_clock(tmp_path, monkeypatch):
     made = Store(tmp_path)
 
     class Past(datetime):
@@ -388,7 +388,7 @@ def test_edited_scene_file_as_another_plan(tmp_path, forget):
         resolve(before[0].scene)
 
 
-def test_a_scene_file_that_was_moved_does_not_matter_to_its_run(tmp_path, forget):
+def test_moved_scene_file_without_effect_on_its_run(tmp_path, forget):
     path = tmp_path / "drop.json"
     cells = written(path)
     made = Store(tmp_path)

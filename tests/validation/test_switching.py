@@ -31,7 +31,7 @@ OURS = [name for name in registry.names() if registry.is_ours(registry.entry(nam
      {"dt": 1 / 960}, {"iterations": 20}, {"ulp": 1}, {"switched": (("iterations", 3),)}],
     ids=lambda changed: next(iter(changed)),
 )  # fmt: skip
-def test_all_that_is_asked_of_a_cell_is_in_the_key_that_it_is_stored_by(changed):
+def test_cell_key_with_every_question_of_a_cell(changed):
     """A moved start that was stored as its unmoved cell would be its answer, and leave it no floor."""
     assert replace(SLOT, **changed).key() != SLOT.key()
 
@@ -179,7 +179,7 @@ def test_a_score_counts_fails_before_it_counts_decades():
     assert score([read(None)]).failing == 1
 
 
-def test_what_passed_and_fails_is_broken_and_what_failed_is_not():
+def test_broken_checks_of_those_that_passed_before():
     before, after = [read(0.5), read(2.0), read(0.5)], [read(1.5), read(3.0), read(0.9)]
     assert len(broken(before, after)) == 1
 

@@ -89,7 +89,7 @@ STEPS[LOSING] = reflected_after_the_move
 
 
 @pytest.mark.parametrize("first, second", [(a, b) for i, a in enumerate(STEPS) for b in list(STEPS)[i + 1 :]])
-def test_the_orders_are_alternatives_and_no_shifts_of_each_other(first, second):
+def test_step_orders_as_alternatives_and_not_shifts(first, second):
     scene = CATALOGUE["bounce"].scene(2, {"e": 0.8})
     dt = 1 / 60
     one, other = (bounce_by(scene, dt, order).pose[:, 1, 1] for order in (first, second))
@@ -136,7 +136,7 @@ def test_an_order_that_loses_height_at_every_bounce_fails():
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_a_force_that_is_told_in_flight_fails_the_bounce(order):
+def test_reported_force_in_flight_fails_the_bounce(order):
     """Told on after the contact, ahead of it, or a part in 1e9 of it all the way: but for the steps next to it."""
     scene, dt = CATALOGUE["bounce"].scene(2, {"e": 0.8}), 1 / 240
     right = bounce_by(scene, dt, order)
@@ -158,7 +158,7 @@ def test_energy_growth_is_caught_where_e_is_below_one():
 OF_ONE_STEP = {"impulse_scatter", "load[least]", "load[greatest]", "unbalanced", "force_in_flight"}
 
 
-def test_bounds_do_not_know_the_engine_and_shrink_with_the_step():
+def test_bounds_independent_of_the_engine_and_smaller_with_the_step():
     for name, params in (("bounce", {}), ("stack", {"n": 5}), ("incline", {"ratio": 0.9}), ("incline", {"ratio": 1.1})):
         canonical = CATALOGUE[name]
         scene = canonical.scene(2, params)

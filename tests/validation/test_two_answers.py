@@ -54,7 +54,7 @@ def both(tmp_path, friction, value):
     return own, {row.profile: row for row in rows}
 
 
-def test_an_engine_that_follows_the_other_motion_is_not_failed(tmp_path):
+def test_engine_on_the_other_of_two_motions_not_failed(tmp_path):
     own, rows = both(tmp_path, 1.0, 1.0)
     assert own.certificate["full"]["several"] and own.certificate["full"]["determined"] == 0.0
     told = "two motions obey the laws from 0 s: bodies "
@@ -71,7 +71,7 @@ def test_engine_that_follows_neither_of_two_motions_fails(tmp_path):
 
 
 @pytest.mark.parametrize("bound", [float("inf"), float("nan")])
-def test_a_tolerance_that_is_no_number_judges_nothing(bound):
+def test_tolerance_that_is_nan_judges_nothing(bound):
     check = Check("apex", "m", 1.0, bound, "because", "source")
     assert judge_physics(3.0, check) is None
     verdict = judge(3.0, check, [], Known(None, True, ""))

@@ -169,7 +169,7 @@ def test_a_scene_is_built_of_its_parameters_by_their_units(name, in_other_units)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_truth_and_bounds_change_by_their_unit_alone(name, in_other_units):
+def test_truth_and_bounds_in_other_units(name, in_other_units):
     canonical = CATALOGUE[name]
     asked = [(d, p, dt) for d in canonical.dimensions for p in cells(canonical) for dt in DTS]
     before = [canonical.checks(canonical.scene(d, p), dt) for d, p, dt in asked]
@@ -202,7 +202,7 @@ def retold(trajectory, d):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_what_is_measured_changes_by_its_unit_alone_and_no_verdict_does(name, in_other_units):
+def test_measures_and_verdicts_in_other_units(name, in_other_units):
     canonical, dt, found = CATALOGUE[name], DTS[0], []
     engine = load("chipmunk" if canonical.dimensions == (2,) else "mujoco")
     for d in canonical.dimensions:

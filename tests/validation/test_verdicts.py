@@ -101,7 +101,7 @@ def test_marginal_is_within_a_factor_of_two_of_the_tolerance():
 
 @pytest.mark.parametrize("check", [Check("m", "1", None, 1.0, "shown", ""), Check("m", "1", 1.0, None, "shown", "")])
 @pytest.mark.parametrize("value", [3.0, None])
-def test_what_has_no_truth_or_no_bound_is_shown_and_not_judged(check, value):
+def test_rows_without_truth_or_bound_shown_and_not_judged(check, value):
     verdict = judge(value, check, (), NEW)
     assert (verdict.physics, verdict.standing) == (None, None)
 
@@ -175,7 +175,7 @@ def test_the_reason_of_a_standing_in_full(value, predictions, known, said):
     assert judge(value, CHECK, predictions, known).reason == said
 
 
-def test_a_missing_value_says_why_after_what_is_wrong_with_that():
+def test_reasons_of_a_missing_value_in_order():
     verdict = judge(None, CHECK, (), NEW, "there is no apex")
     assert verdict.reason == "has no value; not on record; there is no apex"
 
@@ -217,7 +217,7 @@ def test_laws_asked_with_scene_and_step():
     assert asked == [("the scene", 0.25, "its measure")]
 
 
-def test_at_iterations_that_are_asked_for_a_law_says_what_those_make():
+def test_law_prediction_at_requested_iterations():
     def asked(scene, dt, measure, iterations):
         return float(iterations), 0.1
 

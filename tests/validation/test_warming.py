@@ -25,7 +25,7 @@ def compiled():
 
 @pytest.mark.long
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_whole_cells_call_no_kernel_that_first_steps_left_alone(dimension, monkeypatch, tmp_path):
+def test_kernels_of_whole_cells_compiled_by_first_steps(dimension, monkeypatch, tmp_path):
     """One cell of each scene of the quick suite, moved by an ulp: run once, not again for a certificate.
 
     The first steps are those of one scene for each profile.
@@ -125,7 +125,7 @@ def test_no_parts_of_engines_that_compile_nothing_or_are_not_installed(toy):
     assert toy(version=None) == [] and toy([SLOT]) == [] and toy([]) == []
 
 
-def test_a_mark_that_cannot_be_written_stops_nothing(toy):
+def test_unwritable_mark_stops_nothing(toy):
     part = toy()[0]
     part.mark.parent.rmdir()
     part.keep()

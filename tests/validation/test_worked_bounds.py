@@ -50,7 +50,7 @@ def apex_bounds(e, height, g, dt):
 
 @pytest.mark.parametrize(("e", "height", "g"), [(0.5, 1.0, 9.81), (0.8, 1.25, 9.81), (0.95, 1.0, 3.7)])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 4000])
-def test_apexes_are_as_wrong_as_the_late_bounces_before_them(e, height, g, dt):
+def test_apex_bound_by_the_late_bounces_before(e, height, g, dt):
     found = checks_of("bounce", dt=dt, e=e, height=height, g=g)
     expected = {f"apex[{n}]": pytest.approx(bound, rel=1e-12) for n, bound in apex_bounds(e, height, g, dt).items()}
     apexes = {m: c for m, c in found.items() if m.startswith("apex[")}
@@ -102,7 +102,7 @@ def test_growth_allows_the_top_of_the_first_parabola_and_nothing_else(height, g,
 
 
 @pytest.mark.parametrize(("e", "dt"), [(0.8, 1 / 240), (0.5, 1 / 60), (0.95, 1 / 1000)])
-def test_rest_allows_a_step_a_bounce_the_tail_and_the_scatter_of_phases(e, dt):
+def test_rest_bound_of_step_bounce_tail_and_phase_scatter(e, dt):
     height, g = 1.0, 9.81
     check = checks_of("bounce", dt=dt, e=e, height=height, g=g)["rest_time"]
     v0, slow = math.sqrt(2.0 * g * height), 2.0 * g * dt
@@ -119,7 +119,7 @@ def test_rest_bound_of_a_ball_without_a_rebound():
     assert bounds_of("bounce", e=0.0)["rest_time"] == pytest.approx((1 + 4 + 1) * DT, rel=1e-14)
 
 
-def test_rest_of_a_ball_slower_than_two_steps_of_gravity_has_one_bounce():
+def test_rest_bound_of_a_slow_ball_with_one_bounce():
     """From g dt^2 the ball lands with sqrt(2) g dt, below the speed from which bounces are counted."""
     e, g, dt = 0.5, 8.0, 1 / 64
 
@@ -135,7 +135,7 @@ def test_rest_of_a_ball_slower_than_two_steps_of_gravity_has_one_bounce():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(("n", "mass", "g"), [(1, 1.0, 9.81), (5, 2.0, 3.7)])
-def test_a_stack_may_do_what_one_step_of_free_fall_adds(dimension, n, mass, g):
+def test_stack_bound_of_one_step_of_free_fall(dimension, n, mass, g):
     found = checks_of("stack", dimension, n=n, mass=mass, g=g, duration=5.0)
     v1, top = g * DT, n - 0.5
     assert {m: (c.unit, c.bound) for m, c in found.items()} == {
@@ -180,7 +180,7 @@ def test_allowed_distance_of_sticking_and_sliding_boxes(g, duration):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_rules_take_the_truth_they_are_given_and_no_other(name):
+def test_rules_take_the_given_truth(name):
     """A rule that looked up a truth of its own would judge a scene by something else than its law."""
     scene = CATALOGUE[name].scene(CATALOGUE[name].dimensions[0])
     truth = {metric: 10.0 + k for k, metric in enumerate(CATALOGUE[name].exact(scene))}

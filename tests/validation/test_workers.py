@@ -37,7 +37,7 @@ def evil(profile):
         ("refuse", Outcome.UNSUPPORTED, "it does not want to"),
     ],
 )
-def test_what_an_engine_does_to_its_process_costs_only_its_cell(plugins, profile, outcome, reason):
+def test_changes_of_a_process_cost_only_their_cell(plugins, profile, outcome, reason):
     healthy = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (1.0, 2.0)]
     found = {o.slot: o for o in run_cells([healthy[0], evil(profile), healthy[1]], jobs=1, memory=4 * 2**30)}
     assert len(found) == 3
@@ -66,7 +66,7 @@ def test_a_broken_plugin_is_a_row_with_its_reason(plugins):
     assert "this plugin is broken" in observation.reason
 
 
-def test_neither_temporary_files_nor_semaphores_are_needed(monkeypatch):
+def test_run_without_temporary_files_or_semaphores(monkeypatch):
     """A full temporary folder, and a system without /dev/shm."""
 
     def full(*arguments, **options):
@@ -169,7 +169,7 @@ def alive(pid):
         return False
 
 
-def test_one_look_at_a_process_serves_until_names_or_modules_have_come(monkeypatch):
+def test_process_state_cached_until_new_names_or_modules(monkeypatch):
     """What a cell has replaced is seen against an old look as well as against a new one."""
     before = state.taken()
     assert state.still(before) is before and state.changed(state.still(before)) == ""

@@ -117,7 +117,7 @@ def test_extremes_beside_their_heights_and_equal_ones_once():
     assert list(same) == ["0.25"] and same["0.25"][0] == pytest.approx(sum(ERROR) / 2 + 3, abs=DRAWN)
 
 
-def test_an_error_that_is_round_off_is_called_exact_and_a_time_never_is():
+def test_round_off_error_called_exact_and_a_time_never():
     tree = drawn([point(0, error=1e-17, ratio=1e-17), point(1, error=0.0, ratio=2e-17)])
     said = [node.text for node in tree.iter("text")]
     assert said.count("exact") == 1 and "1.0e-17" in said and "2.0e-17" in said
@@ -153,7 +153,7 @@ def test_corners_left_out_only_where_nothing_changes():
 
 @pytest.mark.parametrize("factor, says", [(2.0, "step worse"), (0.5, "step better")])
 @pytest.mark.parametrize("timed", [False, True])
-def test_a_step_stands_half_way_between_two_points_across_its_own_room(timed, factor, says):
+def test_step_mark_half_way_between_two_points(timed, factor, says):
     steps = [(3, Step(3, 1.0, factor))]
     points = [point(i, error=1.0, ratio=1.0) for i in range(8)]
     tree = drawn(points, **{"time_steps" if timed else "error_steps": steps})
@@ -212,7 +212,7 @@ def test_mark_of_a_flip_lost_or_mended():
         assert (x + across + dx, y + dy) == pytest.approx((places[at], tip), abs=2 * DRAWN)
 
 
-def test_who_cannot_see_the_picture_is_told_what_it_marks():
+def test_text_alternative_of_a_picture():
     points = [point(i, error=1.0, lost=i == 2) for i in range(6)]
     tree = drawn(points, [(3, Step(3, 1.0, 2.0))], [(4, Step(4, 1.0, 2.0)), (5, Step(5, 1.0, 2.0))])
     assert tree.get("role") == "img"

@@ -23,7 +23,7 @@ def changed(file, *statements):
     db.close()
 
 
-def test_a_file_that_is_no_database_keeps_nothing_and_stays_what_it_is(file):
+def test_file_that_is_no_database_left_unchanged(file):
     file.write_bytes(b"notes of somebody\n" * 100)
     kept = Kept(file.parent)
     kept.put("run", summary())
@@ -32,7 +32,7 @@ def test_a_file_that_is_no_database_keeps_nothing_and_stays_what_it_is(file):
     assert file.read_bytes() == b"notes of somebody\n" * 100
 
 
-def test_a_table_that_is_gone_or_of_another_program_keeps_nothing(file):
+def test_missing_or_foreign_summary_table(file):
     for statements in (["DROP TABLE kept"], ["DROP TABLE kept", "CREATE TABLE kept (other TEXT)"]):
         kept = Kept(file.parent)
         changed(file, *statements)

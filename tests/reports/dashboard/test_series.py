@@ -87,7 +87,7 @@ def test_a_series_too_short_for_two_levels_has_no_step(n):
     assert steps([1.0] + [9.0] * (n - 1), TIME) == []
 
 
-def test_a_time_that_stands_out_alone_is_no_step_and_one_that_stays_is():
+def test_single_outlier_of_time_and_lasting_change():
     assert steps([1.0] * 9 + [3.0] + [1.0] * 9, TIME) == []
     assert [step.at for step in steps([1.0] * 9 + [1.5] * 3, TIME)] == [9]
 
@@ -157,7 +157,7 @@ def test_a_history_of_one_run_says_so_and_draws_nothing():
     assert "One run; nothing to compare yet." in page and "<figure" not in page and "<script>" not in page
 
 
-def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():
+def test_verdict_unstable_under_moved_starts_is_no_flip():
     """Of the four that fail in turn two pass from a moved start: they neither begin nor cease to fail."""
     entries = []
     for k, (fails, sure) in enumerate([(0, 0), (1, 0), (0, 0), (1, 1), (1, 0), (0, 0)]):
@@ -170,7 +170,7 @@ def test_a_verdict_that_a_moved_start_flips_too_is_no_flip():
     assert [point.fails for point in panel.points] == [0, 1, 0, 1, 1, 0]
 
 
-def test_a_check_fails_for_sure_where_no_moved_start_mends_it(observation):
+def test_sure_failure_without_a_passing_moved_start(observation):
     who = ("chipmunk", "tuned")
     bad, good = observation(who, 0.2), observation(who, 0.0)
     worse = observation(who, 0.3)  # chaos: far from the other, and as wrong
@@ -189,7 +189,7 @@ def test_a_check_fails_for_sure_where_no_moved_start_mends_it(observation):
         assert (brief[1], brief[3]) == (count, sure)
 
 
-def test_runs_that_asked_something_else_bring_no_step():
+def test_no_step_between_runs_of_other_questions():
     """A cell that the newest run does not have decides nothing; a run that lacks one has no error."""
     key = ("e", "p", "impact", 2)
     good, bad = (0.1, 0, 1, 0), (9.0, 1, 1, 1)
@@ -285,7 +285,7 @@ def test_errors_that_are_exact_are_one_level():
     assert not panel.moved
 
 
-def test_a_summary_is_made_once_and_again_for_other_code(history_folder, monkeypatch):
+def test_summary_made_once_per_code_version(history_folder, monkeypatch):
     store = Store(history_folder, create=False)
     panels(store, history_folder)
     assert (history_folder / FILE).exists()
@@ -320,7 +320,7 @@ def test_release_points_by_version_apart_from_runs(tmp_path, observation):
     assert panel.flips == [1] and panel.points[0].fails == 0 < panel.points[1].fails
 
 
-def test_a_release_is_judged_once_and_again_once_it_was_asked_more(tmp_path, observation, monkeypatch):
+def test_release_judged_again_after_new_cells(tmp_path, observation, monkeypatch):
     store = of_releases(tmp_path, observation, [("7.9.0", 0.0), ("7.10.0", 0.3)])
     judged = []
 
@@ -356,7 +356,7 @@ def test_kept_summary_not_judged_again(tmp_path, monkeypatch):
     store.close()
 
 
-def test_where_nothing_can_be_kept_it_is_made_each_time(tmp_path):
+def test_summary_computed_each_time_without_a_writable_folder(tmp_path):
     kept = Kept(tmp_path / "missing")
     kept.put("run", Summary({}, {}))
     assert kept.get("run") is None

@@ -106,7 +106,7 @@ def test_a_check_that_no_row_has_is_said():
     [("apex", ["apex[1]", "apex[2]"]), ("apex[1]", ["apex[1]"]), ("bounce/apex[1]", ["apex[1]"]), ("ape", []),
      ("apex[1", []), ("[1]", [])],
 )  # fmt: skip
-def test_a_check_is_meant_by_its_name_its_series_or_its_place_in_it(asked, meant):
+def test_check_by_name_series_or_index(asked, meant):
     from validation.releases.bisection import is_meant
 
     assert [metric for metric in ("apex[1]", "apex[2]", "rest[1][2]") if is_meant(metric, asked)] == meant
@@ -134,7 +134,7 @@ def test_order_of_asked_releases_and_cells_in_a_bisection():
                for _, moved, params in between)  # fmt: skip
 
 
-def test_a_flip_is_followed_by_its_verdict_whatever_the_value_does():
+def test_flip_followed_by_its_verdict():
     """The value moves at 1 and stays right; the verdict goes at 3."""
     found = bisect(5, [SLOT], "rebound_ratio", Engine([0.5, 0.5 + 1e-13, 0.5 + 1e-13, 0.4, 0.3]))
     assert (found.before, found.after, found.change.kind) == (2, 3, Kind.FLIP)
@@ -148,7 +148,7 @@ def test_bisection_without_a_change_or_with_a_silent_end():
     assert last == Unchanged("release 2 cannot run: no wheel")
 
 
-def test_a_release_that_names_no_reason_has_that_of_its_rows():
+def test_release_without_a_reason_takes_that_of_its_rows():
     class Refusing(Engine):
         def __call__(self, index, cells):
             told = super().__call__(index, cells)
@@ -165,7 +165,7 @@ def test_value_that_changes_twice_between_two_releases():
     assert "0.4" in found.change.before and "0.37" in found.change.after
 
 
-def test_values_that_creep_within_their_floor_are_told_by_the_ends():
+def test_creeping_value_within_its_floor_by_the_ends():
     """No two neighbours differ by more than the floor, of either of two cells; first and last do."""
     other = replace(SLOT, params=(("e", 0.6), ("v", 4.0)))
     engine = Engine([0.4, 0.4 + 0.9e-3, 0.4 + 1.8e-3, 0.4 + 2.7e-3], noise=1e-3)

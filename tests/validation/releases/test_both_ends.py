@@ -113,7 +113,7 @@ def test_timing_failure_with_its_reason_in_a_finished_run(timed, store):
     ("held", "asked", "same"),
     [("1.0", "1.0.0", True), ("1.0.post0", "1.0", False), ("2.0", "1.0", False), ("of today", "1.0", False)],
 )
-def test_a_version_is_the_same_however_many_zeros_it_ends_with(held, asked, same):
+def test_version_with_trailing_zeros(held, asked, same):
     told = {"told": {"distribution_version": held}}
     assert driving._same(told, SimpleNamespace(version=asked)) is same
 
@@ -148,7 +148,7 @@ def far(monkeypatch):
     return run
 
 
-def test_the_far_side_says_first_what_it_is_and_then_what_it_ran(far):
+def test_far_side_tells_its_version_before_its_results(far):
     """Its answers go where its output went, and what an engine prints to where errors go."""
     import platform
     from importlib.metadata import version

@@ -28,7 +28,7 @@ def test_numpy_is_always_asked_for_once():
     assert release("e", TWO, "4.0").requirements == ("new-name==4.0", "helper==1", "numpy")
 
 
-def test_what_the_adapter_does_not_know_is_said_with_the_range():
+def test_release_unknown_to_the_adapter_with_the_range():
     assert release("e", TWO, "3.5").unknown == ""
     assert ">=3,<5" in release("e", TWO, "2.9").unknown and "--try" in release("e", TWO, "5.0").unknown
     assert release("e", TWO, "4.5").unknown == "it erases the disk"

@@ -77,7 +77,7 @@ def test_a_release_that_cannot_be_installed_is_a_row_with_its_reason(toy, store)
 
 
 @pytest.mark.long
-def test_what_is_stored_is_not_asked_again_but_what_was_missing_is(toy, store):
+def test_stored_cells_not_asked_again_and_missing_ones_asked(toy, store):
     asked = []
     for version in ("1.0.0", "1.1.0", "1.0.0", "1.1.0"):
         ask(store, version, progress=lambda observation: asked.append(observation.engine_version))
@@ -175,7 +175,7 @@ def driven(place):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_nothing_goes_on_in_an_environment_when_its_run_is_killed(toy, copied, tmp_path):
+def test_processes_in_an_environment_ended_with_a_killed_run(toy, copied, tmp_path):
     place = copied(release("1.0.0")).path
     own = os.environ | {"TOY_SLEEP": "60"}
     command = [sys.executable, "-c", ASKER, str(tmp_path / "out")]

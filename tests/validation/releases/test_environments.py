@@ -132,7 +132,7 @@ def wait_for(found, seconds=60.0):
     return value
 
 
-def test_a_kill_in_the_middle_of_an_installation_leaves_nothing_trusted(own_cache, tmp_path):
+def test_killed_installation_not_trusted(own_cache, tmp_path):
     mark = tmp_path / "installed"
     process = builder(mark, 600.0)
     assert wait_for(mark.exists), process.communicate()
@@ -146,7 +146,7 @@ def test_a_kill_in_the_middle_of_an_installation_leaves_nothing_trusted(own_cach
     assert not list(environments.folder().glob(f"{environments.UNFINISHED}*"))
 
 
-def test_a_kill_between_receipt_and_name_leaves_nothing_trusted(made):
+def test_kill_between_receipt_and_name_not_trusted(made):
     made.path.rename(made.path.with_name(f"{environments.UNFINISHED}{made.name}-left"))
     assert environments.found() == []
 

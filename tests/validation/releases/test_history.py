@@ -36,7 +36,7 @@ def kinds(releases):
             if s.family.first.metric == "rebound_ratio"]  # fmt: skip
 
 
-def test_what_moves_is_told_once_in_the_release_where_it_moves():
+def test_change_told_once_at_its_release():
     releases = [told("1", 0.5), told("2", 0.5), told("3", 0.4), told("4", 0.4)]
     assert kinds(releases) == [("2", "3", Kind.FLIP, 1)]
 
@@ -73,7 +73,7 @@ def noisy(version, ratio, scatter, moves=(0, 1, 2)):
     return told_by("toy", version, found)
 
 
-def test_a_value_that_moves_no_more_than_from_a_moved_start_is_no_step():
+def test_change_within_moved_starts_is_no_step():
     assert kinds([noisy("1", 0.40, 0.01), noisy("2", 0.41, 0.01)]) == []
     assert kinds([noisy("1", 0.40, 0.001), noisy("2", 0.41, 0.001)]) == [("1", "2", Kind.ERROR, 1)]
 
@@ -84,7 +84,7 @@ def test_starts_moved_only_for_values_changed_on_both_sides():
     assert moved_starts(releases) == {"2": starts, "3": starts}
 
 
-def test_the_command_asks_what_moved_again_and_only_that(monkeypatch):
+def test_command_for_changed_cells_only(monkeypatch):
     asked = []
 
     def drive(store, release, cells, effort, console):
@@ -158,7 +158,7 @@ def test_a_release_is_told_by_its_name_its_rows_and_its_times():
     assert (nothing.rows, nothing.reason, nothing.times) == ((), "it was not run", {})
 
 
-def test_an_invalid_release_has_answered_and_needs_no_reason():
+def test_invalid_release_as_an_answer_without_a_reason():
     assert told("2", None, outcome=Outcome.INVALID).reason == ""
 
 
@@ -187,7 +187,7 @@ def test_failed_receipt_removes_verdicts_of_its_profile_only():
     assert [(row.outcome, row.physics) for row in kept] == [("ok", "pass")]
 
 
-def test_what_was_invalid_before_keeps_its_own_reason():
+def test_earlier_invalid_cell_keeps_its_reason():
     found = [Observation(SLOT, "c", 1, "2", Outcome.INVALID, "it sinks", receipts=(BROKEN,))]
     assert all("no verdict" not in row.reason and "it sinks" in row.reason for row in told_by("toy", "2", found).rows)
 
@@ -357,7 +357,7 @@ def test_step_between_releases_with_its_note_or_unexplained(noted):
     assert notes.explanations("toy", "bounce", "default", "2", "3") == ["unexplained"]
 
 
-def test_what_one_note_explains_stands_under_it_once(noted):
+def test_rows_explained_by_one_note_under_it(noted):
     noted(NOTE)
     slots = (SLOT, replace(SLOT, profile="other"))
     (said,) = sentences("toy", steps([told("2", 0.5, slots), told("3", 0.4, slots)]))

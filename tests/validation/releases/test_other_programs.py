@@ -41,7 +41,7 @@ def programs(monkeypatch):
 LATE = subprocess.TimeoutExpired("x", 1.0)
 
 
-def test_the_commit_is_git_s_own_and_a_plus_says_that_more_has_changed(programs):
+def test_commit_id_with_a_plus_for_local_changes(programs):
     for told, commit in (
         (((0, "abc123\n", ""), (0, "", "")), "abc123"), (((0, "abc123\n", ""), (0, " M file\n", "")), "abc123+"),
         (((0, "abc123\n", ""), (0, "\n", "")), "abc123"), (((128, "no repository", ""),), ""),
@@ -55,7 +55,7 @@ def test_the_commit_is_git_s_own_and_a_plus_says_that_more_has_changed(programs)
         assert asked == wanted[: len(told)]
 
 
-def test_the_registry_is_asked_for_its_list_and_given_up_after_a_while(programs):
+def test_registry_list_with_a_time_limit(programs):
     asked = programs((0, "toy (2.0)\nAvailable versions: 2.0, 1.10, 1.9, 2.1b1, dead-beef\nINSTALLED: none\n", "odd"))
     assert [str(each) for each in choosing._listed("toy")] == ["2.0", "1.10", "1.9"]
     command = [sys.executable, "-m", "pip", "index", "versions", "toy", "--disable-pip-version-check"]

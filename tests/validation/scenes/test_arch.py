@@ -105,7 +105,7 @@ def test_the_stones_are_uniform_touch_and_overlap_nowhere(params):
 
 
 @pytest.mark.parametrize("params", SHAPES)
-def test_it_takes_as_much_friction_as_balances_the_springers(params):
+def test_friction_that_balances_the_springers(params):
     _, scene = made("arch", **params)
     assert needed(scene.params) == pytest.approx(least_friction(scene), rel=1e-9)
 
@@ -125,7 +125,7 @@ def test_it_gives_way_as_newton_s_laws_say(params, ratio):
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.8, 1.05])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5])
-def test_what_goes_or_stays_by_newton_s_laws_passes_in_every_step_order(params, ratio, order):
+def test_arch_by_newton_s_laws_in_every_step_order(params, ratio, order):
     canonical, scene = made("arch", ratio=ratio, **params)
     assert failing(canonical, scene, run(scene, order=order)) == set()
 
@@ -153,7 +153,7 @@ def test_an_arch_that_goes_otherwise_fails(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_what_should_stay_and_moves_or_bears_otherwise_fails(size):
+def test_arch_that_moves_or_bears_wrongly(size):
     canonical, scene = made("arch")
     still = run(scene)
     for k in (1, 2, 3):
@@ -210,7 +210,7 @@ def within_base(p):
     return True
 
 
-def test_what_tips_is_what_the_floor_cannot_hold_at_rest_and_on_its_way():
+def test_tipping_stones_at_rest_and_on_their_way():
     canonical, said = CATALOGUE["arch"], []
     for ratio in (0.05, 0.2, 0.5, 1.05):
         for beta in np.linspace(10.0, 45.0, 36):

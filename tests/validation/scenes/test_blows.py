@@ -84,7 +84,7 @@ def failing(canonical, scene, trajectory):
 
 
 @pytest.mark.parametrize(("ratio", "v1", "v2"), [(1.0, 4.0, -2.0), (3.0, 4.0, -2.0), (0.1, 1.0, 0.0)])
-def test_two_balls_swap_what_springs_between_them_swap(ratio, v1, v2):
+def test_velocities_of_two_balls_with_a_spring(ratio, v1, v2):
     _, scene, truth = made("head_on", ratio=ratio, e=1.0, v1=v1, v2=v2)
     start = [body.pose[0] for body in scene.bodies]
     mass = [body.mass for body in scene.bodies]
@@ -165,7 +165,7 @@ def test_bar_with_a_second_or_earlier_blow_refused(params):
             canonical.scene(2, params)
 
 
-def test_a_bar_that_gives_way_faster_than_the_ball_comes_is_refused():
+def test_bar_that_recedes_faster_than_the_ball_refused():
     with pytest.raises(SceneError, match=r"off_centre.whirl: with 7 rad/s the bar recedes"):
         CATALOGUE["off_centre"].scene(2, {"whirl": 7.0})
 
@@ -243,7 +243,7 @@ def test_spinning_bar_bounds_against_fixed_step_methods(whirl, dt):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_spinning_bar_that_gets_another_push_or_turn_fails(size):
+def test_spinning_bar_with_another_impulse_or_spin(size):
     """At any phase within a step: the bounds of speeds hide what the balances do not."""
     canonical = CATALOGUE["off_centre"]
     for params in phases(DT):
@@ -321,7 +321,7 @@ def test_a_bar_that_turns_wrongly_fails(size):
 
 
 @pytest.mark.parametrize("aspect", [1.0, 4.0])
-def test_a_flat_box_rebounds_as_two_springs_at_its_corners_make_it(aspect):
+def test_flat_box_rebound_as_of_two_corner_springs(aspect):
     """At e = 1: two stiff springs under a rigid box that may turn; nothing turns it."""
     _, scene, truth = made("flat_box", e=1.0, aspect=aspect, mu=0.0)
     box, h, stiffness = scene.bodies[1], 1e-6, 1e8
@@ -350,7 +350,7 @@ def test_one_pass_over_the_corners_fails(size):
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 10.0])
-def test_the_small_ball_is_thrown_as_springs_throw_it(ratio):
+def test_small_ball_rebound_as_of_springs(ratio):
     _, scene, truth = made("stacked_balls", ratio=ratio, e=1.0)
     balls = scene.bodies[1:]
     found = spring_line(
@@ -393,7 +393,7 @@ def test_impacts_that_lie_within_some_steps_are_not_judged():
 
 
 @pytest.mark.parametrize("n", [2, 4])
-def test_a_row_with_gaps_hands_the_blow_on_as_springs_do(n):
+def test_blow_through_a_row_with_gaps_as_of_springs(n):
     _, scene, truth = made("cradle", n=float(n))
     found = spring_line(
         [1.0] * n, [0.5] * n, [b.pose[0] for b in scene.bodies], [b.twist[0] for b in scene.bodies],
@@ -403,7 +403,7 @@ def test_a_row_with_gaps_hands_the_blow_on_as_springs_do(n):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_row_that_loses_or_keeps_some_of_the_blow_fails(size):
+def test_blow_through_a_row_with_loss_or_remainder(size):
     canonical, scene, _ = made("cradle")
     good = [(3, 0, 2.0)]
     assert failing(canonical, scene, ended(scene, good)) == set()
@@ -413,7 +413,7 @@ def test_a_row_that_loses_or_keeps_some_of_the_blow_fails(size):
     assert failing(canonical, scene, ended(scene, lost)) == {"speed[4]", "energy_defect", "momentum_defect"}
 
 
-def test_touching_balls_are_judged_by_what_both_laws_conserve():
+def test_touching_balls_judged_by_common_conserved_quantities():
     canonical, scene, truth = made("cradle", n=3.0, apart=0.0)
     v = scene.params["v"]
     for speeds in ((-v / 3, 2 * v / 3, 2 * v / 3), (0.0, 0.0, v)):

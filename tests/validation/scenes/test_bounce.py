@@ -37,7 +37,7 @@ def test_a_ball_is_dropped_from_its_clearance(dimension):
         (1.0, 0.5 * 12.0),  # the fall and five whole arcs, and one arc more
     ],
 )
-def test_it_runs_past_rest_and_for_six_arcs_if_it_never_rests(e, end):
+def test_duration_past_rest_or_six_arcs(e, end):
     assert scene(e=e).duration == pytest.approx(end, rel=1e-12)
     # From four times the height everything takes twice as long, but for the quarter of a second.
     late = 2.0 * end if e == 1.0 else 2.0 * end - 0.25
@@ -79,7 +79,7 @@ def test_without_restitution_it_lies_where_it_lands():
     assert [bounce.clearance(0.0, HEIGHT, G, t) for t in (0.25, 0.5, 0.75, 9.0)] == [0.75, 0.0, 0.0, 0.0]
 
 
-def test_one_that_never_rests_is_as_high_after_any_number_of_bounces():
+def test_equal_apexes_without_restitution_loss():
     assert bounce.clearance(1.0, HEIGHT, G, 20.0) == pytest.approx(1.0, abs=1e-9)  # twenty whole arcs
 
 
@@ -109,7 +109,7 @@ def test_the_exact_motion_measures_as_its_truth(dimension):
     assert 1.5 - 0.125 <= found["rest_time"] <= 1.5
 
 
-def test_a_ball_that_does_not_rise_again_has_no_apex_and_says_which():
+def test_ball_without_a_second_rise_has_no_apex():
     made = scene()
     lying = sampled(made, heights=lambda t: np.maximum(1.0 - 4.0 * t**2, 0.0))
     found = bounce.measure(made, lying)
@@ -193,7 +193,7 @@ def test_all_five_apexes_count_where_all_are_resolved():
     assert bounce.apex_error(scene(), 1 / 2048, apexes(*last)) == (0.5, "")
 
 
-def test_what_is_resolved_goes_by_the_speed_of_the_whole_fall():
+def test_resolution_by_the_speed_of_the_whole_fall():
     """From 2 m it lands with sqrt(32) = 5.66 m/s; half of that is above twenty steps of 8 m/s^2/80, 2 m/s."""
     assert bounce.apex_error(scene(height=2.0), 1 / 80, apexes(0.5, 9.0, 9.0, 9.0, 9.0)) == (0.0, "")
 
@@ -212,7 +212,7 @@ def test_motion_counts_from_two_steps_of_gravity_on(speed, counts):
     assert measured["apex[1]"][0] == pytest.approx(0.140625 if counts else 0.0)  # of 0, 1/8, 1/8, 0 m
 
 
-def test_an_interval_that_its_own_errors_may_swallow_has_no_bound():
+def test_interval_smaller_than_its_errors_has_no_bound():
     """Intervals of 3/8 and 3/16 s after arcs of 2, 1 and .5 m/s; the errors of the speeds take up to 3/8 s or more."""
     for errors in ([1.0, 1.0, 0.0], [9.0, 0.0, 0.0]):
         assert bounce._interval_check(0.5, HEIGHT, G, 1 / 8, errors, 0.5).bound == np.inf

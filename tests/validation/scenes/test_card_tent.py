@@ -133,7 +133,7 @@ def test_friction_threshold_of_thin_cards():
 
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
-def test_a_tent_slides_out_as_forces_at_feet_and_heads_move_its_cards(params, ratio):
+def test_sliding_tent_as_forces_at_feet_and_heads_move_it(params, ratio):
     canonical, scene = made("card_tent", ratio=ratio, **params)
     measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
     for name in ("passing_time[left]", "passing_time[right]", "passing_spin[left]", "passing_spin[right]"):
@@ -142,7 +142,7 @@ def test_a_tent_slides_out_as_forces_at_feet_and_heads_move_its_cards(params, ra
 
 
 @pytest.mark.parametrize("params", SHAPES)
-def test_feet_and_heads_push_as_forces_at_them_say_all_the_way(params):
+def test_forces_at_feet_and_heads_all_the_way(params):
     _, scene = made("card_tent", ratio=0.5, **params)
     record, p = sliding(scene), scene.params
     for k in (0, 30, 60):
@@ -169,7 +169,7 @@ def test_step_orders_and_late_contacts_pass(dt, late, offset):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_friction_gravity_inertia_and_loads_fail(size):
+def test_tent_with_wrong_friction_gravity_inertia_or_loads(size):
     canonical, slides = made("card_tent", ratio=0.8)
     dt = DT if size > 0.05 else 1 / 1920
     mu = friction(slides.params)

@@ -180,7 +180,7 @@ def test_in_space_a_side_is_the_height_as_well():
     assert columns.fate(lower, found(0.26)) == "toppled" and columns.fate(lower, found(0.24)) == ""
 
 
-def test_what_is_not_made_of_boxes_has_no_side_and_no_fate():
+def test_side_and_fate_of_bodies_other_than_boxes():
     for dimension, shape in ((2, Disc(0.5)), (3, Sphere(0.5))):
         scene = column(dimension)
         ball = replace(scene.bodies[1], shape=shape)

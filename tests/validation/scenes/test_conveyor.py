@@ -47,7 +47,7 @@ def test_conveyor_by_coulomb_s_law_in_every_step_order(dimension, heading, dt, o
         assert {name: measured[name][0] for name in truth} == pytest.approx(truth, abs=1e-5)
 
 
-def test_the_ghost_of_the_replay_goes_where_the_box_goes():
+def test_replay_truth_along_the_path_of_the_box():
     canonical, scene = made("conveyor", 3, heading=30.0)
     trajectory, track = ridden(scene), canonical.track(scene)
     for k in (0, 40, 120, len(trajectory.t) - 1):
@@ -64,7 +64,7 @@ def test_conveyor_taken_for_a_floor_or_running_backwards():
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_wrong_friction_a_wrong_belt_a_hop_a_turn_or_a_bend_fails(size):
+def test_conveyor_with_wrong_friction_belt_hop_turn_or_bend(size):
     canonical, scene = made("conveyor", 3)
     wrong = failing(canonical, scene, ridden(scene, mu=0.4 * (1.0 - size)))
     assert "pull" in wrong and (size < 0.05 or "slipped" in wrong)

@@ -119,7 +119,7 @@ def test_a_domino_turns_and_strikes_as_its_equations_say(params):
 
 
 @pytest.mark.parametrize("params", CELLS)
-def test_feet_that_are_said_to_hold_do_so_in_the_blow(params):
+def test_domino_feet_declared_to_hold_in_the_blow(params):
     _, scene = made("domino", **params)
     p = scene.params
     theta = math.asin(p["gap"])
@@ -139,13 +139,13 @@ def test_domino_feet_that_would_slip_in_the_blow_refused():
 @pytest.mark.parametrize("late", [0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"ratio": 0.9}, {"ratio": 1.3}])
-def test_step_orders_and_a_blow_that_is_found_late_pass(params, dt, late, offset):
+def test_domino_by_step_orders_and_a_late_blow(params, dt, late, offset):
     canonical, scene = made("domino", **params)
     assert failing(canonical, scene, motion(scene, dt, offset=offset, late=late)) == set()
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_restitution_gravity_or_inertia_and_feet_that_slip_fail(size):
+def test_domino_with_wrong_restitution_gravity_inertia_or_slip(size):
     canonical, scene = made("domino")
     dt = DT if size > 0.05 else 1 / 3840
     assert size < 0.05 or "struck_spin" in failing(canonical, scene, motion(scene, dt, e=0.5 * (1.0 - 2.0 * size)))
@@ -184,7 +184,7 @@ def test_domino_pushed_too_little_or_passing_through_the_next():
         ({"ratio": 1.1}, "ratio"),
     ],
 )
-def test_what_does_not_end_as_said_is_refused_by_name(params, named):
+def test_domino_that_does_not_end_as_stated_refused(params, named):
     with pytest.raises(SceneError, match=rf"domino\.{named}"):
         made("domino", **params)
 

@@ -66,7 +66,7 @@ def integrated(scene, dt=DT, g=None, stuck=0.0, drag=0.0, late=0.0):
 
 
 @pytest.mark.parametrize("params", [{}, {"mu": 0.0}, {"mu": 0.1}, {"mu": 2.0, "v": 0.5}, {"mu": 0.0, "v": 2.0}])
-def test_a_disc_leaves_where_the_force_on_it_is_nothing(params):
+def test_departure_angle_at_zero_normal_force(params):
     canonical, scene = made("hilltop", **params)
     trajectory, angle, end = integrated(scene)
     truth, measured = canonical.exact(scene), canonical.measure(scene, trajectory)
@@ -76,7 +76,7 @@ def test_a_disc_leaves_where_the_force_on_it_is_nothing(params):
         assert measured[name][0] == pytest.approx(value, rel=2e-5), name
 
 
-def test_without_friction_it_is_the_textbook_s_two_thirds():
+def test_departure_height_of_two_thirds_without_friction():
     _, scene = made("hilltop", mu=0.0, v=1e-3)
     truth = CATALOGUE["hilltop"].exact(scene)
     assert math.cos(math.radians(truth["leaving_angle"])) == pytest.approx(2.0 / 3.0, abs=1e-6)
@@ -125,7 +125,7 @@ def test_steps_of_first_order_pass(v, dt, new):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_hill_that_holds_on_wrong_gravity_and_drag_fail(size):
+def test_hilltop_with_adhesion_wrong_gravity_or_drag(size):
     canonical, scene = made("hilltop")
     dt = DT if size > 0.05 else 1 / 3840
     assert size < 0.005 or {"level_speed", "leaving_time"} <= failing(
@@ -149,7 +149,7 @@ def test_a_disc_that_takes_off_at_the_top_is_refused():
 
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("v", [0.5, 1.0, 2.0])
-def test_bounds_owe_what_the_hill_turns_by_and_a_step_and_a_half(v, dt):
+def test_hilltop_bound_by_turn_and_a_step_and_a_half(v, dt):
     """Without friction the hill's force over the angle has a closed form: 3 g sin(phi) - (2 g + v^2/reach) phi."""
     canonical, scene = made("hilltop", mu=0.0, v=v)
     g, reach = scene.params["g"], scene.params["hill"] + scene.params["radius"]

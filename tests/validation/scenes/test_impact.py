@@ -65,7 +65,7 @@ def test_momentum_defect_without_an_impulse(impulses, defect):
     assert measured["impulse"] == (sum(impulses), "") and measured["momentum_defect"] == (defect, "")
 
 
-def test_without_impulses_speeds_are_measured_and_the_rest_says_why_not():
+def test_missing_values_without_impulses_and_their_reasons():
     scene = scene_of()
     measured = impact.measure(scene, run(scene, -1.0, [1.0], recorded=False))
     assert measured["rebound_ratio"] == (-0.25, "") and measured["velocity_change"] == (3.0, "")

@@ -32,7 +32,7 @@ def test_gravity_is_turned_and_the_box_stands_on_a_level_floor(dimension):
     assert (made.name, made.version, made.duration, made.params["ratio"]) == ("incline", 1, 4.0, 1.5)
 
 
-def test_it_sticks_up_to_the_edge_of_the_cone_and_slides_beyond():
+def test_stick_up_to_the_cone_edge_and_slide_beyond():
     assert incline.exact(scene(ratio=0.5)) == incline.exact(scene(ratio=1.0)) == {"creep": 0.0}
     assert incline.exact(scene()) == {"acceleration": pytest.approx(10.0 * (0.6 - 0.5 * 0.8))}
     steeper = incline.exact(scene(ratio=1.0000001))
@@ -54,7 +54,7 @@ def test_creep_and_acceleration_are_means_over_the_second_half():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_it_is_expected_at_rest_or_on_a_parabola_along_the_floor(dimension):
+def test_incline_truth_at_rest_or_on_a_parabola(dimension):
     level = (0.0,) * (dimension - 2)
     sliding, stuck = incline.track(scene(dimension)), incline.track(scene(dimension, ratio=0.5))
     assert sliding.body == stuck.body == "box"
@@ -62,7 +62,7 @@ def test_it_is_expected_at_rest_or_on_a_parabola_along_the_floor(dimension):
     assert stuck.position(3.0) == (0.0, *level, 0.5)
 
 
-def test_the_error_of_a_side_is_how_far_it_leads_astray_in_g():
+def test_error_of_a_side_in_units_of_g():
     slides, sticks = scene(duration=4.0), scene(ratio=0.5, duration=4.0)
     assert incline.error(slides, 0.1, {"acceleration": (1.0, "")}) == (pytest.approx(0.1), "")
     assert incline.error(slides, 0.1, {"acceleration": (3.0, "")}) == (pytest.approx(0.1), "")

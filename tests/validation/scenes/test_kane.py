@@ -70,14 +70,14 @@ def test_the_landing_gains_energy_as_published_for_a_thin_rod():
     assert CATALOGUE["kane"].exact(scene)["gain"] == pytest.approx(2.0 * 0.1236, abs=1e-4)
 
 
-def test_without_a_slide_or_without_friction_nothing_is_gained():
+def test_no_energy_gain_without_slide_or_friction():
     for params in ({"along": 0.0, "mu": 0.0}, {"mu": 0.0}, {"along": -0.727}):
         _, scene = made("kane", **params)
         assert CATALOGUE["kane"].exact(scene)["gain"] < 1e-12
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_restitution_friction_or_inertia_fails(size):
+def test_kane_blow_with_wrong_restitution_friction_or_inertia(size):
     canonical, scene = made("kane")
     assert failing(canonical, scene, recorded(scene, blown(scene, e=0.9988 * (1.0 - size)))) >= {"rise", "gain"}
     assert failing(canonical, scene, recorded(scene, blown(scene, heavy=1.0 + size))) >= {"spin", "gain"}
@@ -106,7 +106,7 @@ def test_what_lands_twice_or_is_no_rod_is_refused(params, named):
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e3])
 @pytest.mark.parametrize(("e", "mu"), [(0.0, 0.1), (0.5, 0.1), (0.9, 0.3), (0.0, 0.0)])
-def test_a_point_slides_on_slower_by_what_friction_takes_at_any_speed(scale, e, mu):
+def test_point_slowed_by_friction_at_any_speed(scale, e, mu):
     """A mass point that comes down at 1 and along at 1/2: (1 + e) up, mu (1 + e) back, or all of it if that is less."""
     normal = 1.0 + e
     tangent = min(mu * normal, 0.5)

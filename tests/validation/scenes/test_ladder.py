@@ -117,7 +117,7 @@ def test_step_orders_and_late_contacts_pass(dt, late, offset):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_friction_gravity_inertia_and_loads_fail(size):
+def test_ladder_with_wrong_friction_gravity_inertia_or_loads(size):
     canonical, slides = made("ladder", ratio=0.8)
     dt = DT if size > 0.05 else 1 / 1920
     mu = friction(slides.params)
@@ -147,6 +147,6 @@ def test_ladder_standing_or_sliding_against_its_threshold():
 @pytest.mark.parametrize(
     ("params", "named"), [({"lean": 80.0, "aspect": 0.3}, "lean"), ({"ratio": 0.01, "lean": 20.0}, "ratio")]
 )
-def test_what_needs_no_wall_or_lets_it_go_is_refused_by_name(params, named):
+def test_ladder_without_need_of_a_wall_refused(params, named):
     with pytest.raises(SceneError, match=rf"ladder\.{named}"):
         made("ladder", **params)

@@ -87,7 +87,7 @@ def test_the_formula_s_times_are_those_of_an_integration_with_events():
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_blows_that_know_too_little_of_the_plate_or_of_e_fail(size):
+def test_blows_that_ignore_the_plate_or_e(size):
     canonical, scene = made("closing_wall")
     speeds = {f"speed[{n}]" for n in (1, 2, 3)}
     assert speeds <= failing(canonical, scene, thrown(scene, swept=True, moved=1.0 - size))
@@ -107,7 +107,7 @@ def test_blow_times_from_one_step_on_and_without_a_rebound():
 
 
 @pytest.mark.parametrize("place", range(2), ids=["place", "speed"])
-def test_a_ball_that_is_lost_for_one_sample_is_thrown_back_at_no_time(place):
+def test_ball_missing_in_one_sample_has_no_turning_time(place):
     """Beside the blows it would pass: turns and speeds are looked for at other samples."""
     canonical, scene = made("closing_wall")
     found = thrown(scene, swept=True)
@@ -160,7 +160,7 @@ def test_a_blow_worked_out_at_the_scene_s_own_corner_passes(e, tilt, dimension):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_blow_with_wrong_e_or_inertia_or_shared_unequally_fails(size):
+def test_blow_with_wrong_e_inertia_or_share(size):
     canonical, scene = made("edge_drop", 3)
     told = {"rise", "spin", "impulse"}
     assert failing(canonical, scene, landed(scene, e=0.5 * (1.0 - size))) == told

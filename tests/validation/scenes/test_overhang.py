@@ -38,7 +38,7 @@ def test_without_a_margin_the_reach_is_the_harmonic_sum():
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_stack_that_sinks_slips_shakes_or_carries_too_little_fails(size):
+def test_overhang_that_sinks_slips_shakes_or_carries_too_little(size):
     canonical, scene = made("overhang")
     good = at_rest(scene)
     assert failing(canonical, scene, good) == set()

@@ -32,7 +32,7 @@ def parting(scene, share=0.2, kept=0.0, dt=DT, pull=0.0):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("params", [{}, {"depth": 0.01, "ratio": 100.0}])
 @pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
-def test_places_that_are_corrected_pass_however_fast_or_not_at_all(params, share, dimension):
+def test_corrected_positions_at_any_rate(params, share, dimension):
     canonical, scene = made("overlap", dimension, **params)
     trajectory = parting(scene, share)
     assert failing(canonical, scene, trajectory) == set()
@@ -42,7 +42,7 @@ def test_places_that_are_corrected_pass_however_fast_or_not_at_all(params, share
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("params", [{}, {"depth": 0.01, "ratio": 100.0}])
-def test_an_overlap_that_throws_grows_or_moves_the_centre_fails(params, size):
+def test_overlap_with_throw_growth_or_moved_centre(params, size):
     canonical, scene = made("overlap", **params)
     assert failing(canonical, scene, parting(scene, 0.2, kept=size)) == {"thrown"}
     assert failing(canonical, scene, parting(scene, 0.0, pull=size)) == {"grown"}
@@ -51,7 +51,7 @@ def test_an_overlap_that_throws_grows_or_moves_the_centre_fails(params, size):
     assert failing(canonical, scene, moved) == {"centre_moved"}
 
 
-def test_what_a_share_of_the_overlap_throws_depends_on_the_step_alone():
+def test_throw_by_a_share_of_the_overlap_at_each_step():
     """One step takes beta depth/dt: the number that the docstring names."""
     canonical, scene = made("overlap")
     for dt in (1 / 60, DT):
@@ -103,7 +103,7 @@ def test_speed_from_a_correction_throws_the_box_as_high_as_its_energy():
 @pytest.mark.parametrize(
     ("name", "params"), [("overlap", {}), ("position_correction", {}), ("overlap", {"depth": 1e-5})]
 )
-def test_our_solver_is_not_asked_for_a_solution_where_there_is_none(name, params):
+def test_reference_solver_not_asked_without_a_solution(name, params):
     _, scene = made(name, **params)
     assert "overlap by" in overlap_at_the_start(scene)
 
@@ -118,7 +118,7 @@ def test_no_other_scene_starts_with_an_overlap(name):
             )
 
 
-def test_what_is_thrown_is_told_by_its_speed_and_not_by_its_spin():
+def test_thrown_body_by_speed_and_not_by_spin():
     canonical, scene = made("overlap")
     trajectory = parting(scene)
     before = canonical.measure(scene, trajectory)["thrown"][0]

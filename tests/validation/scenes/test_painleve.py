@@ -168,7 +168,7 @@ def test_painleve_rod_with_wrong_friction_gravity_or_inertia(size):
     assert size < 0.005 or "passing_spin" in failing(canonical, jams, moved(jams, dt, stick=1.0 - size))
 
 
-def test_a_rod_that_slides_where_it_jams_or_stops_where_it_slides_fails():
+def test_painleve_rod_that_slides_or_stops_wrongly():
     canonical, jams = made("painleve")
     sliding = moved(made("painleve", ratio=0.6)[1], late=0.0)
     assert "edge_moved" in failing(canonical, jams, sliding)
@@ -178,7 +178,7 @@ def test_a_rod_that_slides_where_it_jams_or_stops_where_it_slides_fails():
 
 
 @pytest.mark.parametrize(("params", "named"), [({"ratio": 0.6, "v": 1.0}, "v"), ({"v": 0.1}, "v"), ({"v": 20.0}, "v")])
-def test_what_neither_slides_nor_stays_jammed_is_refused_by_name(params, named):
+def test_painleve_rod_in_neither_regime_refused(params, named):
     with pytest.raises(SceneError, match=rf"painleve\.{named}"):
         made("painleve", **params)
 

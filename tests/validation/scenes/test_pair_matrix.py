@@ -53,7 +53,7 @@ def test_a_pair_that_is_off_is_named(pair, size):
 
 
 @pytest.mark.parametrize("rule", [np.minimum, np.maximum, lambda a, b: 0.5 * (a + b), lambda a, b: np.sqrt(a * b)])
-def test_rules_that_combine_two_numbers_otherwise_fail(rule):
+def test_wrong_rules_of_combining_two_numbers(rule):
     """Each face's and ball's number is its pairs' mean; no such rule gives all four pairs back."""
     canonical, scene = made("pair_matrix", cross=1.5)
     table = np.array(materials(scene.params)).reshape(2, 2, 2)
@@ -62,7 +62,7 @@ def test_rules_that_combine_two_numbers_otherwise_fail(rule):
     assert failing(canonical, scene, bouncing(scene, combined))
 
 
-def test_a_ball_that_does_not_come_back_has_no_restitution():
+def test_ball_without_a_return_has_no_restitution():
     canonical, scene = made("pair_matrix")
     table = [(0.0, 0.2), *materials(scene.params)[1:]]
     measured = canonical.measure(scene, bouncing(scene, table))

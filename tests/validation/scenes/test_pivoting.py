@@ -163,7 +163,7 @@ def test_friction_that_an_edge_needs_is_what_moves_the_centre():
 
 @pytest.mark.parametrize("off", [0.0, 0.01])
 @pytest.mark.parametrize(("start", "angle"), [(-0.4, 0.2), (-0.4, -0.1), (0.1, 0.5)])
-def test_what_a_spin_at_the_start_owes_is_that_of_a_start_as_far_off(start, angle, off):
+def test_initial_spin_allowance_as_of_a_shifted_start(start, angle, off):
     """Another spin at the start by 1.5 steps of acceleration, an edge that sinks, and 1.5 steps where it is read."""
     on, spin, dt = Pivot(0.5, 1.0, 9.81), 1.5, DT
     kick = off + 1.5 * dt * on.rate * math.sin(max(abs(start), abs(angle)))
@@ -193,7 +193,7 @@ def landing(width, height, spin):
 
 
 @pytest.mark.parametrize("aspect", [0.15, 0.25, 0.5, 1.0, 1.3])
-def test_a_landing_leaves_what_the_equations_of_impact_leave(aspect):
+def test_state_after_a_landing_by_the_equations_of_impact(aspect):
     _, scene = made("rocking_block", aspect=aspect, mu=5.0)
     from validation.scenes.rocking_block import eta
 
@@ -267,7 +267,7 @@ def test_largest_tilt_allowed_at_coarse_steps(params, dt):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_landing_that_leaves_too_much_and_a_block_that_slides_fail(size):
+def test_pivoting_with_excess_speed_or_a_sliding_block(size):
     canonical, scene = made("rocking_block")
     keep = landing(2.5, 10.0, 1.0)
     wrong = failing(canonical, scene, rocking(scene, 1 / 3840, eta=keep * (1.0 - size)))

@@ -36,13 +36,13 @@ def thrown(scene, dt=DT, e=None, late=0.0):
 
 @pytest.mark.parametrize("params", [{}, {"e": 1.5}, {"e": 2.0}, {"v": 0.1}, {"e": 1.0}])
 @pytest.mark.parametrize("late", [0.0, 1.0, 2.0])
-def test_a_ball_that_is_thrown_back_as_asked_passes_at_every_phase(params, late):
+def test_rebound_above_one_in_every_phase(params, late):
     canonical, scene = made("restitution_above_one", **params)
     assert failing(canonical, scene, thrown(scene, late=late)) == set()
 
 
 @pytest.mark.parametrize("params", [{}, {"e": 1.5}])
-def test_the_ghost_is_where_blows_one_by_one_take_it(params):
+def test_truth_of_the_replay_by_successive_blows(params):
     canonical, scene = made("restitution_above_one", **params)
     fine = thrown(scene, 1e-5)
     place = canonical.track(scene).position
@@ -61,7 +61,7 @@ def test_another_gain_and_a_speed_across_fail(size):
     assert failing(canonical, scene, askew) == {"astray"}
 
 
-def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
+def test_clamped_restitution_or_a_resting_ball_fails():
     canonical, scene = made("restitution_above_one")
     assert failing(canonical, scene, thrown(scene, e=1.0)) == {"growth", "blows"}
     tired = thrown(scene)
@@ -72,7 +72,7 @@ def test_a_number_that_is_clamped_or_a_ball_that_stays_fails():
     assert failing(canonical, scene, stopped) == {"growth", "blows"}
 
 
-def test_a_scene_must_mean_it_and_says_so_when_it_is_kept():
+def test_declaration_of_restitution_above_one_and_its_note():
     _, scene = made("restitution_above_one")
     with pytest.raises(SceneError, match=r"restitution: 1\.1 must lie in \[0, 1\]"):
         replace(scene, gaining=False)
@@ -94,7 +94,7 @@ def test_only_adapters_that_say_so_get_it():
         assert "restitution above 1" not in registry.facts(name).abilities
 
 
-def test_nobody_says_how_far_bodies_get_that_gain_energy():
+def test_no_spread_of_bodies_that_gain_energy():
     _, scene = made("restitution_above_one")
     assert isinstance(scene, Scene) and len(meeting_pairs(replace(scene, duration=1e-3))) == 2
     assert len(meeting_pairs(replace(made("restitution_above_one", e=1.0)[1], duration=1e-3))) < 2

@@ -84,7 +84,7 @@ def test_small_swings_have_the_period_of_the_formula():
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_gravity_or_inertia_drag_slip_and_yaw_fail(size):
+def test_rocker_with_wrong_gravity_inertia_drag_slip_or_yaw(size):
     canonical, scene = made("rocker", 3)
     dt = DT if size > 0.05 else 1 / 960
     assert size < 0.05 or "swing_time" in failing(canonical, scene, integrated(scene, dt, g=9.81 * (1.0 - size)))

@@ -116,7 +116,7 @@ def test_rod_gas_by_fixed_steps_within_the_bounds(dt, k):
     assert failing(canonical, scene, stepped(scene, dt)) == set()
 
 
-def test_what_is_late_uses_a_good_part_of_what_is_allowed():
+def test_late_method_uses_a_good_part_of_the_bound():
     """A bound of which nothing is used would see nothing."""
     canonical, used = CATALOGUE["rod_gas"], []
     for params in phases(DT):
@@ -127,7 +127,7 @@ def test_what_is_late_uses_a_good_part_of_what_is_allowed():
     assert 0.2 < max(used) <= 1.0
 
 
-def test_steps_that_take_two_meetings_for_one_are_not_judged():
+def test_steps_that_merge_two_meetings_not_judged():
     canonical, scene = made("rod_gas")
     coarsest = rod_gas.coarsest(scene.params)
     assert all(check.bound is not None for check in canonical.checks(scene, coarsest))
@@ -135,7 +135,7 @@ def test_steps_that_take_two_meetings_for_one_are_not_judged():
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_lost_energy_other_masses_places_and_speeds_fail(size):
+def test_rod_gas_with_lost_energy_other_masses_or_states(size):
     canonical, scene = made("rod_gas")
     x, v, _ = meeting(scene, e=1.0 - size)
     lossy = failing(canonical, scene, recorded(scene, x, v))
@@ -198,7 +198,7 @@ def test_spread_of_round_ends_by_rounded_normals(params, monkeypatch):
 
 
 @pytest.mark.parametrize("missed", [1, 5, 13])
-def test_a_meeting_that_is_missed_fails_though_it_keeps_the_energy(missed):
+def test_missed_meeting_fails_despite_kept_energy(missed):
     canonical, scene = made("rod_gas")
     x, v, _ = meeting(scene, missed=missed)
     found = failing(canonical, scene, recorded(scene, x, v))

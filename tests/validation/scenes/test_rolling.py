@@ -151,7 +151,7 @@ def test_a_spin_that_decays_a_bend_and_a_hop_fail(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_slide_that_is_bent_or_ends_in_slipping_fails(size):
+def test_rolling_with_a_bent_path_or_final_slip(size):
     canonical, scene = made("slide_to_roll", 3)
     good = integrated(scene)
     bent = good.pose.copy()
@@ -174,7 +174,7 @@ def test_friction_that_turns_away_from_the_slip_is_seen(size):
     assert "turned" in failing(canonical, scene, replace(good, twist=turned)) or size < 0.005
 
 
-def test_a_ball_that_never_rolls_has_no_time_of_rolling():
+def test_ball_without_rolling_has_no_rolling_time():
     canonical, scene = made("slide_to_roll")
     good = integrated(scene)
     sliding = replace(good, twist=np.repeat(good.twist[:1], len(good.t), axis=0))
@@ -261,7 +261,7 @@ def test_a_bounce_that_is_off_fails(size):
 
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"mu": 0.1}, {"v": 1.0, "spin": -10.0, "mu": 1.0}])
-def test_a_ball_that_is_found_deep_and_rubbed_on_its_shorter_arm_passes(params, dt):
+def test_deep_contact_rubbed_on_a_shorter_arm(params, dt):
     """Angular momentum and Coulomb's law, solved anew at the place where a step finds the contact."""
     canonical, scene = made("oblique", 2, **params)
     p = scene.params

@@ -73,7 +73,7 @@ def test_bounds_are_the_same_in_every_unit():
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("length", [1e-3, 1e3])
-def test_wrong_friction_restitution_and_boxes_that_sink_fail(length, size):
+def test_scales_with_wrong_friction_restitution_or_sinking(length, size):
     canonical, scene = made("scales", length=length)
     dt = DT if size > 0.05 else 1 / 1920
     wrong = failing(canonical, scene, moved(scene, dt, mu=MU * (1.0 - size)))
@@ -86,7 +86,7 @@ def test_wrong_friction_restitution_and_boxes_that_sink_fail(length, size):
     assert failing(canonical, spatial, bent) == {"astray"}
 
 
-def test_numbers_in_metres_are_seen_where_they_are_large():
+def test_absolute_lengths_seen_at_large_scales():
     """A threshold of 0.2 m/s and a slop of 1 mm: nothing for a mountain, all of a pebble."""
     canonical, pebble = made("scales", length=1e-3)
     assert failing(canonical, pebble, moved(pebble, threshold=0.2)) == {"apex"}

@@ -50,7 +50,7 @@ def test_seams_stopping_distance_by_coulomb_in_every_order(name, dimension, dt, 
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", NAMES)
-def test_a_bump_a_stop_a_turn_and_wrong_friction_fail(name, size):
+def test_seams_with_a_bump_stop_turn_or_wrong_friction(name, size):
     canonical, scene = made(name, 3)
     box = len(scene.bodies) - 1
     wrong = failing(canonical, scene, sliding(scene, mu=0.4 * (1.0 - size)))
@@ -93,13 +93,13 @@ def test_plates_lie_flush_and_reach_beyond_where_the_box_stops(plate, dimension)
 
 
 @pytest.mark.parametrize("far", [1024.0, 1048576.0, 1e8])
-def test_a_scene_far_away_is_the_same_scene_to_the_last_place(far):
+def test_distant_scene_equal_to_the_last_place(far):
     scene, near = made("far_origin", far=far)[1], made("far_origin", far=0.0)[1]
     for body, other in zip(scene.bodies, near.bodies, strict=True):
         assert np.abs(np.array(body.pose[:2]) - far - other.pose[:2]).max() <= np.spacing(far)
 
 
-def test_places_that_are_added_up_in_single_precision_fail_far_away():
+def test_single_precision_positions_far_away_fail():
     """At 2^20 m a float knows places to 0.125 m: a box that moves 1.25 cm a step does not move at all."""
     canonical, scene = made("far_origin")
     coarse = sliding(scene)

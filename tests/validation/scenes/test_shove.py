@@ -91,7 +91,7 @@ def test_shove_end_speed_a_hundredth_of_a_step_too_fast(params, dt, share, fails
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_wrong_accelerations_and_forces_gaps_and_turns_fail(size):
+def test_shove_with_wrong_accelerations_forces_gaps_or_turns(size):
     canonical, scene = made("shove")
     assert failing(canonical, scene, moving(scene, heavy=1.0 + size)) >= {"down", "ahead"}
     weak = moving(scene)
@@ -113,6 +113,6 @@ def test_boxes_that_stay_fail():
 
 
 @pytest.mark.parametrize(("params", "named"), [({"angle": 30.0}, "angle"), ({"ratio": 1e-2, "angle": 65.0}, "angle")])
-def test_boxes_that_do_not_meet_for_all_of_the_run_are_refused(params, named):
+def test_shoved_boxes_that_separate_refused(params, named):
     with pytest.raises(SceneError, match=rf"shove\.{named}"):
         made("shove", **params)

@@ -43,7 +43,7 @@ def test_the_triangle_of_forces_holds_a_ball_that_touches_both_planes(left, righ
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_plane_that_pushes_too_little_and_a_ball_that_moves_fail(size):
+def test_weak_plane_or_moving_ball_fails(size):
     canonical, scene, trajectory, _ = groove(60.0, 20.0)
     assert failing(canonical, scene, scaled(trajectory, 1.0 - size)) == {"load[left]", "load[right]"}
     sunk = trajectory.pose.copy()
@@ -58,7 +58,7 @@ def test_a_plane_that_pushes_too_little_and_a_ball_that_moves_fail(size):
 
 
 @pytest.mark.parametrize("ratio", [1.0, 100.0, 1e6])
-def test_a_pair_that_carries_passes_and_one_that_does_not_fails(ratio):
+def test_pair_that_carries_its_load_or_not(ratio):
     canonical, scene = made("heavy_on_light", ratio=ratio)
     heavy, both = ratio * G, (1.0 + ratio) * G
     good = loaded(scene, {(0, 1): np.array([0.0, both * DT]), (1, 2): np.array([0.0, heavy * DT])}, DT, 3.0)
@@ -80,7 +80,7 @@ def test_a_pair_that_carries_passes_and_one_that_does_not_fails(ratio):
 
 @pytest.mark.parametrize("margin", [1.05, 2.0, 100.0])
 @pytest.mark.parametrize("share", [0.3, 0.5])
-def test_a_grip_in_balance_passes_however_wall_and_pad_share_the_weight(margin, share):
+def test_grip_in_balance_with_any_share_of_wall_and_pad(margin, share):
     canonical, scene = made("pinch", margin=margin)
     p, force = scene.params, pinch.grip(scene.params)
     weight = p["mass"] * G
@@ -107,7 +107,7 @@ def test_a_grip_in_balance_passes_however_wall_and_pad_share_the_weight(margin, 
         assert failing(canonical, scene, replace(good, twist=turning)) == {"turned"}
 
 
-def test_a_grip_that_comes_and_goes_or_differs_from_side_to_side_fails():
+def test_grip_that_flickers_or_differs_between_sides():
     """By a tenth of the weight, which is 2.5 % of this grip: what a step may be off by is 2 % of the weight."""
     canonical, scene = made("pinch", margin=2.0)
     p, force = scene.params, pinch.grip(scene.params)
@@ -191,7 +191,7 @@ def test_standing_box_stopping_distance_by_coulomb_in_every_order(dimension, hea
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_slide_with_wrong_friction_a_hop_a_turn_or_a_bend_fails(size):
+def test_slide_with_wrong_friction_hop_turn_or_bend(size):
     canonical, scene = made("slide", 3)
     wrong = failing(canonical, scene, sliding(scene, DT, mu=0.4 * (1.0 - size)))
     assert "braking" in wrong
@@ -211,7 +211,7 @@ def test_a_slide_with_wrong_friction_a_hop_a_turn_or_a_bend_fails(size):
     assert failing(canonical, scene, replace(good, twist=late)) == {"end_speed"}
 
 
-def test_a_slide_whose_forces_come_and_go_or_are_told_in_part_fails():
+def test_slide_with_flickering_or_partial_forces():
     """The mean is right, and the motion: who looks at either alone sees nothing."""
     canonical, scene = made("slide")
     good = sliding(scene, DT)

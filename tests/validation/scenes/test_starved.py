@@ -67,7 +67,7 @@ def resting(scene, share=1.0, dt=DT):
 
 
 @pytest.mark.parametrize("n", [3, 10, 30])
-def test_what_a_sweep_leaves_shrinks_as_the_scene_says(n):
+def test_residual_of_a_sweep_by_the_stated_factor(n):
     """One step of a row, swept for long: what a sweep leaves over what the one before left tends to cos^2(pi/2n)."""
     v, impulse, left = np.zeros(n), np.zeros(n), []
     v[-1] = -1.0
@@ -125,7 +125,7 @@ def test_faults_of_three_sizes_fail(size):
     assert failing(canonical, scene, moving) == {"kinetic_energy"}
 
 
-def test_one_contact_that_carries_nothing_is_seen_and_none_is_no_value():
+def test_one_contact_without_load_and_missing_values():
     canonical, scene = made("starved")
     trajectory = resting(scene)
     trajectory.contacts.rows.impulse[3 :: len(scene.bodies) - 1] = 0.0

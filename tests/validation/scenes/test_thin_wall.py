@@ -31,13 +31,13 @@ def thrown(scene, dt=DT, swept=True, e=None):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("v", [1.0, 20.0, 200.0, 1e4])
-def test_a_ball_that_comes_back_passes_however_late_it_is_found(v, dt, dimension):
+def test_late_found_rebound_passes(v, dt, dimension):
     canonical, scene = made("thin_wall", dimension, v=v)
     assert failing(canonical, scene, thrown(scene, dt)) == set()
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_wrong_rebound_and_a_ball_that_goes_deeper_than_a_step_fail(size):
+def test_wrong_rebound_or_depth_beyond_a_step(size):
     canonical, scene = made("thin_wall")
     assert failing(canonical, scene, thrown(scene, e=0.5 * (1.0 - size))) == {"rebound_ratio"}
     deep = thrown(scene)

@@ -89,7 +89,7 @@ def test_newton_s_equations_integrated_pass_in_every_step_order(params, dimensio
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_block_that_should_stay_and_moves_or_turns_fails(size):
+def test_resting_block_that_moves_or_turns(size):
     canonical, scene = made("tilt_table", 3)
     for axis in (0, 1, 2):
         gone = tilted(scene)
@@ -101,7 +101,7 @@ def test_a_block_that_should_stay_and_moves_or_turns_fails(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_block_that_slides_with_wrong_friction_or_turns_fails(size):
+def test_sliding_block_with_wrong_friction_or_a_turn(size):
     canonical, scene = made("tilt_table", aspect=1.0, ratio=1.1)
     assert failing(canonical, scene, tilted(scene, mu=0.5 * (1.0 - size))) == {"acceleration"}
     turned = tilted(scene)
@@ -110,7 +110,7 @@ def test_a_block_that_slides_with_wrong_friction_or_turns_fails(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_block_that_topples_too_fast_or_on_an_edge_that_slips_fails(size):
+def test_toppling_block_too_fast_or_on_a_slipping_edge(size):
     """Gravity is seen in time and spin from a few per cent on: half a per cent of time is one and a half steps."""
     canonical, scene = made("tilt_table", ratio=1.1)
     fast = failing(canonical, scene, tilted(scene, g=9.81 * (1.0 + size)))
@@ -120,7 +120,7 @@ def test_a_block_that_topples_too_fast_or_on_an_edge_that_slips_fails(size):
     assert failing(canonical, scene, slipped) == {"edge_moved"}
 
 
-def test_small_steps_see_small_faults_of_a_toppling_block():
+def test_small_faults_of_a_toppling_block_at_small_steps():
     """The bound shrinks with the step: what 1/240 s forgives, 1/3840 s does not."""
     canonical, scene = made("tilt_table", ratio=1.1)
     assert "passing_time" in failing(canonical, scene, tilted(scene, 1 / 3840, g=9.81 * 1.01))
@@ -138,7 +138,7 @@ def test_tilting_block_that_stays_or_goes_wrongly():
 @pytest.mark.parametrize(
     ("params", "named"), [({"ratio": 1.7}, "ratio"), ({"aspect": 0.05, "mu": 0.06, "ratio": 1.1}, "mu")]
 )
-def test_blocks_that_do_two_things_at_once_are_refused_by_name(params, named):
+def test_blocks_in_two_regimes_refused_by_name(params, named):
     with pytest.raises(ValueError, match=rf"tilt_table\.{named}"):
         made("tilt_table", **params)
 

@@ -82,7 +82,7 @@ def test_steps_of_first_order_pass(params, dt, new_spin):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_wrong_inertia_and_a_spin_that_is_braked_fail(size):
+def test_tumble_with_wrong_inertia_or_a_braked_spin(size):
     """As small as a step of first order is fine: at 1/240 s its own drift is 1.5 per cent, at 1/3840 s 1e-3."""
     canonical, scene = made("tumble", 3)
     dt = DT if size > 0.05 else 1 / 3840

@@ -76,7 +76,7 @@ def test_it_stays_from_the_angle_of_friction_on():
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_wedge_or_a_block_that_goes_otherwise_fails(size):
+def test_wedge_or_block_with_a_wrong_motion(size):
     canonical, scene = made("wedge")
     assert {"given_way", "momentum"} <= failing(canonical, scene, slid(scene, wedge=1.0 - size))
     assert {"acceleration", "momentum"} <= failing(canonical, scene, slid(scene, block=1.0 + size))

@@ -89,7 +89,7 @@ def test_wipe_bounds_by_weight_step_of_fall_and_drag():
     assert allowed == expected
 
 
-def test_forces_that_come_and_go_fail_although_every_mean_is_right():
+def test_flickering_forces_with_right_means_fail():
     canonical, scene = made("wipe")
     good = held(scene)
     by_turns = 1.0 + np.repeat((-1.0) ** np.arange(len(good.contacts.step)), 3)
@@ -128,7 +128,7 @@ def test_a_hand_that_gives_way_fails():
         assert failing(canonical, scene, replace(good, pose=moved)) == {"moved"}
 
 
-def test_what_an_engine_does_not_tell_cannot_be_said():
+def test_missing_forces_of_an_engine_have_no_value():
     canonical, scene = made("wipe")
     measured = canonical.measure(scene, changed(held(scene), np.nan, np.nan))
     assert {measured[name] for name in ALL} == {(None, "the engine does not tell the impulses of these contacts")}

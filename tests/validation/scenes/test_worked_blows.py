@@ -135,7 +135,7 @@ def test_wall_plate_and_ball_stand_in_a_row(dimension):
     assert (scene.pairs[0].restitution, scene.pairs[0].friction) == (1.0, 0.0)
 
 
-def test_what_a_closing_plate_forgives_grows_by_four_steps_a_blow():
+def test_closing_plate_allowance_grows_by_four_steps_a_blow():
     canonical, scene = made("closing_wall", **CLOSING)
     assert stated(canonical.checks(scene, DT)) == {
         "speed[1]": ("m/s", near(7e-12)),

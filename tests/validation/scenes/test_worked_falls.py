@@ -61,7 +61,7 @@ def test_what_a_fall_over_an_edge_forgives():
 
 
 @pytest.mark.parametrize(("tilted", "other"), [(0.02, 0.08), (0.095, 0.01), (0.5, 0.01)])
-def test_a_start_that_is_told_coarsely_costs_the_time_of_another_start(tilted, other):
+def test_coarse_start_allowance_as_time_of_another_start(tilted, other):
     """No start is nearer to the balance than a tenth of what was asked."""
     found = {check.metric: check.bound for check in fall_checks(ON, START, END, DT, TRUTH, tilted)}
     plain = {check.metric: check.bound for check in fall_checks(ON, START, END, DT, TRUTH)}
@@ -69,7 +69,7 @@ def test_a_start_that_is_told_coarsely_costs_the_time_of_another_start(tilted, o
     assert found == {**plain, "passing_time": near(plain["passing_time"] + later)}
 
 
-def test_a_start_that_turns_already_may_turn_otherwise():
+def test_initial_spin_allowance_of_a_turning_start():
     time, spin, squares = fallen(START, 0.5)
     truth = {"passing_time": time, "passing_spin": spin, "edge_moved": 0.0}
     found = {check.metric: check.bound for check in fall_checks(ON, START, END, DT, truth, spin=0.5)}
@@ -84,7 +84,7 @@ def test_a_start_that_turns_already_may_turn_otherwise():
 @pytest.mark.parametrize(
     ("start", "angle", "top"), [(-0.4, 0.2, 0.0), (-0.2, 0.4, 0.0), (-0.4, -0.1, -0.1), (0.1, 0.5, 0.1)]
 )
-def test_a_box_that_may_be_too_slow_for_the_top_of_its_way_has_no_time(start, angle, top):
+def test_box_too_slow_for_the_top_has_no_time(start, angle, top):
     """The spin that just gets over the top, and what a step may take of it: from there on the time is finite."""
     needed = math.sqrt(24.0 * (math.cos(top) - math.cos(start)))
     dt = 1e-4
@@ -115,7 +115,7 @@ def test_the_block_stands_on_the_table_as_gravity_is_tilted(dimension):
     assert (scene.pairs[0].restitution, scene.pairs[0].friction) == (0.0, 1.0)
 
 
-def test_a_block_at_its_limit_stays_and_one_at_both_is_refused():
+def test_block_at_one_limit_stays_and_at_both_is_refused():
     assert set(CATALOGUE["tilt_table"].exact(made("tilt_table", ratio=1.0, mu=0.5, aspect=0.5)[1])) == {"moved"}
     with pytest.raises(SceneError, match=r"tilt_table\.ratio: at 2 "):
         made("tilt_table", ratio=2.0, mu=0.5, aspect=0.25)
@@ -226,7 +226,7 @@ def test_the_time_of_a_fall_is_that_of_its_equation_of_motion(start, spin, end):
     assert on.speed(start, spin, end) == pytest.approx(found.y[1, -1], rel=1e-8)
 
 
-def test_of_a_step_that_is_nothing_only_round_off_is_forgiven():
+def test_round_off_allowed_of_a_zero_step():
     """No kick is owed at the start where none is told: what is left grows with the step alone."""
     for dt in (1e-6, 1e-9):
         assert ON.spin_off(START, 1.0, END, dt) < 1e2 * dt and ON.time_off(START, 1.0, END, dt) < 1e2 * dt

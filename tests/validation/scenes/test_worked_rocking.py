@@ -198,7 +198,7 @@ def test_the_amplitude_is_that_of_the_last_side():
     assert found["amplitude"] == (pytest.approx(0.75, rel=1e-3), "")
 
 
-def test_a_board_that_is_level_at_the_wrong_time_has_no_swings():
+def test_board_level_at_a_wrong_time_has_no_swings():
     """In three quarters of its time it is level the third time before the last swing has begun; then no more."""
     canonical, scene = made("rocker", **BOARD)
     fast = swinging(scene, 0.75 * canonical.exact(scene)["swing_time"], np.ones_like)

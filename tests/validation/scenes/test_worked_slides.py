@@ -54,7 +54,7 @@ def test_five_plates_carry_the_box_half_as_far_again_and_its_own_width():
     assert len(made("seam", plate=0.5)[1].bodies) == 9 + 1  # 4.25 m
 
 
-def test_what_a_slide_forgives_is_a_step_of_everything():
+def test_slide_allowance_of_one_step():
     """At 1/64 s and 8 m/s^2: v dt = 1/16 m, g dt^2 = 1/512 m, g dt/100 = 1/800 m/s; places to 1e-12 of 2 m."""
     canonical, scene = made("slide", 3)
     fall, still = 1 / 512, 1 / 800
@@ -122,7 +122,7 @@ def test_a_slide_within_one_step_has_no_braking():
     assert canonical.measure(scene, moved(long))["braking"] == (None, "the slide lasts less than two steps")
 
 
-def test_the_ghost_goes_the_parabola_and_stays_where_it_ends():
+def test_truth_of_the_replay_on_a_parabola_to_its_end():
     """x = 4 t - 2 t^2 until 1 s."""
     _, scene = made("slide", 3, heading=60.0)
     ghost = CATALOGUE["slide"].track(scene)
