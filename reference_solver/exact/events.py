@@ -96,7 +96,8 @@ class Monitors:
             load = grip = np.full(len(answer.modes), np.inf)
         slip = self._contacts.rows.speed[:, 1:]
         if self._piece.turns and slip.shape[1] > 1:
-            slip = np.linalg.norm(slip, axis=1) - self._ended
+            left = np.linalg.norm(slip, axis=1) - self._ended
+            slip = np.minimum(left, (slip * answer.directions).sum(axis=1))
         else:
             slip = (slip * answer.directions).sum(axis=1)
         ends = margins(self._world, place, axes, self._contacts.features)

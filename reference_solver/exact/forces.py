@@ -12,7 +12,7 @@ from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
 #: Speeds below this are none [m/s], and slips below this have no direction.
-STILL, SLIPPING = 1e-12, 1e-9
+STILL, SLIPPING = 1e-12, 1e-11
 #: Share of the largest load or acceleration that is round-off where a mode ends, and one that is a breach of a law.
 NONE = 1e-9
 
@@ -57,17 +57,20 @@ class Held:
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
         acceleration = self.follow(state.place, state.axes, state.velocity, free)
-        found = Held(self.contacts, replace(self.answer, forces=self.forces), acceleration)
-        return found
+        answer = replace(self.answer, forces=self.forces, directions=self._onward(self.contacts))
+        return Held(self.contacts, answer, acceleration)
+
+    def _onward(self, contacts: Contacts) -> Array:
+        """Directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
+        if contacts.world.dimension == 2:
+            return self.answer.directions
+        slip = contacts.rows.speed[:, 1:]
+        speed = np.linalg.norm(slip, axis=1)
+        turns = (self.answer.modes == SLIP) & (speed > SLIPPING)
+        return np.where(turns[:, None], slip / np.where(turns, speed, 1.0)[:, None], self.answer.directions)
 
     def _solved(self, contacts: Contacts, free: Array) -> Array:
-        answer, d = self.answer, contacts.world.dimension
-        directions = answer.directions
-        if d == 3:
-            slip = contacts.rows.speed[:, 1:]
-            speed = np.linalg.norm(slip, axis=1)
-            turns = (answer.modes == SLIP) & (speed > SLIPPING)
-            directions = np.where(turns[:, None], slip / np.where(turns, speed, 1.0)[:, None], directions)
+        answer, directions = self.answer, self._onward(contacts)
         problem = Problem.of(contacts, contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel(), directions)
         rows, columns = problem.equations(answer.modes, directions)
         matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]

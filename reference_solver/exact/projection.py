@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.forces import Held
+from reference_solver.exact.forces import SLIPPING, Held
 from reference_solver.exact.problem import SINGULAR, STICK
 from reference_solver.model import Array
 
@@ -31,7 +31,7 @@ def projected(world: World, state: State, held: Held) -> State:
         for _ in range(2):
             state = state.moved(_least(contacts.matrices, normal, -contacts.rows.gap).reshape(state.velocity.shape))
             contacts.at_state(state)
-    sticks = np.flatnonzero(held.answer.modes == STICK)
+    sticks = np.flatnonzero((held.answer.modes == STICK) | _at_end(held))
     keeps = np.concatenate([normal, (sticks[:, None] * d + np.arange(1, d)).ravel()])
     speed = contacts.rows.speed.ravel()[keeps]
     if np.abs(speed).max() > SPEED:
@@ -39,6 +39,15 @@ def projected(world: World, state: State, held: Held) -> State:
         state = replace(state, velocity=state.velocity + change)
         contacts.at_state(state)
     return state
+
+
+def _at_end(held: Held) -> NDArray[np.bool_]:
+    """Whether a contact in space slips by so little that its slip is over: what begins there begins at rest (E38)."""
+    contacts = held.contacts
+    if contacts.world.dimension == 2:
+        return np.zeros(len(contacts), bool)
+    slip = np.linalg.norm(contacts.rows.speed[:, 1:], axis=1)
+    return np.asarray((slip <= 2.0 * SLIPPING) & (contacts.friction > 0.0))
 
 
 def _least(matrices: tuple[Array, Array], rows: NDArray[Any], wanted: Array) -> Array:

@@ -23,8 +23,9 @@ from reference_solver import Settings, Simulation
 from reference_solver.certificate.truth import distance
 from reference_solver.exact import Refused
 
-#: Coarser tolerance with which the loop is run again: the difference is X of the loop, but for round-off.
-COARSER = 100.0
+#: Coarser tolerance with which the loop is run again: twice the difference bounds the error of the finer run if that
+#: of the coarser one is half as large again.
+COARSER = 10.0
 #: What both may differ by where X of the oracle is smaller: its X knows places to some last places only [m].
 LEAST = 1e-11
 
@@ -82,7 +83,7 @@ def compared(known: Answer, limit: float) -> Verdict:
     t, horizon = np.array(known.t[:count]), np.inf if known.horizon is None else known.horizon
     end = min(horizon, np.inf if known.determined is None else known.determined)
     error = np.array([np.inf if x is None else x for x in known.error[:count]])
-    own = distance(world.model, found[:count], coarser[:count])
+    own = 2.0 * distance(world.model, found[:count], coarser[:count])
     apart = distance(world.model, found[:count], np.array(known.pose[:count]))
     allowed = error + own + LEAST
     told = t < end
