@@ -15,13 +15,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
+from typing import Literal
 
-from adapters.shapes import HalfSpace, SceneError, check_finite, check_length, check_positive
-
-if TYPE_CHECKING:
-    from adapters.scene import Body, Scene
+from adapters.scene import Body, HalfSpace, Scene
 
 #: Features of a scene beyond discs, balls, boxes, fixed half-spaces, constant twists and passive contacts. An adapter
 #: lists those that it supports (`adapters.engine.EngineFacts.abilities`); others are refused before it is called.
@@ -36,20 +33,6 @@ Ability = Literal[
     "hull",
     "restitution above 1",
 ]
-
-
-@dataclass(frozen=True)
-class Harmonic:
-    """Oscillation of a prescribed body: ``amplitude`` [m] along the world axes, ``frequency`` [Hz], ``phase`` [rad]."""
-
-    amplitude: tuple[float, ...]
-    frequency: float
-    phase: float = 0.0
-
-    @property
-    def top_speed(self) -> float:
-        """Largest speed of the oscillation [m/s]."""
-        return 2.0 * math.pi * self.frequency * math.hypot(*self.amplitude)
 
 
 def velocity_over(body: Body, dt: float, step: int) -> tuple[float, ...]:
@@ -76,30 +59,6 @@ def top_speed(body: Body) -> float:
     """Largest prescribed or surface speed of a body [m/s]; of a free body its initial speed."""
     own = math.hypot(*body.twist[: len(body.force)]) + (body.course.top_speed if body.course else 0.0)
     return own + math.hypot(*body.surface_velocity)
-
-
-def check_drive(body: Body, dimension: int) -> None:
-    """Raise `SceneError` for an invalid surface velocity or course; pose and twist are already checked."""
-    check_finite(f"{body.name}.surface_velocity", body.surface_velocity)
-    check_length(f"{body.name}.surface_velocity", body.surface_velocity, dimension)
-    if any(body.surface_velocity):
-        if body.motion == "free":
-            raise SceneError(f"{body.name}.surface_velocity: only a body that is not free can have a surface velocity")
-        if isinstance(body.shape, HalfSpace):
-            lifting = sum(v * n for v, n in zip(body.surface_velocity, body.shape.normal, strict=True))
-            if abs(lifting) > 1e-9 * math.hypot(*body.surface_velocity):
-                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} does not lie in the face")
-    course = body.course
-    if course is None:
-        return
-    if not isinstance(course, Harmonic):
-        raise SceneError(f"{body.name}.course: {course!r} is not a course")
-    if body.motion != "prescribed":
-        raise SceneError(f"{body.name}.course: only a prescribed body has a course")
-    check_finite(f"{body.name}.course.amplitude", course.amplitude)
-    check_length(f"{body.name}.course.amplitude", course.amplitude, dimension)
-    check_positive(f"{body.name}.course.frequency", course.frequency)
-    check_finite(f"{body.name}.course.phase", course.phase)
 
 
 def asked_abilities(scene: Scene) -> Iterator[tuple[str, Ability]]:

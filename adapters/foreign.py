@@ -12,11 +12,10 @@ import json
 import math
 import re
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import import_module
-from importlib.metadata import EntryPoint
 from multiprocessing.connection import Connection
 from typing import Any, cast, get_args
 
@@ -66,11 +65,11 @@ class Found:
 class ForeignEngine(Engine):
     """An engine whose plugin is in another process: it has facts and settings, but cannot build worlds."""
 
-    def __init__(self, entry: EntryPoint, child: Child, told: Mapping[str, Any]) -> None:
+    def __init__(self, child: Child, told: Mapping[str, Any], again: Callable[[], tuple[Child, Any]]) -> None:
         self.facts = facts_from(told["facts"])
         self.profiles = {name: partial(self._ask, name) for name in told["profiles"]}
         self._version = str(told["version"])
-        self._entry, self._child = entry, child
+        self._child, self._again = child, again
 
     def version(self) -> str:
         """Version reported by the plugin."""
@@ -83,7 +82,7 @@ class ForeignEngine(Engine):
             told = json.loads(self._child.receive(ANSWER))
         except Lost as lost:
             self._child.stop()
-            self._child, _ = _asked(self._entry)
+            self._child, _ = self._again()
             raise EngineError(f"settings: {self.name}/{profile}: {lost}") from None
         if "error" in told:
             raise EngineError(f"settings: {self.name}/{profile}: {told['error']}")
@@ -102,24 +101,29 @@ class ForeignEngine(Engine):
         raise EngineError(f"engine: {self.name} is loaded in worker processes only")
 
 
-def probe(entry: EntryPoint) -> Found:
-    """Load a plugin in a separate process; never raises because of it."""
+def probe(name: str, served: Callable[[Connection], None], question: bytes) -> Found:
+    """Load a plugin in a separate process; never raises because of it.
+
+    Parameters
+    ----------
+    served
+        What runs there: it loads the plugin that ``question`` names, and calls `serve`.
+    """
+    again = partial(_asked, served, question)
     try:
-        child, told = _asked(entry)
+        child, told = again()
     except IsolationError as error:
-        return Found(entry.name, None, "", str(error))
+        return Found(name, None, "", str(error))
     facts = facts_from(told["facts"]) if told.get("facts") else None
     if told.get("reason"):
         child.stop()
-        return Found(entry.name, None, "", told["reason"], facts, bool(told.get("fatal")), told.get("trace", ""))
-    return Found(entry.name, ForeignEngine(entry, child, told), told["version"], "", facts)
+        return Found(name, None, "", told["reason"], facts, bool(told.get("fatal")), told.get("trace", ""))
+    return Found(name, ForeignEngine(child, told, again), told["version"], "", facts)
 
 
-def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
-    from adapters.registry import brought_by
-
-    child = Child(serve)
-    child.send(json.dumps([entry.name, entry.value, entry.group, brought_by(entry)]).encode())
+def _asked(served: Callable[[Connection], None], question: bytes) -> tuple[Child, dict[str, Any]]:
+    child = Child(served)
+    child.send(question)
     try:
         told: dict[str, Any] = json.loads(child.receive(PATIENCE))
     except Lost as lost:
@@ -130,12 +134,8 @@ def _asked(entry: EntryPoint) -> tuple[Child, dict[str, Any]]:
     return child, told
 
 
-def serve(connection: Connection) -> None:
-    """Serve one plugin until the other end closes; runs in the child."""
-    from adapters.registry import loaded
-
-    name, value, group, distribution = json.loads(connection.recv_bytes())
-    found = loaded(EntryPoint(name, value, group), distribution)
+def serve(connection: Connection, found: Found) -> None:
+    """Answer for one plugin until the other end closes; runs in the child."""
     told: dict[str, Any] = {"version": found.version, "reason": found.reason, "trace": found.trace}
     if found.facts is not None:
         told["facts"] = plain_facts(found.facts)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from multiprocessing.connection import Connection
 from typing import Any
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
 from adapters.extras import install, packages
-from adapters.foreign import Found, checked_facts, probe, said_by, trace_of
+from adapters.foreign import Found, checked_facts, probe, said_by, serve, trace_of
 from adapters.plain import NAME, is_visible, one_line
 from adapters.stages import stage
 
@@ -165,7 +167,19 @@ def find(name: str) -> Found:
         hint = f", did you mean {close[0]!r}?" if close else f"; known: {', '.join(names())}"
         raise EngineError(f"engine: there is no engine called {name!r}{hint}")
     entry = registered[name]
-    return loaded(entry, brought_by(entry)) if _here or is_ours(entry) else probe(entry)
+    return loaded(entry, brought_by(entry)) if _here or is_ours(entry) else probed(entry)
+
+
+def probed(entry: EntryPoint) -> Found:
+    """Look for an engine of another package in a process of its own; never raises because of it."""
+    told = [entry.name, entry.value, entry.group, brought_by(entry)]
+    return probe(entry.name, serve_engine, json.dumps(told).encode())
+
+
+def serve_engine(connection: Connection) -> None:
+    """Load the engine of `probed` and answer for it; runs in the child."""
+    name, value, group, distribution = json.loads(connection.recv_bytes())
+    serve(connection, loaded(EntryPoint(name, value, group), distribution))
 
 
 def brought_by(entry: EntryPoint) -> str:

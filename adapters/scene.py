@@ -29,7 +29,6 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any, Literal
 
-from adapters.drives import Harmonic, check_drive
 from adapters.materials import Materials, Pair, single
 from adapters.plain import NAME, REASON, is_visible, kind_of, one_line
 from adapters.shapes import (
@@ -75,6 +74,20 @@ ImpactLaw = Literal["N-SIM", "N-SEQ"]
 
 #: Largest restitution of a scene that gains energy on purpose: a blow doubles the speed.
 MOST_RESTITUTION = 2.0
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Oscillation of a prescribed body: ``amplitude`` [m] along the world axes, ``frequency`` [Hz], ``phase`` [rad]."""
+
+    amplitude: tuple[float, ...]
+    frequency: float
+    phase: float = 0.0
+
+    @property
+    def top_speed(self) -> float:
+        """Largest speed of the oscillation [m/s]."""
+        return 2.0 * math.pi * self.frequency * math.hypot(*self.amplitude)
 
 
 @dataclass(frozen=True)
@@ -341,7 +354,31 @@ def _validate_body(body: Body, dimension: int) -> None:
         raise SceneError(f"{body.name}.pose: the quaternion {body.pose[3:]!r} must have length 1")
     if body.motion == "fixed" and any(body.twist):
         raise SceneError(f"{body.name}.twist: a fixed body cannot move")
-    check_drive(body, dimension)
+    _check_drive(body, dimension)
+
+
+def _check_drive(body: Body, dimension: int) -> None:
+    """Raise `SceneError` for an invalid surface velocity or course; pose and twist are already checked."""
+    check_finite(f"{body.name}.surface_velocity", body.surface_velocity)
+    check_length(f"{body.name}.surface_velocity", body.surface_velocity, dimension)
+    if any(body.surface_velocity):
+        if body.motion == "free":
+            raise SceneError(f"{body.name}.surface_velocity: only a body that is not free can have a surface velocity")
+        if isinstance(body.shape, HalfSpace):
+            lifting = sum(v * n for v, n in zip(body.surface_velocity, body.shape.normal, strict=True))
+            if abs(lifting) > 1e-9 * math.hypot(*body.surface_velocity):
+                raise SceneError(f"{body.name}.surface_velocity: {body.surface_velocity!r} does not lie in the face")
+    course = body.course
+    if course is None:
+        return
+    if not isinstance(course, Harmonic):
+        raise SceneError(f"{body.name}.course: {course!r} is not a course")
+    if body.motion != "prescribed":
+        raise SceneError(f"{body.name}.course: only a prescribed body has a course")
+    check_finite(f"{body.name}.course.amplitude", course.amplitude)
+    check_length(f"{body.name}.course.amplitude", course.amplitude, dimension)
+    check_positive(f"{body.name}.course.frequency", course.frequency)
+    check_finite(f"{body.name}.course.phase", course.phase)
 
 
 def _validate_pair(pair: Pair, names: Mapping[str, int], most: float) -> None:

@@ -16,8 +16,8 @@ from reports.command.reporting import extra
 from reports.page.charts import error_axis, gutter, log_scale, power_axis, with_unit
 from reports.palette import HOLLOW, colours_of, dash_of, role_of, shape_of
 from validation.cells import format_dt
+from validation.files.distance import primary_of
 from validation.metrics import free_bodies
-from validation.posed import primary_of
 
 with extra("plot"):
     import altair as alt

@@ -38,9 +38,10 @@ from validation.bench.work import certified_of
 from validation.canonical import CanonicalScene
 from validation.catalogue import is_introduced
 from validation.cells import Outcome, Slot, parse_dt
+from validation.files.distance import primary_of
 from validation.identity import commit
 from validation.judging.rows import frame, rows_of
-from validation.posed import primary_of, resolve
+from validation.posed import resolve
 from validation.questions.nulls import with_skill
 from validation.questions.sweeping import Study, study_slots
 from validation.records.store import Store

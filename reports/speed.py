@@ -18,8 +18,8 @@ from adapters.whole import write
 from reports.wording import csv_of, number, plural
 from validation.bench import agreement, reading, work
 from validation.cells import Observation, Outcome, checks_of, format_dt
+from validation.files.distance import primary_of
 from validation.judging.verdicts import judge_physics
-from validation.posed import primary_of
 from validation.records.store import Run, Store
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ import sys
 import tokenize
 from difflib import SequenceMatcher
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -149,6 +150,16 @@ def test_engine_folder_imports_the_vocabulary_alone(engine):
         assert not {f"adapters.{other}" for other in FOLDERS if other != engine} & named, path
         if engine != SOLVER:
             assert "reference_solver" not in set(imported(path)), path
+
+
+def test_imports_without_circles():
+    """Within functions and for types as well; the solver makes many worlds of one, which it may know."""
+    files = [path for package in LINE[1:] for path in (ROOT / package).rglob("*.py")]
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
+    line = TopologicalSorter()
+    for name, path in modules.items():
+        line.add(name, *(each for each in modules.keys() & set(named(path)) if not name.startswith(each)))
+    line.prepare()
 
 
 def test_the_shared_vocabulary_knows_no_engine_s_folder():

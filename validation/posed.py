@@ -17,7 +17,7 @@ from typing import Any
 
 from adapters.plain import is_visible, one_line
 from adapters.scene import SceneError
-from validation.canonical import CanonicalScene, Primary
+from validation.canonical import CanonicalScene
 from validation.catalogue import CATALOGUE, matching
 
 _FILE = re.compile(
@@ -174,22 +174,3 @@ def resolve(argument: str) -> CanonicalScene:
 
         return sized(CATALOGUE[name], float(length))
     return matching(argument)[0]
-
-
-def primary_of(argument: str) -> Primary:
-    """Return the declared error of a scene; of one from a file the distance from the certified run.
-
-    Raises
-    ------
-    SceneError
-        If none is declared: a bench needs one number.
-    """
-    found = resolve(argument).primary
-    if found is None and is_file(argument):
-        from validation.files.distance import DISTANCE
-
-        return DISTANCE
-    if found is None:
-        declared = [name for name, scene in CATALOGUE.items() if scene.primary]
-        raise SceneError(f"scene: no primary error is declared for {argument!r}, only for {', '.join(declared)}")
-    return found

@@ -352,3 +352,15 @@ FAULTS: dict[str, Fault] = {
     "recorded impulses too low": Fault("stride", SHARES, "share", record=_low_record),
     "worlds are never freed": Fault("memory", (1e5, 1e4, 3e3), "bytes a world", build=_leaking),
 }
+
+
+class FaultyToy(Spoilt):
+    """The toy with the fault called ``name``, of ``size``."""
+
+    def __init__(self, name: str, size: float) -> None:
+        super().__init__(FAULTS[name], size)
+        self._told = name, size
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process makes the same fault again."""
+        return FaultyToy, self._told

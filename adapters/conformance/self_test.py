@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from adapters.conformance import CHECKS, check_adapter
-from adapters.conformance.faults import FAULTS
+from adapters.conformance.faults import FAULTS, FaultyToy
 from adapters.conformance.finding import found
 from adapters.conformance.scenes import DT
-from adapters.conformance.spoilt import Spoilt
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import Engine
 from adapters.needs import Needs
@@ -39,7 +38,7 @@ def self_test() -> Iterator[Caught]:
     yield Caught("none: the healthy toy", "all", math.nan, "", not wrong, wrong[0] if wrong else "every check holds")
     for name, fault in FAULTS.items():
         for size in fault.sizes or (math.nan,):
-            said = broken(Spoilt(name, size), fault.check)
+            said = broken(FaultyToy(name, size), fault.check)
             yield Caught(name, fault.check, size, fault.unit, bool(said), said or "nothing noticed")
 
 

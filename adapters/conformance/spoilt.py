@@ -57,19 +57,12 @@ class Past:
 
 
 class Spoilt(Engine):
-    """The toy with the fault called ``name`` of `adapters.conformance.faults`, of ``size``."""
+    """The toy with one fault of ``size``."""
 
-    def __init__(self, name: str, size: float) -> None:
-        from adapters.conformance.faults import FAULTS
-
-        self.fault, self.size, self.inner, self.past = FAULTS[name], size, ToyEngine(), Past()
-        self._told = name, size
+    def __init__(self, fault: Fault, size: float) -> None:
+        self.fault, self.size, self.inner, self.past = fault, size, ToyEngine(), Past()
         self.facts = self.fault.facts(self.inner.facts) if self.fault.facts else self.inner.facts
         self.profiles = {profile: self._rule(profile) for profile in self.inner.profiles}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Another process makes the same fault again."""
-        return Spoilt, self._told
 
     def _rule(self, profile: str) -> Callable[[Needs, float], list[Setting]]:
         def rule(needs: Needs, dt: float) -> list[Setting]:

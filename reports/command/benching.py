@@ -36,7 +36,7 @@ from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, tim
 from validation.bench.units import Unit, prepared
 from validation.bench.work import certified_of
 from validation.cells import Outcome, Slot, parse_dt
-from validation.posed import primary_of
+from validation.files.distance import primary_of
 from validation.records.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
 

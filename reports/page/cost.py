@@ -30,7 +30,7 @@ from reports.page.verdicts import slug
 from reports.speed import duration
 from reports.wording import number, reproduce
 from validation.cells import format_dt
-from validation.posed import primary_of
+from validation.files.distance import primary_of
 
 Plain = Mapping[Hashable, Any]
 #: Share of a panel's width up to which a label fits to the right of a point: "1/1920" takes 40 of 215 pixels.

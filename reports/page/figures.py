@@ -32,7 +32,7 @@ from reports.page.charts import (
 from reports.speed import duration
 from reports.wording import number
 from validation.cells import format_dt
-from validation.posed import primary_of
+from validation.files.distance import primary_of
 from validation.questions.convergence import Convergence
 
 #: Caption of charts with moved marks.

@@ -5,15 +5,14 @@ from functools import cache
 
 import pytest
 
-from adapters.conformance.faults import FAULTS
-from adapters.conformance.spoilt import Spoilt
+from adapters.conformance.faults import FAULTS, FaultyToy
 from adapters.conformance.toy import ToyEngine
 
 
 @cache
 def toy_engine(fault="", size=None):
     """One engine per fault, so that its receipts are measured once."""
-    return Spoilt(fault, size or max(FAULTS[fault].sizes, default=math.nan)) if fault else ToyEngine()
+    return FaultyToy(fault, size or max(FAULTS[fault].sizes, default=math.nan)) if fault else ToyEngine()
 
 
 @pytest.fixture

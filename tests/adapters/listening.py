@@ -7,9 +7,8 @@ from types import MappingProxyType
 import numpy as np
 
 from adapters.conformance import scenes
-from adapters.conformance.faults import FAULTS
+from adapters.conformance.faults import FAULTS, FaultyToy
 from adapters.conformance.parameters import STEPS
-from adapters.conformance.spoilt import Spoilt
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import EngineError, Setting, Simulation
 from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
@@ -73,7 +72,7 @@ class Listening(ToyEngine):
     facts = replace(ToyEngine.facts, dimensions=frozenset({2, 3}))
 
     def __init__(self, fault="", size=math.nan, at="second"):
-        self.spoilt = Spoilt(fault, size) if fault else ToyEngine()
+        self.spoilt = FaultyToy(fault, size) if fault else ToyEngine()
         self.fault = FAULTS[fault] if fault else None
         self.at, self.asked, self.built = at, set(), []
         self.profiles = MappingProxyType({name: self._rule(name) for name in SWEEPS})

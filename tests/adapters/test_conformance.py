@@ -7,7 +7,7 @@ import pytest
 
 from adapters import registry
 from adapters.conformance import CHECKS, check_adapter, items, worlds
-from adapters.conformance.spoilt import Spoilt
+from adapters.conformance.faults import FaultyToy
 from adapters.engine import Expected
 from adapters.receipts import QUANTITIES
 from adapters.scene import Box, Capsule, Hull
@@ -73,7 +73,7 @@ def test_exception_of_an_engine_as_a_finding(toy_class):
 @pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
 def test_expected_failures_told_and_unexpected_pass_as_failure(toy_class):
-    class Known(Spoilt):
+    class Known(FaultyToy):
         expected = (Expected("states", "it starts late", "its manual"), Expected("contacts", "no", "nowhere"))
 
     told = {finding.check: finding for finding in check_adapter(Known("start displaced", 1e-6))}

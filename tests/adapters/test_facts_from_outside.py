@@ -99,7 +99,7 @@ def child(monkeypatch):
     waiting, started = [], []
 
     def start(serve):
-        assert serve is foreign.serve and waiting
+        assert serve is registry.serve_engine and waiting
         started.append(waiting.pop(0))
         if isinstance(started[-1], Exception):
             raise started[-1]
@@ -118,7 +118,7 @@ def child(monkeypatch):
     return wait
 
 
-ENTRY = foreign.EntryPoint("toy", "toy_module:Toy", "contact_crosscheck.engines")
+ENTRY = registry.EntryPoint("toy", "toy_module:Toy", "contact_crosscheck.engines")
 ANSWER = {
     "version": "1.2",
     "reason": "",
@@ -131,7 +131,7 @@ ANSWER = {
 def test_facts_and_settings_of_an_engine_that_answers(child):
     setting = {"name": "slop", "value": 0.1, "because": "why", "source": "where"}
     own = child(ANSWER, {"settings": [setting]}, {"error": "ValueError: no such thing"}, Lost("it died"))
-    found = foreign.probe(ENTRY)
+    found = registry.probed(ENTRY)
     assert own.sent == [["toy", "toy_module:Toy", "contact_crosscheck.engines", "a-package"]]
     assert (found.name, found.version, found.reason, found.facts, found.fatal, found.trace) == (
         "toy", "1.2", "", FACTS, False, "")  # fmt: skip
@@ -153,16 +153,16 @@ def test_facts_and_settings_of_an_engine_that_answers(child):
 
 def test_engine_without_an_answer_told_with_its_reason(child):
     own = child({"version": "", "reason": "ImportError: no", "trace": "line", "facts": None, "fatal": True})
-    found = foreign.probe(ENTRY)
+    found = registry.probed(ENTRY)
     assert (found.engine, found.version, found.reason, found.facts, found.fatal, found.trace, own.stopped) == (
         None, "", "ImportError: no", None, True, "line", 1)  # fmt: skip
     own = child(Lost("it aborted"), said="loading\nno such\tlibrary")
-    found = foreign.probe(ENTRY)
+    found = registry.probed(ENTRY)
     assert found.reason == "it aborted while it was imported: no such library" and found.fatal and own.stopped == 2
     assert found.trace == foreign.lines("loading\nno such\tlibrary", foreign.TRACE) and "loading" in found.trace
     child(Lost("it hung"))
-    assert foreign.probe(ENTRY).reason == "it hung while it was imported"
+    assert registry.probed(ENTRY).reason == "it hung while it was imported"
     child(IsolationError("process: cannot start one"))
-    found = foreign.probe(ENTRY)
+    found = registry.probed(ENTRY)
     assert (found.engine, found.reason, found.fatal) == (None, "process: cannot start one", False)
     assert foreign.said_by(ValueError()) == "ValueError" and foreign.said_by(ValueError("a\nb")) == "ValueError: a"

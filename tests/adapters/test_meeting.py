@@ -4,12 +4,11 @@ import math
 
 import pytest
 
-from adapters.drives import Harmonic
 from adapters.lift import lift
 from adapters.meeting import meeting_pairs, representable
 from adapters.needs import needs
 from adapters.registry import load
-from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from adapters.scene import Body, Disc, HalfSpace, Harmonic, Pair, Scene
 from validation.catalogue import CATALOGUE
 
 

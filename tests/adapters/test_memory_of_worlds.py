@@ -9,8 +9,8 @@ import pytest
 from listening import Listening
 
 from adapters.conformance import CHECKS, self_test, worlds
+from adapters.conformance.faults import FaultyToy
 from adapters.conformance.finding import NotAsked
-from adapters.conformance.spoilt import Spoilt
 
 MEGABYTE = 2**20
 
@@ -118,5 +118,5 @@ def test_leaked_worlds_seen_in_a_fragmented_heap(monkeypatch):
         monkeypatch.setattr(worlds, name, value)
     blocks = [bytes(3_100) for _ in range(8_000)]
     del blocks[::2]
-    assert self_test.broken(Spoilt("worlds are never freed", 3e3), "memory")
+    assert self_test.broken(FaultyToy("worlds are never freed", 3e3), "memory")
     assert len(blocks) == 4_000

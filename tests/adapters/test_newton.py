@@ -8,7 +8,6 @@ import pytest
 from driven import driven
 
 from adapters.conformance import items
-from adapters.drives import Harmonic
 from adapters.engine import EngineError
 from adapters.newton import NewtonEngine
 from adapters.newton.laws import DEVIATIONS, MOTIONS
@@ -16,7 +15,7 @@ from adapters.newton.motion import DRAWS, LONGER, followed, held_plane, motion_l
 from adapters.newton.roundings import LIMITS, ROUNDINGS, roundings_of
 from adapters.newton.shipped import GAP, ITERATIONS, REBOUND_ITERATIONS, RELAXATION, ROLLING, STOPPED, TORSIONAL
 from adapters.newton.simulation import imported
-from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, HalfSpace, Harmonic, Pair, Scene, Sphere
 from adapters.shapes import Capsule, Hull
 from adapters.stepping import posed_for, run
 from validation import metrics

@@ -9,8 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from adapters.conformance import CHECKS, self_test
-from adapters.conformance.faults import FAULTS
-from adapters.conformance.spoilt import Spoilt
+from adapters.conformance.faults import FAULTS, FaultyToy
 from adapters.lift import lower_pose, out_of_plane
 from adapters.needs import Needs
 from adapters.planted_faults import _turned
@@ -38,7 +37,7 @@ def test_healthy_toy_passes(toy, name):
 
 def test_a_step_of_its_own():
     """It is measured, where an engine that cannot be built would be noticed as well."""
-    said = self_test.broken(Spoilt("step of its own", 0.1), "receipt step")
+    said = self_test.broken(FaultyToy("step of its own", 0.1), "receipt step")
     assert said.startswith("measured ")
 
 
@@ -128,10 +127,10 @@ def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
 @pytest.mark.parametrize("fault", cases(*((name,) for name, fault in FAULTS.items() if fault.sizes)))
 def test_a_fault_of_no_size_is_none(fault):
     """What is planted is as large as it says: with nothing of it the toy is healthy again."""
-    assert self_test.broken(Spoilt(fault, 0.0), FAULTS[fault].check) == ""
+    assert self_test.broken(FaultyToy(fault, 0.0), FAULTS[fault].check) == ""
 
 
 @pytest.mark.few(18)
 @pytest.mark.parametrize(("fault", "size"), PLANTED)
 def test_planted_fault_is_caught(fault, size):
-    assert self_test.broken(Spoilt(fault, size), FAULTS[fault].check)
+    assert self_test.broken(FaultyToy(fault, size), FAULTS[fault].check)

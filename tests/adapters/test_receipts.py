@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from adapters.conformance.spoilt import Spoilt
+from adapters.conformance.faults import FaultyToy
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
@@ -28,7 +28,7 @@ def by_quantity(slips):
 
 
 def declaring(fault="", **declared):
-    class Declaring(Spoilt if fault else ToyEngine):
+    class Declaring(FaultyToy if fault else ToyEngine):
         def declares(self, profile, needs, dt):
             return declared
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from adapters.trajectory import load_trajectory
 from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot, prepare
-from validation.posed import primary_of
+from validation.files.distance import primary_of
 from validation.records.store import Store
 from validation.running.execution import execute
 from validation.running.tracks import record, representatives

@@ -15,7 +15,8 @@ from validation.bench import timing as timings
 from validation.bench.piles import Row
 from validation.bench.statistics import Spread
 from validation.cells import Observation, Outcome, Slot
-from validation.posed import primary_of, resolve
+from validation.files.distance import primary_of
+from validation.posed import resolve
 from validation.records.store import Store
 
 DT, STEPS = 1 / 240, 100

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from reports.command import benching, main
 from validation.cells import Slot
-from validation.posed import primary_of
+from validation.files.distance import primary_of
 from validation.records.store import Run
 
 

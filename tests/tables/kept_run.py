@@ -17,7 +17,8 @@ from typing import Any
 
 from validation.bench.timing import Timing
 from validation.cells import Observation, Outcome, Slot, observation_from_dict
-from validation.posed import is_file, pinned, primary_of, remember, texts_of
+from validation.files.distance import primary_of
+from validation.posed import is_file, pinned, remember, texts_of
 from validation.records.store import Store
 from validation.running.execution import execute
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 
 from adapters.scene import Body, Disc, Pair, Scene, SceneError
-from validation import posed
 from validation.canonical import GRAVITY
 from validation.catalogue import CATALOGUE
-from validation.files.distance import CERTIFIED, DISTANCE
-from validation.posed import primary_of, resolve
+from validation.files import distance
+from validation.files.distance import CERTIFIED, DISTANCE, primary_of
+from validation.posed import resolve
 
 DT = 1 / 240
 
@@ -90,7 +90,7 @@ def test_equal_errors_of_creep_and_acceleration():
 
 
 def test_a_scene_without_a_declared_error_is_refused(monkeypatch):
-    monkeypatch.setattr(posed, "resolve", lambda name: replace(CATALOGUE["bounce"], name=name, primary=None))
+    monkeypatch.setattr(distance, "resolve", lambda name: replace(CATALOGUE["bounce"], name=name, primary=None))
     with pytest.raises(SceneError, match="no primary error is declared for 'mine', only for "):
         primary_of("mine")
 

@@ -14,7 +14,8 @@ from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
 from validation.bench.timing import Timing
 from validation.bench.work import COST_LEVELS, ERROR_LEVELS, error_at_equal_time, time_at_equal_error, work_points
 from validation.cells import Observation, Outcome, Slot
-from validation.posed import primary_of, resolve
+from validation.files.distance import primary_of
+from validation.posed import resolve
 from validation.records.store import Store
 from validation.running.plan import QUICK_DT, Request, slots
 

@@ -28,7 +28,8 @@ from validation.bench.stopwatch import Lowered
 from validation.bench.units import prepared, scene_of
 from validation.bounds import ROUND_OFF
 from validation.cells import Slot
-from validation.posed import primary_of, resolve
+from validation.files.distance import primary_of
+from validation.posed import resolve
 
 #: Time between two samples of a run [s]. A column of ten sways with a period of about a second.
 SAMPLE = 0.125

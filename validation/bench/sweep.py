@@ -20,9 +20,9 @@ from validation.bench.work import accuracy, certified_of, measured
 from validation.canonical import Suite
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
-from validation.files.distance import CertifiedRuns, certified_slot
+from validation.files.distance import CertifiedRuns, certified_slot, primary_of
 from validation.identity import machine
-from validation.posed import is_file, primary_of, resolve
+from validation.posed import is_file, resolve
 from validation.records.store import RELEASE_TITLE, SCATTER_TITLE, Store
 from validation.running.plan import Request, slots
 

@@ -21,7 +21,8 @@ from adapters.stepping import posed_for, step_count
 from validation.bench.scenes import OWN
 from validation.bench.timing import Purpose
 from validation.cells import Slot, settings_of
-from validation.posed import primary_of, resolve
+from validation.files.distance import primary_of
+from validation.posed import resolve
 
 #: A pile is timed after this time in contact, for as long again [s]: 24 steps of 1/240 s.
 SETTLING = 0.1

@@ -16,8 +16,8 @@ from adapters.registry import is_ranked
 from validation.bench.reading import POINT, SERIES, grouped, identity, table_of, timings_summary
 from validation.bench.statistics import lower_envelope
 from validation.cells import Observation, Outcome, Slot, scene_of
-from validation.files.distance import CertifiedRuns, certified_runs, posed
-from validation.posed import is_file, primary_of, resolve
+from validation.files.distance import CertifiedRuns, certified_runs, posed, primary_of
+from validation.posed import is_file, resolve
 from validation.records.store import Run, Store
 
 if TYPE_CHECKING:

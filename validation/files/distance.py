@@ -13,11 +13,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from adapters.registry import profile_of, solver
-from adapters.scene import Scene
+from adapters.scene import Scene, SceneError
 from validation.canonical import Measured, Primary
+from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot
 from validation.files.stated import metric_of
 from validation.metrics import largest
+from validation.posed import is_file, resolve
 
 #: Begin of the names of the certified run's metrics, beside those of the run that is measured.
 CERTIFIED = "certified "
@@ -46,6 +48,23 @@ DISTANCE = Primary(
     error=_error,
     state="the whole scene",
 )
+
+
+def primary_of(argument: str) -> Primary:
+    """Return the declared error of a scene; of one from a file the distance from the certified run.
+
+    Raises
+    ------
+    SceneError
+        If none is declared: a bench needs one number.
+    """
+    found = resolve(argument).primary
+    if found is None and is_file(argument):
+        return DISTANCE
+    if found is None:
+        declared = [name for name, scene in CATALOGUE.items() if scene.primary]
+        raise SceneError(f"scene: no primary error is declared for {argument!r}, only for {', '.join(declared)}")
+    return found
 
 
 @dataclass(frozen=True)
