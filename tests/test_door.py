@@ -22,7 +22,7 @@ def test_a_foreign_package_is_named_with_its_place_and_nothing_runs(tmp_path, na
     assert f"{name!r} at {tmp_path / name}" in line
 
 
-def test_the_readme_snippet_says_so_as_well(tmp_path):
+def test_readme_snippet_with_a_foreign_package(tmp_path):
     (tmp_path / "reports").mkdir()
     (tmp_path / "reports" / "__init__.py").write_text("")
     result = start(tmp_path, "-c", "from contact_crosscheck import load; load('x')")
@@ -36,12 +36,12 @@ def test_foreign_package_stops_our_own_modules(tmp_path):
     assert "'adapters' at" in result.stderr.splitlines()[-1]
 
 
-def test_a_folder_without_code_hides_nothing(tmp_path):
+def test_foreign_folder_without_code_ignored(tmp_path):
     for name in PACKAGES:
         (tmp_path / name).mkdir()
     result = start(tmp_path, "-m", "contact_crosscheck", "list", "scenes", "--json")
     assert result.returncode == 0, result.stderr
 
 
-def test_here_everything_is_ours():
+def test_own_packages_found_in_the_checkout():
     assert foreign() == {}

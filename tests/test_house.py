@@ -135,7 +135,7 @@ def test_interface_of_outside_scenes_stays_in_place():
     assert ground == {"canonical", "catalogue", "posed", "bounds", "metrics", "geometry", "solids", "cells", "identity"}
 
 
-def test_only_an_engine_s_own_folder_imports_it():
+def test_engine_imported_only_by_its_own_folder():
     for package in LINE:
         for path in (ROOT / package).rglob("*.py"):
             if not set(path.parents) & set(FOLDERS.values()):
@@ -369,7 +369,7 @@ def words_of(node):
 TWINS = {"gained_speed": "loads stand in records of bodies in space, in columns in the plane"}
 
 
-def test_what_both_dimensions_do_alike_is_told_once():
+def test_no_duplicate_code_between_dimensions():
     """Functions of one name, of a hundred words and more, share at most six of seven in both dimensions."""
     told = {
         room: {node.name: words_of(node) for path, node in solver_functions() if path.parts[0] == room}

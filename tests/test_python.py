@@ -192,7 +192,7 @@ def test_a_wrong_call_is_one_line_that_names_what_is_wrong(error, said, given):
     assert str(caught.value).startswith(said) and "\n" not in str(caught.value)
 
 
-def test_what_a_result_does_not_have_is_named(engine):
+def test_missing_attribute_of_a_result_named(engine):
     result = cc.run("impact", engine=engine("chipmunk"))
     with pytest.raises(SceneError, match="metric: there is no 'nope', only"):
         result.explain("nope")
@@ -316,7 +316,7 @@ def test_interrupt_of_one_case_stops_all(own):
         cc.sweep("bounce", engine=Interrupted, e=[0.3, 0.5])
 
 
-def test_what_cannot_be_made_is_one_line(own):
+def test_impossible_chart_refused_in_one_line(own):
     class Unmade(ToyEngine):
         def __init__(self):
             raise ValueError("first line\nsecond line")
@@ -366,7 +366,7 @@ def test_a_sweep_that_is_kept_is_loaded_again(tmp_path, engine):
         ("bounce.dimension: 4 is not one of", {"e": [0.5], "dimension": 4}),
     ],
 )
-def test_a_wrong_sweep_is_one_line(said, given):
+def test_wrong_sweep_in_one_line(said, given):
     with pytest.raises((SceneError, EngineError)) as caught:
         cc.sweep("bounce", **({"engine": "chipmunk"} | given))
     assert str(caught.value).startswith(said)
@@ -438,7 +438,7 @@ def test_a_scene_that_the_caller_has_written(own, engine):
         cc.bench(written, engines="chipmunk")
 
 
-def test_a_model_is_a_scene(engine):
+def test_model_given_as_a_scene(engine):
     path = MODELS / "ball_dropped.xml"
     scene = cc.Scene.from_mjcf(path) if registry.find(engine("mujoco")).engine else None
     assert scene.dimensions == (2, 3) and list(scene.parameters.name) == ["duration"] and scene.notes
@@ -458,7 +458,7 @@ def test_a_model_is_a_scene(engine):
      *(pytest.param(cc.Scene.from_sdf, name, "drake", marks=pytest.mark.optional("drake"))
        for name in ("ball_dropped.sdf", "moon_slope.world"))],
 )  # fmt: skip
-def test_a_model_in_urdf_and_sdf_is_a_scene(engine, read, name, reader):
+def test_urdf_and_sdf_models_given_as_scenes(engine, read, name, reader):
     """Its own engine runs it as its author made it, from where and as our solver does."""
     if registry.find(engine(reader)).engine is None:
         pytest.skip(f"{reader} is not installed")

@@ -140,12 +140,12 @@ def found(text, gone=GONE):
     return [word for word in gone if re.search(rf"(?<!\w){re.escape(word.strip())}(?!\w)", flat)]
 
 
-def test_no_output_has_a_word_that_is_gone():
+def test_no_banned_word_in_the_output():
     texts = [*printed(), *printed("contact_crosscheck")]
     assert [f"{where}: {words} in {text!r}" for where, text in texts if (words := found(text))] == []
 
 
-def test_no_page_has_a_word_that_is_gone():
+def test_no_banned_word_on_a_page():
     """Templates of the report and the dashboard, without what they compute, code and tags."""
     paths = [*(ROOT / "reports").rglob("*.html.j2"), *(ROOT / "docs").rglob("*.md.j2")]
     texts = {path.name: re.sub(r"\{[{%#].*?[}%#]\}|<[^>]*>", "", path.read_text(encoding="utf-8")) for path in paths}
@@ -154,7 +154,7 @@ def test_no_page_has_a_word_that_is_gone():
     assert {name: words for name, words in told if words} == {}
 
 
-def test_no_reason_has_a_phrase_that_is_gone():
+def test_no_banned_phrase_in_a_reason():
     told = [*reasons(), *printed("adapters"), *printed("validation")]
     assert len(told) > 1000
     assert [f"{where}: {words} in {text!r}" for where, text in told if (words := found(text, GONE_FROM_REASONS))] == []
@@ -168,7 +168,7 @@ def test_no_docstring_or_comment_has_a_phrase_that_is_gone(package):
 
 
 @pytest.mark.parametrize("name", [None, *main.list_commands(None)])
-def test_no_help_has_a_word_that_is_gone(name):
+def test_no_banned_word_in_the_help(name):
     result = CliRunner(env={"COLUMNS": "200"}).invoke(main, [*([name] if name else []), "--help"])
     assert result.exit_code == 0 and found(without_code(result.output)) == []
 
@@ -181,7 +181,7 @@ def test_no_help_has_a_word_that_is_gone(name):
         "Run cells given as JSON", "share of the rows that FAIL; e: as laws of the engine predict",
     ],
 )  # fmt: skip
-def test_the_words_of_old_screens_are_found(text):
+def test_banned_words_found_in_old_screens(text):
     assert found(text)
 
 

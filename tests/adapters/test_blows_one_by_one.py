@@ -134,7 +134,7 @@ def test_rubbing_ball_spin_and_stop_by_coulomb_s_law():
 
 
 @pytest.mark.parametrize("value", [SMALLEST, LARGEST, 1.0])
-def test_the_ends_of_what_singles_hold_have_a_place(value):
+def test_ends_of_the_single_precision_range(value):
     light = ball("ball", (0, 0, 0), (0, 0, 0))
     for body in (replace(light, mass=value), replace(light, inertia=(value, 1.0, 1.0))):
         assert singles.without_a_place(space(body)) is None

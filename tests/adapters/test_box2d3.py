@@ -134,7 +134,7 @@ def test_drawn_impulses_not_reported_as_momentum():
     assert np.isnan(rest.contacts().impulse).all() and np.isnan(rest.contacts().gap).all()
 
 
-def test_worlds_are_given_back():
+def test_memory_of_closed_worlds():
     for _ in range(200):
         simulation = ENGINE.build(resting(), DT, settings(resting()))
         simulation.advance(1)

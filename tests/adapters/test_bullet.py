@@ -432,7 +432,7 @@ def test_state_before_the_first_step_is_the_scene_in_its_order(profile):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_readback_is_what_was_asked(profile):
+def test_readback_equal_to_the_requested_scene(profile):
     body = Body("b", Box((0.5,) * 3), 2.5, (0.3, 0.5, 0.9), (0.0, 0.0, 3.0, *UPRIGHT))
     held = drive(scene_of(FLOOR, body, e=0.4, mu=0.3, gravity=(0.0, 1.0, -9.0)), profile).readback
     assert held["fixedTimeStep"] == DT and held["numSolverIterations"] == 50 and held["numSubSteps"] == 0

@@ -36,7 +36,7 @@ class Planar(CheckedEngine):
         return "dt: too long" if dt > 0.1 else None
 
 
-def test_a_world_gets_what_was_checked():
+def test_world_built_from_the_checked_scene():
     made = Planar().build(SCENE, 0.01, SETTINGS)
     assert (made.scene, made.dt, made.settings) == (SCENE, 0.01, SETTINGS) and made.settings is not SETTINGS
     Planar().check_settings(SETTINGS)
@@ -82,7 +82,7 @@ def test_readbacks_name_free_bodies_and_pairs():
     }
 
 
-def test_a_material_is_common_if_all_pairs_have_it():
+def test_common_material_of_all_pairs():
     assert common_material(SCENE) == (0.5, 0.25)
     assert common_material(replace(SCENE, pairs=(*SCENE.pairs, Pair("a", "b", 0.5, 0.5)))) is None
     assert common_material(replace(SCENE, bodies=BALLS[:1])) is None

@@ -385,7 +385,7 @@ def test_no_initial_overlap_of_bodies_that_will_collide() -> None:
 # ---- receipts and repeatability --------------------------------------------------------------------------------
 
 
-def test_what_the_engine_holds_is_what_was_asked() -> None:
+def test_engine_state_equal_to_the_requested_scene() -> None:
     box = unit_box("box", 0.0, 0.5, mass=3.0, inertia=0.7, shape=Box((0.5, 0.25)))
     disc = Body("disc", Disc(0.3), 2.0, 0.11, (2.0, 0.3, 0.0))
     held = drive(make(FLOOR, box, disc, e=0.5, mu=0.3, gravity=(1.0, -9.0), T=3 * DT)).readback
@@ -528,7 +528,7 @@ def test_sharpness_of_the_stick_threshold_as_measured() -> None:
 
 @pytest.mark.parametrize("lean", [0.0, 0.3])
 @pytest.mark.parametrize("away", [1e4, -2.5e4, 1e6])
-def test_a_half_space_has_no_end(lean: float, away: float) -> None:
+def test_half_space_without_an_end(lean: float, away: float) -> None:
     """Its slab lies under the bodies, wherever they are: a box at rest on its face falls nowhere."""
     normal, along = (-math.sin(lean), math.cos(lean)), (math.cos(lean), math.sin(lean))
     face = Body("face", HalfSpace(normal, 0.0), motion="fixed")

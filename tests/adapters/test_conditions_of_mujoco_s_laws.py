@@ -148,7 +148,7 @@ def test_ball_band_grows_with_its_widest_path(monkeypatch):
         assert (band > 1.1 * SUM_ROUND_OFF * scale_of(scene, metric)) == more
 
 
-def test_sizes_of_what_is_measured_of_a_ball():
+def test_sizes_of_ball_measures():
     scene = replace(scene_of(3, Sphere(0.5)), params={"v": 4.0, "height": 3.0})
     sizes = {"apex[2]": 3.0, "rebound_speed": 4.0, "velocity_change": 4.0, "impulse": 8.0, "flight_time": 1.0}
     assert {name: scale_of(scene, name) for name in sizes} == sizes
@@ -265,7 +265,7 @@ def test_planar_motion_along_a_heading_stays_upright(heading):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_gap_of_two_balls_is_what_lies_between_them(dimension):
+def test_gap_between_two_balls(dimension):
     rest = (0.0,) * (dimension - 1), () if dimension == 2 else (0.0, 0.0)
     turn = (0.0,) if dimension == 2 else (1.0, 0.0, 0.0, 0.0)
     made = Disc if dimension == 2 else Sphere

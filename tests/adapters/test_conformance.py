@@ -152,7 +152,7 @@ def test_shape_of_another_size_in_an_adapter(name, shape, change, monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.usefixtures("few_worlds")
-def test_a_fault_that_no_receipt_sees_is_found(toy):
+def test_fault_seen_by_no_receipt_found_by_a_check(toy):
     found = failing(check_adapter(toy("state shared with another world")))
     assert "fresh" in found
     assert not [name for name in found if name.startswith("receipt")]

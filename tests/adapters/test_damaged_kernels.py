@@ -65,14 +65,14 @@ def test_a_damaged_file_of_a_kernel(called, ending, kind):
             path.write_bytes(data)
 
 
-def test_kernels_that_are_whole(called, recwarn):
+def test_undamaged_kernels(called, recwarn):
     _, folder = called
     before = {path for path in folder.rglob("*")}
     engine._heal(folder)
     assert before == {path for path in folder.rglob("*")} and not recwarn.list
 
 
-def test_a_kernel_whose_index_is_empty(called):
+def test_kernel_with_an_empty_index(called):
     """It cannot be called at all until the file is thrown away, and then is compiled again."""
     call, folder = called
     (index,) = folder.rglob("*.nbi")

@@ -236,7 +236,7 @@ def test_blow_friction_pyramid_or_cone_by_the_law(profile, params):
         assert (told["sideways"][1] > 0.1) is (profile in PYRAMIDS)
 
 
-def test_a_slip_that_the_blow_stops_has_no_law():
+def test_no_law_for_a_slip_stopped_by_the_blow():
     assert not [metric for metric, *_ in judged("oblique", 3, {}) if metric == "forward_speed"]
 
 

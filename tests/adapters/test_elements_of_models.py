@@ -73,7 +73,7 @@ def test_elements_of_one_line_without_a_name_get_different_ones():
         ("<mujoco>\ud800</mujoco>", "model: is not XML: "),
     ],
 )
-def test_what_is_no_model_is_refused_in_a_line(text, said):
+def test_text_that_is_no_model_refused(text, said):
     found = refused(read, text)
     assert found.startswith(said) and "\n" not in found
 
@@ -191,7 +191,7 @@ def test_elements_of_another_language_kept_dropped_or_refused():
     assert dropped == ["line 1: <joint>: nothing is held", odd, odd]
 
 
-def test_links_and_their_shapes_are_counted(monkeypatch):
+def test_limit_on_links_and_their_shapes(monkeypatch):
     monkeypatch.setattr(mjcf, "MOST_MADE", 3)
 
     def rid(text):

@@ -86,7 +86,7 @@ def test_facts_computed_at_construction_are_taken_and_cleaned(monkeypatch):
         (NotOne, "odd_engine:Engine is not an adapters.Engine", FACTS),
     ],
 )
-def test_what_is_none_is_a_reason_with_a_trace(monkeypatch, kind, reason, facts):
+def test_object_that_is_no_engine_with_reason_and_traceback(monkeypatch, kind, reason, facts):
     found = loaded(monkeypatch, kind)
     assert (found.name, found.engine, found.version, found.facts) == ("odd", None, "", facts)
     assert reason in found.reason and found.trace
@@ -96,7 +96,7 @@ def test_what_is_none_is_a_reason_with_a_trace(monkeypatch, kind, reason, facts)
     ("profile", "good"),
     [("n" * NAME, True), ("n" * (NAME + 1), False), ("", False), ("a\nb", False), ("\u200b", False), (3, False)],
 )
-def test_a_profile_has_a_name_that_is_seen_and_fits(monkeypatch, profile, good):
+def test_visible_profile_name_of_limited_length(monkeypatch, profile, good):
     class Named(Bare):
         profiles = {profile: Bare.profiles["default"]}  # noqa: RUF012
 

@@ -19,7 +19,7 @@ def read(tmp_path):
 CURED = '[[cured]]\nshipped = "default"\nbetter = "tuned"\nscene = "stack"\ncells = [{}]\n'
 
 
-def test_every_part_may_be_missing(read):
+def test_experiment_file_with_parts_missing(read):
     assert read("") == Tuning() == Tuning({}, {}, ())
     assert read('[belongs]\na = "b"\n') == Tuning(belongs={"a": "b"})
 

@@ -63,7 +63,7 @@ def test_touch_within_the_least_gap(monkeypatch, gap, touches):
         assert [arm.tolist() for arm in contact.arms] == [[0.25, 0.0, 0.0], [-0.25, 0.0, 0.0]]
 
 
-def test_a_ball_that_misses_or_leaves_meets_nothing():
+def test_no_contact_for_a_missing_or_leaving_ball():
     passing = scene(ball("left", 0.0, 2.0), ball("right", 1.0))
     flight = _Flight(passing, EXACT)
     assert flight._meeting(0, 1)[0] == pytest.approx(0.25)

@@ -104,7 +104,7 @@ def test_child_answers_until_stopped(child):
     ],
 )
 @pytest.mark.parametrize("timeout", [None, PATIENCE])
-def test_how_a_child_ended_is_said_however_it_did(child, order, said, timeout):
+def test_reason_for_the_end_of_a_child(child, order, said, timeout):
     child.send(order.encode())
     with pytest.raises(Lost) as lost:
         child.receive(timeout)
@@ -119,7 +119,7 @@ def test_exit_status_of_a_child(child):
     assert child.stop() == "the process was killed by SIGABRT"
 
 
-def test_a_child_that_takes_too_long_is_no_dead_one(child):
+def test_slow_child_not_taken_for_dead(child):
     child.send(b"time.sleep(0.5); answer('late')")
     started = time.monotonic()
     with pytest.raises(Lost, match=r"^no answer after 0\.1 s$"):
@@ -167,7 +167,7 @@ def test_processes_started_by_a_child_ended_with_it(child, leaves):
         "answer('first'), answer('second')",
     ],
 )
-def test_an_answer_that_was_not_asked_for(child, order):
+def test_unrequested_answer_of_a_child(child, order):
     """It ends the child at the next question."""
     child.send(order.encode())
     with pytest.raises(Mistaken, match="not asked"):
@@ -185,7 +185,7 @@ def test_half_an_answer(serve, monkeypatch):
     assert child.ended()
 
 
-def test_a_long_question_that_is_not_read(serve, monkeypatch):
+def test_long_question_that_a_child_does_not_read(serve, monkeypatch):
     monkeypatch.setattr(isolation, "PAUSE", 1)
     child = Child(serve)
     assert asked(child, "answer('begun'); os.kill(os.getpid(), signal.SIGSTOP)") == "begun"
@@ -201,13 +201,13 @@ def test_the_tracker_of_semaphores_of_the_parent(child):
                         "answer(os.fstat(getfd()).st_rdev == os.stat(os.devnull).st_rdev)") == "True"  # fmt: skip
 
 
-def test_a_copy_that_a_child_forks(child):
+def test_forked_copy_of_a_child(child):
     """Both come back to the child's code; one answers."""
     assert asked(child, "os.fork(); answer('once')") == "once"
     assert [asked(child, f"answer({k})") for k in range(3)] == ["0", "1", "2"]
 
 
-def test_many_processes_that_a_child_forks(child):
+def test_many_forks_of_a_child(child):
     """None is left once it is stopped, also where the child has stopped its guardian."""
     order = "pids = [os.fork() or time.sleep(600) for _ in range(200)]; answer(*pids)"
     pids = [int(word) for word in asked(child, order).split()]
@@ -338,7 +338,7 @@ def test_reason_when_no_process_can_be_started(serve, monkeypatch, error, said):
         Child(serve)
 
 
-def test_child_of_a_thread_that_ends(serve):
+def test_child_started_in_a_thread_that_ends(serve):
     """The system reports the end of the thread like that of the process."""
 
     def begun():

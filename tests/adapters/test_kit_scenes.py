@@ -26,14 +26,14 @@ def gap(scene, one, other, t=0.0):
 
 
 @pytest.mark.parametrize("name", MADE)
-def test_nobody_starts_inside_another_one(name):
+def test_no_initial_overlap_in_kit_scenes(name):
     scene = MADE[name]
     for a, b in combinations([body.name for body in scene.bodies], 2):
         assert gap(scene, a, b) > -1e-12, (a, b)
     assert scene.name.startswith("check_") and scene.name == scene.name.lower()
 
 
-def test_what_lies_touches_what_it_lies_on():
+def test_resting_bodies_of_kit_scenes_touch_their_support():
     lying = MADE["leaning"]
     assert gap(lying, "floor", "lower") == pytest.approx(0.0, abs=1e-12)
     assert gap(lying, "lower", "upper") == pytest.approx(0.0, abs=1e-12)
@@ -54,7 +54,7 @@ def test_colliding_bodies_of_a_kit_scene_apart_at_the_start(name, one, other):
     assert min(gap(scene, one, other, t) for t in np.linspace(0.0, scene.duration, 200)) < 0.0
 
 
-def test_pairs_that_are_odd_are_odd():
+def test_pairs_with_their_own_odd_values():
     """No number per body makes e_ab, e_bc and e_ac: their logarithms would have to add up."""
     scene = MADE["odd_pairs"]
     e = {(a, b): scene.material(a, b).restitution for a, b in combinations("abc", 2)}

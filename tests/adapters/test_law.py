@@ -36,7 +36,7 @@ def test_law_without_sweeps_silent_at_requested_iterations():
 ROW = {"engine": "toy", "version": "1.2.3", "profile": "tuned", "scene": "stack", "metric": "load[2]"}
 
 
-def test_a_law_covers_the_rows_that_it_names():
+def test_rows_covered_by_a_law():
     assert ONE.covers(**ROW)
     assert ONE.covers(**ROW | {"version": "2.0", "profile": "default"})
     assert replace(ONE, versions=()).covers(**ROW | {"version": "9"})
@@ -48,5 +48,5 @@ def test_a_law_covers_the_rows_that_it_names():
      {"metric": "load2"}],
     ids=str,
 )  # fmt: skip
-def test_and_no_others(other):
+def test_rows_not_covered_by_a_law(other):
     assert not ONE.covers(**ROW | other)

@@ -128,7 +128,7 @@ def test_law_silent_under_loads_and_quick_successive_blows():
     assert told(metric, exact, row) is not None and told(metric, exact, row, 0.3 * row.params["apart"]) is None
 
 
-def test_a_mass_that_singles_cannot_hold_is_named():
+def test_mass_beyond_single_precision_named():
     scene = CATALOGUE["impact"].scene(2)
     floor, ball = scene.bodies
     assert without_a_place(scene) is None

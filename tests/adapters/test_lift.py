@@ -123,7 +123,7 @@ def test_an_angle_does_not_depend_on_the_sign_of_the_quaternion() -> None:
     assert np.allclose(lower_pose(pose)[:, 2], 2.4, atol=1e-15)
 
 
-def test_contacts_lose_only_what_is_out_of_the_plane() -> None:
+def test_contacts_lowered_without_their_out_of_plane_part() -> None:
     row = (0, 1, (1.0, 2.0, 3.0), (0.6, 0.0, 0.8), (4.0, 5.0, 6.0), -0.1)
     flat = lower_contacts(Contacts.from_rows([row], 3))
     assert flat.point.tolist() == [[1.0, 3.0]]

@@ -25,7 +25,7 @@ def settings_of(engine, profile, scene):
 
 @pytest.mark.parametrize(("name", "profile", "dimension"), PROFILES)
 @pytest.mark.parametrize("first", [0, 3])
-def test_each_world_moves_as_it_does_alone(name, profile, dimension, first):
+def test_world_among_many_moves_as_alone(name, profile, dimension, first):
     engine, scenes = load(name), many(scene_of("incline", dimension), 6)
     settings = settings_of(engine, profile, scenes[0])
     together = engine.build_many(scenes[first:] + scenes[:first], DT, settings, 2)

@@ -207,12 +207,12 @@ def made(mu: float, rounds: int) -> float:
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.5, 1.0, 2.0])
-def test_a_round_leaves_what_the_contraction_says(mu: float) -> None:
+def test_residual_after_a_round_by_its_contraction(mu: float) -> None:
     """mu^2/(1 + mu^2) of a box that does not turn, but for softness: 1e-4 of an inverse mass, across and along."""
     assert abs(made(mu, 2) / made(mu, 1) - mu**2 / (1.0 + mu**2)) <= 2e-4
 
 
-def test_a_secant_makes_few_rounds_of_many() -> None:
+def test_fewer_rounds_with_the_secant_method() -> None:
     scene = scene_of(FLOOR, slab((1.0, 0.0, 0.0)), mu=1.0, g=DOWN, T=0.05)
     contraction = math.log(AGREED) / math.log(0.5)  # 43 rounds
     assert drive(scene).certificate["rounds"] <= 10 < contraction
@@ -256,7 +256,7 @@ def test_matched_profile_without_rank_and_in_flight_like_tuned() -> None:
         ({"kappa_plastic": 0.1}, "kappa_plastic"),
     ],
 )
-def test_settings_of_the_loop_are_checked(changes: dict[str, Any], said: str) -> None:
+def test_wrong_settings_of_the_loop_refused(changes: dict[str, Any], said: str) -> None:
     scene = scene_of(FLOOR, slab(), mu=0.5, g=DOWN)
     with pytest.raises(EngineError, match=said):
         ENGINE.build(scene, DT, settings(scene, **changes))

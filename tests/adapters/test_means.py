@@ -55,7 +55,7 @@ def test_no_body_values_for_one_deviating_pair(coefficient):
 
 
 @pytest.mark.parametrize("size", [1e-3, 1e-9])
-def test_a_pair_that_is_missed_by_little_is_missed(size):
+def test_pair_missed_by_a_little_does_not_meet(size):
     assert means(scene(six(0.5 + size)), "friction") is None
 
 

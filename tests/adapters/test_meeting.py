@@ -60,7 +60,7 @@ def test_momentum_passed_on_by_fixed_and_driven_bodies():
     assert met(table, *lanes, duration=0.05) == set()
 
 
-def test_nobody_touches_whom_it_cannot_meet():
+def test_no_contact_of_bodies_that_cannot_meet():
     """Contacts that a healthy engine reports, in every scene that it plays in the plane."""
     pytest.importorskip("pymunk")
     engine, seen = load("chipmunk"), 0

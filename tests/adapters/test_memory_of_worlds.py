@@ -102,7 +102,7 @@ def test_cyclic_garbage_freed_before_memory_is_measured():
     assert before - after > 40 * MEGABYTE
 
 
-def test_a_system_that_tells_nothing_holds_nothing(monkeypatch):
+def test_memory_check_without_system_information(monkeypatch):
     def missing(*asked):
         raise OSError("no such file")
 

@@ -73,7 +73,7 @@ def test_fault_of_a_given_size_changes_only_its_quantity(fault):
         assert told[name] == pytest.approx(value, abs=1e-12), name
 
 
-def test_what_lies_in_the_middle_is_pulled_nowhere():
+def test_no_pull_on_a_centred_body():
     simulation = _Misread(Gliding(), "pull", 1.0 - SIZE, DT)
     simulation.inner.pose = lambda: np.array([[0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     assert simulation.twist() - V == pytest.approx(SIZE * np.array([[0.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]]))

@@ -125,7 +125,7 @@ def test_model_elements_refused_or_left_out_with_a_message(name):
     (model_of(BALL, head='<option><flag contact="disable"/></option>'), "<option>: contact: without it"),
     (model_of(BALL, head='<option><flag override="enable"/></option>'), "<option>: override: "),
 ])  # fmt: skip
-def test_hostile_and_wrong_models_are_one_line(text, said):
+def test_hostile_and_wrong_models_in_one_line(text, said):
     with pytest.raises(SceneError) as refused:
         reading.read(text, False)
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
@@ -181,7 +181,7 @@ def test_other_files_beside_the_model_are_not_opened(tmp_path, monkeypatch):
         reading.read('<mujoco><worldbody><include file="other.xml"/></worldbody></mujoco>', True)
 
 
-def test_masses_places_and_turns_are_the_compiler_s():
+def test_masses_positions_and_rotations_of_the_compiler():
     text = model_of(
         '<frame pos="1 0 0" euler="0 0 90"><body name="box" pos="0 1 2"><freejoint/>'
         '<geom type="box" size=".1 .2 .3" density="500"/></body></frame>'
@@ -325,7 +325,7 @@ def test_planar_model_as_a_planar_scene_and_back():
 
 
 @pytest.mark.parametrize("out", ["pos='0 .1 1'", "pos='0 0 1' euler='10 0 0'", "pos='0 0 1' euler='0 0 10'"])
-def test_what_leaves_the_plane_is_not_planar(out):
+def test_model_out_of_the_plane_not_planar(out):
     box = f"<body {out}><freejoint/><geom type='box' size='.1 .1 .1'/></body>"
     assert lowered(reading.read(model_of(box), False).scene) is None
 

@@ -112,7 +112,7 @@ def test_faces_moved_on_as_their_contacts():
     assert not data.mocap_pos[[0, 1, 2, 3, 5, 6, 7]].any()
 
 
-def test_a_script_moves_what_the_adapter_moves():
+def test_script_with_the_moving_faces_of_the_adapter():
     assert script_lines(scene(STILL, BOX), DT, "") == ([], ["mujoco.mj_step(model, data)"])
     assert script_lines(scene(STILL, BOX), DT, "half()") == ([], ["mujoco.mj_step1(model, data)", "half()"])
     before, step = script_lines(scene(STILL, BELT, WALL), DT, "")
@@ -137,7 +137,7 @@ def test_slower_motion_seen_from_the_belt():
 
 
 @pytest.mark.parametrize("run", [(2.0, -1.0, 0.5), (2.0, -1.0)])
-def test_in_the_room_all_but_the_belt_go_with_it(run):
+def test_room_velocities_around_a_moving_belt(run):
     t, size = np.array([0.0, 0.5, 2.0]), len(run)
     pose, twist = np.zeros((3, 3, 7)), np.ones((3, 3, 6))
     found = belts._in_the_room(Trajectory(t, pose, twist, None, 0.5, "completed"), np.array(run))

@@ -261,7 +261,7 @@ def test_resting_box_is_carried_by_its_weight_times_dt(profile: str) -> None:
     assert last == pytest.approx([0.0, 0.0, G * DT], abs=1e-9 * G * DT)
 
 
-def test_gap_is_that_of_the_steps_start() -> None:
+def test_gap_at_the_start_of_a_step() -> None:
     trajectory = drive(impact(0.5, 2.0, 0.4), "default")
     assert trajectory.contacts is not None
     rows, samples = trajectory.contacts.rows, trajectory.contacts
@@ -270,7 +270,7 @@ def test_gap_is_that_of_the_steps_start() -> None:
             assert rows.gap[row] == pytest.approx(trajectory.pose[sample - 1, 1, 2] - 0.5, abs=1e-14)
 
 
-def test_rk4_has_no_impulse_of_a_step() -> None:
+def test_no_impulse_of_a_step_with_rk4() -> None:
     trajectory = drive(impact(0.5, 2.0, 0.4), "default", integrator="RK4")
     assert trajectory.contacts is not None and len(trajectory.contacts.rows.a)
     assert np.isnan(trajectory.contacts.rows.impulse).all()
@@ -427,7 +427,7 @@ def test_every_pair_has_its_own_restitution_when_tuned() -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_pairs_and_geoms_are_the_same_model(profile: str) -> None:
+def test_pairs_and_geoms_give_the_same_model(profile: str) -> None:
     boxes = [cube("a", 0.5), cube("b", 1.5, x=0.1), ball("far", 9.0, x=30.0)]
     scene = make(FLOOR, *boxes, mu=0.4, g=(0.0, 0.0, -G), T=0.5)
     chosen = settings(scene, profile, solreffriction=None)
@@ -537,7 +537,7 @@ def test_bad_steps_are_refused(dt: float) -> None:
         ENGINE.build(scene, dt, settings(scene, "default"))
 
 
-def test_moments_that_no_body_has_are_refused() -> None:
+def test_physically_impossible_moments_refused() -> None:
     scene = make(FLOOR, ball("ball", 1.0, inertia=(1.0, 1.0, 3.0)))
     refusal = ENGINE.refuses(scene, "default")
     assert refusal is not None and refusal.startswith("ball.inertia: ")

@@ -75,7 +75,7 @@ def columns(count):
     return Scene("columns", 1, 3, tuple(bodies), (Pair(),), (0.0, 0.0, -9.81), 0.1)
 
 
-def test_columns_have_pairs_and_cost_as_their_bodies():
+def test_linear_cost_and_pairs_of_columns():
     """A floor meets each, a box meets few others: as many pairs a body in a hall of 320 as in one of 5000."""
     shares, times = [], []
     for count in (320, 5000):

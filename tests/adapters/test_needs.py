@@ -30,13 +30,13 @@ def test_what_a_scene_needs_fact_by_fact():
     )  # fmt: skip
 
 
-def test_nothing_that_moves_freely_needs_nothing():
+def test_no_needs_without_free_bodies():
     assert needs(scene(FLOOR)) == Needs(2, False, 0.0, 0.0, "free", False, 1.0, 4.0, 1.0, 8.0, 8.0)
     still = needs(scene(ball(), gravity=(0.0, 0.0)))
     assert still == Needs(2, False, 0.0, 0.0, "free", False, 0.5, 0.0, 1.0, 0.0, 0.0)
 
 
-def test_a_force_pulls_where_gravity_does_not():
+def test_need_of_a_force_without_gravity():
     pressed = ball(force=(-6.0, 8.0))
     assert needs(scene(FLOOR, pressed)).pull == 8.0
     assert needs(scene(FLOOR, pressed, ball("other"), gravity=(0.0, 0.0))).pull == 5.0
@@ -120,7 +120,7 @@ def test_no_slide_under_a_load_normal_to_a_tilted_face():
         ({"shape": Disc(0.5)}, (0.5, 0.0, 0.0), (0.0, -8.0), False),
     ],
 )
-def test_what_moves_level_over_a_fixed_box_slides(platform, twist, gravity, slides):
+def test_sliding_need_of_level_motion_over_a_fixed_box(platform, twist, gravity, slides):
     under = Body("platform", **{"motion": "fixed", **platform})
     assert needs(scene(under, ball(twist=twist), pair=Pair(friction=0.25), gravity=gravity)).slide is slides
 

@@ -36,13 +36,13 @@ def test_invalid_name_of_an_adapter_refused(tmp_path, name):
     assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_is_there_is_left_alone(tmp_path):
+def test_existing_folder_of_an_adapter_unchanged(tmp_path):
     (tmp_path / "mine").mkdir()
     done = make(tmp_path, "mine")
     assert done.exit_code == 2 and "is there already" in done.output and not list((tmp_path / "mine").iterdir())
 
 
-def test_what_is_written_conforms_runs_and_is_short(tmp_path):
+def test_written_adapter_conforms_and_is_short(tmp_path):
     """Its own test runs the kit; then the command finds the engine by the entry point of its pyproject."""
     done = make(tmp_path, "my_discs")
     folder = tmp_path / "my_discs"

@@ -101,7 +101,7 @@ def test_impulses_unknown_with_solved_restitution():
 
 
 @pytest.mark.parametrize("e", [0.25, 0.8, 1.0])
-def test_a_ball_rebounds_as_its_pair_says(e):
+def test_ball_rebound_by_the_restitution_of_its_pair(e):
     assert drive(struck(e, 2.0, 1.3 * 2.0 * DT)).twist[-1, 1, 2] == pytest.approx(2.0 * e, rel=1e-5)
 
 
@@ -168,7 +168,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "dimension", "params", "metric"), CASES, ids=str)
-def test_the_recurrence_says_what_comes_out(name, dimension, params, metric):
+def test_engine_motion_by_the_recurrence(name, dimension, params, metric):
     canonical = CATALOGUE[name]
     scene = canonical.scene(dimension, params)
     found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene), canonical.sampling(scene)))[metric][0]
@@ -178,7 +178,7 @@ def test_the_recurrence_says_what_comes_out(name, dimension, params, metric):
     assert abs(found - said) <= band < 0.021 * abs(found)
 
 
-def test_another_relaxation_would_be_another_motion(monkeypatch):
+def test_recurrence_with_another_relaxation_differs(monkeypatch):
     """A planted fault: what is said hangs on the engine's own numbers, by more than its band."""
     from adapters.newton import motion
 
@@ -213,7 +213,7 @@ def test_one_sided_round_off_of_a_trembling_column():
     assert band == pytest.approx(-missed.mean(), abs=1e-5) and band > 7.88 * missed.std(ddof=1) * math.sqrt(1.125)
 
 
-def test_roundings_are_counted_by_hand():
+def test_rounding_errors_counted_by_hand():
     """A ball that comes down at 2 m/s on a smooth floor without gravity, and is stopped in three steps.
 
     Two sweeps of three roundings each in every one of them, of 2 m/s, and 26 more for each of two sweeps over rebounds;
@@ -617,7 +617,7 @@ def test_half_load_of_starved_balls_by_the_mean_of_two_bodies(profile):
     assert check.bound < whole < stopped < 0.1
 
 
-def test_kernels_of_a_run_that_has_none(tmp_path, monkeypatch):
+def test_run_without_kernels(tmp_path, monkeypatch):
     """They were compiled in the first case: three minutes of its time limit, and its time in all tables."""
     warp, _ = imported()
     monkeypatch.setattr(warp.config, "kernel_cache_dir", str(tmp_path))

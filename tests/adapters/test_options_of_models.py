@@ -35,7 +35,7 @@ def test_every_option_is_a_setting_with_its_place_in_the_text():
     assert kinds == {name: type(value) for name, value in values.items()}
 
 
-def test_what_a_model_does_not_say_is_as_shipped():
+def test_options_missing_in_a_model_as_shipped():
     assert told() == {"integrator": "Euler", "cone": "pyramidal", "impratio": 1.0, "iterations": 100,
                       "tolerance": 1e-8, "noslip_iterations": 0, "solver": "Newton".upper()}  # fmt: skip
     assert read().dt == 0.002
@@ -45,7 +45,7 @@ def test_what_a_model_does_not_say_is_as_shipped():
 
 
 @pytest.mark.parametrize("option", ["density", "viscosity", "wind"])
-def test_wind_and_water_are_refused_by_their_option(option):
+def test_wind_and_water_options_refused(option):
     value = "0 0 1" if option == "wind" else "1"
     with pytest.raises(SceneError) as error:
         read(f'{option}="{value}"')

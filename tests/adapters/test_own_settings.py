@@ -33,7 +33,7 @@ def test_values_read_and_written_alike(text, value, again):
 
 
 @pytest.mark.parametrize("text", ["cone", "=elliptic", "cone=", " = "])
-def test_what_has_no_name_or_no_value_is_refused(text):
+def test_setting_without_name_or_value_refused(text):
     with pytest.raises(EngineError, match=r"^set: .* is not of the form NAME=VALUE"):
         given([text])
 

@@ -80,12 +80,12 @@ def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
         {"persistent_manifolds": False},
     ],
 )
-def test_what_is_set_is_what_the_world_holds(changes):
+def test_settings_in_the_world(changes):
     held = drive(replace(resting(), duration=DT), **changes).readback
     assert {name: held[name] for name in changes} == changes
 
 
-def test_what_is_set_is_what_bodies_hold():
+def test_settings_in_the_bodies():
     changes = {"iterations": 7, "velocity_iterations": 3, "fastest_spin": 50.0, "push_out": 2.0}
     told = drive(replace(resting(), duration=DT), contact_offset=0.003, **changes).readback
     assert told["contact_offset"] == pytest.approx([0.003, 0.003])
@@ -224,7 +224,7 @@ def test_each_pair_has_its_own_material():
     assert found.twist[-1, 1:, 2] == pytest.approx([3.0, 1.6], abs=1e-4)
 
 
-def test_nothing_is_swept():
+def test_no_swept_collision():
     wall = Body("wall", Box((0.005, 2.0, 2.0)), motion="fixed", pose=(1.0, 0.0, 0.0, *UPRIGHT))
     ball = Body("ball", Sphere(0.05), 1.0, (0.1,) * 3, (0.0, 0.0, 0.0, *UPRIGHT), (200.0, 0, 0, 0, 0, 0))
     found = drive(Scene("wall", 1, 3, (wall, ball), (Pair(restitution=1.0),), (0.0, 0.0, 0.0), 5 * DT))

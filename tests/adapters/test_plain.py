@@ -30,12 +30,12 @@ class Mute:
         (Mute(), "a Mute without a text"),
     ],
 )
-def test_a_line_is_visible_and_one(text, line):
+def test_line_made_visible_and_single(text, line):
     assert one_line(text) == line
     assert is_visible(one_line(text))
 
 
-def test_text_is_capped_and_stays_so():
+def test_length_limit_of_text():
     long = one_line("x" * 10**7)
     assert len(long) == REASON and long.endswith(" ...")
     assert one_line(long) == long
@@ -74,7 +74,7 @@ def test_arbitrary_object_as_small_json(value):
     assert json.dumps(plain(json.loads(text))) == text
 
 
-def test_what_is_plain_stays_as_it_is():
+def test_plain_values_unchanged():
     data = {"mass": 1.5, "n": 3, "on": True, "off": None, "names": ["a", "b"], "deep": {"x": [1.0, {"y": "z"}]}}
     assert plain(data) == data
     assert len(one_line("n" * 200, NAME)) == NAME
@@ -189,7 +189,7 @@ class Liar(str):
         return "something else"
 
 
-def test_a_text_is_what_it_holds_whatever_it_says():
+def test_text_treated_as_data_whatever_its_content():
     assert one_line(Liar("what it holds")) == "what it holds"
 
 

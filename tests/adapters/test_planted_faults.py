@@ -70,7 +70,7 @@ def test_the_self_test_is_a_command_that_tells_every_row(monkeypatch):
     assert max(map(len, text.splitlines())) <= 80
 
 
-def test_a_fault_that_goes_unnoticed_fails_the_self_test(monkeypatch):
+def test_unnoticed_fault_fails_the_self_test(monkeypatch):
     monkeypatch.setitem(CHECKS, "states", lambda engine: "")
     done = told(monkeypatch, {"start displaced": FAULTS["start displaced"]})
     assert done.exit_code == 1 and done.output.count("FAIL") == 3 and "1 of 4" in done.output
@@ -125,7 +125,7 @@ def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
 
 @pytest.mark.few(6)
 @pytest.mark.parametrize("fault", cases(*((name,) for name, fault in FAULTS.items() if fault.sizes)))
-def test_a_fault_of_no_size_is_none(fault):
+def test_fault_of_size_zero_is_no_fault(fault):
     """What is planted is as large as it says: with nothing of it the toy is healthy again."""
     assert self_test.broken(FaultyToy(fault, 0.0), FAULTS[fault].check) == ""
 

@@ -68,7 +68,7 @@ def test_impulses_of_smooth_and_rough_contacts():
 
 
 @pytest.mark.parametrize("changes", [{"relaxations": 7}, {"fastest": 5.0}, {"push_out": 0.25}, {"clustering": False}])
-def test_what_is_set_is_what_the_world_holds(changes):
+def test_settings_in_the_world(changes):
     held = drive(replace(resting(), duration=DT), **changes).readback
     assert {name: held[name] for name in changes} == changes
 

@@ -65,7 +65,7 @@ def test_receipts_of_rebound_in_impacts_and_of_friction(toy):
     assert set(QUANTITIES) - set(smooth) == {"friction", "friction_impulse"}
 
 
-def test_asked_is_what_the_scene_needs(toy):
+def test_requested_values_equal_to_the_scene_s_needs(toy):
     slips = by_quantity(receipts(toy(), "default", IMPACT, DT))
     assert slips["restitution"].asked == slips["restitution"].declared == 0.8
     assert slips["friction"].asked == slips["friction"].declared == 0.5
@@ -73,7 +73,7 @@ def test_asked_is_what_the_scene_needs(toy):
     assert slips["mass"].asked == slips["turn"].asked == 1.0
 
 
-def test_a_healthy_engine_is_measured_to_round_off(toy):
+def test_receipts_of_a_healthy_engine_to_round_off(toy):
     for quantity, slip in by_quantity(receipts(toy(), "default", IMPACT, DT)).items():
         if quantity != "size":  # told to a step of motion only
             assert slip.measured == pytest.approx(slip.asked, abs=1e-8)  # 30 sweeps over four corners leave 1e-9
@@ -170,7 +170,7 @@ def test_refused_probe_as_nan_with_its_reason(toy_class):
     assert slips["mass"].measured == pytest.approx(1.0, abs=1e-12)
 
 
-def test_a_probe_that_explodes_does_not_hold(toy_class):
+def test_exploding_probe_fails(toy_class):
     class Exploding(toy_class):
         def build(self, scene, dt, settings):
             simulation = super().build(scene, dt, settings)
@@ -287,7 +287,7 @@ def test_property_of_one_per_cent_less(precision, needs, fault, quantity):
     assert contradictions(list(slips.values())) == [] or in_output
 
 
-def test_bands_of_what_is_as_asked():
+def test_bands_of_properties_realised_as_requested():
     slips = by_quantity(receipts(declaring(), "default", IMPACT, DT))
     # A box of half extent 0.3 m lands at 0.25 m/s and may leave at 0.8 of it: one step of both.
     said = {
@@ -671,7 +671,7 @@ def off(quantity, measured, band=1e-6):
     ],
     ids=lambda slips: " ".join(quantity for quantity, _ in slips),
 )
-def test_property_that_an_engine_realises_otherwise(slips):
+def test_property_realised_with_another_value(slips):
     assert contradictions([off(*slip) for slip in slips]) == []
 
 

@@ -100,7 +100,7 @@ class World:
         self.world.add("closed")
 
 
-def test_lines_make_the_world_that_the_adapter_made():
+def test_script_lines_build_the_adapter_s_world():
     engine = Engine()
     lines, step = written(World, engine, "engine", NAMES, (SCENE, DT, {"sweeps": 3}), {Tag: "tag"})
     assert lines == [

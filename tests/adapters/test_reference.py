@@ -181,7 +181,7 @@ def test_certificate_refused_for_a_run_with_another_end(dimension: int) -> None:
 
 @both
 @profiles
-def test_what_the_solver_holds_is_what_was_asked(dimension: int, profile: str) -> None:
+def test_solver_state_equal_to_the_requested_scene(dimension: int, profile: str) -> None:
     inertia: Any = 0.11 if dimension == 2 else (0.11, 0.12, 0.13)
     ball = body("ball", dimension, (0.0, 0.6), mass=2.0, inertia=inertia)
     held = drive(make(floor(dimension), ball, e=0.5, mu=0.3, g=9.0), profile).readback
@@ -270,7 +270,7 @@ def test_version_without_the_installed_package(monkeypatch: pytest.MonkeyPatch) 
             ENGINE.version()
 
 
-def test_nothing_that_is_a_scene_is_refused() -> None:
+def test_every_valid_scene_accepted() -> None:
     for dimension in (2, 3):
         scene = make(floor(dimension), body("ball", dimension, (0.0, 1.0)), e=1.0, mu=2.0)
         assert all(ENGINE.refuses(scene, profile) is None for profile in PROFILES)

@@ -129,7 +129,7 @@ def test_distribution_of_an_engine_that_cannot_be_imported(tmp_path, monkeypatch
     registry.forget()
 
 
-def test_a_missing_engine_of_ours_comes_with_our_extra(monkeypatch) -> None:
+def test_missing_engine_of_ours_with_its_extra(monkeypatch) -> None:
     name = registry.names()[1]
     adapter = type(registry.adapter(name))
 
@@ -157,7 +157,7 @@ def test_engine_set_apart_in_a_run_without_names(monkeypatch):
 
 
 @pytest.mark.parametrize(("asked", "hint"), [("helthy", "did you mean 'healthy'"), ("qqq", "known: broken_init")])
-def test_an_unknown_engine_gets_a_hint(plugins: None, asked: str, hint: str) -> None:
+def test_hint_for_an_unknown_engine(plugins: None, asked: str, hint: str) -> None:
     with pytest.raises(EngineError, match=f"there is no engine called '{asked}'") as caught:
         registry.find(asked)
     assert hint in str(caught.value) and "\n" not in str(caught.value)

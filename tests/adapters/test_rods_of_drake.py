@@ -54,7 +54,7 @@ def unit(rng):
 
 
 @pytest.mark.parametrize("shape", RODS, ids=lambda shape: type(shape).__name__)
-def test_a_ball_meets_a_rod_where_its_shape_is(shape):
+def test_contact_of_a_ball_and_a_rod_at_its_surface(shape):
     """Against the nearest point of the rod, worked from its axis: any heading, depths from a micrometre to 3 mm."""
     rng = np.random.default_rng(7)
     checked = 0
@@ -79,7 +79,7 @@ def test_a_ball_meets_a_rod_where_its_shape_is(shape):
 
 
 @pytest.mark.parametrize("shape", RODS, ids=lambda shape: type(shape).__name__)
-def test_a_rod_has_the_moments_that_it_is_given(shape):
+def test_moments_of_a_rod_as_given(shape):
     """Free: spins about its own axis and across it are kept; with a ball that strikes it the angular momentum is."""
     moments = uniform_inertia(shape, 1.0, 3)
     for spin in ((3.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, 3.0)):
@@ -97,7 +97,7 @@ def test_a_rod_has_the_moments_that_it_is_given(shape):
     assert about_y == pytest.approx(0.25, abs=1e-9)  # kg m^2/s, of the ball as it comes
 
 
-def test_what_a_rod_can_meet_decides():
+def test_rods_supported_by_their_contact_partners():
     lying = rod(RODS[0], (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0))
     ball = Body("ball", Sphere(0.25), 1.0, (0.025,) * 3, (0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0))
     scene = Scene("rods", 1, 3, (lying, ball), (Pair(),), (0.0, 0.0, -9.81), 1.0)
@@ -117,7 +117,7 @@ def test_what_a_rod_can_meet_decides():
 # ---- why the rest is refused ---------------------------------------------------------------------------------------
 
 
-def test_normals_of_two_capsules_are_wrong():
+def test_wrong_normals_of_two_capsules():
     """Where the end of one meets the side of another: from the side's axis to the end's centre, which needs no library.
 
     Half of them are 0.12 rad off and more. Where both meet with their sides it is right.
@@ -151,7 +151,7 @@ def test_normals_of_two_capsules_are_wrong():
 
 
 @pytest.mark.parametrize("shape", RODS, ids=lambda shape: type(shape).__name__)
-def test_a_rod_that_lies_on_one_point_never_rests(shape):
+def test_rod_on_a_single_point_never_rests(shape):
     """A box and a ball are at rest to 1e-6 m/s by then."""
     late = on_the_floor(shape, "tamsi", "none")
     assert np.sqrt((late.twist[-60:, 1, :3] ** 2).sum(axis=1).mean()) > 5e-3  # m/s
@@ -161,7 +161,7 @@ def test_a_rod_that_lies_on_one_point_never_rests(shape):
 
 @pytest.mark.parametrize("resolution", [0.1, 0.02])  # m, of a radius of 0.2 m
 @pytest.mark.parametrize("shape", RODS, ids=lambda shape: type(shape).__name__)
-def test_a_rod_that_rolls_on_facets_loses_speed(shape, resolution):
+def test_speed_loss_of_a_rod_rolling_on_facets(shape, resolution):
     """A tenth and more in a second, where nothing brakes it; over a point in its middle it loses nothing."""
     along_y = (0.0, 0.0, 0.2, math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
     rolls = (1.0, 0.0, 0.0, 0.0, 5.0, 0.0)

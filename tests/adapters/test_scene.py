@@ -102,7 +102,7 @@ FAULTS: list[tuple[Callable[[], object], str]] = [
 ]
 
 
-def test_what_is_just_allowed_is_allowed() -> None:
+def test_values_at_the_limits_allowed() -> None:
     scene(pairs=(Pair(restitution=1.0),))
     scene(replace(BALL, name="n" * 80))
     check_body(Body("b", Sphere(1.0), 1.0, (1.0, 1.0, 1.0)), 3)  # what a body leaves out is filled in first
@@ -242,7 +242,7 @@ def test_invalid_name_cut_to_the_allowed_length():
     assert len(str(caught.value)) < 300
 
 
-def test_a_quaternion_that_is_none_is_shown_whole():
+def test_invalid_quaternion_shown_whole():
     with pytest.raises(SceneError, match=re.escape("the quaternion (1.0, 0.25, 0.0, 0.0) must have length 1")):
         spatial(Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 1.0, 1.0, 0.25, 0.0, 0.0)))
 

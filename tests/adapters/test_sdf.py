@@ -258,7 +258,7 @@ def test_links_of_a_model_touch_where_one_of_them_says_so():
                fixed("world", "l") + fixed("world", "k").replace("'j'", "'h'")), False)  # fmt: skip
 
 
-def test_a_ball_s_axes_are_those_of_its_inertia():
+def test_axes_of_a_ball_by_its_inertia():
     moments = "<ixx>.01</ixx><iyy>.02</iyy><izz>.025</izz>"
     skewed = f"<inertial><pose>0 0 0 0 0 .7</pose><mass>1</mass><inertia>{moments}</inertia></inertial>"
     (ball,) = read(model(link("l", skewed + BALL)), False).scene.bodies
@@ -284,7 +284,7 @@ def test_sliding_friction_in_drake_solvers():
     assert left.scene == read((MODELS / "soft_surfaces.sdf").read_text(), False).scene
 
 
-def test_it_is_read_in_another_process():
+def test_model_read_in_another_process():
     text = (MODELS / "boxes_in_frames.sdf").read_text()
     assert read_apart("drake", ".sdf", text, False) == read(text, False)
 

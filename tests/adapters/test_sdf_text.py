@@ -122,7 +122,7 @@ def test_sdf_text_refused_in_one_line_or_left_out_with_a_message(text, said, lef
             state(text, True)
 
 
-def test_lines_are_those_of_the_text():
+def test_line_numbers_of_the_text():
     text = model(beside="\n\n  <!-- two\n lines -->\n  <plugin\n name='p'/>")
     with pytest.raises(SceneError, match="line 5: <plugin> 'p'"):
         state(text)
@@ -165,11 +165,11 @@ def test_visual_elements_ignored():
     )
 
 
-def test_a_flat_body_has_the_moments_of_one():
+def test_moments_of_a_flat_body():
     state(model(INERTIAL.replace("<izz>.1", "<izz>.2")))
 
 
-def test_friction_is_one_number_and_stated_twice():
+def test_single_friction_value_stated_twice():
     root, _ = state(with_friction("<mu>.25</mu><mu2>.25</mu2>"))
     (ode,) = (e for e in root.walk() if e.tag == "ode")
     assert [(e.tag, e.text) for e in ode.children] == [("mu", "0.25"), ("mu2", "0.25")]

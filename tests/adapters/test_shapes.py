@@ -109,7 +109,7 @@ def test_rolling_to_two_thirds_of_its_speed_on_mujoco(shape):
 
 @pytest.mark.parametrize("engine", ["mujoco", "bullet"])
 @pytest.mark.parametrize("kind", ["hull", "cylinder", "capsule"])
-def test_what_stands_and_lands_in_space(engine, kind):
+def test_shapes_standing_and_landing_in_space(engine, kind):
     """At rest for half a second, and Newton's e flat on the floor; Bullet's margin is 1 mm, and its ends turn.
 
     Its tuned slop of 1e-5 m takes off a rebound, over dt, what an impact is found less deep than that: none here.
@@ -154,7 +154,7 @@ def test_a_tetrahedron_rests_on_its_face():
         (BRICK, "cannot be used in 2-D"),
     ],
 )
-def test_what_is_no_shape_is_refused_by_its_field(shape, said):
+def test_invalid_shape_refused_by_its_field(shape, said):
     with pytest.raises(SceneError, match=said) as refusal:
         planar(shape, 1.0, 1.0)
     assert str(refusal.value).startswith("body.shape")
@@ -171,7 +171,7 @@ def test_what_is_no_shape_is_refused_by_its_field(shape, said):
         (Disc(1.0), "cannot be used in 3-D"),
     ],
 )
-def test_nor_is_what_is_none_in_space(shape, said):
+def test_invalid_spatial_shape_refused_by_its_field(shape, said):
     with pytest.raises(SceneError, match=said):
         spatial(shape, (1.0, 1.0, 1.0), 1.0)
 
@@ -204,7 +204,7 @@ def test_lift_makes_a_prism_and_keeps_a_capsule():
     assert lowered(capsule).bodies[1].shape == Capsule(0.4, 0.2)
 
 
-def test_engines_refuse_the_shapes_they_do_not_claim():
+def test_unsupported_shapes_refused_by_engines():
     with pytest.raises(EngineError, match=r"body\.shape: the adapter of reference has no hull"):
         posed_for(load("reference"), spatial(BRICK, (1.0,) * 3, 1.0))
     assert posed_for(load("reference"), planar(RECTANGLE, 1.0, 1.0)).dimension == 2

@@ -49,7 +49,7 @@ def touching(**changed):
         ({"impulse": [[5.0, -2e-9]]}, "pulls"),
     ],
 )  # fmt: skip
-def test_what_a_contact_may_be(changed, said):
+def test_allowed_contents_of_a_contact(changed, said):
     """To a round-off of 1e-9, and to 5 cm in places, on either side of the limit."""
     told = mechanics._wrong_contact(scenes.resting(), touching(**changed), 1e-9)
     assert said in told and bool(told) == bool(said)
@@ -266,7 +266,7 @@ LOST = -math.log(0.9) * 0.2
         ("angle", {"pose": (0.0, 0.0, -1.0)}, {"angular_damping": share(0.1)}, 1e-9 + BENT + 2.0 * LOST),
     ],
 )  # fmt: skip
-def test_a_fall_may_be_off_by_this_band_and_no_more(what, off, declared, band):
+def test_free_fall_off_by_the_band_and_slightly_more(what, off, declared, band):
     ((part, direction),) = off.items()
     # Angles are off already by what they are bent: the half of what is allowed, if anything.
     for times, said in ((0.4, False), (1.6, True)):

@@ -49,7 +49,7 @@ def test_readback_against_the_declared_scene(asked, told, same):
         ({"pairs": {"ball-floor": {"friction": 0.4}}}, ""),  # no name that the contract knows
     ],
 )  # fmt: skip
-def test_each_thing_that_is_read_back_is_compared(change, said):
+def test_readback_compared_field_by_field(change, said):
     class Telling(Listening):
         def build(self, scene, dt, settings):
             world = super().build(scene, dt, settings)
@@ -235,7 +235,7 @@ def test_process_that_exits_and_process_that_cannot_start(child, monkeypatch):
 # ---- what is found -------------------------------------------------------------------------------------------------
 
 
-def test_what_a_check_says_is_a_finding_of_its_name():
+def test_message_of_a_check_as_a_finding_of_its_name():
     def check(engine):
         """All is well.
 
@@ -270,7 +270,7 @@ def test_what_a_check_says_is_a_finding_of_its_name():
     ("status", "holds"),
     [("ok", True), ("FAIL", False), ("refused", True), ("expected", True), ("unexpected pass", False)],
 )
-def test_what_holds_and_how_it_is_told(status, holds):
+def test_passed_checks_and_their_output(status, holds):
     finding = Finding("states", status, "as it is")
     assert finding.holds is holds
     assert str(finding) == f"{status:8s}  states: as it is"

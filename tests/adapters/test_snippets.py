@@ -90,7 +90,7 @@ def test_python_of_bullet_runs_and_sets_what_the_profile_has():
         assert name in text or name == "iterations"
 
 
-def test_an_adapter_without_such_words_says_nothing():
+def test_adapter_without_snippets_prints_nothing():
     from adapters.engine import Engine
 
     assert Engine.snippet(registry.load("chipmunk"), {}, [], drop(2, 0.5), DT) == ""

@@ -33,7 +33,7 @@ def test_times_of_nested_stages(spend):
     assert stages.taken() == [(OTHER, 0, 1.0, 0.5)]
 
 
-def test_a_stage_that_fails_is_counted_and_left(spend):
+def test_failing_stage_counted_and_left(spend):
     stages.begin()
     stages.taken()
     with pytest.raises(ZeroDivisionError), stage("outer", whole=True), stage("inner"):
@@ -50,7 +50,7 @@ def test_sums_of_other_processes_are_added_by_stage(spend):
     assert stages.sent() == [("steps", 6, 4.0, 2.0), ("reading", 2, 1.0, 0.5)]
 
 
-def test_nothing_is_measured_unless_it_is_asked_for(monkeypatch):
+def test_no_timing_unless_requested(monkeypatch):
     monkeypatch.setattr(stages, "time", None)
     with stage("outer", whole=True), stage("inner"):
         stages.add([("steps", 1, 1.0, 1.0)])

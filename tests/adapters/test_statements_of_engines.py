@@ -48,7 +48,7 @@ def test_a_fact_that_is_wrong_is_named(changed, said):
     assert told.startswith(said) and bool(told) == bool(said)
 
 
-def test_facts_are_facts_and_a_version_is_a_word():
+def test_types_of_facts_and_version():
     engine = Listening()
     engine.facts = SimpleNamespace(**{name: getattr(Listening.facts, name) for name in ("name", "package")})
     assert CHECKS["facts"](engine) == "facts need a name and the package to install"

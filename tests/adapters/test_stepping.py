@@ -154,7 +154,7 @@ def test_contacts_of_time_zero_are_those_of_the_first_step() -> None:
     assert record is not None and record.step.tolist() == list(range(1, 11))
 
 
-def test_contacts_nobody_asked_for_are_not_recorded() -> None:
+def test_unrequested_contacts_not_recorded() -> None:
     assert run(Toy({2}), scene(), 0.1, {}).contacts is None
 
 
@@ -219,7 +219,7 @@ def test_speed_explained_without_free_bodies(speed: float, finish: str) -> None:
     assert run(Toy({2}, spoiled("_twist", (0, 0), speed)), held, 0.1, {}).finish == finish
 
 
-def test_a_body_that_nothing_moves_must_not_move() -> None:
+def test_motion_of_a_body_without_a_cause() -> None:
     still = scene(bodies=(Body("a", Disc(0.5)),), gravity=(0.0, 0.0))
     assert run(Toy({2}, spoiled("_twist", (0, 0), 1.0)), still, 0.1, {}).finish == "diverged"
     assert run(Toy({2}), still, 0.1, {}).finish == "completed"
@@ -271,7 +271,7 @@ def test_departure_from_the_plane_kept_at_any_sample(entry: int, told: float) ->
     assert run(Toy({3}, sideways), scene(), 0.1, {}).out_of_plane == told
 
 
-def test_only_what_is_lifted_has_a_plane_to_leave() -> None:
+def test_departure_from_the_plane_only_of_lifted_scenes() -> None:
     assert run(Toy({2}), scene(), 0.1, {}).out_of_plane is None
 
 
@@ -452,7 +452,7 @@ def test_an_error_of_a_step_is_raised_by_that_step(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("dimensions", [{2}, {3}])
-def test_what_a_simulation_gives_may_be_its_own(monkeypatch: pytest.MonkeyPatch, dimensions: set[int]) -> None:
+def test_simulation_reusing_its_own_arrays(monkeypatch: pytest.MonkeyPatch, dimensions: set[int]) -> None:
     """Poses, twists and contacts in arrays that the next step writes into."""
     monkeypatch.setattr(Flight, "pose", lambda flight: flight._pose)
     monkeypatch.setattr(Flight, "twist", lambda flight: flight._twist)
@@ -668,7 +668,7 @@ def test_missing_answers_and_overlap_of_a_long_run():
 
 
 @pytest.mark.parametrize("name", registry.names())
-def test_a_world_of_a_run_that_ends(monkeypatch, name):
+def test_world_closed_at_the_end_of_a_run(monkeypatch, name):
     """What `record` raises leads to a second world, which goes step by step: only its time would tell."""
     engine = registry.find(name).engine
     if engine is None:

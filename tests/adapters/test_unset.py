@@ -86,7 +86,7 @@ def test_engine_defaults_found_by_experiments_in_a_known_world():
      ({"drag": 0.0}, lambda make: unset.damping(make, "along"), 0.0), ({"e": 0.0}, unset.restitution, 0.0),
      ({"mu": 0.0}, unset.friction, 0.0)],
 )  # fmt: skip
-def test_what_there_is_none_of_measures_as_none(changed, measure, expected):
+def test_default_without_a_mechanism_measured_as_none(changed, measure, expected):
     assert measure(type("Other", (Known,), changed)) == pytest.approx(expected, abs=1e-12)
 
 
@@ -170,5 +170,5 @@ def test_description_without_compiling_kernels(monkeypatch, tmp_path):
     assert listing._why_unmeasured("reference") == ""
 
 
-def test_a_body_stands_where_it_was_asked():
+def test_body_at_its_requested_position():
     assert Asked("ball", 0.25).height == 0.75 and Asked("box", 0.25).height == 0.35

@@ -135,7 +135,7 @@ def test_visuals_ignored_and_links_without_geometry():
     assert found.dropped == () and found.scene.bodies[0].shape == Sphere(0.2)
 
 
-def test_it_is_read_in_another_process():
+def test_model_read_in_another_process():
     assert reader_of(".URDF") == "mujoco"
     text = (MODELS / "cube_on_table.urdf").read_text()
     assert read_apart("mujoco", ".urdf", text, False) == read(text, False)

@@ -12,7 +12,7 @@ from adapters.whole import write
 from reports.wording import csv_of
 
 
-def test_a_file_that_cannot_be_written_whole(tmp_path):
+def test_file_that_cannot_be_written_whole(tmp_path):
     path = tmp_path / "rows.csv"
     write(path, "old")
     with pytest.raises(UnicodeEncodeError):

@@ -131,7 +131,7 @@ def test_no_fault_reaches_another_cell(faulty, dice, every, tmp_path):
     assert not [line for line in processes() if "sleep 360" in line]
 
 
-def test_an_answer_for_another_case(faulty, tmp_path):
+def test_answer_for_another_case_detected(faulty, tmp_path):
     """No row of another engine is written, every case has its own answer, and none is missing."""
     slots = [faulty_slot("answer_for_another"), *[faulty_slot("fork", v=float(v)) for v in range(1, 6)]]
     slots += [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (2.0, 3.0)]

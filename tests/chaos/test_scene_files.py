@@ -95,7 +95,7 @@ def test_generated_files_are_refused_in_one_line_or_run_into_rows(dice, soak, tm
 
 
 @pytest.mark.parametrize("scene", [BASE, SPATIAL])
-def test_the_scenes_that_are_changed_are_sound(tmp_path, scene, dice):
+def test_unspoilt_scenes_are_valid(tmp_path, scene, dice):
     path = tmp_path / "sound.json"
     path.write_text(json.dumps(scene))
     assert planned(path)
@@ -128,7 +128,7 @@ def test_unreadable_sizes_refused_at_once(tmp_path, text, said):
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 5000, "a" * 5000 + " = ", "\x00"])
-def test_toml_that_is_none_is_refused_in_one_line(tmp_path, text):
+def test_invalid_toml_refused_in_one_line(tmp_path, text):
     path = tmp_path / "scene.toml"
     path.write_text(text)
     with pytest.raises(SceneError) as caught:

@@ -41,13 +41,13 @@ def moved(known, way):
     return Answer(**{**vars(known), "pose": pose.tolist()})
 
 
-def test_other_answer_is_seen():
+def test_deviating_answer_detected():
     known = ANSWERS["random 0"]
     assert compared(known, LIMIT).word == "same"
     assert compared(moved(known, 1e-6), LIMIT).word == "different"
 
 
-def test_refused_world_is_no_different_one(monkeypatch):
+def test_refused_world_counted_apart_from_different_ones(monkeypatch):
     def refused(self):
         raise NoForces(t=0.0)
 

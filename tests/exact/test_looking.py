@@ -49,7 +49,7 @@ def test_copy_goes_on_with_the_same_bits():
     assert np.array_equal(simulation.pose, other.pose) and np.array_equal(simulation.twist, other.twist)
 
 
-def test_tolerance_is_what_moves_an_answer():
+def test_tolerance_as_change_of_an_answer():
     """A rod falls over on its round end, without an event: coarser tolerances differ by more."""
     rod = Body(Capsule(0.4, 0.1), 1.0, 0.06, (0.0, 0.1 + 0.4 * np.sin(1.4), 1.4))
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), rod], (0.0, -G), 0.0, 3.0)

@@ -81,7 +81,7 @@ def test_no_list_written_without_accepted_rows(out, findings):
     assert str(findings / files.FAMILIES) in result.stderr and not findings.exists()
 
 
-def test_an_engine_of_which_nothing_fails(findings, tmp_path):
+def test_engine_without_failures(findings, tmp_path):
     """It had no list after `accept`, so that no later failure was ever new."""
     run = ["run", *IMPACT, "--engine", "chipmunk", "--profile", "tuned", "--out", tmp_path / "out"]
     assert call(*run).exit_code == 0

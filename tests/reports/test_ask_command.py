@@ -66,7 +66,7 @@ def test_scene_with_eight_symptoms_that_lead_to_it(scene):
     assert [text for text in symptoms if search(text).matches[0].name != scene] == []
 
 
-def test_sentences_are_no_symptoms_of_scenes():
+def test_general_sentences_not_matched_as_symptoms():
     """The search could otherwise know its own test by heart."""
     database = opened()
     known = {frozenset(own) for own in stems([text for s in CATALOGUE.values() for text in s.symptoms], database)}
@@ -77,7 +77,7 @@ def test_packaged_table_equal_to_scenes_and_engines():
     assert making.text_of(making.made()) == making.TABLE.read_text(encoding="utf-8"), "make tables"
 
 
-def test_order_plurals_and_engines_do_not_matter():
+def test_question_in_any_word_order_plural_or_engine_name():
     one = led_to("my ball does not bounce")
     assert one == led_to("balls do not bounce pymunk") == led_to("bouncing, mujoco: does not my ball") == ["bounce"]
     assert search("a bullet passes through paper").engines == []
@@ -90,7 +90,7 @@ def test_order_plurals_and_engines_do_not_matter():
      ("contactERP", "penetration correction"), ("slop", "margin"), ("passes through", "tunnelling ccd"),
      ("on top of one another", "stacked")],
 )  # fmt: skip
-def test_words_that_mean_the_same(words, word):
+def test_synonyms_in_a_question(words, word):
     assert set(search(words).terms) & set(search(word).terms)
 
 
@@ -144,12 +144,12 @@ def test_engine_that_fails_without_a_fix():
 
 
 @pytest.mark.parametrize("words", ["a hinge joint is loose", "rope stretches", "the cloth tears", "camera is black"])
-def test_what_is_no_contact_is_out_of_scope(words):
+def test_question_out_of_scope(words):
     said = asked(*words.split())
     assert said.startswith("no scene shows this\nOut of scope: joints") and "--engine" not in said
 
 
-def test_what_nothing_knows():
+def test_question_with_unknown_words():
     said = asked("quantum", "entanglement")
     assert (
         said.startswith("no scene shows this\n")
@@ -171,11 +171,11 @@ def test_unclear_question_has_three_candidates_and_no_fix():
      ("falling body stops accelerating", "crosscheck describe ENGINE"),
      ("body on a moving platform is left behind", "pose it in a scene file")],
 )  # fmt: skip
-def test_what_another_command_answers(words, command):
+def test_question_for_another_command(words, command):
     assert command in asked(*words.split()) and answer(words)["answer"] == COMMAND
 
 
-def test_what_is_right_is_said_to_be_right():
+def test_question_about_correct_behaviour():
     assert "That is right: in pure rolling" in asked("rolling", "ball", "never", "stops")
 
 

@@ -113,7 +113,7 @@ def test_durations_are_shown_with_a_fitting_unit(seconds, shown):
     assert speed.duration(seconds) == shown
 
 
-def test_what_is_not_a_number_is_null_in_json():
+def test_nan_as_null_in_json():
     import pandas as pd
 
     table = pd.DataFrame([{"a": math.nan, "b": 1.0, "c": "x"}])

@@ -101,7 +101,7 @@ def test_absent_engines_and_empty_tables(printed):
     assert "Overhead" not in text and "Cost of a step" not in text
 
 
-def test_a_busy_machine_is_said_and_ranks_nobody(printed):
+def test_busy_machine_told_without_a_ranking(printed):
     text = printed(busy=("bullet",))
     assert "The machine was busy: for 33% of the cases wall time is more than 1.2 times CPU time." in text
     assert [cells[0] for cells in marks(text).values()] == ["1 ms 1/240", "1.01 ms 1/240", "1.5 ms 1/240"]

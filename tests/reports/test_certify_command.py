@@ -32,7 +32,7 @@ def test_command_fails_with_a_failed_gate(monkeypatch, measured, exit_code):
     assert ("holds" if exit_code == 0 else "FAILS") in result.stderr
 
 
-def test_what_is_not_a_number_is_null_and_fails(monkeypatch):
+def test_nan_as_null_and_a_failure(monkeypatch):
     result = certify(monkeypatch, Gate.at_most("rest time", "", math.nan, 1e-12, "oracle"))
     assert result.exit_code == 1
     assert json.loads(result.stdout)[0]["measured"] is None

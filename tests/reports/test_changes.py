@@ -93,7 +93,7 @@ def test_one_sided_checks_by_profile_and_scene():
     assert as_markdown(gone, A, B).endswith("\n\nProfiles: default: as shipped.\n")
 
 
-def test_a_change_without_a_size_says_none():
+def test_change_without_a_size():
     line, _ = as_text([replace(FLIP, size=0.0, params="")], A, B).splitlines()[5:]
     assert line.endswith("stack 2-D drift: pass 1e-6 m -> FAIL 3e-3 m [3.2.6 -> 3.2.7]")
 
@@ -267,7 +267,7 @@ def written(tmp_path, *lines):
     return path
 
 
-def test_a_side_is_a_file_of_rows_and_ratios(tmp_path):
+def test_side_from_a_file_of_rows_and_ratios(tmp_path):
     rows = [{**ROW, "run": "one"}, {**ROW, "run": "two"}, {**ROW, "run": "one"}]
     found = load_side(str(written(tmp_path, *rows, "", "  ", TIME)), tmp_path)
     assert (found.rows, found.ratios, found.run) == (rows, [TIME], "one, two")
@@ -305,7 +305,7 @@ def test_wrong_run_id_refused_by_its_likely_meaning(tmp_path, argument, said):
     assert str(caught.value) == said
 
 
-def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
+def test_special_files_not_waited_for(tmp_path):
     folder = tmp_path / "rows.jsonl"
     folder.mkdir()
     with pytest.raises(MissingError) as caught:

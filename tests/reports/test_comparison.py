@@ -66,7 +66,7 @@ def test_text_and_markdown_name_the_row_and_the_command():
     assert "| newly failing | worse | 1 | chipmunk/tuned bounce 2-D" in markdown
 
 
-def test_rows_of_one_side_only_are_said(tmp_path):
+def test_rows_of_one_side_told(tmp_path):
     lines = (GOLDEN / "base.jsonl").read_text().splitlines()
     shorter = tmp_path / "shorter.jsonl"
     shorter.write_text("\n".join(lines[1:]) + "\n")
@@ -133,7 +133,7 @@ def test_a_change_counts_from_a_hundredth_of_the_tolerance_on(tmp_path, share, c
     assert {c["kind"] for c in found} <= {"value changed"}
 
 
-def test_one_unit_in_the_last_place_is_nothing(tmp_path):
+def test_difference_of_one_last_bit_ignored(tmp_path):
     before = planted(tmp_path, lambda row: {}).rename(tmp_path / "before.jsonl")
     after = planted(tmp_path, lambda row: {"value": math.nextafter(row["value"], math.inf)})
     result = CliRunner().invoke(main, ["compare", str(before), str(after)])

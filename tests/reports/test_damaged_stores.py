@@ -42,7 +42,7 @@ def test_a_command_on_a_damaged_store(damaged, command):
     assert len(set(said)) == len(said) and done.stdout
 
 
-def test_a_damaged_run_that_is_deleted(damaged):
+def test_damaged_run_deleted(damaged):
     done = CliRunner().invoke(main, ["prune", "--unfinished", "--out", str(damaged)])
     assert done.exit_code == 0 and "'../../x' is damaged" in done.stdout, done.output
     listed = CliRunner().invoke(main, ["list", "runs", "--out", str(damaged)])

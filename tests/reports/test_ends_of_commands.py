@@ -66,7 +66,7 @@ def ended(capsys, raised):
         (OSError("odd"), statuses.RESULTS, "the output: odd"),
     ],
 )  # fmt: skip
-def test_what_goes_wrong_is_a_line_and_a_status(capsys, monkeypatch, raised, status, line):
+def test_error_as_one_line_and_a_status(capsys, monkeypatch, raised, status, line):
     monkeypatch.setattr(group, "_silence_stdout", lambda: None)
     assert ended(capsys, raised) == (status, f"crosscheck: {line}\n")
 
@@ -86,7 +86,7 @@ def test_ctrl_c_while_modules_are_loaded(capsys, monkeypatch):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_line_is_one_line_and_not_longer_than_a_page(capsys):
+def test_line_without_breaks_and_of_limited_length(capsys):
     status, err = ended(capsys, ModuleNotFoundError("first\nsecond"))
     assert (status, err) == (statuses.INCOMPLETE, "crosscheck: first\n")
     _, err = ended(capsys, ModuleNotFoundError("x" * 3000))
@@ -170,7 +170,7 @@ def test_output_file_in_an_existing_folder(tmp_path):
     assert files.nearest(Path("no-such-folder-here")) == Path.cwd()
 
 
-def test_what_may_not_be_written_is_said(tmp_path, monkeypatch):
+def test_write_without_permission_told(tmp_path, monkeypatch):
     there = tmp_path / "there.txt"
     there.write_text("x")
     asked = []

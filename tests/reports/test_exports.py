@@ -50,7 +50,7 @@ def test_json_array_and_json_lines():
 
 
 @pytest.mark.parametrize("write", [exports.as_json, exports.as_jsonl])
-def test_what_is_no_json_is_refused_and_not_written(write):
+def test_non_finite_json_refused_and_not_written(write):
     with pytest.raises(ValueError, match="not JSON compliant"):
         write(plain(replace(ROW, value=float("nan"))))
 
@@ -155,7 +155,7 @@ NO_VALUE = replace(ROW, value=None, error=None, physics=None, standing=None, rea
 
 
 @pytest.mark.parametrize("row", [CRASHED, SILENT])
-def test_what_died_is_an_error_with_its_last_words(row):
+def test_crashed_cell_as_a_junit_error(row):
     assert outcome_of(row) == [("error", finding_line(row.as_dict()), row.log or None)]
 
 
@@ -164,7 +164,7 @@ def test_what_died_is_an_error_with_its_last_words(row):
     [ROW, replace(ROW, standing="drifted"), replace(PASS, standing="drifted"), replace(CRASHED, outcome="invalid"),
      replace(CRASHED, outcome="missing")],
 )  # fmt: skip
-def test_an_alarm_is_a_failure_that_says_what_it_is(row):
+def test_alarm_as_a_junit_failure(row):
     assert outcome_of(row) == [("failure", finding_line(row.as_dict()), None)]
 
 
@@ -176,11 +176,11 @@ def test_rows_without_a_verdict_skipped_with_a_reason(row):
 
 
 @pytest.mark.parametrize("row", [KNOWN, replace(ROW, standing="explained"), replace(ROW, standing=None)])
-def test_a_fail_that_is_no_alarm_passes_and_says_so(row):
+def test_known_failure_as_a_junit_pass_with_a_note(row):
     assert outcome_of(row) == [("system-out", None, finding_line(row.as_dict()))]
 
 
-def test_a_pass_says_nothing():
+def test_pass_without_a_junit_message():
     assert outcome_of(PASS) == []
 
 
@@ -243,7 +243,7 @@ def test_null_answers_behind_rows_when_requested(two_runs):
     assert both["engine"].tolist()[: len(alone)] == alone["engine"].tolist()
 
 
-def test_a_folder_without_results_is_not_made(tmp_path):
+def test_missing_results_folder_not_created(tmp_path):
     with pytest.raises(StoreError):
         exports.load(tmp_path / "nothing")
     assert not (tmp_path / "nothing").exists()

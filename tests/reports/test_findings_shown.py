@@ -60,7 +60,7 @@ def test_units_and_digits_of_measured_values():
     ("error", "tolerance", "found"),
     [(0.5, 0.1, 5.0), (-0.5, 0.1, 5.0), (None, 0.1, 0.0), (0.5, None, 0.0), (0.5, 0.0, 0.0), (0.0, 0.1, 0.0)],
 )
-def test_how_bad_a_row_is_counts_in_tolerances(error, tolerance, found):
+def test_severity_of_a_row_in_tolerances(error, tolerance, found):
     assert severity(row(error=error, tolerance=tolerance)) == found
 
 

@@ -95,7 +95,7 @@ def test_hanging_or_crashing_scene_stops_no_other(monkeypatch):
     assert "broken" not in found[0] and "broken" not in found[3]
 
 
-def test_what_a_scene_raises_is_its_answer():
+def test_exception_of_a_scene_as_its_answer():
     sent = []
 
     asked = [json.dumps([3, 5]).encode()]
@@ -112,7 +112,7 @@ def test_what_a_scene_raises_is_its_answer():
     assert sent[0] == fuzzing.READY and json.loads(sent[1])["broken"]
 
 
-def test_what_a_scene_raises_is_told_in_one_line(monkeypatch):
+def test_exception_of_a_scene_in_one_line(monkeypatch):
     """The first that says something, however long the whole is, and however narrow the terminal."""
 
     def raised(seed, dimension):

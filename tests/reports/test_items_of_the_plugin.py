@@ -46,7 +46,7 @@ def test_plugin_items_of_checks_with_a_tolerance(items):
         assert all(each["plugin"].engine == "toy" and len(each) == 4 for each in found)
 
 
-def test_items_stand_behind_the_tests_that_are_there(monkeypatch):
+def test_plugin_items_after_the_existing_tests(monkeypatch):
     asked = []
 
     def from_parent(session, **given):

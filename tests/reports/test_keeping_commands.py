@@ -75,7 +75,7 @@ def test_polars_and_duckdb_read_the_same_numbers_as_pandas(out, tmp_path):
     assert [round(value, 9) for (value,) in duckdb.sql(query).fetchall()] == [0.8]
 
 
-def test_merge_says_what_came(out, tmp_path):
+def test_merge_reports_added_runs(out, tmp_path):
     first = call("merge", out, "--out", tmp_path)
     assert "2 new runs, 0 there already" in first.stdout
     assert "0 new runs, 2 there already, 0 results" in call("merge", out, "--out", tmp_path).stdout

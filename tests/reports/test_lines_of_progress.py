@@ -60,5 +60,5 @@ def test_breaks_kept_after_every_cell_with_a_family(asked, monkeypatch, capsys, 
         (BREAK, Standing.NEW, True), (Change("again"), Standing.DRIFTED, True), (BREAK, Standing.DRIFTED, True),
     ],
 )  # fmt: skip
-def test_what_is_not_as_it_is_listed_is_an_alarm(change, standing, alarms):
+def test_row_unlike_its_listing_is_an_alarm(change, standing, alarms):
     assert posing.Judged(change, standing, "").alarming == alarms

@@ -81,7 +81,7 @@ def test_run_without_verdicts_neither_timed_nor_reported(make_run, broken):
 
 
 @pytest.mark.parametrize("stage", ["bench", "report"])
-def test_a_stage_that_fails_fails_it(make_run, stage):
+def test_make_run_fails_with_a_failed_stage(make_run, stage):
     status, _, calls = make_run(**{stage: 1})
     assert status != 0 and calls[-1][0] == stage
 
@@ -125,7 +125,7 @@ def test_a_full_installation_serves_a_run_as_well(tmp_path):
         assert f"[{ALL}]" not in done.stdout and done.returncode == 0
 
 
-def test_what_a_run_installs_is_a_part_of_all():
+def test_extras_of_make_run_within_all():
     """So that a full installation serves a run as well."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     (whole,) = extras["all"]

@@ -62,7 +62,7 @@ def shown(rows, width, versions=VERSIONS):
     return [line.rstrip() for line in stream.getvalue().splitlines()]
 
 
-def test_a_wide_terminal_shows_it_in_full():
+def test_full_matrix_in_a_wide_terminal():
     assert shown(ROWS, 100) == [
         "engine, profile      impact       stack",
         "─" * 52,
@@ -123,7 +123,7 @@ def test_an_engine_whose_version_nobody_knows_stands_by_its_name():
     assert shown(ROWS, 100, {})[2] == "flat" and shown(ROWS, 100, {})[5] == "deep"
 
 
-def test_nothing_is_an_empty_matrix():
+def test_matrix_without_rows():
     assert tables_of(matrix_of([]), {}, 80) == [] and sweeps_of(matrix_of([])) == []
 
 

@@ -211,7 +211,7 @@ def test_exported_model_read_back_as_the_same_scene(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"engine": "mujoco"}', "[" * 5000, '{"engine": 1, "scene": 2}'])
-def test_a_kept_model_that_is_none_is_one_line(text):
+def test_damaged_kept_model_in_one_line(text):
     from adapters.scene import SceneError
 
     with pytest.raises(SceneError) as refused:
@@ -235,7 +235,7 @@ def falling(kick=0.0, impulse=None, n=21, dt=0.05):
     return scene, Trajectory(t, pose, twist, record, dt, "completed")
 
 
-def test_momentum_that_nobody_gave_is_seen():
+def test_momentum_without_a_source_detected():
     assert momentum_drift(*falling())[0] == pytest.approx(0.0, abs=1e-12)
     assert momentum_drift(*falling(kick=0.01))[0] == pytest.approx(0.02)
 

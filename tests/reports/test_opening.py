@@ -60,7 +60,7 @@ def dead(e):
          "As shipped, a fails 40 % of its checks, the most of all engines; tuned, none"),
     ],
 )  # fmt: skip
-def test_the_headline_is_the_finding_of_the_rows(laws, said):
+def test_headline_from_the_rows(laws, said):
     assert headline(made(laws)) == said
 
 
@@ -130,7 +130,7 @@ def test_picture_at_the_speed_where_most_engines_deviate():
     assert "every engine" in found[2].picture
 
 
-def test_a_name_that_another_line_would_cross():
+def test_label_that_another_line_would_cross():
     """ "MuJoCo as shipped", above its own level line, was crossed by Bullet's at 6 m/s."""
     laws = {("mujoco", "default"): lambda e: 0.105, ("bullet", "default"): lambda e: max(0.0, 0.58 * (e - 0.5))}
     (figure,) = explorer(made(laws)).maps

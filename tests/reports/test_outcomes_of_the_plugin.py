@@ -197,7 +197,7 @@ def test_plugin_error_for_an_absent_engine_or_unknown_scene(monkeypatch, options
     assert str(refused.value).startswith(said)
 
 
-def test_a_check_is_found_by_the_words_of_its_cell(monkeypatch):
+def test_check_found_by_words_of_its_cell(monkeypatch):
     """``pytest -k`` knows the scene, the profile and the metric, and all of them together."""
     monkeypatch.setattr(pytest.Item, "__init__", lambda self, **named: setattr(self, "extra_keyword_matches", {"own"}))
     item = object.__new__(_Check)

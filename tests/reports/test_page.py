@@ -155,7 +155,7 @@ def test_names_reasons_and_logs_are_escaped_everywhere(elements, text):
     assert "img" not in {tag for tag, _ in elements.tags}
 
 
-def test_data_blocks_cannot_end_themselves():
+def test_escaped_ends_in_data_blocks():
     evil = {"name": "</script><script>alert(1)</script>&amp;"}
     assert "<" not in as_data(evil) and "&" not in as_data(evil)
     assert json.loads(as_data(evil)) == evil
@@ -172,7 +172,7 @@ def test_every_judged_value_stands_in_a_table(page_source, text):
     assert text.count("Not supported by chipmunk.") == 1
 
 
-def test_the_taken_away_rows_are_the_rows(elements, page_source):
+def test_exported_rows_equal_to_the_page(elements, page_source):
     (href,) = [a["href"] for t, a in elements.tags if a.get("download") == "rows.json.gz"]
     columns = json.loads(gzip.decompress(base64.b64decode(href.partition(",")[2])))
     for name in ("value", "truth", "tolerance", "metric", "because", "standing"):
@@ -204,7 +204,7 @@ def test_anchors_are_plain_whatever_a_name_holds():
     assert re.fullmatch(r"x-[0-9a-f]{8}", slug("", "<>"))
 
 
-def test_a_drawing_is_told_from_prose():
+def test_drawing_told_from_prose():
     prose, drawing = split_figure("A title.\n\n    o\n   ===\n\nWhy it\nmatters.\n")
     assert prose == ["A title.", "Why it matters."]
     assert drawing == " o\n==="
@@ -298,7 +298,7 @@ def test_drift_within_the_tolerance_changes_the_spread_only():
     assert base[1:] == drifted[1:]
 
 
-def test_what_is_only_slower_changes_no_sentence():
+def test_slower_run_leaves_the_sentences():
     assert said("slow") == said("base")
 
 
@@ -422,7 +422,7 @@ def test_tie_with_the_cheapest_engine(low, tied):
     assert ("a/x or b/y" in _answer(found, True)) is tied
 
 
-def test_times_of_a_busy_machine_rank_nobody(page_source, monkeypatch):
+def test_no_ranking_by_times_of_a_busy_machine(page_source, monkeypatch):
     from reports.page import choosing
 
     assert any(c.cost_text for choice in choices(page_source) for c in choice.candidates)
@@ -503,7 +503,7 @@ def test_first_departure_only_of_engines_that_leave(page_source):
 # ---- what is missing ----
 
 
-def test_a_page_is_made_of_whatever_there_is(page_source):
+def test_page_of_any_incomplete_results(page_source):
     page = render(Source(page_source.run, page_source.rows, page_source.observations))
     assert "This folder has no bench yet" in page and "kept no recordings" in page
     assert "No check has a result" in render(Source(page_source.run, [], []))

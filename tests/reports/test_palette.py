@@ -49,7 +49,7 @@ def test_every_colour_has_three_to_one_contrast_on_both_papers(colour, paper):
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_engines_stay_apart_in_every_kind_of_vision(vision):
+def test_engine_colours_distinct_in_colour_blindness(vision):
     seen = {name: oklab(VISION[vision] @ linear(colour)) for name, colour in ENGINES.items()}
     for a, b in combinations(seen, 2):
         assert np.linalg.norm(seen[a] - seen[b]) >= APART, (a, b)
@@ -69,7 +69,7 @@ def test_readable_number_on_the_shade_of_a_failing_share(scheme):
     assert np.ptp(hues) < np.radians(20.0)
 
 
-def test_an_engine_keeps_its_colour_in_any_company():
+def test_engine_colour_independent_of_other_engines():
     assert colours_of(["bullet"])["bullet"] == colours_of(["mujoco", "bullet", "toy"])["bullet"]
     others = colours_of(["zeta", "alpha", "bullet"])
     assert others["alpha"] == OTHERS[0] and others["zeta"] == OTHERS[1]

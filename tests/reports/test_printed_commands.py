@@ -51,7 +51,7 @@ def test_command_that_repeats_the_run_of_a_page(line, tmp_path):
     assert asked_by(said) == slots(request)
 
 
-def test_a_page_says_how_its_bench_is_asked_again():
+def test_page_with_the_command_of_its_bench():
     words = "impact --engine chipmunk --profile tuned --dt 1/60 --full"
     options = bench.make_context("bench", shlex.split(words)).params
     said = again("bench", f"full: {asked(request_from(options), options)}")

@@ -68,7 +68,7 @@ def test_missing_kernels_compiled_beside_the_cells(planned, monkeypatch, tmp_pat
     assert "compil" not in said  # its machines have caches of their own
 
 
-def test_who_writes_into_a_file_gets_no_line(planned):
+def test_no_progress_line_when_output_is_a_file(planned):
     _, said = planned(lambda todo, leave: map(answer, todo), terminal=False)
     assert counted(said) == [] and "\x1b" not in said
 

@@ -65,7 +65,7 @@ BLAMED_IN_VAIN = {
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("engine", "reason"), BLAMED_IN_VAIN)
-def test_a_reason_is_proven_on_its_engine(engine, reason):
+def test_reason_proven_on_its_engine(engine, reason):
     package, blamed, cells = BLAMED_IN_VAIN[engine, reason]
     pytest.importorskip(package)
     result = run("--prove", reason, "--engine", engine, "--json")
@@ -101,7 +101,7 @@ def test_misspelt_name_with_the_nearest_names(page_folder):
     assert said.endswith("this run has no check of 'bounc', did you mean 'bounce'?\n")
 
 
-def test_a_ratio_is_told_without_its_unit_of_one():
+def test_ratio_without_a_unit():
     pytest.importorskip("pybullet", reason="pybullet is an optional engine")
     said = run("--prove", "bounce-interval-blurred").output
     assert "FAIL apex_interval_ratio 0 of 0.8" in said and " 1 of 0.8" not in said

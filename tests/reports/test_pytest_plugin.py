@@ -113,6 +113,6 @@ def test_finding_of_other_releases_as_non_strict_xfail(repository):
      (("--crosscheck", "toy", "--scenes", "impct"), "did you mean 'impact'"),
      (("--crosscheck", "toy", "--crosscheck-profile", "fast"), "no chosen engine has a profile")],
 )  # fmt: skip
-def test_a_wrong_call_is_one_line(repository, options, said):
+def test_wrong_call_in_one_line(repository, options, said):
     output = repository(options=options, status=4)
     assert said in output and "Traceback" not in output

@@ -224,7 +224,7 @@ def test_a_command_of_the_readme_that_takes_seconds_runs(results, tmp_path, monk
                                   "list runs", "describe bounce", "doctor", "list suites", "nulls impact",
                                   "merge crosscheck-out --out again", "prune --keep 50 --dry-run", "dashboard",
                                   "export --parquet again"])  # fmt: skip
-def test_json_is_json(results, monkeypatch, line):
+def test_json_output_parsed(results, monkeypatch, line):
     monkeypatch.chdir(results)
     result = CliRunner().invoke(main, [*shlex.split(line), "--json"])
     assert result.exit_code == 0, result.output
@@ -266,13 +266,13 @@ def test_a_python_snippet_runs(tmp_path, monkeypatch, capsys, snippet):
         (["describe"], "muj", "mujoco"),
     ],
 )
-def test_the_shell_is_offered_scenes_and_engines(words, incomplete, offered):
+def test_shell_completion_of_scenes_and_engines(words, incomplete, offered):
     completion = ShellComplete(main, {}, "crosscheck", "_CROSSCHECK_COMPLETE")
     assert offered in [item.value for item in completion.get_completions(words, incomplete)]
 
 
 @pytest.mark.parametrize("words", [["run"], ["describe"]])
-def test_a_scene_is_offered_with_its_title(words):
+def test_shell_completion_with_the_title_of_a_scene(words):
     completion = ShellComplete(main, {}, "crosscheck", "_CROSSCHECK_COMPLETE")
     offered = {item.value: item.help for item in completion.get_completions(words, "bou")}
     assert offered["bounce"] == CATALOGUE["bounce"].title

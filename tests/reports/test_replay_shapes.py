@@ -57,7 +57,7 @@ def test_a_cylinder_reaches_its_two_rims():
     assert sorted(points[:, 0])[len(points) // 2 - 1] < 0.0 < sorted(points[:, 0])[len(points) // 2]  # as many on each
 
 
-def test_a_polygon_and_a_hull_are_their_own_corners():
+def test_polygon_and_hull_by_their_corners():
     triangle = ((-1.0, -1.0), (2.0, -1.0), (-1.0, 2.0))
     assert corners(Polygon(triangle), 2) == pytest.approx(np.array(triangle))
     solid = ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))

@@ -173,7 +173,7 @@ def test_script_of_an_engine_set_apart(engine, scene, params, dimension, profile
     ("physx", {"friction_every_iteration": False, "persistent_manifolds": False}),
     ("newton", {"weighted": False, "rebound_iterations": 3}),
 ]))  # fmt: skip
-def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
+def test_script_with_settings_of_no_profile(engine, changes, tmp_path):
     found = installed(engine)
     slot = slot_of(engine, "oblique", {"e": 0.0 if engine == "drake" else 0.5}, "default", 2)
     scene = prepare(slot).scene
@@ -190,7 +190,7 @@ def test_so_does_one_with_settings_of_no_profile(engine, changes, tmp_path):
     ("bullet", "pybullet", ["frictionERP=0.1", "contactStiffness=1e5", "contactDamping=10", "linearDamping=0.5"]),
     ("chipmunk", "pymunk", ["damping=0.5", "collision_slop=0.01", "iterations=3"]),
 ])  # fmt: skip
-def test_so_does_one_with_settings_of_a_user_s_own(engine, package, texts, tmp_path):
+def test_script_with_own_settings(engine, package, texts, tmp_path):
     """And no other does: each of them is in the script."""
     pytest.importorskip(package)
     plain = slot_of(engine, "oblique", {"e": 0.5}, "default", 2)
@@ -227,7 +227,7 @@ def another(value):
 
 
 @pytest.mark.parametrize("engine", cases((name,) for name in sorted(OPTIONAL)))
-def test_no_setting_is_left_out(engine):
+def test_script_with_every_setting(engine):
     """A profile's own number may be the engine's default, so that a script ends in the same bits without it."""
     found = installed(engine)
     for profile in found.profiles:
@@ -249,7 +249,7 @@ def test_script_of_a_model_with_its_own_surfaces(name, tmp_path):
     assert_same_bits(slot_of("drake", pinned(str(MODELS / f"{name}.sdf")), {}, "model", 3), tmp_path)
 
 
-def test_so_does_one_whose_bodies_come_from_files(tmp_path):
+def test_script_of_bodies_from_files(tmp_path):
     """Tuned Bullet clips faces of hulls, and knows those of bodies from URDF alone."""
     pytest.importorskip("pybullet")
     assert_same_bits(slot_of("bullet", "wedge", {}, "tuned", 2), tmp_path)
@@ -313,7 +313,7 @@ COURSE = "course = { amplitude = [0.01, 0.02], frequency = 3.0, phase = 0.5 }"
     ("mujoco", False, True), ("mujoco matched", True, True), ("mujoco matched", False, True),
     ("physx", None, True), ("newton", True, True), ("newton", False, True),
 ]) + [pytest.param("reference", True, False, marks=pytest.mark.long)])  # fmt: skip
-def test_so_does_one_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
+def test_script_of_conveyors_and_courses(engine, runs, shaken, tmp_path):
     engine, _, profile = engine.partition(" ")
     found = installed(engine)
     path, course = tmp_path / "driven.toml", COURSE if shaken else ""
@@ -360,7 +360,7 @@ HULL = CYLINDER | {"other": '"hull", vertices = [[1, 1, 1], [1, -1, -1], [-1, 1,
     ("bullet", HULL), ("mujoco", CYLINDER), ("mujoco", HULL), ("physx", IN_THE_PLANE), ("physx", HULL),
     ("newton", IN_THE_PLANE), ("newton", HULL),
 ]) + [pytest.param("reference", IN_THE_PLANE, marks=pytest.mark.long)])  # fmt: skip
-def test_so_does_one_of_other_shapes(engine, values, tmp_path):
+def test_script_of_other_shapes(engine, values, tmp_path):
     found = installed(engine)
     path = tmp_path / "shapes.toml"
     path.write_text(SHAPES.format(**values))
@@ -397,7 +397,7 @@ def test_mjcf_from_its_keyframe_to_the_bits_of_its_cell(dimension, profile):
     assert np.array_equal(pose, ended(slot)[0][moving])
 
 
-def test_mjcf_pushes_a_loaded_body_as_its_cell_does(tmp_path):
+def test_mjcf_with_loads_as_in_its_cell(tmp_path):
     mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "loaded.toml"
     path.write_text(LOADED.format(**SPATIAL))
@@ -419,7 +419,7 @@ def test_mjcf_pushes_a_loaded_body_as_its_cell_does(tmp_path):
     assert data.qfrc_actuator.any() and np.allclose(data.qacc, pushed.qacc, rtol=1e-12, atol=1e-12)
 
 
-def test_mjcf_says_what_it_has_no_word_for():
+def test_mjcf_note_on_what_it_cannot_express():
     pytest.importorskip("mujoco")
     done = CliRunner().invoke(main, ["export", "slide", "--engine", "mujoco", "--profile", "matched", "--to", "mjcf"])
     assert done.exit_code == 2 and "rounds: MJCF has no word for a loop around the solver" in done.output
@@ -479,7 +479,7 @@ def test_hostile_names_within_comments_and_strings(tmp_path):
     (["bounce", "--engine", "chipmunk", "--to", "python", "-o", "pymunk.py"], "name it otherwise"),
     (["bounce", "--engine", "chipmunk", "--profile", "best", "--to", "python"], "has no profile 'best'"),
 ])  # fmt: skip
-def test_a_wrong_call_is_one_line(words, said, tmp_path, monkeypatch):
+def test_wrong_call_in_one_line(words, said, tmp_path, monkeypatch):
     pytest.importorskip("pymunk")
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(main, ["export", *words])
@@ -487,7 +487,7 @@ def test_a_wrong_call_is_one_line(words, said, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_every_format_of_ours_is_tried_here():
+def test_script_formats_all_tested():
     ours = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
     forms = {(name, form) for name in ours for form in registry.adapter(name).exports}
     tried = {*USUAL, *OPTIONAL}

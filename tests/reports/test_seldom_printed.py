@@ -80,7 +80,7 @@ def test_two_tables_of_seen_faults_and_blind_spots():
     ]
 
 
-def test_sensitivity_is_asked_of_checks_alone(monkeypatch):
+def test_sensitivity_of_checks_alone(monkeypatch):
     monkeypatch.setattr(detection, "detection", lambda *asked, **named: Detected([], BLIND))
     assert "incline/angle" in call("list", "checks", "--sensitivity").stdout
     assert json.loads(call("list", "checks", "--sensitivity", "--json").stdout) == []

@@ -59,7 +59,7 @@ def test_rows_are_of_a_profile_of_that_name_without_standing(ran):
 
 
 @pytest.mark.parametrize("width", [80, 120])
-def test_it_is_shown_under_its_name_at_any_width(ran, width, monkeypatch):
+def test_row_with_own_settings_shown_at_any_width(ran, width, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))
     text = call("show", "--out", ran[0], status=0).output
     assert PROFILE in text and all(len(line.rstrip()) <= width for line in text.splitlines() if "/" not in line)
@@ -103,7 +103,7 @@ def test_row_with_own_settings_found_by_name_and_by_set(ran):
     assert "not listed: with settings of your own" in told[0]["reason"]
 
 
-def test_what_explain_cannot_find_is_one_line(ran):
+def test_explain_of_an_unknown_row_in_one_line(ran):
     done = call("explain", "chipmunk/default/bounce", "--set", "damping=0.25", "--out", ran[0], status=2)
     assert "no check 'chipmunk/default+damping=0.25/bounce'" in done.output
     done = call("explain", "0123abcd", "--set", "damping=0.25", "--out", ran[0], status=2)
@@ -185,7 +185,7 @@ def test_a_scene_file_runs_with_settings(tmp_path):
         (["export", "--parquet", "folder", "--set", "damping=0.5"], "set: chooses a case to write, which needs --to"),
     ],
 )  # fmt: skip
-def test_a_wrong_setting_is_one_line_and_nothing_runs(words, said, tmp_path, monkeypatch):
+def test_wrong_setting_in_one_line_without_a_run(words, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = call(*words, status=2)
     assert done.output.startswith(f"crosscheck: {said}") and done.output.count("\n") == 1

@@ -31,7 +31,7 @@ def test_a_duration_is_said_in_seconds_until_there_is_a_whole_minute(seconds, te
     assert stages.clock(seconds) == text
 
 
-def test_a_line_is_never_broken_nor_read_as_markup(console):
+def test_line_without_breaks_or_markup(console):
     stages.say(console, "[red] " + "x" * 60)
     assert said(console) == "[red] " + "x" * 60 + "\n"
 
@@ -45,7 +45,7 @@ def test_stage_duration_by_a_monotonic_clock(console, monkeypatch):
     assert said(console) == "cells: 3 min 05 s\n"
 
 
-def test_a_stage_that_fails_says_no_time(console):
+def test_failing_stage_without_a_time(console):
     with pytest.raises(ZeroDivisionError), stages.stage(console, "cells"):
         raise ZeroDivisionError
     assert said(console) == ""

@@ -42,7 +42,7 @@ def test_a_healthy_run_is_fine_and_a_crash_is_an_alarm(plugins, tmp_path):
 
 
 @pytest.mark.parametrize("seconds", ["nan", "inf", "0", "-1", "1e9", "soon"])
-def test_a_time_limit_that_is_none_is_a_wrong_call(tmp_path, seconds):
+def test_invalid_time_limit_as_a_wrong_call(tmp_path, seconds):
     result = call(*SMALL, "--timeout", seconds, "--out", tmp_path / "out")
     assert result.exit_code == statuses.WRONG_CALL
     assert "seconds" in result.stderr
@@ -96,7 +96,7 @@ def test_folder_without_a_name_refused_for_merge_and_output(tmp_path, arguments,
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
-def test_a_pipe_is_no_side_of_a_comparison(tmp_path):
+def test_pipe_refused_as_a_side_of_a_comparison(tmp_path):
     """It was waited for, without an end."""
     pipe = tmp_path / "rows.jsonl"
     os.mkfifo(pipe)

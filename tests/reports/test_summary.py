@@ -198,7 +198,7 @@ def test_profile_that_ran_another_case_not_compared():
     assert answer.cure.startswith("no other profile was run in this case; ")
 
 
-def test_what_is_nearer_is_no_cure():
+def test_nearer_profile_not_called_a_cure():
     rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
     rows += [
         row("incline", 2, "bullet", "tuned", "known" if r > 0.8 else "pass", 0.01, 0.0, ratio=r) for r in (0.5, 0.9)

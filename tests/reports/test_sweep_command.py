@@ -90,13 +90,13 @@ def test_whole_numbers_are_rounded():
     (("--list", "e=1", "--param", "e=0.5"), "e is both fixed and varied"),
     (("--grid", "e=0:1:1000", "--grid", "v=1:2:1000"), f"are more than the {MOST_CELLS} of one sweep"),
 ])  # fmt: skip
-def test_a_wrong_call_is_one_line_and_runs_nothing(words, said, tmp_path):
+def test_wrong_call_in_one_line_without_a_run(words, said, tmp_path):
     done = call(*CELL, *words, "--out", tmp_path / "out", status=2)
     assert said in done.output and len(done.output.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_without_a_scene_there_is_nothing_to_vary(tmp_path):
+def test_sweep_without_a_scene_refused(tmp_path):
     assert "needs the name of a scene" in call("sweep", "--list", "e=1", "--out", tmp_path, status=2).output
 
 

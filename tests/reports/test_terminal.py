@@ -80,7 +80,7 @@ def folder(tmp_path_factory):
         (("explain", "ROW"), [FILE_NAME, f"{BODY}.vy", BECAUSE]),
     ],
 )
-def test_commands_about_a_run_show_text_as_it_is(folder, arguments, texts):
+def test_text_shown_literally_by_commands_about_a_run(folder, arguments, texts):
     if "ROW" in arguments:
         rows = json.loads(call("findings", "--all", "--json", "--out", folder).stdout)
         arguments = ("explain", next(row["id"] for row in rows if BODY in row["metric"]))

@@ -75,7 +75,7 @@ def test_failure_nowhere_for_what_does_not_fail_the_command(name):
     assert not junit(row)
 
 
-def test_every_format_has_every_digit():
+def test_full_digits_in_every_format():
     plain = [ROW.as_dict()]
     (row,) = csv.DictReader(io.StringIO(exports.as_csv(plain)))
     assert float(row["value"]) == VALUE
@@ -93,7 +93,7 @@ def test_every_format_has_every_digit():
         (0.123456789, 6, "0.123457"),
     ],
 )  # fmt: skip
-def test_a_number_is_shown_as_it_is(value, digits, text):
+def test_number_shown_literally(value, digits, text):
     assert number(value, digits) == text
 
 
@@ -129,7 +129,7 @@ def test_a_known_fail_is_never_counted_as_clean():
 
 
 @pytest.mark.parametrize("worse, better", [(a, b) for i, a in enumerate(MARKS) for b in MARKS[i + 1 :]])
-def test_the_mark_of_a_field_is_its_worst(worse, better):
+def test_mark_of_a_field_by_its_worst_row(worse, better):
     from collections import Counter
 
     assert Field(Counter({better: 5, worse: 1})).mark == worse

@@ -40,7 +40,7 @@ def test_a_quantity_has_its_unit_unless_it_is_a_ratio_or_nothing(value, unit, te
     assert quantity(value, unit) == text
 
 
-def test_digits_are_four_unless_somebody_asks():
+def test_four_digits_by_default():
     assert number(0.123456789) == "0.1235"
     assert number(0.123456789, 6) == "0.123457"
     assert quantity(0.123456789, "m", 6) == "0.123457 m"
@@ -72,7 +72,7 @@ def test_a_plain_number_keeps_the_digits_it_was_asked_for():
     ("raw", "shown"),
     [("a & b", "a &amp; b"), ("<b>", "&lt;b&gt;"), ("a|b", "a\\|b"), ("&lt;", "&amp;lt;"), ("plain", "plain")],
 )
-def test_markdown_shows_text_as_it_is(raw, shown):
+def test_markdown_shows_text_literally(raw, shown):
     assert markdown(raw) == shown
 
 
@@ -120,7 +120,7 @@ def options_of(command):
     return words[2], list(zip(words[3::2], words[4::2], strict=True))
 
 
-def test_a_command_names_all_that_was_asked():
+def test_command_with_every_question_of_a_row():
     scene, options = options_of(reproduce({**SLOT, "iterations": 20}))
     assert scene == "impact"
     assert options == [
@@ -155,7 +155,7 @@ def test_row_id_of_eight_digits_from_the_question_alone():
     [(1, "row", "1 row"), (0, "row", "0 rows"), (2, "row", "2 rows"), (1, "family", "1 family"),
      (3, "family", "3 families"), (2, "day", "2 days")],
 )  # fmt: skip
-def test_nouns_are_counted(count, noun, text):
+def test_plural_of_nouns(count, noun, text):
     assert plural(count, noun) == text
 
 

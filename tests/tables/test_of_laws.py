@@ -9,5 +9,5 @@ OWN = [name for name in LAWS if not name.startswith(tuple(f"laws/{engine}-" for 
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_what_a_law_predicts_is_as_it_was_kept(name):
+def test_predictions_of_laws_as_kept(name):
     check(name, LAWS[name], share=1e-7, nothing=1e-10)

@@ -15,5 +15,5 @@ def kept():
 
 
 @pytest.mark.parametrize("name", screens.SCREENS)
-def test_what_a_command_prints_is_as_it_was_kept(name):
+def test_output_of_a_command_as_kept(name):
     check_screen(name, screens.SCREENS[name])

@@ -32,7 +32,7 @@ def test_numbers_agree_to_nine_digits_and_words_to_the_letter(told, kept, same):
     assert agree(told, kept) is same
 
 
-def test_what_differs_is_told_with_both_values():
+def test_difference_told_with_both_values():
     made = {**CELLS, "2-D": {**CELLS["2-D"], "mass": "2"}}
     del made["beside"]
     assert differences(made, CELLS) == ["[2-D] mass: 1 -> 2", "[beside] is gone"]
@@ -49,7 +49,7 @@ def test_changed_table_fails_with_its_command():
         check(name, lambda: wrong)
 
 
-def test_two_lines_of_one_name_are_an_error():
+def test_duplicate_line_names_are_an_error():
     with pytest.raises(ValueError, match=r"two lines are called a\.b"):
         section(**{"a": {"b": 1}, "a.b": 2})
 

@@ -228,7 +228,7 @@ def test_row_of_a_release_outside_its_family_refused():
     assert "holds for >=1,<2, not for 2.0" in why
 
 
-def test_a_row_whose_scatter_is_not_known_is_refused():
+def test_row_with_unknown_scatter_refused():
     (why,) = refusals(propose(rows(moved=0.0), "nameless", listed(FAMILY)))
     assert "its scatter is unknown" in why
 
@@ -268,7 +268,7 @@ def test_band_containing_the_truth_from_sixteen_starts():
     assert shifted[3] == pytest.approx((7.0 + ends[0], 7.0 + ends[1]))
 
 
-def test_student_is_what_it_is():
+def test_student_quantile_against_the_table():
     from scipy.stats import t
 
     assert {n: round(float(t.ppf(1.0 - 0.0005, n)), 4) for n in acceptance.STUDENT} == acceptance.STUDENT
@@ -312,7 +312,7 @@ def test_single_deviating_start_and_least_band():
         ((0.5, 2.0), "fail", False),
     ],
 )
-def test_what_a_band_hides(ends, physics, hidden):
+def test_values_hidden_by_a_band(ends, physics, hidden):
     row = row_of(truth=0.0, tolerance=0.1, value=1.0, physics=physics)
     assert acceptance.hides(row, ends) is hidden
     assert acceptance.hides(replace(row, value=-1.0), (-ends[1], -ends[0])) is hidden
@@ -444,7 +444,7 @@ def test_a_study_needs_no_moved_starts():
     assert [finding.value for finding in accepted(proposal, ["late"]).values()] == [study.value]
 
 
-def test_the_check_of_a_row_is_what_it_was_judged_by():
+def test_check_of_a_row_as_it_was_judged():
     (row,) = rows()
     assert acceptance._check(row) == Check("creep", "m/s", 0.0, row.tolerance, row.because, row.source)
     assert row.tolerance == pytest.approx(TOLERANCE)
@@ -509,7 +509,7 @@ def test_missing_and_exploded_values_that_stay_unchanged(old, found):
 
 
 @pytest.mark.parametrize(("value", "same"), [(0.625, True), (0.6251, False)])
-def test_a_row_at_the_edge_of_its_band_is_the_same(value, same):
+def test_row_at_the_edge_of_its_band_unchanged(value, same):
     old = Finding(FAMILY, 0.5, 0.125)
     (change,) = propose(rows(creep=value), "nameless", listed(FAMILY, creep=old)).changes
     assert (change.same == {KEY: old}, KEY in change.drifted) == (same, not same)
@@ -642,7 +642,7 @@ def test_zero_values_and_tolerances():
     assert acceptance._ends(tolerant, draws) == pytest.approx((-0.005, 0.005), abs=1e-12)
 
 
-def test_what_is_no_number_is_no_draw():
+def test_nan_not_counted_as_a_start():
     for value in (None, math.nan, math.inf):
         seen = [observed(SLOT, creep=0.5), observed(replace(SLOT, ulp=1), creep=value)]
         assert acceptance.draws_of(seen) == {KEY: (0.5,)}

@@ -12,7 +12,7 @@ from validation.running.apart import Apart
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing tells which processes one has started")
 @pytest.mark.parametrize("kind", [Apart, Lane])
-def test_process_that_an_engine_leaves_behind(kind):
+def test_process_left_behind_by_an_engine(kind):
     """In a session of its own, so that it is not in the engine's group."""
     with kind(60.0) as apart:
         left = apart.ask(os.spawnvp, os.P_NOWAIT, "setsid", ["setsid", "sleep", "1000"])
@@ -21,7 +21,7 @@ def test_process_that_an_engine_leaves_behind(kind):
         os.kill(left, 0)
 
 
-def test_process_that_a_call_has_changed():
+def test_process_changed_by_a_call():
     """Its answer stands, and the next call has another process."""
     with Apart(60.0) as apart:
         first = apart.ask(os.getpid)
@@ -29,7 +29,7 @@ def test_process_that_a_call_has_changed():
         assert apart.ask(os.umask, 0o7) is not None and apart.ask(os.getpid) != first
 
 
-def test_answer_that_is_lost():
+def test_lost_answer_of_a_process():
     with Apart(60.0) as apart:
         assert apart.ask(os._exit, 3) == "the process ended with exit code 3"
         assert apart.ask(os.abort) == "the process was killed by SIGABRT"

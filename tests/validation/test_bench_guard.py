@@ -28,7 +28,7 @@ def test_a_step_is_too_slow_beyond_the_margin(monkeypatch, capsys, median, statu
 
 
 @pytest.mark.long
-def test_the_steps_that_are_watched_run(monkeypatch):
+def test_watched_steps_run(monkeypatch):
     pytest.importorskip("numba")
     monkeypatch.setattr(guard, "ROUNDS", 1)
     assert guard.main() in (0, 1)

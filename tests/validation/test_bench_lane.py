@@ -196,7 +196,7 @@ def test_a_series_ends_where_a_pile_takes_too_long(clockwork):
 
 
 @pytest.mark.parametrize("engine", ["chipmunk", "reference"])
-def test_what_is_timed_ends_where_the_judged_run_ends(engine):
+def test_timed_run_ends_with_the_judged_run(engine):
     pytest.importorskip({"chipmunk": "pymunk", "reference": "numba"}[engine])
     profile = next(iter(registry.load(engine).profiles))
     slot = Slot("bounce", (("height", 1.03),), 2, engine, profile, 1 / 240)

@@ -56,7 +56,7 @@ def test_impacts_are_met_in_sixteen_phases_spread_over_one_step():
     assert len({params["height"] for params in primary_of("bounce").variations(DT)}) == 16
 
 
-def test_a_dead_rebound_is_wrong_by_e():
+def test_error_e_of_a_dead_rebound():
     assert error("impact", {"e": 0.8}, {"rebound_ratio": 0.0})[0] == pytest.approx(0.8)
 
 

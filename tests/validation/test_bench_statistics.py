@@ -34,7 +34,7 @@ def test_a_slow_down_during_the_lane_is_drift_and_noise_is_not():
     assert abs(drift(noise)) < 0.02
 
 
-def test_the_lower_envelope_is_what_nothing_beats():
+def test_lower_envelope_of_undominated_points():
     rng = np.random.default_rng(4)
     for _ in range(50):
         # Few distinct values, so that ties occur.
@@ -103,7 +103,7 @@ def test_two_points_give_no_exponent():
     assert power_law([3.0, 3.0, 3.0], [1.0, 2.0, 3.0]) is None
 
 
-def test_drift_is_of_halves():
+def test_drift_between_halves():
     """Medians of 2 and 6."""
     assert drift([1.0, 3.0, 4.0, 8.0]) == 2.0
     assert drift([1.0, 3.0, 9.0, 4.0, 8.0]) == 3.0  # the middle one belongs to the second half: 8 over 2

@@ -153,7 +153,7 @@ def test_most_exact_cheap_enough_point_at_equal_time(store, seed):
         assert row["error"] == pytest.approx(min(good)) if good else math.isnan(row["error"]) and row["reason"]
 
 
-def test_the_best_points_are_those_no_engine_beats(store):
+def test_best_points_undominated_by_any_engine(store):
     errors = {("a", STEPS[0]): 1e-1, ("a", STEPS[1]): 1e-3, ("b", STEPS[0]): 1e-2, ("b", STEPS[1]): 1e-2}
     costs = {("a", STEPS[0]): 1e-3, ("a", STEPS[1]): 1e-1, ("b", STEPS[0]): 1e-2, ("b", STEPS[1]): 2e-2}
     points = work_points(store, filled(store, errors, costs)).set_index(["engine", "dt"])

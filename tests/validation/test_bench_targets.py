@@ -171,7 +171,7 @@ def test_a_free_fall_is_measured_as_a_sag_of_the_discrete_fall():
     assert found.errors["drift [m]"] == 0.0
 
 
-def test_an_engine_that_refuses_costs_a_reason():
+def test_refusing_engine_with_its_reason():
     slot = Slot("flight", (), 3, "chipmunk", "default", 1 / 240)
     assert "planar" in errors_of("column", slot, 0.1).reason
 
@@ -190,7 +190,7 @@ def row(measured, floor=None, target=None, at=AT_SWEEPS):
     return Row("scene", "a/b", at, measured, measured, measured, floor, target, {}, {}, 10, {})
 
 
-def test_marks_say_what_is_met():
+def test_marks_of_reached_levels():
     assert [row(x, 2.0, 3.0).mark for x in (None, 1.99, 2.0, 2.9, 3.0)] == [
         *["below floor"] * 2,
         *["floor"] * 2,

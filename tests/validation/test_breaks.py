@@ -70,7 +70,7 @@ def test_a_break_is_new_then_known_and_drifts_when_it_is_another(folder):
         assert bool(why) is (standing in (Standing.KNOWN, Standing.DRIFTED)), change  # only a list has a reason
 
 
-def test_an_answer_that_is_lost_is_listed_as_such(folder):
+def test_lost_answer_listed_as_such(folder):
     lost = Change("renumbered", refused="it crashed", lost=True)
     keep(folder, (slot(), lost))
     assert (folder / "breaks.csv").read_text().splitlines()[1] == "order,default,head_on,2,renumbered,,lost"

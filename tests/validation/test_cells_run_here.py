@@ -101,7 +101,7 @@ def test_transformed_cell_keeps_the_original_settings(monkeypatch):
     assert told.runs == [(told, mirrored, 1 / 120, {"sweeps": 3, "slop": 0.1}, sampling)]
 
 
-def test_a_cell_is_nudged_as_far_as_it_is_told(monkeypatch):
+def test_cell_nudged_by_the_requested_amount(monkeypatch):
     for moves, turns in ((0.0, 0.0), (0.25, 0.0), (0.0, 0.5)):
         told = Told(monkeypatch, invariance)
         measured(SLOT, "again", moves, turns)

@@ -28,7 +28,7 @@ def test_batches_are_of_one_engine_and_neither_tiny_nor_huge():
 
 
 @pytest.mark.parametrize("address", ["", "local:0", "local:x", "http://a:1", "tcp://a", "tcp://a:b", "tcp://a b:1"])
-def test_an_address_that_can_be_none_is_refused(address):
+def test_impossible_address_refused(address):
     with pytest.raises(SceneError, match="neither local:N nor tcp"):
         checked(address)
 

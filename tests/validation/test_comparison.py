@@ -106,7 +106,7 @@ def test_rows_without_a_floor_are_compared_by_their_tolerance():
     assert "hundredth" in change(before, after).note
 
 
-def test_what_has_no_tolerance_changes_with_any_bit():
+def test_rows_without_a_tolerance_changed_by_any_bit():
     bare = {"tolerance": None, "truth": None, "error": None, "physics": None}
     before, after = ({**ROW, **bare, "value": v} for v in (0.25, math.nextafter(0.25, 1.0)))
     assert brief(change(before, after)) == (
@@ -197,7 +197,7 @@ def test_families_of_changes_by_kind_direction_and_metric():
     [("never", set()), ("flips", {"flip", "outcome"}), ("regressions", {"flip", "outcome", "error", "speed"}),
      ("changes", {"flip", "outcome", "error", "speed", "better"})],
 )  # fmt: skip
-def test_what_fails_a_comparison(fail_on, caught):
+def test_changes_that_fail_a_comparison(fail_on, caught):
     made = {
         "flip": replace(CHANGE, kind=Kind.FLIP), "outcome": replace(CHANGE, kind=Kind.OUTCOME), "error": CHANGE,
         "speed": replace(CHANGE, kind=Kind.SPEED), "better": replace(CHANGE, kind=Kind.FLIP, regressed=False),

@@ -148,7 +148,7 @@ def said(errors, dts=None, **options):
     return limit_of(dts or DTS[: len(errors)], errors, **options)[1:]
 
 
-def test_what_has_too_few_errors_says_so():
+def test_too_few_errors_told():
     assert limit_of(DTS[:1], [0.0]) == (None, Limit.FEW, "1 of 3")  # one step converges to nothing
     assert limit_of(DTS[:2], [1e-17, 0.0]) == (None, Limit.FEW, "2 of 3")
     assert limit_of([], []) == (None, Limit.FEW, "no step has a measured error")

@@ -40,7 +40,7 @@ def test_shapes_moved_to_their_centroid_with_a_message(kind, points, by, said):
 
 
 @pytest.mark.parametrize(("kind", "points"), [("polygon", SQUARE), ("hull", BRICK)])
-def test_what_is_centred_keeps_its_bits(kind, points):
+def test_centred_shape_unchanged_to_the_bit(kind, points):
     given, notes = body(kind, points), []
     centre(given, notes)
     assert given == body(kind, points) and notes == []

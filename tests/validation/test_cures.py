@@ -297,7 +297,7 @@ def test_single_setting_that_mends_all_with_equivalents(monkeypatch):
     assert [dict(each.changes[0]) for each in singles] == [{"b": 2}, {"c": 1}]
 
 
-def test_what_breaks_a_check_that_passed_is_no_cure(monkeypatch):
+def test_change_that_breaks_a_passed_check_is_no_cure(monkeypatch):
     def off(s):
         return (0.0, 0.0, 1.5) if s.get("a") else (9.0, 0.5) if s.get("b") else (9.0, 9.0)
 
@@ -321,7 +321,7 @@ def test_profile_reduced_to_necessary_settings(monkeypatch):
     assert dict(best.changes[0]) == {"a": 1, "c": 1} and best.failing == 0
 
 
-def test_where_nothing_helps_nothing_is_said_to(monkeypatch):
+def test_no_advice_without_a_helpful_change(monkeypatch):
     best, singles = trials_of(monkeypatch, lambda s: (9.0, 9.0), {"a": (1, 2)}, {"b": 1})
     assert best is None and singles == []
 
@@ -338,7 +338,7 @@ def test_told_check_mended_by_its_cure(monkeypatch):
     assert cures._mended(trials, failing, best) == ("turned",) and cures._mended(trials, failing, None) == ()
 
 
-def test_what_mends_in_one_size_alone_is_none(monkeypatch):
+def test_cure_in_one_size_alone_not_counted(monkeypatch):
     """The same cells in other sizes at another step: what fails as shipped must be mended there as well."""
 
     def off(s):
@@ -378,7 +378,7 @@ def test_single_setting_with_most_of_the_error_left_not_told(monkeypatch, left, 
 
 
 @pytest.mark.long
-def test_a_real_engine_is_cured_by_what_its_sheet_says():
+def test_real_engine_cured_by_its_documented_setting():
     """Chipmunk's box hops as it starts to slide, by an overlap that it is not given at the start."""
     pytest.importorskip("pymunk")
     found = search("chipmunk", "slide", 2)

@@ -62,7 +62,7 @@ def test_decisive_settings_sufficient_and_minimal(enough, kept):
         ({"a": NEEDED, "b": NEEDED, "c": NEEDED, "d": COMPLETES}, "a, b and c with d"),
     ],
 )
-def test_what_decides_is_said_in_words(roles, text):
+def test_decisive_settings_in_words(roles, text):
     assert entry(*(Part(name, "1", 2.0, 2.0, role) for name, role in roles.items())).text == text
 
 
@@ -98,7 +98,7 @@ def test_listed_cures_match_today_s_profiles(engine):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("engine", "scene"), [("chipmunk", "stack"), ("bullet", "incline")])
-def test_what_is_listed_comes_out_again(engine, scene):
+def test_listed_cures_reproduced(engine, scene):
     if find(engine).engine is None:
         pytest.skip(f"{engine}: {find(engine).reason}")
     (target,) = [target for target in cured_of(engine) if target.scene == scene]
@@ -108,7 +108,7 @@ def test_what_is_listed_comes_out_again(engine, scene):
     assert {part.setting: part.decides for part in found.parts} == {part.setting: part.decides for part in listed.parts}
 
 
-def test_what_passes_as_shipped_has_no_cure():
+def test_no_cure_for_a_case_that_passes_as_shipped():
     pytest.importorskip("pymunk")
     with pytest.raises(ValueError, match="no fix"):
         measure("chipmunk", Cured("default", "tuned", "incline", ({},)))

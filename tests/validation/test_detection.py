@@ -183,7 +183,7 @@ def test_blind_spots_within_the_step_error():
 
 
 @pytest.mark.long
-def test_what_no_check_sees_is_said(whole):
+def test_faults_seen_by_no_check_told(whole):
     """Since a bar is struck beside its centre, and turns, there is no fault that only probes see."""
     assert only_by_receipts(whole.seen) == {}
 

@@ -36,7 +36,7 @@ def test_arithmetic(formula, value):
     ("(" * 140 + "1" + ")" * 140, ""), ("1" * (LONGEST + 1), "longer than"), ("-" * 299 + "1", ""),
     ("\x00", "no formula"), ("9" * 299, ""),
 ])  # fmt: skip
-def test_nothing_else(formula, said):
+def test_other_syntax_in_expressions_refused(formula, said):
     try:
         found = value_of(formula, NAMES)
     except FormulaError as error:
@@ -92,13 +92,13 @@ def test_formulas_of_value_and_tolerance_in_constants(tmp_path):
     ('quantity = "ball.y"\nvalue = 1\ntolerance = 1', '[constants]\na = "b"\nb = 1', "constants.a: 'b': 'b' is not"),
     ('quantity = "ball.y"\nvalue = 1\ntolerance = 1', "[constants]\nsqrt = 1.0", "constants.sqrt: cannot be the name"),
 ])  # fmt: skip
-def test_what_is_no_check_is_refused_with_its_path(tmp_path, check, constants, said):
+def test_invalid_check_refused_with_its_path(tmp_path, check, constants, said):
     with pytest.raises(SceneError) as refusal:
         read(tmp_path, check, constants)
     assert said in str(refusal.value) and len(str(refusal.value).splitlines()) == 1
 
 
-def test_everything_that_is_wrong_is_told_at_once(tmp_path):
+def test_all_errors_of_a_check_told_at_once(tmp_path):
     text = FILE.format(check='quantity = "box.y"\nvalue = "q"\ntolerance = 1', constants="[constants]\npi = 3.0")
     text = (
         text.replace("radius = 0.5", "radius = -0.5")

@@ -27,7 +27,7 @@ def test_twenty_field_notes_with_source_symptom_and_check():
 
 
 @pytest.mark.long
-def test_what_our_run_says_is_what_the_notes_say():
+def test_field_notes_against_our_run():
     """All cells of all notes: 5 s of CPU."""
     if not HERE:
         pytest.skip("none of the engines that the notes ask is installed")

@@ -450,7 +450,7 @@ def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
         (Unsupported("u", ("*",), "*", 0, "why", "source", (("far", 1e8),)), False),
     ],
 )
-def test_what_an_unsupported_entry_speaks_about(entry, covered):
+def test_content_of_an_unsupported_entry(entry, covered):
     assert entry.covers(SLOT) is covered
 
 

@@ -118,7 +118,7 @@ APART = {"thrown": (0.9, ""), "centre_moved": (0.04, ""), "grown": (0.02, ""), "
         ("overlap", "overlap", APART, {"thrown": (None, "gone")}, "no answer"),
     ],
 )  # fmt: skip
-def test_each_way_to_end_has_its_word(scene, name, good, changes, word):
+def test_words_for_every_way_to_end(scene, name, good, changes, word):
     own = axis(scene, name)
     made = resolve(scene).scene(resolve(scene).dimensions[0], dict(own.params))
     assert own.fate(made, good) == ""

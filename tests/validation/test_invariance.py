@@ -245,7 +245,7 @@ def test_a_dependence_on_order_and_on_the_side_is_found(monkeypatch):
     assert verdicts == {"again": True, "renumbered": False, "mirrored": False}
 
 
-def test_a_real_engine_is_asked_everything():
+def test_real_engine_under_every_transformation():
     pytest.importorskip("pymunk")
     found = {change.relation: change for change in compare(Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 240))}
     assert list(found) == [relation.name for relation in RELATIONS]

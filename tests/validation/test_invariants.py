@@ -142,7 +142,7 @@ def test_energy_of_a_constant_torque_is_no_growth():
         assert not verdicts(scene, moved(scene, (pose, 1.02 * twist)))["energy_growth"]
 
 
-def test_restituting_gravity_s_own_step_is_growth():
+def test_restitution_of_a_gravity_step_as_growth():
     scene = over_floor(ball())
     rows, (y, v) = [], (1.0, 0.0)
     for _ in range(480):
@@ -273,7 +273,7 @@ def test_kane_s_paradox_needs_a_box_with_both_in_one_pair(pairs, fed):
             if fed else "")  # fmt: skip
 
 
-def test_a_fixed_box_is_no_body_that_turns():
+def test_fixed_box_has_no_rotation():
     wall = Body("wall", Box((0.5, 0.5)), motion="fixed", pose=(9.0, 1.0, 0.0))
     scene = Scene("drop", 1, 2, (wall, ball()), (Pair("*", "*", 0.5, 0.25),), (0.0, 0.0), 1.0)
     assert invariants.fed_by(scene) == ""
@@ -470,7 +470,7 @@ def test_energy_of_an_overlap_removed_slowly_and_explosively(depth, gravity):
     assert not parted(depth, 2.0 * depth / DT + 4.0 * fall + math.sqrt(2.0 * gravity * depth), load=load)
 
 
-def test_what_starts_apart_is_granted_nothing():
+def test_no_allowance_for_bodies_that_start_apart():
     scene = over_floor(ball(pose=(0.0, 0.31, 0.0)), gravity=(0.0, 0.0), duration=0.1)
     pose, twist = np.tile((0.0, 0.31, 0.0), (3, 1)), np.zeros((3, 3))
     twist[1:, 1] = 1e-3

@@ -255,5 +255,5 @@ def test_run_age_from_now_or_a_given_time(tmp_path, monkeypatch):
     assert len(prune(store, Rules(days=1), tomorrow)) == 1
 
 
-def test_what_is_as_old_as_the_rule_stays():
+def test_run_of_exactly_the_rule_s_age_kept():
     assert doomed([run(1, days=3), run(2)], Rules(days=3), NOW) == []

@@ -50,7 +50,7 @@ def test_memory_by_machine_or_control_group(monkeypatch):
         assert limits.installed_memory() == limits.PLENTY
 
 
-def test_as_many_workers_as_were_asked_for_and_fit(monkeypatch):
+def test_requested_workers_within_the_machine(monkeypatch):
     machine(monkeypatch, cores=4, memory=64 * GIB)
     for asked, cells, count in ((0, 100, 4), (0, 3, 3), (1, 100, 1), (9, 100, 9), (99, 100, 16), (9, 5, 5), (3, 0, 1)):
         assert limits.workers(asked, cells) == count

@@ -38,7 +38,7 @@ def test_a_release_from_rest_is_not_an_apex():
     assert len(metrics.apexes(t, 1.0 - 0.5 * G * t * t, -G * t)[0]) == 0
 
 
-def test_last_motion_says_when_it_never_stops():
+def test_last_motion_of_a_run_that_never_stops():
     t = np.linspace(0.0, 1.0, 11)
     assert metrics.last_motion(t, np.zeros(11), 0.1) == (0.0, "")
     value, why = metrics.last_motion(t, np.ones(11), 0.1)
@@ -73,7 +73,7 @@ def test_interface_load_is_signed_and_relative_to_the_weight():
     assert (mean, why, deviation) == (pytest.approx(1.0), "", pytest.approx(0.0))
 
 
-def test_unavailable_impulses_are_no_zero():
+def test_unavailable_impulses_not_taken_for_zero():
     rows = Contacts.from_rows([(0, 1, (0, 0), (0, 1), (math.nan, math.nan), 0.0)], 2)
     t = np.array([0.0, 0.1])
     blank = planar(t, np.zeros(2), np.zeros(2))
@@ -119,7 +119,7 @@ def test_deepest_overlap_is_never_negative():
     assert metrics.deepest_overlap(scene, planar(t, np.full(2, 0.4), np.zeros(2))) == pytest.approx(0.1)
 
 
-def test_chatter_of_a_resting_ball_is_no_arc():
+def test_chatter_of_a_resting_ball_not_counted_as_an_arc():
     t = np.arange(200) / 240
     chatter = 1e-13 * np.sin(40.0 * t)
     assert len(metrics.apexes(t, chatter, chatter, 2 * G / 240)[0]) == 0
@@ -158,7 +158,7 @@ def test_total_impulse_over_samples_and_contacts():
     assert (list(total), why) == ([2.5, 6.25], "")
 
 
-def test_impulses_that_were_not_recorded_are_none():
+def test_unrecorded_impulses_have_no_value():
     assert metrics.total_impulse(resting(2), 0, 1) == (None, "contacts were not recorded")
     assert metrics.interface_load(resting(2), [(0, 1)], 1.0, 1.0) == ((None, "contacts were not recorded"), None)
 

@@ -127,7 +127,7 @@ def test_a_body_in_space_keeps_turning_about_its_axis():
     assert found.pose[-1, 0, 3:] == pytest.approx(expected)
 
 
-def test_who_does_nothing_has_no_speed_either():
+def test_null_at_rest_has_no_speed():
     found = did_nothing(scene_of(disc("ball", 0.0, 5.0)), DT)
     assert not found.twist.any() and (found.pose == found.pose[0]).all()
 
@@ -180,7 +180,7 @@ def test_skill_is_measured_against_the_best_null(error, worth):
     assert found == (pytest.approx(worth), "best")
 
 
-def test_where_there_is_no_skill_it_is_said_why():
+def test_reason_for_missing_skill():
     assert skill(None, [Null("a", 0.0, 1.0)])[0] is None
     assert skill(0.1, [Null("a", 0.0, 0.0), Null("b", 1.0, 1.0)]) == (None, "a is exact here")
     assert "no trivial answer has this value" in skill(0.1, [Null("a", None, None)])[1]
@@ -217,7 +217,7 @@ def test_null_rows_shared_by_engines_with_skill_of_each_error():
     assert any(row.skill is not None for row in with_skill(rows))
 
 
-def test_of_a_large_sweep_no_null_is_asked(monkeypatch):
+def test_no_null_for_a_large_sweep(monkeypatch):
     pytest.importorskip("pymunk")
     rows = judged(*(Slot("impact", (("e", e),), 2, "chipmunk", "tuned", DT) for e in (0.1, 0.2)))
     monkeypatch.setattr(nulls, "MOST_CELLS", 1)
@@ -225,7 +225,7 @@ def test_of_a_large_sweep_no_null_is_asked(monkeypatch):
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_value_that_is_no_number_is_none(monkeypatch, value):
+def test_nan_taken_for_a_missing_value(monkeypatch, value):
     monkeypatch.setattr(nulls, "_measured", lambda *asked: {"did nothing": {"rebound_ratio": (value, "divided by 0")}})
     assert nulls_of("impact", 2, {}, DT, "rebound_ratio", 0.8) == [Null("did nothing", None, None, "divided by 0")]
 

@@ -36,7 +36,7 @@ def test_own_profile_named_after_its_settings():
     assert again == OWN and again.key() == OWN.key() != SLOT.key() and not is_standard(OWN)
 
 
-def test_an_experiment_is_no_profile_of_its_own():
+def test_experiment_not_counted_as_an_own_profile():
     experiment = switched(SLOT, dict(OWN.switched))
     assert not experiment.is_own and experiment.base == experiment.profile == "default"
     assert experiment.key() != OWN.key()

@@ -217,7 +217,7 @@ def test_a_run_that_is_invalid_keeps_how_far_it_left_its_plane(observed):
     assert "out_of_plane" in [check.metric for check in checks_of(found)[1]]
 
 
-def test_a_scene_file_owes_its_plane_as_well(observed, tmp_path):
+def test_plane_bound_of_a_scene_file(observed, tmp_path):
     path = tmp_path / "tipping.json"
     ground = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
     box = Body("box", Box((0.2, 0.4)), 1.0, 0.1, (0.0, 0.5, 0.1))
@@ -236,7 +236,7 @@ def test_plane_checks_for_spatial_engines_alone(monkeypatch, engine, owed):
     assert list(testing._Cells.collect(SimpleNamespace(plugin=plugin))).count("out_of_plane") == owed
 
 
-def test_only_what_is_lifted_is_asked(observed):
+def test_plane_only_of_lifted_scenes(observed):
     def asked(observation):
         return [check.metric for check in checks_of(observation)[1]].count("out_of_plane")
 
@@ -247,7 +247,7 @@ def test_only_what_is_lifted_is_asked(observed):
     assert asked(planar[0] if isinstance(planar, tuple) else planar) == 0
 
 
-def test_a_cell_without_an_answer_owes_no_plane(observed):
+def test_no_plane_bound_for_a_cell_without_an_answer(observed):
     crashed = replace(observed(0.0), outcome=Outcome.CRASHED, metrics={})
     assert "out_of_plane" not in {row.metric for row in rows_of("run", [crashed])}
 
@@ -290,7 +290,7 @@ def test_saddle_growth_beyond_floating_point():
     assert bounds.saddle(701.0) == bounds.saddle(1e9) == math.cosh(700.0)
 
 
-def test_an_attitude_is_no_place():
+def test_attitude_not_counted_as_a_position():
     """A disc at 3, 4 m that has turned by 1000 rad is 5.5 m across, and owes its plane no more than that."""
     turned = Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 1000.0))
     assert size_across(flying(turned, (0.0, 0.0))) == pytest.approx(5.5, rel=1e-12)

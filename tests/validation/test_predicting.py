@@ -38,7 +38,7 @@ def few(monkeypatch):
     monkeypatch.setattr(predicting, "TOGETHER", 5)
 
 
-def test_side_by_side_laws_say_what_they_say_here(few):
+def test_laws_in_parallel_processes_agree(few):
     found = foretold(ASKED, 2)
     assert list(found) == ASKED
     for (slot, *row), said in found.items():
@@ -46,11 +46,11 @@ def test_side_by_side_laws_say_what_they_say_here(few):
     assert len({said[0][1] for said in found.values()}) > len(METRICS)  # no two rows were taken for each other
 
 
-def test_few_rows_are_asked_where_they_are_needed():
+def test_few_rows_predicted_on_demand():
     assert len(ASKED) < predicting.MANY and foretold(ASKED) == {}
 
 
-def test_rows_are_judged_by_what_was_asked_ahead(few, monkeypatch):
+def test_rows_judged_by_predictions_made_before(few, monkeypatch):
     alone = rows_of("run", SEEN)
 
     def not_here(*row):

@@ -40,7 +40,7 @@ def test_proof_defaults_of_the_quick_suite_and_reason(proofs):
     assert proofs(PROOF) == (own,)
 
 
-def test_all_that_can_be_said_is_read_with_its_kind(proofs):
+def test_all_fields_of_a_proof_with_their_types(proofs):
     (proof,) = proofs(
         "[[family.proof]]\n"
         'cell = { profile = "tuned", dimension = 2, metric = "creep", params = { e = 1, mu = 0.1 }, iterations = 4, '

@@ -65,7 +65,7 @@ def test_coordinates_at_the_end_and_between_samples(dimension, name, column):
 
 
 @pytest.mark.parametrize("name", ["ball.z", "ball.vz"])
-def test_a_plane_has_no_third_axis(name):
+def test_no_third_axis_in_the_plane(name):
     with pytest.raises(AssertionError):
         quantity(scene_of(2), moving(2), name)
 
@@ -145,7 +145,7 @@ def test_forces_in_space_have_three_components():
     assert forces == pytest.approx([4.0, 8.0, 12.0])
 
 
-def test_a_force_that_is_not_there_says_why():
+def test_missing_force_with_its_reason():
     assert quantity(scene_of(2), moving(2), "ball.fy") == (None, "contacts were not recorded")
     assert quantity(scene_of(2), pushed(2, []), "ball.fy") == (None, "contacts were not recorded")
     blank = pushed(2, [[(0, 1, (math.nan, math.nan))]] * 16)

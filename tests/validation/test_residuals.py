@@ -167,7 +167,7 @@ def nothing(reason):
     return dict.fromkeys(LAWS, (None, reason))
 
 
-def test_why_there_is_nothing_is_said_of_every_law():
+def test_reason_for_a_missing_residual_of_every_law():
     scene, found = sliding()
     assert residuals(scene, replace(found, contacts=None)) == (nothing("the engine reports no contacts"), 0)
     empty = ContactRecord(np.array([1]), np.array([0, 0]), Contacts.from_rows([], 2))

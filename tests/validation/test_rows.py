@@ -156,7 +156,7 @@ def test_the_floor_of_a_value_is_the_largest_move_of_its_moved_starts(others, fl
     ("value", "other", "found"),
     [(0.75, 0.5, 0.25), (None, 0.5, None), (0.5, None, None), (1e308, -1e308, None), (1e308, 1e308, 0.0)],
 )
-def test_a_difference_that_is_no_number_is_missing(value, other, found):
+def test_difference_with_a_nan_as_missing(value, other, found):
     assert rows._difference(value, other) == found
 
 

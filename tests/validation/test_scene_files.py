@@ -129,7 +129,7 @@ def test_a_density_gives_mass_and_inertia_and_says_so(tmp_path):
     assert [note.partition(":")[0] for note in canonical.notes] == ["ball.mass", "ball.inertia"]
 
 
-def test_nothing_is_said_where_everything_is_given(tmp_path):
+def test_no_note_on_a_complete_file(tmp_path):
     assert stated(tmp_path, GOOD).notes == ()
 
 
@@ -177,7 +177,7 @@ def judged(canonical, trajectory):
     return {check.metric: abs(measured[check.metric][0] - check.truth) <= check.bound for check in checks}
 
 
-def test_numbers_that_a_user_states_are_judged(tmp_path):
+def test_stated_numbers_of_a_file_judged(tmp_path):
     canonical = stated(tmp_path, GOOD + CHECK)
     found = judged(canonical, falling(canonical.scene(2)))
     assert found["at[0.1 s][ball.vy]"] and found["final[ball.angle]"]
@@ -280,7 +280,7 @@ def test_a_body_may_have_a_slash_in_its_name():
 
 
 @pytest.mark.parametrize("name", ["none.toml", "none.xml", "none\0.toml", "."])
-def test_what_cannot_be_read_is_told_once(tmp_path, name):
+def test_unreadable_file_told_once(tmp_path, name):
     with pytest.raises(SceneError) as refused:
         read_text(tmp_path / name)
     assert str(refused.value).count("cannot read") == 1
@@ -335,7 +335,7 @@ def test_invalid_growth_factor_refused_with_its_name(tmp_path, stated, said):
         load_stated(path)
 
 
-def test_a_spatial_scene_has_no_plane_to_leave(tmp_path):
+def test_no_plane_departure_of_a_spatial_scene(tmp_path):
     path = tmp_path / "ball.toml"
     path.write_text(
         'name = "ball"\ndimension = 3\ngravity = [0.0, 0.0, -10.0]\nduration = 1.0\ngrowth = 10.0\n'

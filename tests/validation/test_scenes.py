@@ -29,7 +29,7 @@ def families(checks):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_a_scene_says_what_it_is(name):
+def test_text_of_a_scene(name):
     canonical = CATALOGUE[name]
     assert canonical.name == name and canonical.title and canonical.law
     drawn = [line for line in canonical.figure.splitlines() if line.startswith("    ")]

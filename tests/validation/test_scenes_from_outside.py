@@ -134,7 +134,7 @@ def test_a_broken_scene_is_named_by_the_doctor_and_costs_nothing_else(site, name
         matching(name)
 
 
-def test_nobody_takes_the_place_of_one_of_ours(site):
+def test_names_of_our_scenes_protected(site):
     ours = CATALOGUE["impact"]
     install(site, catalogue.GROUP, {"impact": "mypackage.bad:SCENE"}, bad="SCENE = 7")
     forget()

@@ -20,7 +20,7 @@ def at(x, y, z, attitude=LEVEL):
     return np.array([[x, y, z, *attitude]])
 
 
-def test_a_hull_is_as_far_as_the_box_that_it_is():
+def test_distances_of_a_box_as_a_hull():
     pytest.importorskip("coal")
     random = np.random.default_rng(3)
     for _ in range(40):

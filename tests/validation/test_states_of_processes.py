@@ -35,7 +35,7 @@ def setting(thing, name, value):
     return (lambda: setattr(thing, name, value)), (lambda: setattr(thing, name, old))
 
 
-def test_what_is_not_changed_is_not_named():
+def test_unchanged_state_not_named():
     assert state.changed(state.taken()) == ""
 
 
@@ -51,7 +51,7 @@ def test_what_is_not_changed_is_not_named():
         ("validation.running.state.State.__eq__", lambda: setting(state.State, "__eq__", len)),
     ],
 )
-def test_what_a_cell_may_change_is_named(name, change):
+def test_allowed_changes_by_a_cell(name, change):
     assert seen(*change()) == name
 
 
@@ -70,7 +70,7 @@ def test_changed_recursion_limit_umask_handler_and_signal_named():
                 lambda: signal.pthread_sigmask(signal.SIG_UNBLOCK, one)) == "signal handlers"  # fmt: skip
 
 
-def test_a_thread_that_goes_on_and_a_module_that_is_gone(monkeypatch):
+def test_lasting_thread_and_missing_module_named(monkeypatch):
     ended = threading.Event()
     thread = threading.Thread(target=ended.wait)
     assert seen(thread.start, lambda: (ended.set(), thread.join())) == "threads"
@@ -87,7 +87,7 @@ def test_a_folder_and_traps_of_numbers_are_named(tmp_path):
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the mode's number is this processor's")
-def test_a_rounding_mode_is_seen_by_what_sums_are():
+def test_rounding_mode_detected_by_sums():
     to_nearest, upward = 0, 0x800
     known = state._rounding()
     assert state._C.fegetround() == to_nearest
@@ -161,7 +161,7 @@ def test_numerical_library_asked_by_its_name(monkeypatch):
         assert state._libm() is None
 
 
-def test_what_a_system_does_not_have_is_nothing(monkeypatch):
+def test_absent_system_facts_as_nothing(monkeypatch):
     reading, writing = os.pipe()
     os.close(writing)
     there = os.fstat(reading)

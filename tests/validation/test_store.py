@@ -38,7 +38,7 @@ def test_unfinished_run_resumed_and_finished_one_not(tmp_path):
     assert second.observations(run)[0].metrics["rebound_ratio"][0] == 0.8
 
 
-def test_another_plan_is_another_run(tmp_path):
+def test_other_plan_as_another_run(tmp_path):
     store = Store(tmp_path)
     first, _ = store.start("test", SLOTS)
     second, _ = store.start("test", SLOTS[:2])
@@ -110,7 +110,7 @@ def test_a_store_that_is_closed_says_that_it_cannot_write(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a b", "x" * 200 + "\n", "20260101-000000\n", "", "20260101-000000; DROP"])
-def test_an_id_that_is_none(name):
+def test_invalid_run_id(name):
     row = [name, "2026-01-01T00:00:00+00:00", "abc", "{}", "title", "[]", 1]
     with pytest.raises(ValueError, match=r"^run '.{0,80}' is damaged \(id\)$") as error:
         store_module.run_of(row)

@@ -184,7 +184,7 @@ def test_a_folder_with_the_name_of_an_address(tmp_path, name):
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "ours"])
 
 
-def test_a_lock_that_lasts(tmp_path, monkeypatch):
+def test_lasting_lock(tmp_path, monkeypatch):
     """Who writes says that it waits, and writes when it is gone."""
     run = filled(tmp_path)
     made = Store(tmp_path)

@@ -179,7 +179,7 @@ def test_every_check_states_unit_reason_and_source():
                 assert check.bound > 0.0 and math.isfinite(check.bound)
 
 
-def test_the_worked_example_is_a_scene():
+def test_worked_example_of_the_docs_as_a_scene():
     scene = CATALOGUE["impact"].scene(2, {"e": 0.8, "v": 6.0, "mass": 0.5})
     truth = CATALOGUE["impact"].exact(scene)
     assert truth["rebound_speed"] == pytest.approx(4.8, abs=1e-15)

@@ -34,7 +34,7 @@ EXPLODES = Known(Finding(FAMILY, None, diverged=True), True)
 
 
 @given(st.floats(allow_nan=True, allow_infinity=True))
-def test_physics_is_the_tolerance_and_nothing_else(value):
+def test_physics_verdict_by_the_tolerance_alone(value):
     expected = Physics.PASS if math.isfinite(value) and abs(value - 1.0) <= 0.1 else Physics.FAIL
     assert judge_physics(value, CHECK) is expected
 
@@ -86,7 +86,7 @@ def test_a_divergence_is_a_fail_and_known_only_if_listed_as_one(known, standing)
     assert "the state is not finite" in verdict.reason
 
 
-def test_why_there_is_no_value_is_said():
+def test_reason_of_a_missing_value():
     assert "there is no apex" in judge(None, CHECK, (), NEW, "there is no apex").reason
 
 

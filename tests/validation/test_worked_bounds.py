@@ -242,7 +242,7 @@ STATED = {
 
 
 @pytest.mark.parametrize("name", STATED)
-def test_a_bound_is_its_number_and_says_why(name):
+def test_bound_with_its_number_and_reason(name):
     arguments, value, because = STATED[name]
     bound = getattr(bounds, name)(*arguments)
     assert bound.value == pytest.approx(value, rel=1e-12)

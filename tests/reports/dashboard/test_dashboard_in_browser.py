@@ -78,7 +78,7 @@ def test_no_width_makes_the_page_scroll_sideways(browser, dashboard_file, width)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing(browser, dashboard_file, scheme):
+def test_accessibility_audit_without_findings(browser, dashboard_file, scheme):
     from axe_playwright_python.sync_playwright import Axe
 
     with opened(browser, dashboard_file, color_scheme=scheme, bypass_csp=True) as page:
@@ -86,7 +86,7 @@ def test_axe_finds_nothing(browser, dashboard_file, scheme):
         assert [(each["id"], each["nodes"][0]["html"][:200]) for each in found] == []
 
 
-def test_a_name_that_is_markup_is_text(browser, tmp_path):
+def test_markup_in_a_name_shown_as_text(browser, tmp_path):
     from reports.brief import Summary
     from reports.dashboard import render
     from reports.dashboard.series import _divided, _Entry

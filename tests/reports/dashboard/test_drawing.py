@@ -124,7 +124,7 @@ def test_round_off_error_called_exact_and_a_time_never():
     assert len({y for _, y in dots_of(tree)[:2]}) == 1  # both are the same answer
 
 
-def test_signs_of_an_error_do_not_matter():
+def test_signs_of_errors_ignored():
     assert line_of(drawn([point(0, error=-0.2), point(1, error=0.4)]), "line").tolist() == pytest.approx(
         line_of(drawn([point(0, error=0.2), point(1, error=-0.4)]), "line")
     )

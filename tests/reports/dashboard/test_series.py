@@ -83,7 +83,7 @@ def test_values_that_repeat_exactly_have_a_step_wherever_they_change(n):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
-def test_a_series_too_short_for_two_levels_has_no_step(n):
+def test_short_series_without_a_step(n):
     assert steps([1.0] + [9.0] * (n - 1), TIME) == []
 
 
@@ -152,7 +152,7 @@ def test_opening_of_the_page_with_grid_and_largest_steps():
     assert '<span class="h w20">100 %</span>' in page and '<span class="h w5">25 %</span>' in page
 
 
-def test_a_history_of_one_run_says_so_and_draws_nothing():
+def test_history_of_one_run_without_a_drawing():
     page = render(released("e", {scene: states[:1] for scene, states in HISTORY.items()}), "generated")
     assert "One run; nothing to compare yet." in page and "<figure" not in page and "<script>" not in page
 
@@ -276,7 +276,7 @@ def test_dashboard_of_500_runs_and_benches_below_ten_seconds(tmp_path):
     assert took < 10.0  # s, of one core; imports not counted
 
 
-def test_errors_that_are_exact_are_one_level():
+def test_exact_errors_as_one_level():
     key = ("e", "p", "impact", 2)
     sizes = [1e-16, 3e-9, 0.0, 2e-12]
     (panel,) = _divided(
@@ -405,7 +405,7 @@ def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_pat
     assert "<svg" in text and "4 series of " in text
 
 
-def test_a_store_without_a_finished_run_is_one_line(tmp_path):
+def test_store_without_a_finished_run_in_one_line(tmp_path):
     Store(tmp_path).close()
     done = CliRunner().invoke(main, ["dashboard", "--out", str(tmp_path)])
     assert done.exit_code == 2 and "has no finished run" in done.output

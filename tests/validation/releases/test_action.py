@@ -89,5 +89,5 @@ def test_comparison_without_an_answer_from_the_base(job):
     assert "libtoy.so.1" in (home / "crosscheck-out" / "base.json").read_text()
 
 
-def test_an_engine_that_is_not_there_stops_the_job(job):
+def test_missing_engine_stops_the_job(job):
     job("3.0", 2, ENGINE="another")

@@ -26,7 +26,7 @@ def test_a_change_is_found_in_log2_questions_wherever_it_is(count):
         assert len(asked) <= math.ceil(math.log2(count)) and len(set(asked)) == len(asked)
 
 
-def test_silent_releases_are_passed_over():
+def test_silent_releases_skipped():
     answers = [True, None, True, None, None, False, None, False]
     before, after = search(8, lambda index: answers[index])
     assert (before, after) == (2, 5)
@@ -78,7 +78,7 @@ def test_a_value_that_moves_within_its_floor_has_not_changed():
     assert (found.before, found.after) == (1, 2) and found.change.kind is Kind.ERROR
 
 
-def test_an_end_that_does_not_answer_is_said():
+def test_end_of_a_bisection_without_an_answer():
     found = bisect(3, [SLOT], "rebound_ratio", Engine([0.5, 0.5, None]))
     assert isinstance(found, Unchanged) and "no wheel" in found.reason
 
@@ -96,7 +96,7 @@ def test_the_most_serious_cell_is_followed():
     assert found.change.kind is Kind.FLIP and "e=0.5" in found.change.params
 
 
-def test_a_check_that_no_row_has_is_said():
+def test_check_without_a_row_told():
     found = bisect(2, [SLOT], "rebound", Engine([0.5, 0.4]))
     assert isinstance(found, Unchanged) and "no such check" in found.reason
 
@@ -174,7 +174,7 @@ def test_creeping_value_within_its_floor_by_the_ends():
     assert "0.4" in found.change.before and "0.4027" in found.change.after
 
 
-def test_two_ends_without_a_value_are_not_the_same():
+def test_two_ends_without_a_value_differ():
     class Silent(Engine):
         def __call__(self, index, cells):
             told = super().__call__(index, cells)

@@ -50,7 +50,7 @@ def test_mujoco_release_4_0_0_of_two_distributions():
     assert [r.distribution for r in chosen("mujoco", "3.17.0,4.0.0")] == ["mujoco", "mujoco-core"]
 
 
-def test_a_range_is_all_that_the_registry_has_in_it(toy):
+def test_range_with_every_release_of_the_registry(toy):
     assert [r.version for r in chosen("toy", "1.0.0..1.2.0")] == ["1.0.0", "1.1.0", "1.2.0"]
     assert [r.version for r in chosen("toy", "1.1.0..")] == ["1.1.0", "1.2.0", "2.0.0"]
     assert [r.version for r in chosen("toy", "..1.1")] == ["1.0.0", "1.1.0"]
@@ -61,7 +61,7 @@ def test_a_range_is_all_that_the_registry_has_in_it(toy):
 
 
 @pytest.mark.parametrize("text", ["", ",", "3.0;rm", "a..b", "1.0.0..--pre", "1.0 2.0", "@x", "1.0..2.0..3.0"])
-def test_what_is_no_version_is_one_line(toy, text):
+def test_invalid_version_in_one_line(toy, text):
     with pytest.raises(EngineError, match=r"^releases: [^\n]*$"):
         chosen("toy", text)
 
@@ -88,7 +88,7 @@ def test_releases_of_optional_engines_can_be_chosen(engine, distribution, inside
     assert unknown.unknown.endswith("--try runs it all the same")
 
 
-def test_a_registry_that_does_not_answer_is_one_line(toy, monkeypatch, tmp_path):
+def test_registry_without_an_answer_in_one_line(toy, monkeypatch, tmp_path):
     monkeypatch.setenv("PIP_FIND_LINKS", str(tmp_path))
     offered.cache_clear()
     with pytest.raises(RegistryError, match=r"^releases: [^\n]*toyphysics[^\n]*$"):

@@ -57,14 +57,14 @@ def test_every_release_asked_before_a_change_is_called_the_only_one(call):
 
 
 @pytest.mark.long
-def test_nothing_changed_is_said_and_is_no_alarm(call):
+def test_unchanged_result_without_an_alarm(call):
     slow = ["--dim", "2", "--param", "e=0.5", "--param", "v=2", "--jobs", "1"]
     done = call("bisect", "toy", "1.0.0,1.2.0", "impact", "--check", "rebound_ratio", *slow)
     assert "is the same in 1.0.0 and 1.2.0" in done.stdout
 
 
 @pytest.mark.long
-def test_an_end_that_does_not_answer_is_incomplete(call):
+def test_end_without_an_answer_as_incomplete(call):
     done = call("bisect", "toy", "1.0.0,1.1.0", "impact", "--check", "rebound_ratio", *CELL, status=4)
     assert "1.1.0 cannot run: cannot be imported" in done.stdout
 

@@ -46,13 +46,13 @@ def test_environment_with_release_numpy_and_receipt(made):
     assert [each.name for each in environments.found()] == [made.name]
 
 
-def test_it_is_built_once(made, monkeypatch):
+def test_environment_built_once(made, monkeypatch):
     monkeypatch.setattr(environments, "_install", lambda *args: pytest.fail("it was installed again"))
     assert environments.build(toy_release()) == made
     assert environments.existing(toy_release()) == made
 
 
-def test_what_is_imported_there_does_not_change_it(made):
+def test_imports_leave_an_environment_unchanged(made):
     subprocess.run([made.python, "-c", "import toyphysics"], check=True)
     assert environments.check(made) == ""
 
@@ -68,7 +68,7 @@ def test_an_environment_that_was_changed_is_not_trusted_and_made_anew(made):
     assert "0.5" not in module.read_text()
 
 
-def test_a_file_that_was_added_is_noticed_as_well(made):
+def test_added_file_in_an_environment_detected(made):
     (site,) = made.path.glob("lib/python*/site-packages")
     (site / "sitecustomize.py").write_text("")
     assert environments.check(made)
@@ -90,7 +90,7 @@ def test_a_release_that_does_not_exist_is_one_line_and_leaves_nothing(own_cache)
     assert [path for path in environments.folder().iterdir() if path.suffix != ".lock"] == []
 
 
-def test_what_cannot_be_made_is_one_line(own_cache, monkeypatch):
+def test_failed_environment_in_one_line(own_cache, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc")
     with pytest.raises(EngineError, match="cannot be made"):
         environments.build(toy_release())
@@ -168,7 +168,7 @@ def test_a_folder_of_that_name_without_a_receipt_is_replaced(own_cache):
     assert environments.check(environments.build(toy_release())) == ""
 
 
-def test_a_receipt_that_is_none_is_no_environment(made):
+def test_environment_with_an_invalid_receipt(made):
     (made.path / environments.RECEIPT).write_text("[1, 2")
     assert environments.found() == []
     (made.path / environments.RECEIPT).write_text(json.dumps([1]))

@@ -366,7 +366,7 @@ def test_rows_explained_by_one_note_under_it(noted):
     assert [line.split(":")[0] for line in lines] == ["  * default impact", "  * other impact"]
 
 
-def test_without_notes_everything_is_unexplained():
+def test_changes_without_notes_unexplained():
     assert notes.explanations("chipmunk", "impact", "tuned", "1", "2") == ["unexplained"]
 
 
@@ -377,7 +377,7 @@ def test_without_notes_everything_is_unexplained():
      ("says", "tells", "needs exactly"), ('"notes of 2.5"', '" "', "source is missing"),
      ("[[change]]", "[[change]", ":")],
 )  # fmt: skip
-def test_notes_that_are_wrong_are_one_line(noted, old, new, said):
+def test_wrong_notes_in_one_line(noted, old, new, said):
     noted(NOTE.replace(old, new))
     with pytest.raises(FindingsError, match=r"^[^\n]*$") as caught:
         notes.notes_of("toy")

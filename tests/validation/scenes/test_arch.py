@@ -112,7 +112,7 @@ def test_friction_that_balances_the_springers(params):
 
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
-def test_it_gives_way_as_newton_s_laws_say(params, ratio):
+def test_arch_fall_by_newton_s_laws(params, ratio):
     _, scene = made("arch", ratio=ratio, **params)
     p = scene.params
     found = accelerations(scene, ratio * least_friction(scene), p["g"])
@@ -131,7 +131,7 @@ def test_arch_by_newton_s_laws_in_every_step_order(params, ratio, order):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_an_arch_that_goes_otherwise_fails(size):
+def test_arch_with_another_motion_fails(size):
     canonical, scene = made("arch", ratio=0.8)
     for factors, metric in (
         ((1.0 - 3.0 * size, 1.0, 1.0), "parting[left]"),
@@ -184,7 +184,7 @@ def test_the_replay_s_ghost_sinks_with_the_keystone():
     assert canonical.track(scene).position(record.t[-1]) == pytest.approx(tuple(record.pose[-1, 3, :2]), abs=1e-12)
 
 
-def test_all_stones_that_rise_together_fail():
+def test_arch_that_rises_as_a_whole_fails():
     canonical, scene = made("arch", ratio=0.8)
     raised = run(scene)
     raised.pose[-1, 1:, 1] += 1e-3

@@ -103,7 +103,7 @@ def test_two_balls_solve_the_equations_of_momentum_and_restitution(e, ratio):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_blow_of_two_balls_that_is_off_fails(size):
+def test_blow_of_two_balls_with_a_fault(size):
     canonical, scene, truth = made("head_on")
     good = [(0, 0, truth["first_speed"]), (1, 0, truth["second_speed"])]
     assert failing(canonical, scene, ended(scene, good)) == set()
@@ -302,7 +302,7 @@ def test_one_rounded_number_at_a_time_in_the_booking_law(dimension):
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_bar_that_turns_wrongly_fails(size):
+def test_bar_with_a_wrong_turn(size):
     canonical, scene, truth = made("off_centre")
     speeds = [(1, 1, truth["ball_speed"]), (0, 1, truth["bar_speed"])]
     assert failing(canonical, scene, ended(scene, speeds, (0, truth["spin"]))) == set()
@@ -375,7 +375,7 @@ def test_a_light_ball_is_almost_three_times_as_fast():
 
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
-def test_a_throw_that_is_off_fails(size):
+def test_throw_with_a_fault(size):
     canonical, scene, truth = made("stacked_balls")
     good = [(1, 1, truth["large_speed"]), (2, 1, truth["small_speed"])]
     assert failing(canonical, scene, ended(scene, good)) == set()

@@ -45,7 +45,7 @@ def test_duration_past_rest_or_six_arcs(e, end):
     assert bounce.rest_time(e, HEIGHT, G) == (math.inf if e == 1.0 else pytest.approx(0.5 * (1.0 + e) / (1.0 - e)))
 
 
-def test_what_is_exact():
+def test_exact_numbers_of_a_bounce():
     assert bounce.exact(scene()) == pytest.approx(
         {f"apex[{n}]": 0.25**n for n in range(1, 6)}
         | {"apex_interval_ratio": 0.5, "apex_growth": 0.0, "force_in_flight": 0.0, "rest_time": 1.5}
@@ -75,7 +75,7 @@ def test_the_exact_clearance_is_parabolas_between_exact_bounces(t, height):
         assert track.position(t) == pytest.approx((*(0.0,) * (dimension - 1), 0.5 + height), abs=1e-9)
 
 
-def test_without_restitution_it_lies_where_it_lands():
+def test_rest_at_the_landing_without_restitution():
     assert [bounce.clearance(0.0, HEIGHT, G, t) for t in (0.25, 0.5, 0.75, 9.0)] == [0.75, 0.0, 0.0, 0.0]
 
 
@@ -159,7 +159,7 @@ def test_apex_error_over_resolved_apexes_relative_to_the_drop():
     assert bounce.apex_error(made, 1 / 256, missing) == (0.125, "")
 
 
-def test_an_apex_that_is_no_number_leaves_no_error():
+def test_nan_apex_without_an_error():
     for heights in ((math.nan, 0.0625, 0.0, 0.0, 0.0), (0.25, math.nan, 0.0, 0.0, 0.0)):
         value, why = bounce.apex_error(scene(), 1 / 256, apexes(*heights))
         assert math.isnan(value) and why == ""

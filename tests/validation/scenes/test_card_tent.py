@@ -210,7 +210,7 @@ def test_tent_standing_or_sliding_against_its_threshold():
     assert failing(canonical, stands, fallen) == {"moved", "head_load", "floor_load"}
 
 
-def test_a_tent_of_which_one_card_stays_fails():
+def test_tent_with_one_standing_card():
     canonical, slides = made("card_tent", ratio=0.8)
     half = sliding(slides)
     half.pose[:, 2], half.twist[:, 2] = half.pose[0, 2], 0.0

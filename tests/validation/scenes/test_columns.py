@@ -99,7 +99,7 @@ def test_rest_by_the_fastest_body_at_a_hundredth_of_a_gravity_step():
     assert values(scene, replace(trajectory, twist=twist))["settle_time"] == 100 * DT
 
 
-def test_displacements_are_seen():
+def test_displacements_of_a_column_detected():
     scene = column()
     trajectory = resting(scene)
     pose = trajectory.pose.copy()
@@ -157,7 +157,7 @@ FALL = 3 * 2.0 * 8.0
         ({}, "NaN"),
     ],
 )
-def test_a_column_stands_sinks_topples_or_explodes(measured, said):
+def test_fate_of_a_column(measured, said):
     assert columns.fate(column(), measured) == said
 
 

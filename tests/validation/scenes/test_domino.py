@@ -189,6 +189,6 @@ def test_domino_that_does_not_end_as_stated_refused(params, named):
         made("domino", **params)
 
 
-def test_the_next_domino_is_told_while_it_rises():
+def test_next_domino_measured_while_it_rises():
     _, scene = made("domino")
     assert math.atan(scene.params["aspect"]) > STRUCK

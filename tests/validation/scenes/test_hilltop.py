@@ -135,7 +135,7 @@ def test_hilltop_with_adhesion_wrong_gravity_or_drag(size):
     assert size < 0.05 or failing(canonical, scene, integrated(scene, 1 / 3840, stuck=5.0 * size)[0])
 
 
-def test_a_disc_that_stays_does_not_leave():
+def test_disc_that_stays_has_no_departure():
     canonical, scene = made("hilltop")
     still = integrated(scene)[0]
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))

@@ -90,7 +90,7 @@ def test_kane_blow_with_wrong_restitution_friction_or_inertia(size):
         assert failing(canonical, scene, recorded(scene, off)) == {metric, "gain"}
 
 
-def test_whoever_takes_the_gain_away_fails():
+def test_motion_without_the_energy_gain_fails():
     """Energy clipped by a smaller normal rebound, the end sticking as it should."""
     canonical, scene = made("kane")
     assert failing(canonical, scene, recorded(scene, blown(scene, e=0.8))) >= {"rise", "spin", "gain"}
@@ -99,7 +99,7 @@ def test_whoever_takes_the_gain_away_fails():
 @pytest.mark.parametrize(
     ("params", "named"), [({"lean": 35.0, "e": 0.1, "v": 10.0}, "lean"), ({"aspect": 0.0}, "aspect"), ({"e": 1.1}, "e")]
 )
-def test_what_lands_twice_or_is_no_rod_is_refused(params, named):
+def test_second_landing_or_other_shape_refused(params, named):
     with pytest.raises(SceneError, match=rf"kane\.{named}"):
         made("kane", **params)
 

@@ -63,7 +63,7 @@ def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
     assert failing(canonical, scene, at_rest(scene)) == {"stands"}
 
 
-def test_a_block_that_leans_on_the_one_below_has_fallen():
+def test_leaning_block_counts_as_fallen():
     """Its end stands on the floor: it has turned by .53 rad and sunk by .17 blocks, less than half of one."""
     canonical, scene = made("overhang", n=2.0, margin=-0.05)
     leaning = at_rest(scene)

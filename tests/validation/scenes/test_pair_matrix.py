@@ -35,7 +35,7 @@ def bouncing(scene, table, dt=DT):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("cross", [0.5, 1.0, 1.5])
-def test_balls_that_obey_the_table_pass_in_every_phase(cross, dt, dimension):
+def test_coefficients_of_balls_by_the_table_in_every_phase(cross, dt, dimension):
     canonical, scene = made("pair_matrix", dimension, cross=cross)
     table = materials(scene.params)
     assert table[3] == pytest.approx((0.4 * cross, 0.05 * cross))
@@ -44,7 +44,7 @@ def test_balls_that_obey_the_table_pass_in_every_phase(cross, dt, dimension):
 
 @pytest.mark.parametrize("size", [0.1, 0.01, 0.001])
 @pytest.mark.parametrize("pair", [0, 1, 2, 3])
-def test_a_pair_that_is_off_is_named(pair, size):
+def test_deviating_pair_named(pair, size):
     canonical, scene = made("pair_matrix")
     for quantity, name in ((0, "restitution"), (1, "friction")):
         table = [list(row) for row in materials(scene.params)]
@@ -70,7 +70,7 @@ def test_ball_without_a_return_has_no_restitution():
     assert measured["restitution[2]"] == measured["friction[2]"] == (None, "it does not come back")
 
 
-def test_impacts_that_would_grip_are_refused():
+def test_impacts_with_gripping_refused():
     with pytest.raises(SceneError, match=r"pair_matrix\.v"):
         made("pair_matrix", v=1.0)
 

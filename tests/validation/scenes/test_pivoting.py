@@ -129,7 +129,7 @@ def test_pivoting_fall_with_wrong_gravity_inertia_slip_or_twist(size):
     assert failing(canonical, scene, twisting) == {"twisted"}
 
 
-def test_a_box_that_does_not_get_there_has_no_time():
+def test_box_that_stops_before_the_edge_has_no_time():
     canonical, scene = made("pivot")
     still = fallen(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))
@@ -140,7 +140,7 @@ def test_a_box_that_does_not_get_there_has_no_time():
     ("params", "named"),
     [({"to": 5.0}, "pivot.to"), ({"to": 62.0, "mu": 9.0}, "pivot.to"), ({"mu": 0.3}, "pivot.mu")],
 )
-def test_what_is_no_fall_over_an_edge_is_refused(params, named):
+def test_motion_other_than_a_fall_over_an_edge_refused(params, named):
     with pytest.raises(SceneError, match=named):
         made("pivot", **params)
 
@@ -281,7 +281,7 @@ def test_pivoting_with_excess_speed_or_a_sliding_block(size):
     assert failing(canonical, scene, slid) == {"slid"}
 
 
-def test_a_block_that_lies_down_has_no_landings():
+def test_lying_block_without_landings():
     canonical, scene = made("rocking_block")
     still = rocking(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))

@@ -52,7 +52,7 @@ def test_truth_of_the_replay_by_successive_blows(params):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_another_gain_and_a_speed_across_fail(size):
+def test_wrong_gain_and_a_speed_across_fail(size):
     canonical, scene = made("restitution_above_one")
     for e in (1.1 * (1.0 - size), 1.1 * (1.0 + size)):
         assert "growth" in failing(canonical, scene, thrown(scene, e=e))
@@ -83,7 +83,7 @@ def test_declaration_of_restitution_above_one_and_its_note():
     assert "gaining" not in passive.as_dict() and list(asked_abilities(passive)) == []
 
 
-def test_only_adapters_that_say_so_get_it():
+def test_restitution_above_one_only_for_declared_adapters():
     _, scene = made("restitution_above_one")
     assert list(asked_abilities(scene)) == [("pairs", "restitution above 1")]
     assert list(asked_abilities(lift(scene))) == [("pairs", "restitution above 1")]

@@ -106,7 +106,7 @@ def test_boards_that_fall_off_or_slip_are_refused(params, named):
         made("rocker", **params)
 
 
-def test_a_board_that_stays_has_no_swings():
+def test_resting_board_without_swings():
     canonical, scene = made("rocker")
     still = integrated(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0), twist=0.0 * still.twist)

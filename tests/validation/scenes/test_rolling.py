@@ -163,7 +163,7 @@ def test_rolling_with_a_bent_path_or_final_slip(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_friction_that_turns_away_from_the_slip_is_seen(size):
+def test_friction_oblique_to_the_slip_detected(size):
     """A cone of which one axis is weaker turns the direction of the slip."""
     canonical, scene = made("masse", 3)
     good = integrated(scene)
@@ -246,7 +246,7 @@ def left(scene, forward, spin, rebound, sideways=0.0):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_bounce_that_is_off_fails(size):
+def test_bounce_with_a_fault(size):
     canonical, scene = made("oblique", 3, mu=0.1, heading=30.0)
     forward, spin, up = 2.64, 0.9, 1.6
     assert failing(canonical, scene, left(scene, forward, spin, up)) == set()

@@ -105,7 +105,7 @@ def test_shove_with_wrong_accelerations_forces_gaps_or_turns(size):
     assert failing(canonical, scene, leaning) == {"turned"}
 
 
-def test_boxes_that_stay_fail():
+def test_boxes_that_stay_at_rest_fail():
     canonical, scene = made("shove")
     still = moving(scene, heavy=1e12)
     still.contacts.rows.impulse[:] = 0.0

@@ -132,7 +132,7 @@ def test_grip_that_flickers_or_differs_between_sides():
     assert failing(canonical, scene, pushed((2, 3), 1, 0.01)) == set()
 
 
-def test_the_grip_is_as_strong_as_its_margin_says():
+def test_grip_strength_by_its_margin():
     """Friction of both faces at the limit, over the weight."""
     for margin in (1.0, 1.05, 7.0):
         _, scene = made("pinch", margin=margin, mu=0.3)

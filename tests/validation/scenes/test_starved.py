@@ -78,14 +78,14 @@ def test_residual_of_a_sweep_by_the_stated_factor(n):
 
 
 @pytest.mark.parametrize(("n", "dt"), [(1, DT), (3, 1 / 60), (5, DT)])
-def test_a_row_that_is_solved_passes(n, dt):
+def test_fully_solved_row_passes(n, dt):
     canonical, scene = made("starved", n=float(n))
     assert failing(canonical, scene, resting(scene, dt=dt)) == set()
     assert failing(canonical, scene, swept(replace(scene, duration=1.0), 20 * n, dt)) == set()
 
 
 @pytest.mark.parametrize(("sweeps", "warm"), [(1, True), (1, False), (2, False), (4, False), (10, False)])
-def test_a_row_that_is_starved_gives_way(sweeps, warm):
+def test_starved_row_gives_way(sweeps, warm):
     """Impulses of the step before are half of the answer: who throws them away starves with ten sweeps."""
     canonical, scene = made("starved")
     found = failing(canonical, scene, swept(scene, sweeps, warm=warm))

@@ -46,7 +46,7 @@ def test_wrong_rebound_or_depth_beyond_a_step(size):
     assert failing(canonical, scene, deep) == {"beyond"}
 
 
-def test_a_ball_that_passes_fails_both():
+def test_ball_passing_through_fails_both_checks():
     canonical, scene = made("thin_wall", v=200.0)
     passed = thrown(scene, swept=False)
     assert failing(canonical, scene, passed) == {"rebound_ratio", "beyond"}
@@ -68,6 +68,6 @@ def test_passage_through_a_thin_wall_without_sweeping(v, dt):
 
 
 @pytest.mark.parametrize("name", ["impact", "head_on", "off_centre", "slide"])
-def test_the_law_is_silent_on_other_scenes(name):
+def test_thin_wall_law_silent_on_other_scenes(name):
     canonical = CATALOGUE[name]
     assert passing_law("rebound_ratio")(canonical.scene(2, {}), DT, canonical.measure) is None

@@ -92,7 +92,7 @@ def test_tumble_with_wrong_inertia_or_a_braked_spin(size):
     assert size < 0.005 or {"flip_time", "energy_drift"} <= failing(canonical, scene, integrated(scene, dt, own=heavy))
 
 
-def test_a_box_that_does_not_turn_over_has_no_time():
+def test_box_without_a_turn_over_has_no_time():
     canonical, scene = made("tumble", 3)
     times = np.arange(10) * DT
     steady = recorded(times, np.tile([1.0, 0.0, 0.0, 0.0], (10, 1)), np.tile([0.0, 3.0, 0.0], (10, 1)), DT)

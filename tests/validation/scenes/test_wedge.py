@@ -60,7 +60,7 @@ def test_lagrange_s_equations_pass_in_every_step_order(params, order):
     )
 
 
-def test_without_friction_it_is_the_textbook_s_formula():
+def test_wedge_without_friction_by_the_textbook():
     p = CATALOGUE["wedge"].complete({"mu": 0.0})
     c, s = math.cos(math.radians(30.0)), math.sin(math.radians(30.0))
     away, pull, load = motion(p)
@@ -68,7 +68,7 @@ def test_without_friction_it_is_the_textbook_s_formula():
     assert pull == pytest.approx(9.81 * s * 3.0 / (2.0 + s * s))
 
 
-def test_it_stays_from_the_angle_of_friction_on():
+def test_wedge_at_rest_from_the_angle_of_friction():
     tan = math.tan(math.radians(30.0))
     assert motion(CATALOGUE["wedge"].complete({"mu": tan * 1.0001}))[:2] == (0.0, 0.0)
     slow = motion(CATALOGUE["wedge"].complete({"mu": tan * 0.9999, "ratio": 1e6}))[1]
@@ -96,13 +96,13 @@ def test_wedge_or_block_with_a_wrong_motion(size):
     assert failing(canonical, scene, drawn) == {"momentum"}
 
 
-def test_a_wedge_that_is_held_fails():
+def test_wedge_held_in_place_fails():
     canonical, scene = made("wedge")
     assert {"given_way", "momentum"} <= failing(canonical, scene, slid(scene, wedge=0.0))
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_what_should_stay_and_moves_or_turns_fails(size):
+def test_resting_wedge_that_moves_or_turns_fails(size):
     canonical, scene = made("wedge", mu=0.7)
     still = slid(scene, wedge=0.0, block=0.0)
     assert failing(canonical, scene, still) == set()
@@ -126,6 +126,6 @@ def test_the_block_lies_on_the_face_and_the_wedge_is_a_right_triangle():
 
 
 @pytest.mark.parametrize("params", [{"slope": 60.0, "ratio": 0.01}, {"slope": 60.0, "mu": 1.5}])
-def test_what_tips_is_refused_by_name(params):
+def test_tipping_block_refused_by_name(params):
     with pytest.raises(ValueError, match=r"wedge\.ratio"):
         made("wedge", **params)

@@ -119,7 +119,7 @@ def test_wipe_with_a_missing_contact_wrong_sign_or_friction():
     assert failing(canonical, scene, changed(good, 0.999, axes=[0])) == {"friction[mean]"}
 
 
-def test_a_hand_that_gives_way_fails():
+def test_yielding_hand_fails():
     canonical, scene = made("wipe")
     good = held(scene)
     for axis in (0, 1):

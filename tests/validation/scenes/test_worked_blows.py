@@ -60,7 +60,7 @@ def test_round_off_of_an_overlap_removed_in_a_step():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_is_measured_of_an_overlap(dimension):
+def test_measures_of_an_overlap(dimension):
     """One ball is pushed 0.1 m in, then both out again: the common centre of 3 and 12 kg follows."""
     canonical, scene = made("overlap", dimension, **INSIDE)
     record = still(scene, 4)
@@ -151,7 +151,7 @@ def test_closing_plate_allowance_grows_by_four_steps_a_blow():
     )
 
 
-def test_the_ghost_goes_to_and_fro():
+def test_truth_of_the_replay_between_two_walls():
     canonical, scene = made("closing_wall", 3, **CLOSING)
     ghost = canonical.track(scene)
     assert ghost.body == "ball"

@@ -48,7 +48,7 @@ TRUTH = {"passing_time": TIME, "passing_spin": SPIN, "edge_moved": 0.0}
 CARRIED = 0.25 / 64 * SQUARES + 1 / 512
 
 
-def test_what_a_fall_over_an_edge_forgives():
+def test_allowance_of_a_fall_over_an_edge():
     found = stated(fall_checks(ON, START, END, DT, TRUTH))
     assert found == {
         "passing_time": ("s", near(1.5 / 64 + TIME * CARRIED / 0.5)),
@@ -121,7 +121,7 @@ def test_block_at_one_limit_stays_and_at_both_is_refused():
         made("tilt_table", ratio=2.0, mu=0.5, aspect=0.25)
 
 
-def test_what_a_tilted_table_forgives():
+def test_allowance_on_a_tilted_table():
     table = CATALOGUE["tilt_table"]
     fall = 9.81 / 4096
     _, stays = made("tilt_table", height=2.0)
@@ -175,7 +175,7 @@ def test_the_error_on_a_tilted_table_is_in_heights_or_relative():
     assert error(topples, DT, {"passing_time": (None, "never")}) == (None, "never")
 
 
-def test_what_is_measured_on_a_tilted_table():
+def test_measures_on_a_tilted_table():
     """A block of 1.2 by 2 m: it goes 0.3 m and back, turns by 1/100, and its edge goes with it."""
     canonical, scene = made("tilt_table", 3, aspect=0.6, height=2.0, mu=2.0)
     t = np.arange(9) * DT

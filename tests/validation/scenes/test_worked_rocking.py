@@ -84,7 +84,7 @@ def test_friction_that_a_rocking_board_needs_is_asked_for():
         made("rocker", **{**BOARD, "g": 0.4, "mu": 0.99 * needed})
 
 
-def test_what_a_rocking_board_forgives():
+def test_allowance_of_a_rocking_board():
     """Of each swing a first-order step leaves out the integral of |a| dt/sqrt(2), and a^2 dt/(2 g) as height."""
     canonical, scene = made("rocker", 3, **BOARD)
     t, _, a = swung()
@@ -148,7 +148,7 @@ def test_boards_at_their_limits_are_refused(params, named):
     made("rocker", **{**BOARD, "length": 0.6 * THETA / 0.45 * 1.001, "mu": 9.0})
 
 
-def test_what_is_measured_of_a_rocking_board():
+def test_measures_of_a_rocking_board():
     """Half a turn of a cosine a swing, in two fifths of its angle, rolling but for 1/50 m; a yaw of 0.5, twice.
 
     It begins a tenth of a metre off where it should be, and a hundredth more in the next sample: no slip from there on.

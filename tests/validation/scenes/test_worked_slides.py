@@ -104,7 +104,7 @@ def moved(scene, dt=DT):
 
 
 @pytest.mark.parametrize("name", ["seam", "far_origin"])
-def test_what_is_measured_of_a_slide(name):
+def test_measures_of_a_slide(name):
     canonical, scene = made(name, 3, g=4.0)  # it slides for 2 s
     assert canonical.measure(scene, moved(scene)) == {
         "stopping_distance": (pytest.approx(1.2), ""),
@@ -156,7 +156,7 @@ def test_place_round_off_by_distance_or_farthest_plate():
         assert hop.bound == pytest.approx(9.81e-16 + 1e-12 * farthest, rel=1e-3, abs=0.0)
 
 
-def test_a_ghost_in_space_starts_where_the_box_does():
+def test_start_of_the_replay_truth_in_space():
     canonical, scene = made("slide", 3, heading=30.0)
     box = scene.bodies[-1]
     moved = replace(scene, bodies=(*scene.bodies[:-1], replace(box, pose=(1.0, -2.0, *box.pose[2:]))))
