@@ -162,7 +162,7 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
 
 
 def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
-    """The other profile that passes every row, or the nearest one; or that none is better, or none was run."""
+    """The other profile that passes every row, or the one that fails least; or that none is better, or none was run."""
     failed = _failing(own[profile])
     if all(mark_of(row) == "invalid" for row in failed):
         return "the measurement contradicts itself, so it says nothing about the engine"
@@ -189,8 +189,8 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
     if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted])
     failing = _failing(others[best])
-    nearer = f"profile {best} is nearer ({len(failing)} of {len(others[best])} fail): {_wrong(others[best], failing)}"
-    return "; ".join([nearer, *listed, *unlisted])
+    fewer = f"profile {best} fails less ({len(failing)} of {len(others[best])}): {_wrong(others[best], failing)}"
+    return "; ".join([fewer, *listed, *unlisted])
 
 
 def _fix(profiles: Sequence[str]) -> str:

@@ -204,7 +204,7 @@ def test_nearer_profile_not_called_a_cure():
         row("incline", 2, "bullet", "tuned", "known" if r > 0.8 else "pass", 0.01, 0.0, ratio=r) for r in (0.5, 0.9)
     ]
     (answer,) = answers(rows)
-    assert answer.cure.startswith("profile tuned is nearer (1 of 2 fail): creeps at 0.01")
+    assert answer.cure.startswith("profile tuned fails less (1 of 2): creeps at 0.01")
 
 
 def test_time_cut_off_by_the_end_not_shown():

@@ -321,7 +321,11 @@ SCENE = CanonicalScene(
         ({"e": 0.5, "height": 1.0}, {"e": 1.0, "height": 1.0}, {"height": 1.03}, {"height": 1.1}),
         ({"height": 1.07}, {"e": 1.0, "height": 1.05}),
     ),
-    words={"apex": "rebounds at {value}", "apex=0": metrics.SILENT},
+    words={
+        "apex": "rebounds at {value}",
+        "apex=0": metrics.SILENT,
+        "force_in_flight": "reports a contact force of {value} of its weight in flight",
+    },
     seen_as={"apex[1]": rebound},
     restitution=Restitution("apex", "e", "height", APEXES),
 )

@@ -159,5 +159,9 @@ SCENE = CanonicalScene(
         error,
         "the whole scene: approach, impacts, departure",
     ),
-    words={"speed": "leaves a ball with {value}", "energy_defect": "changes the energy by {value} (relative)"},
+    words={
+        "speed": "leaves a ball with {value}",
+        "energy_defect": "changes the energy by {value} (relative)",
+        "momentum_defect": "changes the momentum by {value} (relative)",
+    },
 )
