@@ -44,7 +44,7 @@ def test_default_is_what_a_fresh_world_holds():
     assert chosen["maximum_speed"] == told.maximum_linear_speed and chosen["continuous"] == world.continuous_enabled
 
 
-def test_push_speed_of_default_stated_once():
+def test_default_push_speed_of_3_metres_per_second():
     """A deep overlap of a world without any tuning comes out as one that is tuned to 3 m/s, and not to another."""
     import pyb2d3
 

@@ -54,7 +54,7 @@ def test_colliding_bodies_of_a_kit_scene_apart_at_the_start(name, one, other):
     assert min(gap(scene, one, other, t) for t in np.linspace(0.0, scene.duration, 200)) < 0.0
 
 
-def test_pairs_with_their_own_odd_values():
+def test_odd_pairs_without_values_per_body():
     """No number per body makes e_ab, e_bc and e_ac: their logarithms would have to add up."""
     scene = MADE["odd_pairs"]
     e = {(a, b): scene.material(a, b).restitution for a, b in combinations("abc", 2)}

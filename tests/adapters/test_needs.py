@@ -184,7 +184,7 @@ def test_conflicting_default_entries_of_materials():
     assert Materials(named).materials(free) == {(0.75, 0.0)}
 
 
-def test_refused_pair_named_by_no_entry():
+def test_contradiction_about_a_pair_that_no_entry_names():
     """a-b and a-c are named and agree; b-c is what two entries say different things of."""
     pairs = (Pair("a", "b", 0.5), Pair("a", "c", 0.5), Pair("b", "*", 0.25), Pair("c", "*", 0.75), Pair("a", "*", 0.25))
     with pytest.raises(SceneError, match="pair b-c: 2 entries"):

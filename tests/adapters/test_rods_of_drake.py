@@ -97,7 +97,7 @@ def test_moments_of_a_rod_as_given(shape):
     assert about_y == pytest.approx(0.25, abs=1e-9)  # kg m^2/s, of the ball as it comes
 
 
-def test_rods_supported_by_their_contact_partners():
+def test_refusal_of_rods_that_meet_other_shapes_than_balls():
     lying = rod(RODS[0], (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0))
     ball = Body("ball", Sphere(0.25), 1.0, (0.025,) * 3, (0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0))
     scene = Scene("rods", 1, 3, (lying, ball), (Pair(),), (0.0, 0.0, -9.81), 1.0)

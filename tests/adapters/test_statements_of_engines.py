@@ -100,7 +100,7 @@ def test_profiles_for_rest_and_impact_in_each_dimension(kind):
             assert bool(CHECKS["profiles"](engine)) is (dimension in asked)
 
 
-def test_needs_of_profiles_under_gravity_of_the_earth():
+def test_needs_of_blows_and_rest_under_gravity_of_the_earth():
     """Elastic, plastic and rough blows at 6 m/s, rest with and without a slip."""
     asked, engine = [], Listening()
 

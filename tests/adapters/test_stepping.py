@@ -651,12 +651,12 @@ def parting_at(speed):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("depth", [4.9e-5, 1e-3, 0.02])
 @pytest.mark.parametrize("speed", [1e-3, 0.2, 5.0])
-def test_answer_of_a_scene_at_rest_without_loads(dimension, depth, speed):
+def test_fast_separation_of_overlapping_bodies_at_rest(dimension, depth, speed):
     found = run(Toy({dimension}, parting_at(speed)), two_cubes(depth, dimension), 1 / 240, {})
     assert found.finish == "completed" and found.twist[-1, 1, 1] == speed
 
 
-def test_missing_answers_and_overlap_of_a_long_run():
+def test_separation_speed_limit_of_an_overlap_in_a_long_run():
     """A step that undoes 20 mm makes 4.8 m/s; a thousand times that is no answer, nor anything where none overlap."""
     fast = 1e3 * 0.02 * 240.0
     scene = two_cubes(0.02, duration=100.0)

@@ -129,7 +129,7 @@ def test_urdf_elements_refused_or_left_out_with_a_message(text, said, left):
         assert said in found.dropped[0]
 
 
-def test_visuals_ignored_and_links_without_geometry():
+def test_visuals_and_transmissions_ignored():
     drawn = BALL.replace("</link>", '<visual><geometry><mesh filename="/etc/passwd"/></geometry></visual></link>')
     found = read(robot(drawn + '<transmission name="t"/><material name="m"/>'), False)
     assert found.dropped == () and found.scene.bodies[0].shape == Sphere(0.2)

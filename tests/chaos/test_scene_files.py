@@ -119,7 +119,7 @@ def test_unspoilt_scenes_are_valid(tmp_path, scene, dice):
         (json.dumps(BASE | {"bodies": [BASE["bodies"][1] | {"name": "\x1b[2J"}]}), "cannot be the name"),
     ],
 )  # fmt: skip
-def test_unreadable_sizes_refused_at_once(tmp_path, text, said):
+def test_json_too_large_or_too_deep_refused(tmp_path, text, said):
     path = tmp_path / "scene.json"
     path.write_text(text)
     with pytest.raises(SceneError) as caught:

@@ -101,7 +101,7 @@ USED, ALL = "chipmunk,bullet,mujoco,report,shapes", "all,dev"
         ((".installed", ".installed-to-run"), "test", []),
     ],
 )
-def test_install_on_first_use_of_a_target(tmp_path, stamps, target, installed):
+def test_extras_that_a_target_installs(tmp_path, stamps, target, installed):
     for stamp in stamps:
         (tmp_path / stamp).touch()
 

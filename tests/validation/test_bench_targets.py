@@ -190,7 +190,7 @@ def row(measured, floor=None, target=None, at=AT_SWEEPS):
     return Row("scene", "a/b", at, measured, measured, measured, floor, target, {}, {}, 10, {})
 
 
-def test_marks_of_reached_levels():
+def test_marks_below_the_floor_and_at_the_target():
     assert [row(x, 2.0, 3.0).mark for x in (None, 1.99, 2.0, 2.9, 3.0)] == [
         *["below floor"] * 2,
         *["floor"] * 2,

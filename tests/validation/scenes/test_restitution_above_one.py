@@ -94,7 +94,7 @@ def test_restitution_above_one_only_for_declared_adapters():
         assert "restitution above 1" not in registry.facts(name).abilities
 
 
-def test_no_spread_of_bodies_that_gain_energy():
+def test_no_reach_limit_for_bodies_that_gain_energy():
     _, scene = made("restitution_above_one")
     assert isinstance(scene, Scene) and len(meeting_pairs(replace(scene, duration=1e-3))) == 2
     assert len(meeting_pairs(replace(made("restitution_above_one", e=1.0)[1], duration=1e-3))) < 2
