@@ -38,7 +38,7 @@ FIXES = r"profiles? .+? fix(es)? it\b"
 
 @dataclass(frozen=True)
 class Answer:
-    """Error of one engine and profile in one scene."""
+    """Error of one engine and profile in one scene; ``better`` are the profiles that ``cure`` names."""
 
     engine: str
     profile: str
@@ -47,6 +47,7 @@ class Answer:
     judged: int
     wrong: str
     cure: str
+    better: tuple[str, ...] = ()
 
     @property
     def line(self) -> str:
@@ -144,7 +145,7 @@ def answers(rows: Sequence[Plain]) -> list[Answer]:
             group = own[profile]
             text = _wrong(group, _failing(group))
             found.append(
-                Answer(engine, profile, scene, len(_failing(group)), len(group), text, _cure(own, profile))
+                Answer(engine, profile, scene, len(_failing(group)), len(group), text, *_cure(own, profile))
             )  # fmt: skip
     return found
 
@@ -161,11 +162,11 @@ def _failing(rows: Iterable[Plain]) -> list[Plain]:
     return [row for row in rows if mark_of(row) != "pass"]
 
 
-def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
-    """The other profile that passes every row, or the one that fails least; or that none is better, or none was run."""
+def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> tuple[str, tuple[str, ...]]:
+    """The other profiles that pass every row, or the one that fails least, in words and by name."""
     failed = _failing(own[profile])
     if all(mark_of(row) == "invalid" for row in failed):
-        return "the measurement contradicts itself, so it says nothing about the engine"
+        return "the measurement contradicts itself, so it says nothing about the engine", ()
     row, dimensions = failed[0], sorted({row["dimension"] for row in failed if is_standard(row)})
     others = {
         name: group for name, group in own.items()
@@ -179,18 +180,18 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> str:
         which = (row["engine"], row["engine_version"], row["scene"], dimensions, profile)
         by = {name: decided_by(*which, name) for name in good} if dimensions and not listed else {}
         said = [f"{name if len(good) > 1 else ''} by {text}".strip() for name, text in by.items() if text]
-        return "; ".join([", ".join([_fix(good), *said]), *listed])
+        return "; ".join([", ".join([_fix(good), *said]), *listed]), tuple(good)
     unlisted = [] if listed or not can_be_searched(row) else [f"{search_command(row)} searches for settings"]
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None:
         none = f"profile {' and '.join(silent)} gave no result" if silent else "no other profile was run in this case"
-        return "; ".join([none, *listed, *unlisted])
+        return "; ".join([none, *listed, *unlisted]), ()
     if share[best] >= len(failed) / len(own[profile]):
-        return "; ".join(["no other profile does better", *listed, *unlisted])
+        return "; ".join(["no other profile does better", *listed, *unlisted]), ()
     failing = _failing(others[best])
     fewer = f"profile {best} fails less ({len(failing)} of {len(others[best])}): {_wrong(others[best], failing)}"
-    return "; ".join([fewer, *listed, *unlisted])
+    return "; ".join([fewer, *listed, *unlisted]), (best,)
 
 
 def _fix(profiles: Sequence[str]) -> str:

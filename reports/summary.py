@@ -20,7 +20,7 @@ from rich.text import Text
 
 from adapters.stages import stage
 from reports import overview
-from reports.answers import Costs, answers, choices
+from reports.answers import Answer, Costs, answers, choices
 from reports.cures import profile_costs
 from reports.findings import REFUSED, alarms, families, refusals
 from reports.matrix import (
@@ -133,7 +133,7 @@ def _show_families(
     _heading(f"What is wrong as shipped, and what fixes it: the worst scene of each group{count}", console)
     for answer in worst:
         console.print(_folded(answer.line, console))
-    _elsewhere(rows, console)
+    _elsewhere(worst, console)
 
 
 def _fits(table: Table, console: Console) -> bool:
@@ -189,12 +189,12 @@ def _answers(rows: Sequence[Plain], console: Console) -> None:
     _heading("What is wrong, and what fixes it" if found else _nothing_wrong(rows), console)
     for answer in found:
         console.print(_folded(answer.line, console))
-    _elsewhere(rows, console)
+    _elsewhere(found, console)
 
 
-def _elsewhere(rows: Sequence[Plain], console: Console) -> None:
-    """What the tuned profiles of a run break in other scenes than its own."""
-    for line in profile_costs((row["engine"], row["profile"]) for row in rows):
+def _elsewhere(found: Iterable[Answer], console: Console) -> None:
+    """What profiles that a run recommends break in other scenes than its own."""
+    for line in profile_costs((answer.engine, profile) for answer in found for profile in answer.better):
         console.print(_folded(line, console), style="dim")
 
 

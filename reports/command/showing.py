@@ -24,7 +24,7 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import proof_of, prove_and_show
 from reports.command.selection import SET
-from reports.cures import ROLES, Change, changes, fix, how_measured, told_cure
+from reports.cures import ROLES, Change, changes, fix, how_measured, profile_costs, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
@@ -544,6 +544,7 @@ def _print_explanation(
         if idle:
             lines.append(("", "not needed: " + ", ".join(f"{c.name} {c.before} -> {c.after}" for c in idle)))
         lines.append(("", how_measured(row["engine"], row["scene"], row["dimension"], row["profile"], better)))
+        lines += [("", cost) for cost in profile_costs([(row["engine"], better)])]
     recorded = told_cure(row) if mark_of(row) != "pass" else ""
     lines += [("smallest fix" if better else "fix", recorded)] if recorded else []
     lines += [("test cause", proof)] if mark_of(row) == "known" and (proof := proof_of(row)) else []

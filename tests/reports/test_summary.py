@@ -105,6 +105,16 @@ def test_constant_answer_in_one_clause_with_its_cure():
     assert answer.line == "mujoco/default impact: rebounds at 0.1 to 0.101, whatever e is; profile tuned fixes it"
 
 
+@pytest.mark.parametrize(("shipped", "told"), [("pass", False), ("known", True)])
+def test_cost_of_a_profile_shown_only_where_it_is_recommended(shipped, told):
+    """Beside "Every check passes" it read as a failure of the run."""
+    rows = [row("impact", 2, "mujoco", "default", shipped, 0.5), row("impact", 2, "mujoco", "tuned")]
+    rows += [row("impact", 2, "bullet", "default"), row("impact", 2, "bullet", "tuned")]
+    text = " ".join(" ".join(shown(rows, 80)).split())
+    assert ("mujoco/tuned, against the engine as shipped" in text) == told
+    assert "bullet/tuned, against the engine as shipped" not in text
+
+
 def test_parameter_named_only_if_the_truth_depends_on_it():
     """Numbers of one cell have truths of their own, whatever its parameters are."""
     rows = [row("impact", 2, "mujoco", "default", "known", 0.1, truth, e=e, v=1.0) | {"metric": f"restitution[{i}]"}
@@ -453,6 +463,7 @@ def test_explain_with_truth_tolerance_reason_and_cure(two_engines):
     ):
         assert word in text
     assert "<option " in text and "solref=" in text
+    assert "mujoco/tuned, against the engine as shipped, tried in" in text
     plain = json.loads(call("explain", "mujoco/default/bounce/apex", "--json", "--out", out).stdout)
     assert plain["cure"]["profile"] == "tuned" and {c["name"] for c in plain["cure"]["changes"]} >= {"solref"}
     again = json.loads(call("explain", plain["id"], "--json", "--out", out).stdout)

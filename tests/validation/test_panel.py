@@ -53,6 +53,13 @@ def test_fix_that_breaks_more_than_it_mends_not_printed():
     assert panel_text(Panel(20, 3, ())) == "tried in 20 other cases: breaks nothing"
 
 
+def test_every_case_that_a_fix_breaks_named():
+    """What a reader pastes it for may be the third: a stiffness of 0 lets whatever rests sink."""
+    cases = ("a spinning rebound", "a slide at 45 degrees", "a bouncy body at rest", "a column of ten")
+    text = panel_text(Panel(24, 9, tuple(Cost(case, "drift", "m", 0.0, 0.1, 0.0) for case in cases)))
+    assert all(case in text for case in cases) and "more" not in text
+
+
 def test_formula_value_at_the_step_and_gravity_of_a_case():
     pytest.importorskip("mujoco")
     here = Slot("stack", (), 3, "mujoco", "default", 1 / 240)
