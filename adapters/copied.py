@@ -59,11 +59,13 @@ class Copied(Simulation):
 
     def pose(self) -> Array:
         """See `Simulation.pose`."""
-        return self.poses_of([self.copy_pose()])[0]
+        pose: Array = self.poses_of([self.copy_pose()])[0]
+        return pose
 
     def twist(self) -> Array:
         """See `Simulation.twist`."""
-        return self.twists_of([self.copy_twist()])[0]
+        twist: Array = self.twists_of([self.copy_twist()])[0]
+        return twist
 
     def contacts(self) -> Contacts:
         """See `Simulation.contacts`."""

@@ -159,7 +159,7 @@ class _Misread(Simulation):
         if self.fault == "velocity":
             return self.factor * twist
         if self.fault == "damping":
-            return twist * self.factor ** (self.steps * self.dt)
+            return twist * float(self.factor ** (self.steps * self.dt))
         if self.fault == "tremble":
             twist = twist.copy()
             twist[:, 0] += self._turn() * self.size
@@ -213,7 +213,8 @@ def _inwards(pose: Array) -> Array:
     """Unit vectors (n, axes) from each body to the centre of all; zero for a body there."""
     way = pose[:, : _axes(pose)].mean(axis=0) - pose[:, : _axes(pose)]
     far = np.linalg.norm(way, axis=1, keepdims=True)
-    return np.divide(way, far, out=np.zeros_like(way), where=far > 0.0)
+    unit: Array = np.divide(way, far, out=np.zeros_like(way), where=far > 0.0)
+    return unit
 
 
 def _turned(pose: Array, angle: float) -> Array:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -210,7 +211,7 @@ def _motion(key: Held, dt: float, method: Method) -> tuple[Trajectory, int] | No
 
 
 def _sampled(
-    scene: Scene, dt: float, states: list[tuple[float, Array, Array]], blows: list[tuple[float, list]]
+    scene: Scene, dt: float, states: list[tuple[float, Array, Array]], blows: list[tuple[float, list[Any]]]
 ) -> Trajectory:
     """The motion at every step, with the blows of each step as contacts; rotations stay as at the start."""
     steps = step_count(scene.duration, dt)

@@ -90,14 +90,15 @@ def motion_chart(
             for t, value in zip(motion.t[::stride], values[::stride, body], strict=True)
         ]
     lines = alt.Chart(_data(records)).mark_line(strokeWidth=1.5)
-    return lines.encode(
+    drawn: alt.Chart = lines.encode(
         x=alt.X("t:Q", title="time [s]"),
         y=alt.Y("value:Q", title=f"{what} [{unit}]", scale=alt.Scale(zero=False)),
         color=alt.Color("body:N", title="body", sort=None),
         strokeDash=alt.StrokeDash(
             "of:N", title=None, scale=alt.Scale(domain=["engine", "truth"], range=[[1, 0], [5, 3]])
         ),
-    ).properties(title=title, width=420, height=260)
+    )
+    return drawn.properties(title=title, width=420, height=260)
 
 
 def components(trajectory: Trajectory) -> dict[str, tuple[Array, str]]:

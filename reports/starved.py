@@ -131,7 +131,8 @@ def chart(rows: Iterable[Starved], scheme: str) -> dict[str, Any]:
         "titleFontSize": 13,
     }
     config = {"background": paper, "font": "system-ui, sans-serif", "view": {"stroke": None}, "axis": axis}
-    return whole.to_dict() | {"config": config | {"title": {"color": ink, "fontSize": 15, "anchor": "start"}}}
+    drawn: dict[str, Any] = whole.to_dict()
+    return drawn | {"config": config | {"title": {"color": ink, "fontSize": 15, "anchor": "start"}}}
 
 
 def main(folder: str) -> None:

@@ -87,4 +87,5 @@ def _extent(shape: Shape, turn: Array, axis: Array) -> Array:
     if not isinstance(shape, Box):  # an upper bound of its projection
         return np.full(len(axis), reach(shape))
     along = np.einsum("sij,si->sj", turn, axis)
-    return np.abs(along) @ np.array(shape.half_extents)
+    half: Array = np.abs(along) @ np.array(shape.half_extents)
+    return half

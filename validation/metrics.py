@@ -213,7 +213,8 @@ def body_speeds(scene: Scene, trajectory: Trajectory) -> Array:
     free = free_bodies(scene)
     linear = np.linalg.norm(trajectory.twist[:, free, :d], axis=2)
     angular = np.linalg.norm(trajectory.twist[:, free, d:], axis=2)
-    return linear + angular * np.array([reach(scene.bodies[i].shape) for i in free])
+    speeds: Array = linear + angular * np.array([reach(scene.bodies[i].shape) for i in free])
+    return speeds
 
 
 def kinetic_energy(scene: Scene, trajectory: Trajectory) -> Array:

@@ -60,7 +60,7 @@ def _turn(shape: Shape, pose: Array) -> Array:
     """Rotation of the solid of a shape, (3, 3)."""
     from reference_solver.geometry import rotation
 
-    turn = np.asarray(rotation(pose[None]))[0]
+    turn: Array = np.asarray(rotation(pose[None]))[0]
     lying = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # z to x
     return turn @ lying if isinstance(shape, Capsule | Cylinder) else turn
 

@@ -106,7 +106,7 @@ def _farthest(body: Body, place: Array, nx: Array, ny: Array) -> Array:
         along = nx * shape.normal[0] + ny * shape.normal[1] > 1.0 - ALONG
         return np.where(along, shape.offset, np.inf)
     x, y, c, s = place
-    centre = nx * x + ny * y
+    centre: Array = nx * x + ny * y
     if not isinstance(shape, Box):
         assert isinstance(shape, Disc)  # the only other shape of this engine
         return centre + shape.radius

@@ -152,7 +152,8 @@ def loss_in_one_second(law: ContactLaw, dt: float) -> float:
     steps, speed = min(max(8, round(1.0 / dt)), 1000), 1.0
     for _ in range(steps):
         speed -= law.drag(speed, dt)
-    return 1.0 - speed ** (1.0 / (steps * dt))
+    left: float = speed ** (1.0 / (steps * dt))
+    return 1.0 - left
 
 
 def drag_share(law: ContactLaw, speed: float, braking: float, dt: float, time: float) -> float:

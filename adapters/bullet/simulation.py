@@ -37,7 +37,8 @@ def pybullet_here() -> ModuleType:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
-    return pybullet
+    module: ModuleType = pybullet
+    return module
 
 
 class BulletSimulation(Copied):

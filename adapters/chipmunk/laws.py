@@ -15,8 +15,9 @@ def _pushed(profile: str) -> Push:
 
     def push(scene: Scene, dt: float, overlap: float) -> float:
         chosen = {s.name: s.value for s in PROFILES[profile](needs(scene), dt)}
-        share: float = 1.0 - chosen["collision_bias"] ** dt
-        return share * max(0.0, overlap - chosen["collision_slop"]) / dt
+        share, slop = 1.0 - chosen["collision_bias"] ** dt, chosen["collision_slop"]
+        speed: float = share * max(0.0, overlap - slop) / dt
+        return speed
 
     return push
 

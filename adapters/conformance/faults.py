@@ -201,7 +201,8 @@ def _held(world: World, held: dict[str, Any], size: float) -> dict[str, Any]:
 
 
 def _mirrored_turn(world: World, value: Array, size: float) -> Array:
-    return value * np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+    turned: Array = value * np.array([1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
+    return turned
 
 
 # ---- statements of the engine --------------------------------------------------------------------------------------

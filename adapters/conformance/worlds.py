@@ -306,7 +306,7 @@ def memory(engine: Engine) -> str:
 def _growth(build: Callable[[int], None]) -> float:
     before = _settled()
     build(BUILDS)
-    return max(np.subtract(_settled(), before))
+    return float(max(np.subtract(_settled(), before)))
 
 
 def _settled() -> tuple[float, float]:

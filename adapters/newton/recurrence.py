@@ -190,7 +190,8 @@ def _felt(bodies: Bodies, k: int, x: float, y: float, z: float) -> float:
     """Inverse mass at a point of body ``k`` by rotation, for a lever of an impulse of 1."""
     a, b, c = _into(bodies.turn[k], x, y, z)
     soft = bodies.softness[k]
-    return a * a * soft[0] + b * b * soft[1] + c * c * soft[2]
+    felt: float = a * a * soft[0] + b * b * soft[1] + c * c * soft[2]
+    return felt
 
 
 @inner_kernel
@@ -218,7 +219,8 @@ def _on_box(
     points[1, 0], points[1, 1], points[1, 2] = zero, zero, zero
     ux, uy, uz = _into(t, n[0], n[1], n[2])
     arms[1, 0], arms[1, 1], arms[1, 2] = -radius * ux, -radius * uy, -radius * uz
-    return far - radius
+    gap: float = far - radius
+    return gap
 
 
 @inner_kernel
@@ -412,7 +414,8 @@ def _part(bodies: Bodies, a: int, b: int, n: Numbers, levers: Numbers, v: Number
     normal = n[0] * (v[1, 0] - v[0, 0]) + n[1] * (v[1, 1] - v[0, 1]) + n[2] * (v[1, 2] - v[0, 2])
     right = levers[1, 0] * w[1, 0] + levers[1, 1] * w[1, 1] + levers[1, 2] * w[1, 2]
     left = levers[0, 0] * w[0, 0] + levers[0, 1] * w[0, 1] + levers[0, 2] * w[0, 2]
-    return normal + right - left
+    speed: float = normal + right - left
+    return speed
 
 
 @inner_kernel

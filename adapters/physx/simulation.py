@@ -30,7 +30,8 @@ def imported() -> ModuleType:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import sapien
-    return sapien
+    module: ModuleType = sapien
+    return module
 
 
 class PhysxSimulation(Copied):

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 
-class _File(click.ParamType):
+class _File(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
     """Name of a file to write; a name that ends in a slash is a folder and refused."""
 
     name = "file"
@@ -21,7 +21,7 @@ class _File(click.ParamType):
         return Path(value)
 
 
-class _Folder(click.ParamType):
+class _Folder(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
     """Name of a folder. An empty one, as of an unset variable, is refused: it would be the current folder."""
 
     name = "folder"

@@ -21,7 +21,7 @@ from validation.posed import is_file, pinned
 from validation.running.plan import Request, knowing
 
 
-class _Seconds(click.ParamType):
+class _Seconds(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
     """Time limit: a number of seconds between 1 and `LONGEST`."""
 
     name = "seconds"

@@ -245,7 +245,8 @@ def _multiple(scene: str, dimension: int, table: pd.DataFrame, x: alt.X) -> Figu
 def _steps(table: pd.DataFrame, right: bool) -> alt.Chart:
     """Time steps beside points: above them, away from the axis, and on the side on which they fit into the plot."""
     side: dict[str, Any] = {"align": "left", "dx": 5} if right else {"align": "right", "dx": -5}
-    return alt.Chart(table).mark_text(dy=-8, fontSize=11, aria=False, **side).encode(text="step:N")
+    steps: alt.Chart = alt.Chart(table).mark_text(dy=-8, fontSize=11, aria=False, **side).encode(text="step:N")
+    return steps
 
 
 def _scaling_figures(table: pd.DataFrame) -> list[Figure]:

@@ -196,7 +196,8 @@ def _labels(places: Sequence[tuple[float, float, str]], x: alt.X, y: alt.Y, colo
     """Text that ends at given places of a panel."""
     table = pd.DataFrame(places, columns=["asked", "got", "text"])
     mark = alt.Chart(table).mark_text(align="right", fontSize=13, fontWeight=600, color=colour, opacity=0.9, aria=False)
-    return mark.encode(x=x, y=y, text="text:N")
+    labels: alt.Chart = mark.encode(x=x, y=y, text="text:N")
+    return labels
 
 
 def _end_labels(left: pd.DataFrame) -> list[tuple[list[tuple[float, float, str]], str]]:

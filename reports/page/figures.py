@@ -61,7 +61,8 @@ def _guides(x: Sequence[float], anchor: tuple[float, float], scale_x: alt.X, sca
         ends = np.array([max(min(x), edge), anchor[0]])
         parts.append(pd.DataFrame({"dt": ends, "error": anchor[1] * (ends / anchor[0]) ** order, "order": str(order)}))
     mark = alt.Chart(pd.concat(parts)).mark_line(color="currentColor", opacity=0.22, strokeDash=[2, 3], aria=False)
-    return mark.encode(x=scale_x, y=scale_y, detail="order:N")
+    guides: alt.Chart = mark.encode(x=scale_x, y=scale_y, detail="order:N")
+    return guides
 
 
 def error_against_step(entries: Iterable[Convergence], scene: str, dimension: int) -> Figure | None:
@@ -155,7 +156,8 @@ def intervals(table: pd.DataFrame, x: alt.X, y: alt.Y, colour: alt.Color) -> alt
     """Error bars along x, from ``cost_low`` to ``cost_high``."""
     bar = alt.Chart(table).mark_rule(strokeWidth=1.6, opacity=0.6)
     low = alt.X("cost_low:Q", scale=x["scale"], axis=x["axis"])
-    return bar.encode(x=low, x2="cost_high:Q", y=y, color=colour, description="who:N")
+    bars: alt.Chart = bar.encode(x=low, x2="cost_high:Q", y=y, color=colour, description="who:N")
+    return bars
 
 
 def _point_text(row: Mapping[Hashable, Any]) -> str:

@@ -84,7 +84,8 @@ def _axis(letter: str, dimension: int) -> int:
 def _turned(pose: Array) -> Array:
     """Angle since the start [rad]: with full turns in 2-D; in 3-D the rotation angle, from 0 to pi."""
     if pose.shape[1] == 3:
-        return np.unwrap(pose[:, 2]) - pose[0, 2]
+        angle: Array = np.unwrap(pose[:, 2]) - pose[0, 2]
+        return angle
     turn = rotation(pose)
     relative = turn @ turn[0].T
     sine = np.stack([relative[:, 2, 1] - relative[:, 1, 2], relative[:, 0, 2] - relative[:, 2, 0]], -1)

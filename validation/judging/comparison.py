@@ -115,7 +115,8 @@ def _growth(a: Plain, b: Plain) -> float:
     """Change of |error| in units of the tolerance; of the value where there is no truth."""
     if a["error"] is None or b["error"] is None or not b["tolerance"]:
         return 0.0
-    return (abs(b["error"]) - abs(a["error"])) / b["tolerance"]
+    grown: float = (abs(b["error"]) - abs(a["error"])) / b["tolerance"]
+    return grown
 
 
 def _versions(a: Plain, b: Plain) -> str:
