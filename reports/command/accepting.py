@@ -19,7 +19,7 @@ from reports.command.selection import JOBS
 from reports.progress import run_plan
 from reports.terminal import terminal
 from reports.wording import first_of, number, plural
-from validation.cells import Observation, prepare
+from validation.cells import Observation, prepare, slot_from_dict
 from validation.findings import Family, Findings, FindingsError, Key, files
 from validation.findings.files import FAMILIES, MEMBERS, add_entries, findings_of, write_members
 from validation.judging.acceptance import (
@@ -234,6 +234,7 @@ def _show_refused(refused: Sequence[tuple[Row, str]]) -> None:
         click.echo(f"refused: {plural(count, 'check')}: {why}", err=True)
     for row, _ in refused[:SHOWN]:
         where = f"{row.engine}/{row.profile} {row.scene} {row.dimension}-D"
-        click.echo(f"  {where} {row.slot['params']} {row.metric} {number(row.value, 6)}", err=True)
+        case = f"{where} {slot_from_dict(row.slot).params_text()}".rstrip()
+        click.echo(f"  {case} {row.metric} {number(row.value, 6)}", err=True)
     if len(refused) > SHOWN:
         click.echo(f"  and {len(refused) - SHOWN} more", err=True)

@@ -301,5 +301,6 @@ def test_fault_of_two_per_cent_not_listable(weak, findings, tmp_path, fault, cel
     blessed = call("accept", "--family", "starved", *own)
     assert blessed.exit_code == 1, blessed.output
     assert ("invalid: " if fault == "impulse" else "its property checks do not hold") in blessed.stderr
+    assert "{" not in blessed.stderr  # parameters in words
     assert not (findings / files.MEMBERS).exists() or members(findings) == []
     assert call(*run).exit_code == 1

@@ -122,6 +122,16 @@ def test_rows_of_one_side_neither_better_nor_worse():
     assert removed.engine == added.engine == "toy" and removed.slot == added.slot == ROW["slot"]
 
 
+@pytest.mark.parametrize(("physics", "kind"), [("fail", Kind.FLIP), ("pass", Kind.ADDED)])
+def test_failure_without_a_row_on_the_other_side(physics, kind):
+    """A restitution that is realised too low has a check only where it is; `compare` called it "only in B", exit 0."""
+    realised = {**ROW, "metric": "realised_restitution", "value": 0.9, "error": -0.1, "physics": physics}
+    (change,) = compare_rows([ROW], [ROW, realised])
+    assert (change.kind, change.regressed) == (kind, kind is Kind.FLIP)
+    (elsewhere,) = compare_rows([], [realised])
+    assert (elsewhere.kind, elsewhere.regressed) == (Kind.ADDED, False)
+
+
 def test_the_same_question_is_found_however_its_slot_is_written():
     turned = {**ROW, "slot": dict(reversed(list(ROW["slot"].items())))}
     assert compare_rows([ROW], [turned]) == []

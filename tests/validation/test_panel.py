@@ -51,6 +51,8 @@ def test_fix_that_breaks_more_than_it_mends_not_printed():
     assert gone.withdrawn and not gone.recommended and recorded_paste(gone) == ""
     assert "no fix: what was found breaks more elsewhere than it fixes" in recorded_text(gone)
     assert panel_text(Panel(20, 3, ())) == "tried in 20 other cases: breaks nothing"
+    own = panel_text(Panel(4, 3, ()), alone=True)
+    assert own == "tried on this scene only, at other steps and from moved starts: breaks nothing"
 
 
 def test_every_case_that_a_fix_breaks_named():

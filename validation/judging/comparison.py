@@ -3,7 +3,8 @@
 Deterministic values are equal to the last bit or they changed; a change counts only if it is larger than the noise
 floor of its cell, measured by moving the start by one and two units in the last place, and larger than a hundredth of
 its tolerance: smaller changes are ignored. Verdict flips come first, then errors, then speed. Rows on one side only are
-reported, and are neither better nor worse; so are checks that are newer than the run of one side.
+reported, and are neither better nor worse, but for a failure of a case that both ran; so are checks that are newer than
+the run of one side.
 """
 
 from __future__ import annotations
@@ -75,11 +76,25 @@ def checks_in(rows: Iterable[Plain]) -> dict[tuple[str, str], Plain]:
 @stage("comparing runs")
 def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change]:
     """All changes of rows from ``before`` to ``after``, most serious first."""
+    before = list(before)
     a, b = checks_in(before), checks_in(after)
+    ran = {slot for (slot, _), row in a.items() if row["outcome"] == "ok"}
+    newer = {(json.dumps(row["slot"], sort_keys=True), row["metric"]) for row in before} - a.keys()
     changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
     changes += [_make(Kind.REMOVED, False, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
-    changes += [_make(Kind.ADDED, False, b[key], "-", _state(b[key]), 0.0) for key in b.keys() - a.keys()]
+    changes += [_added(b[key], held=key[0] in ran and key not in newer) for key in b.keys() - a.keys()]
     return sorted(changes, key=by_seriousness)
+
+
+def _added(row: Plain, held: bool) -> Change:
+    """A check of one side only: newly failing where the other side ran the case and, as it ``held``, has no row of it.
+
+    What an engine realises is a check where it is not what was asked.
+    """
+    if held and row["outcome"] == "ok" and row["physics"] == "fail":
+        size = abs(row["error"]) / row["tolerance"] if row["error"] is not None and row["tolerance"] else 0.0
+        return _make(Kind.FLIP, True, row, "held", _state(row), size)
+    return _make(Kind.ADDED, False, row, "-", _state(row), 0.0)
 
 
 def by_seriousness(change: Change) -> tuple[Any, ...]:
