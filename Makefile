@@ -51,7 +51,7 @@ REQUIRE_ENGINES ?= reference,chipmunk,mujoco$(shell $(BIN)/python -c 'import sys
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(STAMP)
 	$(BIN)/crosscheck compile --engine reference
-	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto --dist loadfile
+	CROSSCHECK_REQUIRE_ENGINES=$(REQUIRE_ENGINES) CROSSCHECK_REQUIRE_PINOCCHIO=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 # Everything there is, before an issue is called resolved.
 test-all: export CROSSCHECK_ALL = 1

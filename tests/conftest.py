@@ -34,7 +34,7 @@ settings.load_profile("all" if ALL else "few")
 
 
 def pytest_addoption(parser):
-    """`PYTEST_ADDOPTS="--cpu 30" make test` prints the tables of docs/development/tests.md."""
+    """`make test ARGS="--cpu 12"` prints the tables of docs/development/tests.md."""
     parser.addoption(
         "--cpu", type=int, metavar="N", help="tell the N tests that take most CPU, and what the rest takes"
     )

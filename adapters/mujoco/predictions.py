@@ -250,6 +250,8 @@ def stopping_law(profile: str, metric: str) -> Law:
             return None
         level = np.array(scene.bodies[1].twist[: d - 1])
         speed = float(np.linalg.norm(level))
+        if speed == 0.0:
+            return None
         heading = level / speed
         if np.abs(heading).max() < 1.0 and box.cone != "elliptic":
             return None

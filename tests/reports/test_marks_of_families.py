@@ -9,8 +9,8 @@ from reports.page import verdicts
 from reports.page.verdicts import Mark, family_mark
 from reports.wording import LABELS, MARKS
 
-#: Nobody asked the engine anything there: no row to lead to.
-NOWHERE = {"unsupported", "not_installed"}
+#: There is nothing to measure: no row to lead to.
+NOWHERE = {"unsupported", "declined", "not_installed"}
 
 
 @pytest.mark.parametrize("mark", sorted({*MARKS, *LABELS}))

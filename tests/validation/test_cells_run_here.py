@@ -80,7 +80,7 @@ def test_frontier_cell_without_an_answer_and_its_reason(monkeypatch, given, outc
 
 @pytest.mark.parametrize(
     ("answer", "outcome"),
-    [("Timeout: 9 s", Outcome.TIMED_OUT), ("the process was killed by SIGSEGV", Outcome.CRASHED)],
+    [("no answer after 9 s", Outcome.TIMED_OUT), ("the process was killed by SIGSEGV", Outcome.CRASHED)],
 )
 def test_process_lost_over_a_cell_told_of_that_cell(answer, outcome):
     asked = []
