@@ -110,6 +110,8 @@ class World:
 
     Parameters
     ----------
+    shapes
+        Of the bodies.
     restitution, friction
         (n, n).
     size
@@ -119,6 +121,7 @@ class World:
     """
 
     bodies: Bodies
+    shapes: tuple[object, ...]
     restitution: Array
     friction: Array
     size: float
@@ -176,7 +179,8 @@ def world_of(model: Model) -> World:
         generator,
     )
     weight = max(1e-3, float(np.abs(load).max()), float(np.abs(torque / moment).max()))
-    return World(bodies, np.array(model.restitution), np.array(model.friction), size, weight)
+    shapes = tuple(body.shape for body in model.bodies)
+    return World(bodies, shapes, np.array(model.restitution), np.array(model.friction), size, weight)
 
 
 def start_of(model: Model) -> State:

@@ -8,10 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from reference_solver.exact.bodies import World
-from reference_solver.exact.features import features_of
-from reference_solver.exact.kernels.separation import least_separation
 from reference_solver.exact.motion import Piece
 from reference_solver.exact.refusals import EnergyGrows, Overlap
+from reference_solver.geometry import gap
 
 #: Overlap that is refused, as a share of the smallest half width; growth of energy, as a share of what there is.
 DEEP, GROWS = 1e-8, 1e-9
@@ -26,18 +25,30 @@ def check(world: World, piece: Piece) -> None:
     ------
     Overlap, EnergyGrows
     """
-    pair = np.zeros(2, np.int64)
-    for share in LOOK:
-        place, axes, _ = piece.at(share)
-        least = least_separation(world.bodies, place, axes, *features_of(world, place, axes), pair)
-        if least < -DEEP * world.size:
-            a, b = sorted(pair.tolist())
-            raise Overlap(a=a, b=b, depth=-least, t=piece.start.t + share * piece.length)
+    a, b, share, depth = deepest(world, piece)
+    if depth > DEEP * world.size:
+        raise Overlap(a=a, b=b, depth=depth, t=piece.start.t + share * piece.length)
     if world.dimension == 2 and not _is_driven(world, piece):
         before, size = energy(world, piece, 0.0)
         after, _ = energy(world, piece, 1.0)
         if after - before > GROWS * (size + abs(before)):
             raise EnergyGrows(amount=after - before, t=piece.start.t)
+
+
+def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
+    """Return the bodies that are deepest in each other at shares of a piece, the share, and how deep [m]."""
+    bodies, d = world.bodies, world.dimension
+    poses = np.array([piece.state(share).pose for share in LOOK])
+    place, reach = poses[:, :, :d], bodies.reach + bodies.radius
+    apart = np.linalg.norm(place[:, :, None] - place[:, None], axis=3) - reach[:, None] - reach
+    moves = (bodies.free[:, None] + bodies.free) > 0
+    found = (0, 0, 0.0, -np.inf)
+    for a, b in np.argwhere(np.triu((apart.min(axis=0) < 0.0) & moves, 1)).tolist():
+        gaps = gap(world.shapes[a], poses[:, a], world.shapes[b], poses[:, b])
+        least = int((gaps < gaps.min() + DEEP * world.size).argmax())  # the first that is as deep
+        if -gaps[least] > found[3]:
+            found = (a, b, LOOK[least], -float(gaps[least]))
+    return found
 
 
 def _is_driven(world: World, piece: Piece) -> bool:

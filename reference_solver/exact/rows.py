@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.features import find
+from reference_solver.exact.kernels.features import LINE
 from reference_solver.exact.kernels.rows import write_rows
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
@@ -133,14 +134,19 @@ class Contacts:
 
 
 def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
-    """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it."""
+    """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it.
+
+    Edges that cross count at one place each: where a corner leaves a face two begin, which part.
+    """
     features = find(world, state, left)
     contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
     keep: list[int] = []
+    crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
     pair, place = features[:, :2], contacts.rows.place
     # Places differ by as much as two gaps and two distances from ends may be off.
     tol = 2e-10 * world.size
     for k in range(len(features)):
-        if not any((pair[j] == pair[k]).all() and np.abs(place[j] - place[k]).max() < tol for j in keep):
+        others = [j for j in keep if not (crosses[j] and crosses[k])]
+        if not any((pair[j] == pair[k]).all() and np.abs(place[j] - place[k]).max() < tol for j in others):
             keep.append(k)
     return contacts if len(keep) == len(features) else contacts.chosen(np.array(keep))

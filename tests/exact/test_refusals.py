@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
-from reference_solver.exact import cones, forces, impacts, loop, problem, refusals
+from reference_solver.exact import cones, events, forces, impacts, loop, problem, refusals
 from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.checks import check
 from reference_solver.exact.kernels.cones import CONVERGED, JAMMED, UNCONVERGED
+from reference_solver.exact.kernels.meeting import NEVER
+from reference_solver.exact.meeting import Meeting
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import Answer, Problem
 from reference_solver.exact.rows import touching_contacts
@@ -35,6 +37,20 @@ def test_ball_between_closing_walls_is_crushed():
 def test_overlap_at_the_start():
     with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
         advance([FLOOR, Body(Box((0.5, 0.5)), 1.0, 0.2, (0.0, 0.4, 0.0))])
+
+
+def test_edges_in_space_whose_meeting_is_missed(monkeypatch):
+    """A bar falls across another, edge on edge: no corner of either comes near the other."""
+    side, half = np.sin(np.pi / 8), np.cos(np.pi / 8)
+    shape = Box((0.5, 0.1, 0.1))
+    lower = Body(shape, pose=(0.0, 0.0, 0.0, half, side, 0.0, 0.0), motion="fixed")
+    across = np.sqrt(0.5) * np.array((half, side, side, half))  # turned by 45 degrees about x, then by 90 about z
+    upper = Body(shape, 1.0, (0.1, 0.2, 0.2), (0.0, 0.0, 0.5, *across))
+    model = Model(3, [lower, upper], (0.0, 0.0, -G), 0.0, 0.5)
+    Simulation(model, Settings.exact(1 / 240)).advance(120)
+    monkeypatch.setattr(events, "next_meeting", lambda *_: Meeting(NEVER, (0, 0), stopped=False))
+    with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
+        Simulation(model, Settings.exact(1 / 240)).advance(120)
 
 
 def test_impacts_of_an_instant_that_do_not_end(monkeypatch):

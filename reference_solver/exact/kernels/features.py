@@ -147,10 +147,11 @@ def touching_points(bodies, world, pair, found, tol):
                 share[0] = dot(second - first, along) / long_a**2
             elif kind_b == LINE:
                 share[1] = dot(first - second, other) / long_b**2
-            # At an end the point is nearer, or as near.
-            if kind_a == LINE and (share[0] * long_a < tol[0] or (1.0 - share[0]) * long_a < tol[0]):
+            # At an end the point is nearer, or as near; but sharp edges that cross begin and end there.
+            end = -tol[0] if kind_a == LINE and kind_b == LINE and r == 0.0 else tol[0]
+            if kind_a == LINE and (share[0] * long_a < end or (1.0 - share[0]) * long_a < end):
                 continue
-            if kind_b == LINE and (share[1] * long_b < tol[0] or (1.0 - share[1]) * long_b < tol[0]):
+            if kind_b == LINE and (share[1] * long_b < end or (1.0 - share[1]) * long_b < end):
                 continue
             for p in range(d):
                 n[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]

@@ -51,19 +51,22 @@ class Miss(NamedTuple):
 
 
 def miss(motion: Motion, steps: int) -> Miss:
-    """Certify ``motion`` in ``steps`` steps and compare its end with the truth; turns count at the body's reach."""
+    """Certify ``motion`` in ``steps`` steps and compare its end with the truth."""
     found = certify(motion.model, Settings.reference(motion.time / steps), steps, 5)
+    return Miss(off(motion, found.pose[-1]), float(found.error[-1]), () if found.holds else found.reasons)
+
+
+def off(motion: Motion, pose: Array) -> float:
+    """Return how far poses (n, 3 | 7) are from the truth [m]; turns count at the body's reach."""
     d, truths = motion.model.dimension, np.atleast_2d(motion.truth)
-    off = 0.0
-    for body, here, there in zip(
-        motion.model.bodies[-len(truths) :], found.pose[-1, -len(truths) :], truths, strict=True
-    ):
+    most = 0.0
+    for body, here, there in zip(motion.model.bodies[-len(truths) :], pose[-len(truths) :], truths, strict=True):
         apart = float(np.linalg.norm(here[:d] - there[:d]))
         if not np.isnan(there[d]):
             turned = np.linalg.norm(rotation(here[None])[0] - rotation(there[None])[0], ord=2)
             apart = max(apart, float(turned) * reach(body.shape))
-        off = max(off, apart)
-    return Miss(off, float(found.error[-1]), () if found.holds else found.reasons)
+        most = max(most, apart)
+    return most
 
 
 def integrated(
