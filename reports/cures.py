@@ -333,11 +333,10 @@ def cure_text(cure: Cure, where: str = "") -> str:
     return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}{elsewhere}"
 
 
-def panel_text(panel: Panel | None, alone: bool = False) -> str:
+def panel_text(panel: Panel | None) -> str:
     """``tried in 24 other cases: breaks a thrown ball (forward_speed 1.4 -> 0.953 m/s, true 1.43)``.
 
-    Every case that breaks is named, as a reader has to find their own among them; the worst ones with numbers. A fix of
-    a scene file is tried on that scene ``alone``: "breaks nothing" would promise more.
+    Every case that breaks is named, as a reader has to find their own among them; the worst ones with numbers.
     """
     if panel is None:
         return ""
@@ -347,8 +346,7 @@ def panel_text(panel: Panel | None, alone: bool = False) -> str:
         unit = "" if cost.unit == "1" else f" {cost.unit}"
         named.setdefault(cost.case, f"{cost.case} ({cost.metric} {before} -> {after}{unit}, true {truth})")
     told = ", ".join([*list(named.values())[:NAMED], *list(named)[NAMED:]])
-    where = "on this scene only, at other steps and from moved starts" if alone else f"in {panel.cases} other cases"
-    return f"tried {where}: breaks {told or 'nothing'}"
+    return f"tried in {panel.cases} other cases: breaks {told or 'nothing'}"
 
 
 def profile_costs(columns: Iterable[tuple[str, str]]) -> list[str]:

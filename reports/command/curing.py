@@ -136,7 +136,7 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         console.print(
             f"what fixes {found.failing - found.left} of {found.failing} checks:", markup=False, highlight=False
         )
-    if told := panel_text(found.panel, is_file(found.scene)):
+    if told := panel_text(found.panel):
         console.print(told, markup=False, highlight=False, soft_wrap=True)
     if found.withdrawn:
         console.print("not recommended: it breaks more than it fixes", style="bold")

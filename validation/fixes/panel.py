@@ -157,7 +157,7 @@ def tried(slots: Sequence[Slot], changes: Sequence[Changes], jobs: int = 1) -> P
     here, change = slots[first], changes[first]
     others = [
         (words, there, _meant(change, here, there))
-        for words, there in (() if is_file(here.scene) else other_cases(here.engine, here.profile))
+        for words, there in other_cases(here.engine, here.profile)
         if there.scene != here.scene
     ]
     return compared(
