@@ -119,8 +119,8 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Public names, including those that are not loaded yet."""
-    return sorted([*__all__, "__version__"])
+    """Public names, including those that are not loaded yet; pytest finds its hooks here as well."""
+    return sorted([*__all__, "__version__", "pytest_addoption", "pytest_configure"])
 
 
 def load(folder: str | Path = "crosscheck-out", run: str = "latest", nulls: bool = False) -> pd.DataFrame:

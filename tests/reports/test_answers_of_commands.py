@@ -258,7 +258,7 @@ def test_accepted_refused_and_omitted_rows_counted(monkeypatch, tmp_path):
     reasons = f"write reasons into {tmp_path / accepting.FAMILIES}, and name them by --family"
     told = [
         "refused: 14 checks: a law covers it",
-        *["  chipmunk/default stack 3-D {'n': 2.0} creep 0.123457"] * accepting.SHOWN,
+        *["  chipmunk/default stack 3-D n=2 creep 0.123457"] * accepting.SHOWN,
         "  and 2 more", f"not accepted: f-2 (without a terminal: {reasons})",
         "not named by --family: 2 checks new or changed",
     ]  # fmt: skip
