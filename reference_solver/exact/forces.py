@@ -15,6 +15,8 @@ from reference_solver.model import Array
 STILL, SLIPPING = 1e-12, 1e-11
 #: Share of the largest load or acceleration that is round-off where a mode ends, and one that is a breach of a law.
 NONE = 1e-9
+#: Turn of a slip that shows how forces change with it [rad].
+TURN = 1e-6
 
 
 @dataclass
@@ -46,22 +48,28 @@ class Held:
         found[:, :d], found[:, d:] = (part.max(axis=1, keepdims=True) for part in (found[:, :d], found[:, d:]))
         return np.asarray(found)
 
-    def follow(self, place: Array, axes: Array, velocity: Array, free: Array) -> Array:
-        """Return accelerations (n, q) with the modes held at another state, and keep the forces there."""
+    def follow(self, place: Array, axes: Array, velocity: Array, free: Array, directions: Array | None = None) -> Array:
+        """Return accelerations (n, q) with the modes held at another state, and keep the forces there.
+
+        Parameters
+        ----------
+        directions
+            (m, d - 1) of slips, where they are not those of the velocities.
+        """
         if not len(self.contacts):
             return free
         contacts = self.contacts.at(place, axes, velocity)
-        self.forces = self._solved(contacts, free)
+        self.forces = self._solved(contacts, free, self.onward(contacts) if directions is None else directions)
         return free + (contacts.matrices[1] @ self.forces.ravel()).reshape(free.shape)
 
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
         acceleration = self.follow(state.place, state.axes, state.velocity, free)
-        answer = replace(self.answer, forces=self.forces, directions=self._onward(self.contacts))
+        answer = replace(self.answer, forces=self.forces, directions=self.onward(self.contacts))
         return Held(self.contacts, answer, acceleration)
 
-    def _onward(self, contacts: Contacts) -> Array:
-        """Directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
+    def onward(self, contacts: Contacts) -> Array:
+        """Return directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
         if contacts.world.dimension == 2:
             return self.answer.directions
         slip = contacts.rows.speed[:, 1:]
@@ -69,8 +77,15 @@ class Held:
         turns = (self.answer.modes == SLIP) & (speed > SLIPPING)
         return np.where(turns[:, None], slip / np.where(turns, speed, 1.0)[:, None], self.answer.directions)
 
-    def _solved(self, contacts: Contacts, free: Array) -> Array:
-        answer, directions = self.answer, self._onward(contacts)
+    def turned(self, slip: int, free: Array, directions: Array) -> Array:
+        """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now."""
+        turned = directions.copy()
+        turned[slip] += TURN * np.array([-directions[slip, 1], directions[slip, 0]])
+        change = self._solved(self.contacts, free, turned) - self.forces
+        return np.asarray(self.contacts.matrices[1] @ change.ravel()) / TURN
+
+    def _solved(self, contacts: Contacts, free: Array, directions: Array) -> Array:
+        answer = self.answer
         problem = Problem.of(contacts, contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel(), directions)
         rows, columns = problem.equations(answer.modes, directions)
         matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]

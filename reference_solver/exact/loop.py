@@ -12,11 +12,12 @@ from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.events import Event, Kind, first_event
 from reference_solver.exact.forces import Held, changed, decide
 from reference_solver.exact.impacts import jam, strike
-from reference_solver.exact.motion import Piece, Turning, constant, free_acceleration
+from reference_solver.exact.motion import Piece, constant, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
 from reference_solver.exact.projection import projected
 from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
 from reference_solver.exact.rows import Contacts, touching_contacts
+from reference_solver.exact.stiff import step
 
 #: Pieces of a run, events that may follow each other without progress, and progress [s].
 MOST_PIECES, MOST_AT_ONCE, PROGRESS = 20_000, 50, 1e-12
@@ -111,7 +112,7 @@ class Loop:
             if piece is not None:
                 return piece
             self.step = FIRST_STEP * float(np.sqrt(self.world.size / self.world.weight))
-        piece, self.step = Turning(self.world, self.state, held, self.tolerance).step(min(self.step, self.longest))
+        piece, self.step = step(self.world, self.state, held, self.tolerance, min(self.step, self.longest))
         return piece
 
     def _cut(self, piece: Piece, event: Event) -> Piece:
@@ -119,7 +120,7 @@ class Loop:
         if event.share >= 1.0:
             return piece
         if piece.turns and event.share > 0.0:
-            shorter, _ = Turning(self.world, piece.start, piece.held, self.tolerance).step(event.share * piece.length)
+            shorter, _ = step(self.world, piece.start, piece.held, self.tolerance, event.share * piece.length)
             return shorter
         return piece.cut(event.share)
 

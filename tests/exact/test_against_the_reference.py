@@ -34,6 +34,13 @@ def test_cell_of_the_standard_suite_is_the_same_or_refused(key):
     assert compared(ANSWERS[key], LIMIT).word != "different"
 
 
+@pytest.mark.parametrize("seed", [3, 11, 15])
+def test_slip_in_space_that_begins_or_ends_stiffly(monkeypatch, seed):
+    """Explicit steps would have to be some 1e-8 s long: more than 600 pieces."""
+    monkeypatch.setattr(loop, "MOST_PIECES", 200)
+    assert compared(ANSWERS[f"fuzz3 {seed}"], LIMIT).word == "same"
+
+
 def moved(known, way):
     """The same answer, but for its last pose."""
     pose = np.array(known.pose)

@@ -1,0 +1,131 @@
+"""Steps of motion that turns; implicit ones where a slip in space is so slow that friction turns it at once (E38).
+
+Friction turns a slip s at the rate ``k = mu N w / |s|``, where w says how its place yields. Where s begins or ends k
+has no bound, while the motion stays smooth: the slip points where its acceleration leads. Explicit steps must resolve
+1/k. Collocation at Radau's points need not (E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
+IV.5), if directions d of slips are unknown at each point, with the equation that s lies along d: it holds where s is
+none. By Newton's method, in which only directions count: what else changes is found by repeating it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.special import roots_jacobi
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.forces import SLIPPING, Held
+from reference_solver.exact.kernels.motion import write_moved
+from reference_solver.exact.motion import LONGER, SAFE, SHORTER, Piece, Turning, free_acceleration
+from reference_solver.exact.problem import SLIP
+from reference_solver.model import Array
+
+#: Points of a step, and powers of the share at them.
+NODES = np.append(0.5 * (1.0 + roots_jacobi(4, 1.0, 0.0)[0]), 1.0)
+COUNT = len(NODES)
+POWERS = np.arange(COUNT)
+#: Coefficients of the polynomial through values at the points; integrals of it up to each point; its Legendre series.
+THROUGH = np.linalg.inv(NODES[:, None] ** POWERS)
+UP_TO = NODES[:, None] ** (POWERS + 1) / (POWERS + 1) @ THROUGH
+SERIES = np.linalg.inv(legendre.legvander(2.0 * NODES - 1.0, COUNT - 1))
+#: An explicit step is stable up to this many 1/k; corrections below this share of the tolerance end the iteration,
+#: which takes at most so many rounds.
+STABLE, CLOSE, MOST = 5.0, 0.03, 20
+
+
+def step(world: World, state: State, held: Held, tolerance: float, length: float) -> tuple[Piece, float]:
+    """Return a piece of at most a length [s] as `Turning.step` does, and the next length."""
+    explicit = Turning(world, state, held, tolerance)
+    if world.dimension == 3 and len(held.contacts):
+        stiff = Stiff(world, state, held, tolerance)
+        # What order 8 could do with the smallest half width's time to fall through.
+        smooth = tolerance**0.125 * float(np.sqrt(world.size / world.weight))
+        if stiff.rate * smooth > STABLE:
+            while stiff.rate * length > SHORTER * STABLE:
+                found = stiff.step(length)
+                if found is not None:
+                    return found
+                length *= SHORTER
+    return explicit.step(length)
+
+
+class Stiff:
+    """An implicit step from a state on: at each point the directions of slips are unknown as well."""
+
+    def __init__(self, world: World, state: State, held: Held, tolerance: float) -> None:
+        self._world, self._state, self._held, self._tolerance = world, state, held, tolerance
+        n, d = state.place.shape
+        self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
+        held.contacts.at_state(state)
+        self._directions = held.onward(held.contacts)
+        rubs = (held.answer.modes == SLIP) & (held.contacts.friction > 0.0)
+        self._slips = np.flatnonzero(rubs & self._directions.any(axis=1))
+        _, self._start, turn, slip, across = self._at(np.zeros(state.velocity.shape), state.velocity, self._directions)
+        sizes = np.maximum(np.linalg.norm(slip, axis=1), SLIPPING)
+        self.rate = float(np.abs((across * turn).sum(axis=1) / sizes).max(initial=0.0))
+
+    def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Rates of ways and accelerations (N,); of slips, how they turn accelerations, along and across, and rows."""
+        write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
+        place, axes, rate = self._moved
+        free = free_acceleration(self._world, axes, velocity)
+        held = self._held
+        acceleration = held.follow(place, axes, velocity, free, directions)
+        turn, across = np.zeros((2, len(self._slips), velocity.size))
+        rows = held.contacts.matrices[0].reshape(len(held.contacts), 3, -1)
+        slip = np.zeros((len(self._slips), 2))
+        for out, k in enumerate(self._slips.tolist()):
+            first, second = directions[k]
+            turn[out] = held.turned(k, free, directions)
+            across[out] = first * rows[k, 2] - second * rows[k, 1]
+            speed = held.contacts.rows.speed[k, 1:]
+            slip[out] = first * speed[0] + second * speed[1], first * speed[1] - second * speed[0]
+        return rate.ravel().copy(), acceleration.ravel(), turn, slip, across
+
+    def step(self, length: float) -> tuple[Piece, float] | None:
+        """Return a piece of at most a length [s] and the next length; None where the iteration does not converge."""
+        start = self._state.velocity
+        shape, count, k = start.shape, start.size, len(self._slips)
+        scale = self._tolerance * (1e-2 + np.abs(start.ravel()))
+        rates = np.tile(start.ravel(), (COUNT, 1))
+        accelerations = np.tile(self._start, (COUNT, 1))
+        directions = np.tile(self._directions, (COUNT, 1, 1))
+        for _ in range(MOST):
+            velocity = start.ravel() + length * UP_TO @ accelerations
+            way = length * UP_TO @ rates
+            found = [self._at(way[i].reshape(shape), velocity[i].reshape(shape), directions[i]) for i in range(COUNT)]
+            moved, now, turn, slip, across = (np.array(each) for each in zip(*found, strict=True))
+            rest = now - accelerations
+            # Slips are to lie along their directions: across (v + change of v) = |s| z, where z is how far they turn.
+            wanted = (slip[:, :, 1] / length + np.einsum("ikn,in->ik", across, UP_TO @ rest)).ravel()
+            matrix = np.diag(slip[:, :, 0].ravel() / length) - np.einsum(
+                "ikn,ij,jln->ikjl", across, UP_TO, turn
+            ).reshape(COUNT * k, COUNT * k)
+            try:
+                z = np.linalg.solve(matrix, wanted).reshape(COUNT, k)
+            except np.linalg.LinAlgError:  # a slip that does not yield has no direction
+                return None
+            change = rest + np.einsum("ik,ikn->in", z, turn)
+            accelerations = accelerations + change
+            old = directions[:, self._slips]
+            new = old + np.clip(z, -1.0, 1.0)[:, :, None] * np.stack([-old[:, :, 1], old[:, :, 0]], axis=2)
+            directions[:, self._slips] = new / np.linalg.norm(new, axis=2, keepdims=True)
+            shift = length * max(np.abs(UP_TO @ change / scale).max(), np.abs(UP_TO @ (moved - rates) / scale).max())
+            rates = moved
+            if shift < CLOSE:
+                break
+        else:
+            return None
+        if slip[:, :, 0].min() < 0.0:  # it would have turned round before
+            return None
+        last, least = np.abs(SERIES[-1] @ accelerations), np.abs(SERIES[-2] @ accelerations)
+        # The next term of the series, if terms go on to fall as they do.
+        error = float((length * last * np.minimum(1.0, last / np.maximum(least, 1e-300)) / scale).max())
+        factor = min(LONGER, SAFE * error ** (-1.0 / (COUNT + 1))) if error > 0.0 else LONGER
+        if error > 1.0:
+            return self.step(length * max(SHORTER, factor))
+        out = np.zeros((2, count, COUNT + 1))
+        out[:, :, 1:] = length * (THROUGH @ np.array([rates, accelerations])).swapaxes(1, 2) / (POWERS + 1)
+        out[1, :, 0] = start.ravel()
+        way, twist = out.reshape(2, *shape, COUNT + 1)
+        return Piece(self._state, length, way, twist, self._held, turns=True), factor * length
