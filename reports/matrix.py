@@ -60,7 +60,8 @@ class Field:
             return LABELS[self.mark]
         unexpected = [f", {self.marks[mark]} {STATUS[mark]}" for mark in ALARMING if self.marks[mark]]
         counted = f"{self.missed} of {self.judged} fail" if self.missed else f"{self.judged} pass"
-        return counted + "".join(unexpected)
+        declined = f", {self.marks['declined']} refused" if self.marks["declined"] else ""
+        return counted + "".join(unexpected) + declined
 
     @property
     def short(self) -> str:

@@ -202,6 +202,11 @@ def test_regression_status_apart_from_the_size_of_errors():
     assert field.text == "3 of 9 fail, 2 crashed, 1 changed"
 
 
+def test_field_of_an_exact_profile_that_refuses_some_checks():
+    """Energy and overlap are judged in any of several motions; where it ends up is not."""
+    assert Field(Counter({"pass": 2, "declined": 8})).text == "2 pass, 8 refused"
+
+
 def test_missing_cell_counted_as_not_passed():
     """Who leaves cells out must not look better by it."""
     field = Field(Counter({"pass": 6, "missing": 2, "unsupported": 5}))
