@@ -114,7 +114,7 @@ class Box2DSimulation(Copied):
             raise EngineError(f"contacts: {type(listener.failure).__name__}: {listener.failure}")
 
     def copy_pose(self) -> list[float]:
-        """Place and angle of each body."""
+        """Position [m] and angle [rad] of each body, (samples, bodies, 3)."""
         return [number for body in self.bodies for number in (*body.position, body.angle)]
 
     def poses_of(self, copies: Sequence[list[float]]) -> Array:

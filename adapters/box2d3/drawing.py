@@ -83,7 +83,7 @@ def named(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Bodies of k contacts: both touch the plane through the point across the normal, the first one from behind.
 
-    ``places``: x, y, cosine and sine of each body when each contact was found, (4, k).
+    ``places``: position (x, y) [m], cosine and sine of the angle of each body when each contact was found, (4, k).
     """
     (x, y), (nx, ny) = points.T, normals.T
     level, behind, ahead = nx * x + ny * y, [], []

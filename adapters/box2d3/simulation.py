@@ -112,7 +112,7 @@ class Box2D3Simulation(Copied):
             step(dt, count)
 
     def copy_pose(self) -> list[float]:
-        """Place [m], cosine and sine of each body."""
+        """Position [m], cosine and sine of the angle of each body."""
         placed, units = [(body.position, body.rotation) for body in self.bodies], self.units
         return [number for place, turn in placed for number in (place.x / units, place.y / units, turn.c, turn.s)]
 

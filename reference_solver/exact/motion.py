@@ -53,7 +53,7 @@ class Piece:
     turns: bool
 
     def at(self, s: float) -> tuple[Array, Array, Array]:
-        """Return places, axes and twists at a share."""
+        """Return positions, axes and twists at a share."""
         way = self.way @ s ** np.arange(self.way.shape[2])
         moved = np.empty(self.start.place.shape), np.empty(self.start.axes.shape), np.empty(way.shape)
         velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])

@@ -120,7 +120,7 @@ class Problem:
         speed = np.linalg.norm(u[:, 1:], axis=1)
         slides = speed > still
         given = self.slipping
-        # Friction is known to more places than what it leaves of a slip.
+        # Friction is known to more digits than what it leaves of a slip.
         friction = np.linalg.norm(forces[:, 1:], axis=1)
         rubs = friction > 0.0
         directions = np.where(

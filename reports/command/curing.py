@@ -146,10 +146,9 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
         console.print(f"  profile {found.profile} has all of it", markup=False, highlight=False)
     if found.others:
         console.print(f"  or alone: {_alternatives(found)}", markup=False, highlight=False, soft_wrap=True)
-    paste = cure_paste(found)
     if found.withdrawn:
-        pass
-    elif paste:
+        return
+    if paste := cure_paste(found):
         console.print("to paste:", style="bold")
         console.print(Text(paste), soft_wrap=True)
     else:

@@ -625,7 +625,7 @@ def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal):
 # ---- faces that are clipped ----------------------------------------------------------------------------------------
 
 
-def test_four_contact_points_of_a_box_on_a_hull_with_known_faces(tmp_path, monkeypatch):
+def test_contacts_of_a_box_on_a_hull(tmp_path, monkeypatch):
     """Without, from the same files, it stands on one in some of them; nothing else in the run differs."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     canonical = CATALOGUE["wedge"]

@@ -105,7 +105,7 @@ def test_visual_and_sensor_elements_dropped_silently():
 
 
 @pytest.mark.parametrize("tag", sorted(set(mjcf.NO_PLACE) - {"mesh"}))
-def test_elements_without_a_place_refused_or_left_out_with_a_message(tag):
+def test_unsupported_elements(tag):
     line = f"line 1: <{tag}>: {mjcf.NO_PLACE[tag]}"
     assert refused(clean, f"<{tag}/>") == f"model: {line}"
     root, dropped = clean(f'<{tag}/><worldbody><body name="kept"/></worldbody>', drop=True)

@@ -60,7 +60,7 @@ def test_no_collision_law_for_rubbing_spinning_or_falling_balls():
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
 @pytest.mark.parametrize("params", [{}, {"e": 0.5, "mu": 0.1}, {"along": -0.3, "mu": 0.2}], ids=str)
-def test_friction_at_the_middle_of_the_overlap_of_a_sliding_edge(profile, params):
+def test_point_of_friction_on_a_sliding_edge(profile, params):
     """Far from the textbook's answer, and for pivoting and for splitting a hundred times nearer than that is."""
     found = measured("kane", profile, params=params)
     truth = CATALOGUE["kane"].exact(CATALOGUE["kane"].scene(2, params))

@@ -54,7 +54,7 @@ def test_every_profile_is_asked_for_all_needs_at_both_steps(measured):
     assert {(each.top_speed, each.gravity) for each in needs} == {(6.0, 9.81)}
 
 
-def test_first_failed_receipt_of_a_quantity_with_place_and_reason(measured):
+def test_first_failed_receipt(measured):
     def rule(profile, needs, dt):
         wrong = profile == "second" and needs.dimension == 3 and needs.regime == "rest"
         return {"mass": slip("mass", 0.5, False, "told\nso")} if wrong else {}
@@ -71,7 +71,7 @@ def test_first_failed_receipt_of_a_quantity_with_place_and_reason(measured):
     assert told["receipt turn"].status == "unexpected pass"
 
 
-def test_quantity_measured_nowhere_refused_and_partly_measured_told(measured):
+def test_quantity_without_a_measurement(measured):
     def rule(profile, needs, dt):
         never = {"size": slip("size", math.nan, True, "no boxes")}
         if profile == "second" and dt == STEPS[1]:

@@ -128,7 +128,7 @@ def test_slow_child_not_taken_for_dead(child):
     assert child.receive(PATIENCE) == b"late"
 
 
-def test_child_lost_with_its_guardian_despite_an_open_connection(child):
+def test_child_of_a_lost_guardian(child):
     """By what the child has started; nobody but its guardian could have ended that."""
     pid = int(asked(child, "answer(start(600, connection.fileno()))"))
     try:

@@ -63,7 +63,7 @@ def test_corner_law_silent_outside_its_case():
         assert said(other) is None, other
 
 
-def test_position_law_silent_near_the_origin_and_on_other_scenes():
+def test_position_law_near_the_origin():
     law = standstill_law("stopping_distance", lambda scene, dt: (1.0, 0.0))
     far = FAR.scene(2)
     plate, box = far.bodies
@@ -156,7 +156,7 @@ def test_plane_kept_to_a_thousand_roundings():
 
 
 @pytest.mark.parametrize(("share", "standing"), [(0.99, "explained"), (1.01, "drifted"), (100.0, "drifted")])
-def test_departure_from_the_plane_beyond_round_off_not_explained(share, standing):
+def test_unexplained_departure_from_the_plane(share, standing):
     scene = CATALOGUE["flat_box"].scene(2)
     law = Deviation("toy", ("default",), "flat_box", "out_of_plane", plane_law, "numbers are singles", "source")
     value, band = law.says(scene, DT, CATALOGUE["flat_box"].measure)

@@ -94,7 +94,7 @@ def test_outermost_point_of_a_tilted_body_off_the_plane(axis: int, angle: float,
     assert out_of_plane(pose, np.array([0.5])) == pytest.approx(math.sin(0.5 * angle), rel=1e-12)
 
 
-def test_largest_distance_from_the_plane_over_bodies_and_samples() -> None:
+def test_largest_distance_from_the_plane() -> None:
     pose = np.zeros((3, 2, 7))
     pose[..., 3] = 1.0
     reach = np.array([1.0, 0.25])

@@ -390,7 +390,7 @@ def test_nan_sample_as_the_farthest():
     assert not math.isfinite(slip.measured) and not slip.holds
 
 
-def test_quantity_from_another_probe_after_refusal_or_divergence():
+def test_quantity_after_a_refused_probe():
     class Picky(ToyEngine):
         def refuses(self, scene, profile):
             return "no corners" if scene.name == "probe_corner" else None

@@ -12,7 +12,7 @@ from validation.canonical import Check
 from validation.cells import Slot
 from validation.fixes import panel, search
 from validation.fixes.kept import cures_of, panels_of
-from validation.fixes.panel import Cost, Panel, carried, compared, judged, other_cases
+from validation.fixes.panel import ELSEWHERE, Cost, Panel, carried, compared, judged, other_cases
 from validation.posed import pinned, resolve
 from validation.settings.switching import Reading, switched
 
@@ -36,8 +36,8 @@ def test_check_broken_after_pass_or_threefold_failure(before, after, breaks, men
 
 def test_check_of_many_variants_counted_once():
     good, bad = (reading(2.0), reading(0.5)), (reading(0.5), reading(2.0))
-    assert judged({("0", "creep"): [good, good]}, 2).mends == 1
-    found = judged({("0", "creep"): [good, bad, bad]}, 3)
+    assert judged({(ELSEWHERE, "creep"): [good, good]}, 2).mends == 1
+    found = judged({(ELSEWHERE, "creep"): [good, bad, bad]}, 3)
     assert found.mends == 0 and [each.case for each in found.breaks] == ["its own scene elsewhere"]
 
 

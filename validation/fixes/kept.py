@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from adapters import whole
 from adapters.engine_folder import CURES, PANELS, inside
 from adapters.registry import find
 from validation.canonical import Params
@@ -141,17 +143,18 @@ _TEXT = ("engine", "version", "shipped", "scene", "metric", "unit", "profile")
 
 def write(cures: Iterable[Cure], path: Path) -> None:
     """Write a table of fixes; the old one stays until it is complete."""
-    fresh = path.with_suffix(".new")
-    with fresh.open("w", encoding="utf-8", newline="") as lines:
-        table = csv.writer(lines, lineterminator="\n")
-        names = [field.name for field in fields(Cure)]
-        table.writerow(names)
-        for cure in cures:
-            rounded = replace(cure, cost_before=_digits(cure.cost_before, 3), cost_after=_digits(cure.cost_after, 3))
-            values = [getattr(rounded, name) for name in names]
-            cells = [v if n in _TEXT else json.dumps(v, default=_plain) for n, v in zip(names, values, strict=True)]
-            table.writerow(cells)
-    fresh.replace(path)
+    names, rows = [field.name for field in fields(Cure)], []
+    for cure in cures:
+        rounded = replace(cure, cost_before=_digits(cure.cost_before, 3), cost_after=_digits(cure.cost_after, 3))
+        values = [getattr(rounded, name) for name in names]
+        rows.append([v if n in _TEXT else json.dumps(v, default=_plain) for n, v in zip(names, values, strict=True)])
+    _write(path, names, rows)
+
+
+def _write(path: Path, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    lines = StringIO(newline="")
+    csv.writer(lines, lineterminator="\n").writerows([names, *rows])
+    whole.write(path, lines.getvalue())
 
 
 def _plain(value: Any) -> Any:
@@ -173,20 +176,20 @@ def _digits(value: float | None, digits: int) -> float | None:
 def panels_of(engine: str) -> Mapping[str, Panel]:
     """Listed panels of an engine's profiles, of the installed release; see `of_profile`."""
     path = inside(engine, PANELS)
+    if path is None:
+        return {}
     try:
-        with path.open(encoding="utf-8", newline="") as lines:  # type: ignore[union-attr]
+        with path.open(encoding="utf-8", newline="") as lines:
             rows = [row for row in csv.DictReader(lines) if row["version"] == find(engine).version]
         return {row["profile"]: _panel_of(json.loads(row["panel"])) for row in rows}
-    except (OSError, AttributeError, ValueError, KeyError, TypeError):  # none, or a file of another package
+    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are tested
         return {}
 
 
 def write_panels(version: str, panels: Mapping[str, Panel], path: Path) -> None:
     """Write the panels of profiles."""
-    with path.open("w", encoding="utf-8", newline="") as lines:
-        table = csv.writer(lines, lineterminator="\n")
-        table.writerow(("version", "profile", "panel"))
-        table.writerows((version, name, json.dumps(panel, default=_plain)) for name, panel in panels.items())
+    rows = [(version, name, json.dumps(panel, default=_plain)) for name, panel in panels.items()]
+    _write(path, ("version", "profile", "panel"), rows)
 
 
 def _panel_of(plain: Mapping[str, Any]) -> Panel:

@@ -1,7 +1,7 @@
 """The panel: other cases on which a fix is tried before it is printed, and what it mends and breaks there.
 
     own       its scene at other steps, in another size and mass, from moved starts; a check counts once for all of them
-    others    a dozen cases of other groups: long rest, column, overlap, thrown ball, slide, rebound, grip
+    others    cases of other groups: long rest, column, overlap, thrown ball, slide, rebound, grip
 
 A check that passes as shipped and fails with the fix is broken; so is one that fails by `WORSE` times as much. A check
 that fails as shipped and passes with the fix is mended. A fix that breaks more than it mends is withdrawn.
@@ -35,8 +35,8 @@ Changes = Mapping[str, Any]
 STEPS = (0.25, 4.0)
 #: Size of another model of the scene, `validation.scenes.sized`, and moves of its starts [units in the last place].
 SIZE, MOVES = 0.3, (-16, 16)
-#: Own cases that run, the shown one first: the others ran in the search.
-OWN = 1
+#: The cases of its own scene in words.
+ELSEWHERE = "its own scene elsewhere"
 #: Error with a fix, over that as shipped, from which a failing check counts as broken too.
 WORSE = 3.0
 #: Factor of a number that is printed as a formula.
@@ -146,15 +146,10 @@ def tried(slots: Sequence[Slot], changes: Sequence[Changes], jobs: int = 1) -> P
     Parameters
     ----------
     slots, changes
-        Own cases as shipped, and the settings of the fix in each.
+        Own cases as shipped, and the settings of the fix in each. The first that it changes is run elsewhere.
     """
-    first = min(range(len(slots)), key=lambda k: not changes[k])
-    own = [
-        (str(k), there, carried(change, slot, there))
-        for k, (slot, change) in list(enumerate(zip(slots, changes, strict=True)))[:OWN]
-        for there in own_cases(slot)
-    ]
-    here, change = slots[first], changes[first]
+    here, change = max(zip(slots, changes, strict=True), key=lambda pair: bool(pair[1]))
+    own = [(ELSEWHERE, there, carried(change, here, there)) for there in own_cases(here)]
     others = [
         (words, there, _meant(change, here, there))
         for words, there in other_cases(here.engine, here.profile)
@@ -198,10 +193,9 @@ def judged(checks: Checks, cases: int) -> Panel:
         worst = max((pair for pair in both if _broken(*pair)), key=lambda pair: pair[1].badness, default=None)
         if worst:
             before, after = worst
-            case = "its own scene elsewhere" if words.isdigit() else words
             assert before.check.truth is not None
             numbers = before.value, after.value, before.check.truth
-            breaks.append((after.badness, Cost(case, before.check.metric, before.check.unit, *numbers, before.slot)))
+            breaks.append((after.badness, Cost(words, before.check.metric, before.check.unit, *numbers, before.slot)))
         mends += not worst and any(before.badness > 1.0 >= after.badness for before, after in both)
     breaks.sort(key=lambda each: -each[0])
     return Panel(cases, mends, tuple(cost for _, cost in breaks))

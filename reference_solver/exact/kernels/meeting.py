@@ -192,7 +192,7 @@ def clear(bodies, course, who, s, seen, bounds):
 
 @kernel
 def write_bounds(course, bounds):
-    """Write bounds of the first three derivatives by s of every body's place and orientation (n, 2, 3)."""
+    """Write bounds of the first three derivatives by s of every body's position and orientation (n, 2, 3)."""
     n, d = course.place.shape
     for i in range(n):
         bounds[i] = 0.0
