@@ -1,6 +1,7 @@
-"""Cheap checks of every piece: bodies do not overlap, and contacts do not create energy.
+"""Cheap checks of every piece: bodies do not overlap, and in the plane contacts do not create energy.
 
-They do not replace the audit: a lever that is wrong passes both.
+In space moments of inertia turn with their bodies, which `energy` does not follow. The checks do not replace the audit:
+a lever that is wrong passes both.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ LOOK = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def check(world: World, piece: Piece) -> None:
-    """Refuse a piece in which bodies overlap or whose energy grows.
+    """Refuse a piece in which bodies overlap, or a planar one whose energy grows.
 
     Raises
     ------

@@ -60,7 +60,7 @@ class Held:
             return free
         contacts = self.contacts.at(place, axes, velocity)
         self.forces = self._solved(contacts, free, self.onward(contacts) if directions is None else directions)
-        return free + (contacts.matrices[1] @ self.forces.ravel()).reshape(free.shape)
+        return free + contacts.changes(self.forces)
 
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
@@ -82,11 +82,11 @@ class Held:
         turned = directions.copy()
         turned[slip] += TURN * np.array([-directions[slip, 1], directions[slip, 0]])
         change = self._solved(self.contacts, free, turned) - self.forces
-        return np.asarray(self.contacts.matrices[1] @ change.ravel()) / TURN
+        return self.contacts.changes(change).ravel() / TURN
 
     def _solved(self, contacts: Contacts, free: Array, directions: Array) -> Array:
         answer = self.answer
-        problem = Problem.of(contacts, contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel(), directions)
+        problem = Problem.of(contacts, accelerations(contacts, free), directions)
         rows, columns = problem.equations(answer.modes, directions)
         matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]
         if not self._is_redundant(matrix):
@@ -116,7 +116,7 @@ def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
     stays = answer.modes != OPEN
     if not stays.any():
         return Held(contacts.chosen(stays), answer.chosen(stays), free)
-    acceleration = free + (contacts.matrices[1] @ answer.forces.ravel()).reshape(free.shape)
+    acceleration = free + contacts.changes(answer.forces)
     if stays.all():
         return Held(contacts, answer, acceleration)
     return Held(contacts.chosen(stays), answer.chosen(stays), acceleration)

@@ -9,7 +9,7 @@ import numpy as np
 from reference_solver.exact import series
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.cones import NoSolution
-from reference_solver.exact.forces import STILL
+from reference_solver.exact.forces import STILL, accelerations
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import Problem
 from reference_solver.exact.refusals import NoImpulses, TooManyImpacts
@@ -86,8 +86,7 @@ def _struck(state: State, part: Contacts, stopped: set[Pair]) -> State:
         impulses = Problem.of(part, wanted.ravel()).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
-    change = (part.matrices[1] @ impulses.ravel()).reshape(state.velocity.shape)
-    return replace(state, velocity=state.velocity + change)
+    return replace(state, velocity=state.velocity + part.changes(impulses))
 
 
 def jam(world: World, state: State, contacts: Contacts, instant: float) -> State:
@@ -99,9 +98,7 @@ def jam(world: World, state: State, contacts: Contacts, instant: float) -> State
         If there are no such impulses.
     """
     contacts.at_state(state)
-    rows, yields = contacts.matrices
     free = free_acceleration(world, state.axes, state.velocity)
-    wanted = contacts.rows.speed.ravel() + instant * (rows @ free.ravel() + contacts.rows.rate.ravel())
+    wanted = contacts.rows.speed.ravel() + instant * accelerations(contacts, free)
     impulses = Problem.of(contacts, wanted).solved(state.t).forces
-    change = (yields @ impulses.ravel()).reshape(state.velocity.shape)
-    return replace(state, velocity=state.velocity + change)
+    return replace(state, velocity=state.velocity + contacts.changes(impulses))

@@ -72,7 +72,7 @@ class Loop:
             piece = self._piece(held)
             event = first_event(self.world, piece)
             if event.at_start:
-                self._count(event)
+                self._count(event.kind.value)
                 self.left, self.held = self.left | event.left, self._revised(held, event)
                 continue
             piece = self._cut(piece, event)
@@ -132,7 +132,7 @@ class Loop:
         if piece.length > PROGRESS:
             self.at_once, self.left = 0, frozenset()
         else:
-            self._count(event)
+            self._count(event.kind.value)
         self.state = piece.state(1.0)
         if not piece.turns:
             self.step = 0.0
@@ -164,8 +164,7 @@ class Loop:
             return None
         return found or changed(held, modes, free, strictly=False)
 
-    def _count(self, event: object) -> None:
+    def _count(self, what: str) -> None:
         self.at_once += 1
         if self.at_once > MOST_AT_ONCE:
-            last = event.kind.value if isinstance(event, Event) else event
-            raise NoProgress(count=MOST_AT_ONCE, t=self.state.t, last=last)
+            raise NoProgress(count=MOST_AT_ONCE, t=self.state.t, last=what)

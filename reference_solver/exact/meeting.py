@@ -18,6 +18,7 @@ leaves: with a speed, or without one, and then it must first rise over the noise
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -53,10 +54,9 @@ def course_of(piece: Piece) -> Course:
 
 
 class Meeting(NamedTuple):
-    """What a search found: the share of the piece, the bodies, and whether it was given up there and goes on."""
+    """What a search found: the share of the piece, and whether it was given up there and goes on."""
 
     share: float
-    bodies: tuple[int, int]
     stopped: bool
 
 
@@ -71,15 +71,12 @@ def next_meeting(world: World, piece: Piece, contacts: Contacts) -> Meeting:
             held[a, b, j] = True
         if kind_a == POINT:
             held[b, a, i] = True
-    course, found = course_of(piece), np.zeros(3, np.int64)
+    course = course_of(piece)
     # In the plane, and where a body is round, points are all that meets.
     round_ = (bodies.points == 1) | (bodies.points == 0)
     edges = ~(round_[:, None] | round_[None, :]) & ~touch if world.dimension == 3 else np.zeros((n, n), np.bool_)
     scales = np.array([NOISE * world.size, SLOW * piece.length])
-    share = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales, found)
-    bodies_met, stopped = (int(found[0]), int(found[1])), bool(found[2])
+    found = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales)
     if edges.any():
-        of_edges = first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales, found)
-        if of_edges < share:
-            share, bodies_met, stopped = of_edges, (int(found[0]), int(found[1])), bool(found[2])
-    return Meeting(float(share), bodies_met, stopped)
+        found = min(found, first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales), key=itemgetter(0))
+    return Meeting(float(found[0]), bool(found[1]))

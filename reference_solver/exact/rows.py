@@ -86,6 +86,7 @@ class Contacts:
         self.rows = empty_rows(len(self.features), d, q)
         a, b = self.features[:, 0], self.features[:, 1]
         self.friction, self.restitution = self.world.friction[a, b], self.world.restitution[a, b]
+        self._matrices: tuple[Array, Array] | None = None
 
     def __len__(self) -> int:
         return len(self.features)
@@ -95,6 +96,7 @@ class Contacts:
         if len(self):
             self.rows.frame[:, 1] = self.along
             write_rows(self.world.bodies, (place, axes, velocity), self.features, self.rows)
+            self._matrices = None
         return self
 
     def at_state(self, state: State) -> Contacts:
@@ -117,7 +119,7 @@ class Contacts:
         """Bodies of each contact."""
         return [(a, b) for a, b in self.features[:, :2].tolist()]
 
-    def spread(self, blocks: Array) -> Array:
+    def _spread(self, blocks: Array) -> Array:
         """Return rows (m, d, 2, q) as a matrix (m d, n q)."""
         m, d, _, q = blocks.shape
         n = self.world.shape[0]
@@ -127,10 +129,17 @@ class Contacts:
             out[which, :, self.features[:, turn]] += blocks[:, :, turn]
         return out.reshape(m * d, n * q)
 
+    def changes(self, forces: Array) -> Array:
+        """Return accelerations (n, q) by forces (m, d) along the frames, or changes of velocities by impulses."""
+        return np.asarray((self.matrices[1] @ forces.ravel()).reshape(self.world.shape))
+
     @property
     def matrices(self) -> tuple[Array, Array]:
         """G (m d, n q) and H = M^-1 G' (n q, m d)."""
-        return self.spread(self.rows.row), np.ascontiguousarray(self.spread(self.rows.yields).T)
+        if self._matrices is None:
+            rows, yields = self._spread(self.rows.row), self._spread(self.rows.yields)
+            self._matrices = rows, np.ascontiguousarray(yields.T)
+        return self._matrices
 
 
 def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.forces import STILL, accelerations, decide
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK, Problem
@@ -34,7 +33,7 @@ def _low(world: World, state: State, contacts: Contacts) -> tuple[NDArray[np.boo
     free = free_acceleration(world, state.axes, state.velocity)
     try:
         held = decide(world, state, contacts, free)
-    except (NoSolution, Refused):
+    except Refused:
         return np.zeros(len(contacts), bool), none
     falls = -accelerations(contacts.at_state(state), held.acceleration)[:: world.dimension]
     low = (parts > STILL) & (falls > 0.0) & (parts**2 < 2.0 * falls * LOW * world.size)
@@ -65,6 +64,5 @@ def settled(world: World, state: State, contacts: Contacts) -> State:
     found = Problem.of(contacts, contacts.rows.speed.ravel()).with_modes(modes, directions)
     if found is None:
         return state
-    change = (contacts.matrices[1] @ found.forces.ravel()).reshape(state.velocity.shape)
-    after = replace(state, velocity=state.velocity + change)
+    after = replace(state, velocity=state.velocity + contacts.changes(found.forces))
     return after if contacts.at_state(after).rows.speed[:, 0].min() > -STILL else state

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
-from reference_solver.exact import cones, events, forces, impacts, loop, problem, refusals
+from reference_solver.exact import cones, events, forces, impacts, loop, refusals
 from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.checks import check
 from reference_solver.exact.kernels.cones import CONVERGED, JAMMED, UNCONVERGED
@@ -48,7 +48,7 @@ def test_edges_in_space_whose_meeting_is_missed(monkeypatch):
     upper = Body(shape, 1.0, (0.1, 0.2, 0.2), (0.0, 0.0, 0.5, *across))
     model = Model(3, [lower, upper], (0.0, 0.0, -G), 0.0, 0.5)
     Simulation(model, Settings.exact(1 / 240)).advance(120)
-    monkeypatch.setattr(events, "next_meeting", lambda *_: Meeting(NEVER, (0, 0), stopped=False))
+    monkeypatch.setattr(events, "next_meeting", lambda *_: Meeting(NEVER, stopped=False))
     with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
         Simulation(model, Settings.exact(1 / 240)).advance(120)
 
@@ -137,4 +137,3 @@ def test_every_refusal_is_one_sentence():
     for kind in kinds:
         said = str(kind(**facts))
         assert "{" not in said and "\n" not in said and len(said) < 160
-    assert problem.BROKEN > problem.NONE

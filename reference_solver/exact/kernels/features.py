@@ -3,7 +3,7 @@
 import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
-from reference_solver.exact.kernels.rotation import dot
+from reference_solver.exact.kernels.rotation import cross, dot
 
 POINT, LINE, FACE = 0, 1, 2
 
@@ -28,12 +28,18 @@ def place_features(bodies, place, axes, point, normal):
 
 
 @kernel
+def ends(bodies, i, kind, number):
+    """Return the numbers of the points at both ends of a line of body i, of a point twice its own."""
+    if kind == LINE:
+        return bodies.line[i, number, 0], bodies.line[i, number, 1]
+    return number, number
+
+
+@kernel
 def beyond(bodies, point, i, kind, number, direction):
     """Return how far the farthest other point of body i lies beyond a point or line along ``direction`` (d,) [m]."""
     d = len(direction)
-    first, second = number, number
-    if kind == LINE:
-        first, second = bodies.line[i, number, 0], bodies.line[i, number, 1]
+    first, second = ends(bodies, i, kind, number)
     most = -1e300
     for k in range(bodies.points[i]):
         if k == first or k == second:
@@ -46,8 +52,8 @@ def beyond(bodies, point, i, kind, number, direction):
 
 
 @kernel
-def within(bodies, axes, place, o, face, where):
-    """Return how far a place (d,) is from the nearest side of a face of body o, < 0 outside [m]."""
+def within(bodies, axes, place, o, face, where, out):
+    """Write how far a place (d,) is from the sides of a face of body o, < 0 outside; return the least of it [m]."""
     d = len(where)
     least = 1e300
     for k in range(bodies.sides[o, face]):
@@ -55,6 +61,7 @@ def within(bodies, axes, place, o, face, where):
         for p in range(d):
             for q in range(d):
                 s -= bodies.side[o, face, k, q] * axes[o, p, q] * (where[p] - place[o, p])
+        out[k] = s
         least = min(least, s)
     return least
 
@@ -78,12 +85,38 @@ def nearest_on_lines(start, along, other_start, other_along, share):
 
 
 @kernel
+def nearest(bodies, point, feature, share, lines, apart):
+    """Write where two points or lines are nearest to each other, which a row (a, b, kind, number, kind, number) names.
+
+    ``share`` (2,): shares of their lengths; ``lines`` (2, d): from end to end, zeros for a point; ``apart`` (d,): from
+    that of a to that of b. Return both lengths [m], and sin^2 of the angle of two lines, 1 where one is a point.
+    """
+    a, b, kind_a, ia, kind_b, jb = feature
+    begin_a, end_a = ends(bodies, a, kind_a, ia)
+    begin_b, end_b = ends(bodies, b, kind_b, jb)
+    first, second, along, other = point[a, begin_a], point[b, begin_b], lines[0], lines[1]
+    along[:] = point[a, end_a] - first
+    other[:] = point[b, end_b] - second
+    long_a, long_b, spread = np.sqrt(dot(along, along)), np.sqrt(dot(other, other)), 1.0
+    share[0] = share[1] = 0.0
+    if kind_a == LINE and kind_b == LINE:
+        spread = nearest_on_lines(first, along, second, other, share)
+    elif kind_a == LINE:
+        share[0] = dot(second - first, along) / long_a**2
+    elif kind_b == LINE:
+        share[1] = dot(first - second, other) / long_b**2
+    for p in range(len(apart)):
+        apart[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]
+    return long_a, long_b, spread
+
+
+@kernel
 def touching_faces(bodies, place, axes, world, pair, found, tol):
     """Write contacts of faces of body a or b with points of the other from row ``pair[2]`` on; return the next row."""
     point, normal = world
     d = place.shape[1]
     count, deep = pair[2], tol[1]
-    foot = np.zeros(d)
+    room = np.zeros(bodies.side.shape[2])
     for turn in range(2):
         o, w = pair[turn], pair[1 - turn]
         for f in range(bodies.faces[o]):
@@ -101,9 +134,7 @@ def touching_faces(bodies, place, axes, world, pair, found, tol):
                 h = -level
                 for p in range(d):
                     h += normal[o, f, p] * point[w, k, p]
-                for p in range(d):
-                    foot[p] = point[w, k, p]
-                if h > tol[0] or within(bodies, axes, place, o, f, foot) < -tol[0]:
+                if h > tol[0] or within(bodies, axes, place, o, f, point[w, k], room) < -tol[0]:
                     continue
                 if count < len(found):
                     found[count, 0], found[count, 1] = pair[0], pair[1]
@@ -125,7 +156,7 @@ def touching_points(bodies, world, pair, found, tol):
     r = bodies.radius[a] + bodies.radius[b]
     lines_a = bodies.lines[a] if d == 3 else 0
     lines_b = bodies.lines[b] if d == 3 else 0
-    n, share = np.zeros(d), np.zeros(2)
+    n, share, lines = np.zeros(d), np.zeros(2), np.zeros((2, d))
     for i in range(bodies.points[a] + lines_a):
         kind_a = POINT if i < bodies.points[a] else LINE
         ia = i if kind_a == POINT else i - bodies.points[a]
@@ -134,32 +165,18 @@ def touching_points(bodies, world, pair, found, tol):
             jb = j if kind_b == POINT else j - bodies.points[b]
             if r == 0.0 and (kind_a == POINT or kind_b == POINT):
                 continue
-            first = point[a, ia] if kind_a == POINT else point[a, bodies.line[a, ia, 0]]
-            second = point[b, jb] if kind_b == POINT else point[b, bodies.line[b, jb, 0]]
-            along = first - first if kind_a == POINT else point[a, bodies.line[a, ia, 1]] - first
-            other = second - second if kind_b == POINT else point[b, bodies.line[b, jb, 1]] - second
-            share[0] = share[1] = 0.0
-            long_a, long_b = np.sqrt(dot(along, along)), np.sqrt(dot(other, other))
-            if kind_a == LINE and kind_b == LINE:
-                if nearest_on_lines(first, along, second, other, share) < 1e-12:
-                    continue  # parallel: their ends are points on lines
-            elif kind_a == LINE:
-                share[0] = dot(second - first, along) / long_a**2
-            elif kind_b == LINE:
-                share[1] = dot(first - second, other) / long_b**2
+            long_a, long_b, spread = nearest(bodies, point, (a, b, kind_a, ia, kind_b, jb), share, lines, n)
+            if spread < 1e-12:
+                continue  # parallel: their ends are points on lines
             # At an end the point is nearer, or as near; but sharp edges that cross begin and end there.
             end = -tol[0] if kind_a == LINE and kind_b == LINE and r == 0.0 else tol[0]
             if kind_a == LINE and (share[0] * long_a < end or (1.0 - share[0]) * long_a < end):
                 continue
             if kind_b == LINE and (share[1] * long_b < end or (1.0 - share[1]) * long_b < end):
                 continue
-            for p in range(d):
-                n[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]
             gap = np.sqrt(dot(n, n))
             if kind_a == LINE and kind_b == LINE and r == 0.0:
-                n[0] = along[1] * other[2] - along[2] * other[1]
-                n[1] = along[2] * other[0] - along[0] * other[2]
-                n[2] = along[0] * other[1] - along[1] * other[0]
+                n[:] = cross(lines[0], lines[1])
                 size = np.sqrt(dot(n, n))
                 if beyond(bodies, point, a, LINE, ia, n) > tol[0] * size:
                     n *= -1.0
@@ -207,52 +224,29 @@ def write_margins(bodies, place, axes, world, features, out):
     """
     point = world[0]
     d = place.shape[1]
-    n, share = np.zeros(d), np.zeros(2)
+    n, share, lines = np.zeros(d), np.zeros(2), np.zeros((2, d))
     for k in range(len(features)):
         out[k] = 1e300
         a, b = features[k, 0], features[k, 1]
         kind_a, ia, kind_b, jb = features[k, 2], features[k, 3], features[k, 4], features[k, 5]
-        column = 0
         if kind_a == FACE or kind_b == FACE:
             o, f, w, j = (a, ia, b, jb) if kind_a == FACE else (b, jb, a, ia)
-            for e in range(bodies.sides[o, f]):
-                s = bodies.limit[o, f, e]
-                for p in range(d):
-                    for q in range(d):
-                        s -= bodies.side[o, f, e, q] * axes[o, p, q] * (point[w, j, p] - place[o, p])
-                out[k, column] = s
-                column += 1
+            within(bodies, axes, place, o, f, point[w, j], out[k])
             continue
-        first = point[a, ia] if kind_a == POINT else point[a, bodies.line[a, ia, 0]]
-        second = point[b, jb] if kind_b == POINT else point[b, bodies.line[b, jb, 0]]
-        along = first - first if kind_a == POINT else point[a, bodies.line[a, ia, 1]] - first
-        other = second - second if kind_b == POINT else point[b, bodies.line[b, jb, 1]] - second
-        share[0] = share[1] = 0.0
-        long_a, long_b = np.sqrt(dot(along, along)), np.sqrt(dot(other, other))
-        if kind_a == LINE and kind_b == LINE:
-            nearest_on_lines(first, along, second, other, share)
-        elif kind_a == LINE:
-            share[0] = dot(second - first, along) / long_a**2
-        elif kind_b == LINE:
-            share[1] = dot(first - second, other) / long_b**2
+        long_a, long_b, _ = nearest(bodies, point, (a, b, kind_a, ia, kind_b, jb), share, lines, n)
         if kind_a == LINE:
             out[k, 0], out[k, 1] = share[0] * long_a, (1.0 - share[0]) * long_a
         if kind_b == LINE:
             out[k, 2], out[k, 3] = share[1] * long_b, (1.0 - share[1]) * long_b
-        for p in range(d):
-            n[p] = second[p] + share[1] * other[p] - first[p] - share[0] * along[p]
         if kind_a == LINE and kind_b == LINE and bodies.radius[a] + bodies.radius[b] == 0.0:
-            n[0] = along[1] * other[2] - along[2] * other[1]
-            n[1] = along[2] * other[0] - along[0] * other[2]
-            n[2] = along[0] * other[1] - along[1] * other[0]
+            n[:] = cross(lines[0], lines[1])
             if dot(n, place[b] - place[a]) < 0.0:
                 n *= -1.0
         n /= np.sqrt(dot(n, n))
         column = 4
         for turn in range(2):
             i, kind, number, sign = (a, kind_a, ia, 1.0) if turn == 0 else (b, kind_b, jb, -1.0)
-            e0 = number if kind == POINT else bodies.line[i, number, 0]
-            e1 = number if kind == POINT else bodies.line[i, number, 1]
+            e0, e1 = ends(bodies, i, kind, number)
             for e in range(bodies.points[i]):
                 if e != e0 and e != e1:
                     s = 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
-from reference_solver.exact.kernels.rotation import dot, turn_axes
+from reference_solver.exact.kernels.rotation import cross, dot, turn_axes
 
 #: A share that no piece has.
 NEVER = 2.0
@@ -223,39 +223,140 @@ def third_derivative(bounds, o, w, arm, apart):
 
 
 @kernel
-def meeting_of_point(bodies, course, who, k, limits):
-    """Return the first share below ``limits[0]`` at which point k of body ``who[1]`` meets body ``who[0]``, or `NEVER`.
+def write_directions(bodies, o, w, seen, out):
+    """Write directions (m, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
 
-    ``limits``: the share to look up to, T, noise [m], speed of what leaves [m], round-off of gaps [m]. The second
-    number tells whether the search stopped there before anything met.
+    Normals of faces of o; of planes through edges of both; towards each other at the nearest places of lines and
+    points. Return their number.
     """
-    w = who[1]
-    until, third, noise, slow, least = limits
-    d = course.place.shape[1]
-    seen = np.zeros((3, d))
-    point = bodies.point[w, k]
+    d = seen.shape[2]
+    count = 0
+    for f in range(bodies.faces[o]):
+        out[count] = bodies.normal[o, f]
+        count += 1
+    lines_o, lines_w = bodies.lines[o], bodies.lines[w]
+    share, u, v, z = np.zeros(2), np.zeros(d), np.zeros(d), np.zeros(d)
+    for i in range(max(1, lines_o)):
+        a0, a1 = (bodies.line[o, i, 0], bodies.line[o, i, 1]) if lines_o > 0 else (0, 0)
+        for j in range(max(1, lines_w)):
+            b0, b1 = (bodies.line[w, j, 0], bodies.line[w, j, 1]) if lines_w > 0 else (0, 0)
+            for p in range(d):
+                u[p], v[p] = bodies.point[o, a1, p] - bodies.point[o, a0, p], seen[b1, 0, p] - seen[b0, 0, p]
+                z[p] = seen[b0, 0, p] - bodies.point[o, a0, p]
+            aa, bb, ab, aw, bw = dot(u, u), dot(v, v), dot(u, v), dot(u, z), dot(v, z)
+            spread = aa * bb - ab * ab
+            inside = False
+            if spread > 1e-12 * aa * bb and aa > 0.0 and bb > 0.0:
+                share[0], share[1] = (bb * aw - ab * bw) / spread, (ab * aw - aa * bw) / spread
+                inside = 0.0 < share[0] < 1.0 and 0.0 < share[1] < 1.0
+            if inside and d == 3:
+                out[count] = cross(u, v)
+            else:  # one is nearest with an end
+                best = 1e300
+                for end in range(4):
+                    u0 = float(end) if end < 2 else 0.0
+                    v0 = float(end - 2) if end >= 2 else 0.0
+                    if end < 2 and bb > 0.0:
+                        v0 = (u0 * ab - bw) / bb
+                        v0 = 0.0 if v0 < 0.0 else (1.0 if v0 > 1.0 else v0)
+                    if end >= 2 and aa > 0.0:
+                        u0 = (v0 * ab + aw) / aa
+                        u0 = 0.0 if u0 < 0.0 else (1.0 if u0 > 1.0 else u0)
+                    square = aa * u0 * u0 + bb * v0 * v0 - 2.0 * ab * u0 * v0 - 2.0 * aw * u0 + 2.0 * bw * v0
+                    if square < best:
+                        best = square
+                        for p in range(d):
+                            out[count, p] = z[p] + v0 * v[p] - u0 * u[p]
+            size, way = dot(out[count], out[count]), dot(out[count], z)
+            if size > 1e-30:
+                for p in range(d):
+                    out[count, p] *= (1.0 if way > 0.0 else -1.0) / np.sqrt(size)
+                count += 1
+    return count
+
+
+@kernel
+def clear_of_pair(bodies, course, who, s, bounds, room):
+    """Return the gap of two bodies at a share s, and how far they stay clear of each other.
+
+    ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and T of points of
+    either body. Half-spaces of either body hold it.
+    """
+    lift, slow, ahead = bounds[0], bounds[1], bounds[2]
+    seen, directions = room
+    gap, best = -1e300, 0.0
+    for side in range(2):
+        o, w = who[side], who[1 - side]
+        if bodies.points[w] == 0:
+            continue
+        r = bodies.radius[o] + bodies.radius[w]
+        for k in range(bodies.points[w]):
+            write_seen(course, bodies.generator, (o, w, 0, -1), bodies.point[w, k], s, seen[k])
+        count = write_directions(bodies, o, w, seen, directions)
+        for m in range(count):
+            level, low = -1e300, 1e300
+            for k in range(bodies.points[o]):
+                level = max(level, dot(directions[m], bodies.point[o, k]))
+            if bodies.points[o] == 0:
+                level = bodies.offset[o, m]
+            for k in range(bodies.points[w]):
+                low = min(low, dot(directions[m], seen[k, 0]) - level - r)
+            gap = max(gap, low)
+            if low + lift < 0.0 or ahead <= best:
+                continue
+            far = ahead
+            for k in range(bodies.points[w]):
+                h, h1 = dot(directions[m], seen[k, 0]) - level - r + lift, dot(directions[m], seen[k, 1])
+                # What touches counts only where it leaves, but for points that are away.
+                far = 0.0 if h <= lift + bounds[5] and h1 <= slow else far
+                far = min(far, safe(h, h1, dot(directions[m], seen[k, 2]), bounds[3 + side], far))
+            best = max(best, far)
+    return gap, best
+
+
+@kernel
+def clear_at(bodies, course, who, s, bounds, third, room):
+    """Return the gap and how far it stays clear: of point ``who[3]`` (`clear`), or of two bodies if that is -1.
+
+    ``bounds``: the lift, the least rate of gaps that count, how far to look, the noise of `clear` and that of
+    `clear_of_pair`. ``third``: T of points of either body.
+    """
+    lift, slow, ahead, runs, touches = bounds
+    if who[3] < 0:
+        return clear_of_pair(bodies, course, who, s, (lift, slow, ahead, third[0], third[1], touches), room)
+    seen = room[0][0]
+    write_seen(course, bodies.generator, who, bodies.point[who[1], who[3]], s, seen)
+    return clear(bodies, course, who, s, seen, (lift, slow, third[0], ahead, runs))
+
+
+@kernel
+def meeting(bodies, course, who, limits, third, room):
+    """Return the first share below ``limits[0]`` at which a point or a body meets body ``who[0]``, or `NEVER`.
+
+    ``limits``: the share to look up to, noise [m], speed of what leaves [m], round-off of gaps [m]. The second number
+    tells whether the search stopped there before anything met. See `clear_at` for the rest.
+    """
+    until, noise, slow, least = limits
     s, lift, leaves, before, runs = 0.0, 0.0, True, 0.0, noise
     for step in range(MOST_STEPS):
         ahead = until - s
-        write_seen(course, bodies.generator, who, point, s, seen)
-        gap, far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))
+        gap, far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)
         if step == 0 and gap <= noise:  # it touches, and leaves with a speed
             lift, runs = max(0.0, -gap), -1e300
-            far = clear(bodies, course, who, s, seen, (lift, slow, third, ahead, runs))[1]
+            far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), third, room)[1]
             if far == 0.0:  # or without one: no contact until it is deeper than now by the noise
                 lift, leaves = noise + lift, False
-                far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))[1]
+                far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)[1]
         elif not leaves and gap > noise:
             lift, leaves = 0.0, True
-            far = clear(bodies, course, who, s, seen, (lift, -1e300, third, ahead, runs))[1]
+            far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)[1]
         if s > 0.0 and gap + lift <= least:
             low, high = before, s
             while gap + lift < 0.0:  # passed by round-off
                 middle = 0.5 * (low + high)
                 if not low < middle < high:
                     break
-                write_seen(course, bodies.generator, who, point, middle, seen)
-                if clear(bodies, course, who, middle, seen, (0.0, 0.0, 0.0, 0.0, runs))[0] + lift > 0.0:
+                if clear_at(bodies, course, who, middle, (0.0, 0.0, 0.0, runs, 0.0), third, room)[0] + lift > 0.0:
                     low = middle
                 else:
                     high = middle
@@ -270,8 +371,8 @@ def meeting_of_point(bodies, course, who, k, limits):
 
 
 @kernel
-def first_meeting(bodies, course, held, pairs, scales, found):
-    """Return the first share of a piece at which points that are not held meet another body, or `NEVER`.
+def first_meeting(bodies, course, held, pairs, scales):
+    """Return the first share of a piece at which points that are not held meet another body, or `NEVER`; see `meeting`.
 
     Parameters
     ----------
@@ -281,13 +382,12 @@ def first_meeting(bodies, course, held, pairs, scales, found):
         (n, n): whether the pair is followed here.
     scales
         Noise of gaps [m], speed of what leaves, as a way in the piece [m].
-    found
-        (3,): the bodies that meet, and whether the search stopped instead.
     """
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
     write_bounds(course, bounds)
-    first = NEVER
+    room = np.zeros((1, 3, d)), np.zeros((1, d))
+    first, stopped = NEVER, 0
     for o in range(n):
         for w in range(n):
             if o == w or pairs[o, w] == 0 or bodies.points[w] == 0 or (bodies.free[o] == 0 and bodies.free[w] == 0):
@@ -321,174 +421,22 @@ def first_meeting(bodies, course, held, pairs, scales, found):
                     third, moves = third_derivative(bounds, o, w, np.sqrt(arm), apart)
                 if moves == 0.0 and third == 0.0 and (fixed == 1 or bounds[o, 1, 0] == 0.0):
                     continue
-                limits = (min(first, 1.0), third, scales[0], scales[1], 1e-16 * size)
-                s, stopped = meeting_of_point(bodies, course, (o, w, fixed), k, limits)
+                limits = (min(first, 1.0), scales[0], scales[1], 1e-16 * size)
+                s, ended = meeting(bodies, course, (o, w, fixed, k), limits, (third, 0.0), room)
                 if s < first:
-                    first = s
-                    found[0], found[1], found[2] = o, w, stopped
-    return first
+                    first, stopped = s, ended
+    return first, stopped
 
 
 @kernel
-def write_directions(bodies, o, w, seen, out):
-    """Write directions (m, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
-
-    Normals of faces of o; of planes through edges of both; towards each other at the nearest places of lines and
-    points. Return their number.
-    """
-    d = seen.shape[2]
-    count = 0
-    for f in range(bodies.faces[o]):
-        out[count] = bodies.normal[o, f]
-        count += 1
-    lines_o, lines_w = bodies.lines[o], bodies.lines[w]
-    share = np.zeros(2)
-    for i in range(max(1, lines_o)):
-        a0, a1 = (bodies.line[o, i, 0], bodies.line[o, i, 1]) if lines_o > 0 else (0, 0)
-        for j in range(max(1, lines_w)):
-            b0, b1 = (bodies.line[w, j, 0], bodies.line[w, j, 1]) if lines_w > 0 else (0, 0)
-            aa, bb, ab, aw, bw = 0.0, 0.0, 0.0, 0.0, 0.0
-            for p in range(d):
-                u, v = bodies.point[o, a1, p] - bodies.point[o, a0, p], seen[b1, 0, p] - seen[b0, 0, p]
-                z = seen[b0, 0, p] - bodies.point[o, a0, p]
-                aa += u * u
-                bb += v * v
-                ab += u * v
-                aw += u * z
-                bw += v * z
-            spread = aa * bb - ab * ab
-            inside = False
-            if spread > 1e-12 * aa * bb and aa > 0.0 and bb > 0.0:
-                share[0], share[1] = (bb * aw - ab * bw) / spread, (ab * aw - aa * bw) / spread
-                inside = 0.0 < share[0] < 1.0 and 0.0 < share[1] < 1.0
-            if inside and d == 3:
-                for p in range(3):
-                    q, t = (p + 1) % 3, (p + 2) % 3
-                    uq, ut = (
-                        bodies.point[o, a1, q] - bodies.point[o, a0, q],
-                        bodies.point[o, a1, t] - bodies.point[o, a0, t],
-                    )
-                    vq, vt = seen[b1, 0, q] - seen[b0, 0, q], seen[b1, 0, t] - seen[b0, 0, t]
-                    out[count, p] = uq * vt - ut * vq
-            else:  # one is nearest with an end
-                best = 1e300
-                for end in range(4):
-                    u0 = float(end) if end < 2 else 0.0
-                    v0 = float(end - 2) if end >= 2 else 0.0
-                    if end < 2 and bb > 0.0:
-                        v0 = (u0 * ab - bw) / bb
-                        v0 = 0.0 if v0 < 0.0 else (1.0 if v0 > 1.0 else v0)
-                    if end >= 2 and aa > 0.0:
-                        u0 = (v0 * ab + aw) / aa
-                        u0 = 0.0 if u0 < 0.0 else (1.0 if u0 > 1.0 else u0)
-                    square = aa * u0 * u0 + bb * v0 * v0 - 2.0 * ab * u0 * v0 - 2.0 * aw * u0 + 2.0 * bw * v0
-                    if square < best:
-                        best = square
-                        for p in range(d):
-                            u, v = bodies.point[o, a1, p] - bodies.point[o, a0, p], seen[b1, 0, p] - seen[b0, 0, p]
-                            z = seen[b0, 0, p] - bodies.point[o, a0, p]
-                            out[count, p] = z + v0 * v - u0 * u
-            size, way = 0.0, 0.0
-            for p in range(d):
-                size += out[count, p] ** 2
-                way += out[count, p] * (seen[b0, 0, p] - bodies.point[o, a0, p])
-            if size > 1e-30:
-                for p in range(d):
-                    out[count, p] *= (1.0 if way > 0.0 else -1.0) / np.sqrt(size)
-                count += 1
-    return count
-
-
-@kernel
-def clear_of_pair(bodies, course, who, s, bounds, room):
-    """Return the gap of two bodies at a share s, and how far they stay clear of each other.
-
-    ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and T of points of
-    either body. Half-spaces of either body hold it.
-    """
-    lift, slow, ahead = bounds[0], bounds[1], bounds[2]
-    seen, directions = room
-    gap, best = -1e300, 0.0
-    for side in range(2):
-        o, w = who[side], who[1 - side]
-        if bodies.points[w] == 0:
-            continue
-        r = bodies.radius[o] + bodies.radius[w]
-        for k in range(bodies.points[w]):
-            write_seen(course, bodies.generator, (o, w, 0), bodies.point[w, k], s, seen[k])
-        count = write_directions(bodies, o, w, seen, directions)
-        for m in range(count):
-            level, low = -1e300, 1e300
-            for k in range(bodies.points[o]):
-                level = max(level, dot(directions[m], bodies.point[o, k]))
-            if bodies.points[o] == 0:
-                level = bodies.offset[o, m]
-            for k in range(bodies.points[w]):
-                low = min(low, dot(directions[m], seen[k, 0]) - level - r)
-            gap = max(gap, low)
-            if low + lift < 0.0 or ahead <= best:
-                continue
-            far = ahead
-            for k in range(bodies.points[w]):
-                h, h1 = dot(directions[m], seen[k, 0]) - level - r + lift, dot(directions[m], seen[k, 1])
-                # What touches counts only where it leaves, but for points that are away.
-                far = 0.0 if h <= lift + bounds[5] and h1 <= slow else far
-                far = min(far, safe(h, h1, dot(directions[m], seen[k, 2]), bounds[3 + side], far))
-            best = max(best, far)
-    return gap, best
-
-
-@kernel
-def meeting_of_pair(bodies, course, who, limits, room):
-    """Return the first share at which bodies meet, edges included, or `NEVER`; see `meeting_of_point`.
-
-    ``limits``: the share to look up to, T of points of either body, noise [m], speed of what leaves [m], round-off of
-    gaps [m].
-    """
-    until, third, other, noise, slow, least = limits
-    s, lift, leaves, before = 0.0, 0.0, True, 0.0
-    for step in range(MOST_STEPS):
-        ahead = until - s
-        gap, far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)
-        if step == 0 and gap <= noise:
-            lift = max(0.0, -gap)
-            far = clear_of_pair(bodies, course, who, s, (lift, slow, ahead, third, other, noise), room)[1]
-            if far == 0.0:
-                lift, leaves = noise + lift, False
-                far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)[1]
-        elif not leaves and gap > noise:
-            lift, leaves = 0.0, True
-            far = clear_of_pair(bodies, course, who, s, (lift, -1e300, ahead, third, other, 0.0), room)[1]
-        if s > 0.0 and gap + lift <= least:
-            low, high = before, s
-            while gap + lift < 0.0:  # passed by round-off
-                middle = 0.5 * (low + high)
-                if not low < middle < high:
-                    break
-                passed = clear_of_pair(bodies, course, who, middle, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), room)[0]
-                if passed + lift > 0.0:
-                    low = middle
-                else:
-                    high = middle
-            return (high if gap + lift >= 0.0 else low), 0
-        if far >= ahead:
-            return NEVER, 0
-        if s + far <= s:
-            return s, 0
-        before = s
-        s += far
-    return s, 1
-
-
-@kernel
-def first_meeting_of_pairs(bodies, course, pairs, scales, found):
+def first_meeting_of_pairs(bodies, course, pairs, scales):
     """Return the first share of a piece at which pairs that no contact holds meet, or `NEVER`; see `first_meeting`."""
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
     write_bounds(course, bounds)
     lines = bodies.line.shape[1]
     room = np.zeros((bodies.point.shape[1], 3, d)), np.zeros((bodies.normal.shape[1] + lines * lines + 1, d))
-    first = NEVER
+    first, stopped = NEVER, 0
     for o in range(n):
         for w in range(o + 1, n):
             if pairs[o, w] == 0 or (bodies.free[o] == 0 and bodies.free[w] == 0):
@@ -500,9 +448,8 @@ def first_meeting_of_pairs(bodies, course, pairs, scales, found):
             reach_o, reach_w = min(bodies.reach[o], 1e300), min(bodies.reach[w], 1e300)
             third = third_derivative(bounds, o, w, reach_w, apart)[0]
             other = third_derivative(bounds, w, o, reach_o, apart)[0] if bodies.points[o] > 0 else 0.0
-            limits = (min(first, 1.0), third, other, scales[0], scales[1], 1e-15 * (apart + r))
-            s, stopped = meeting_of_pair(bodies, course, (o, w), limits, room)
+            limits = (min(first, 1.0), scales[0], scales[1], 1e-15 * (apart + r))
+            s, ended = meeting(bodies, course, (o, w, 0, -1), limits, (third, other), room)
             if s < first:
-                first = s
-                found[0], found[1], found[2] = o, w, stopped
-    return first
+                first, stopped = s, ended
+    return first, stopped

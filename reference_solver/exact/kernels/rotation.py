@@ -15,6 +15,16 @@ def dot(a, b):
 
 
 @kernel
+def cross(a, b):
+    """Return a x b."""
+    out = np.empty(3)
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+    return out
+
+
+@kernel
 def turn_axes(axes, turn, out):
     """Write body axes (d, d), as columns, after a turn (1 | 3,) into ``out`` (d, d).
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
-from reference_solver.exact.kernels.features import FACE, LINE, POINT
-from reference_solver.exact.kernels.rotation import dot
+from reference_solver.exact.kernels.features import FACE, LINE, POINT, ends
+from reference_solver.exact.kernels.rotation import cross, dot
 
 
 @kernel
@@ -60,19 +60,7 @@ def write_tangents(frame):
         t[least] += 1.0
         size = dot(t, t)
     t /= np.sqrt(size)
-    frame[2, 0] = n[1] * t[2] - n[2] * t[1]
-    frame[2, 1] = n[2] * t[0] - n[0] * t[2]
-    frame[2, 2] = n[0] * t[1] - n[1] * t[0]
-
-
-@kernel
-def cross(a, b):
-    """Return a x b."""
-    out = np.empty(3)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+    frame[2] = cross(n, t)
 
 
 @kernel
@@ -95,7 +83,7 @@ def write_rows(bodies, state, features, rows):
             if kind == POINT:
                 write_motion(bodies, state, i, bodies.point[i, number], spin[turn], core[turn])
             elif kind == LINE:
-                first, last = bodies.line[i, number, 0], bodies.line[i, number, 1]
+                first, last = ends(bodies, i, kind, number)
                 write_motion(bodies, state, i, bodies.point[i, last], spin[turn], end)
                 write_motion(bodies, state, i, bodies.point[i, first], spin[turn], core[turn])
                 along[turn] = end - core[turn]
