@@ -13,7 +13,6 @@ from adapters.engine import Array
 from adapters.scene import Scene, SceneError
 from adapters.trajectory import Trajectory
 from reports.command.reporting import extra
-from reports.page.charts import error_axis, gutter, log_scale, power_axis, with_unit
 from reports.palette import HOLLOW, colours_of, dash_of, role_of, shape_of
 from validation.cells import format_dt
 from validation.files.distance import primary_of
@@ -23,9 +22,11 @@ with extra("plot"):
     import altair as alt
     import vl_convert  # noqa: F401  (writes PDF, SVG and PNG; asked for before anything is drawn)
 
+    from reports.page.charts import error_axis, gutter, log_scale, power_axis, with_unit
+
 #: Largest number of drawn samples of a motion; a page has fewer points.
 MOST_SAMPLES = 4000
-#: Columns of the speed figure.
+#: Columns that the figure of error against time draws.
 COLUMNS = ["cost", "shown", "error", "who", "panel", "step", "end", "best", "on_front"]
 #: Smallest drawn share of a tolerance; below it, differences do not matter for the choice of an engine.
 LEAST = 1e-3
@@ -164,9 +165,7 @@ def work_chart(points: pd.DataFrame) -> alt.FacetChart:
             shape=by(alt.Shape, shapes),
         ),
         base.mark_text(align="left", dx=6, dy=-7, fontSize=10).encode(text="end:N"),
-        data=_data(
-            used[["cost", "shown", "error", "who", "panel", "step", "end", "best", "on_front"]].to_dict("records")
-        ),
+        data=_data(used[COLUMNS].to_dict("records")),
     )
     return chart.properties(width=340, height=280).facet(column=alt.Column("panel:N", title=None))
 

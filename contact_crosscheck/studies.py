@@ -119,11 +119,7 @@ def sweep(
         for each in own:
             request = _request(name, canonical, each, profiles, dimension, dts, counts, settings, fixed)
             slots += study_slots(request, Study(crossed, [{}]))
-    here = [slot for slot in slots if registry.is_introduced(slot.engine) or is_introduced(slot.scene)]
-    elsewhere = [slot for slot in slots if slot not in set(here)]
-    if here and out is not None:
-        alone = here[0].engine if registry.is_introduced(here[0].engine) else here[0].scene
-        raise EngineError(f"out: {alone} exists in this process alone; its results are not kept")
+    here, elsewhere = _divided(slots, out)
     observations = [observe(slot) for slot in here]
     run_id = ""
     if elsewhere:
@@ -161,6 +157,17 @@ def _request(
         fixed,
         sets=settings_from(settings),
     )
+
+
+def _divided(slots: Sequence[Slot], out: str | os.PathLike[str] | None) -> tuple[list[Slot], list[Slot]]:
+    """Cases of engines and scenes that exist in this process alone, and the others; only the others can be kept."""
+    alone = {
+        slot: slot.engine if registry.is_introduced(slot.engine) else slot.scene
+        for slot in slots if registry.is_introduced(slot.engine) or is_introduced(slot.scene)
+    }  # fmt: skip
+    if alone and out is not None:
+        raise EngineError(f"out: {next(iter(alone.values()))} exists in this process alone; its results are not kept")
+    return [*alone], [slot for slot in slots if slot not in alone]
 
 
 def _is_several(value: Any) -> bool:
@@ -327,13 +334,10 @@ def bench(
         slots = accuracy_slots(wanted)
         if not slots:
             raise SceneError("bench: no case fits these engines, profiles and dimension")
+        here, elsewhere = _divided(slots, out)
         console = terminal(stderr=True)
         with _store(out) as store:
-            here = [slot for slot in slots if registry.is_introduced(slot.engine)]
-            if here and out is not None:
-                raise EngineError(f"out: {here[0].engine} exists in this process alone; its results are not kept")
-            asked = [slot for slot in slots if slot not in set(here)]
-            run = run_plan(store, f"bench {name}", asked, console, jobs, timeout, finish=False, recorded=False)
+            run = run_plan(store, f"bench {name}", elsewhere, console, jobs, timeout, finish=False, recorded=False)
             for slot in here:
                 store.add(run, observe(slot))
             observations = store.observations(run)

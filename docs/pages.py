@@ -95,11 +95,6 @@ def prose(text: str) -> str:
     return "".join(f"`{part}`" if k % 2 else markdown(part) for k, part in enumerate(parts))
 
 
-def plain(text: object) -> str:
-    """Text that Markdown shows as it is, on one line."""
-    return markdown(str(text)).replace("\n", " ").replace("*", "\\*").replace("_", "\\_")
-
-
 def parts(figure: str) -> list[tuple[bool, str]]:
     """Parts of a figure's text between blank lines: whether each is drawn, and its text; drawings are joined."""
     found: list[tuple[bool, str]] = []

@@ -14,10 +14,13 @@ import contact_crosscheck as cc
 from adapters import registry
 from reports.wording import number
 from validation import bounds
+from validation.canonical import GRAVITY
+from validation.catalogue import CATALOGUE
+from validation.running.plan import QUICK_DT
+from validation.scenes.bounce import RADIUS
 
-E, HEIGHT, G, DT = 0.8, 1.0, 9.81, 1.0 / 240.0
-#: Radius of the ball [m]: its centre is above the floor by this and the height.
-RADIUS = 0.5
+E, DT, G = 0.8, QUICK_DT, GRAVITY
+HEIGHT = CATALOGUE["bounce"].complete({})["height"]
 #: Engine of the example: the first that is installed.
 ENGINES = ("mujoco", "bullet", "chipmunk", "reference")
 
@@ -56,12 +59,11 @@ def example() -> dict[str, Any]:
 
 def truth() -> pd.DataFrame:
     """Height of the ball's centre over time by the law."""
-    start, speed, rows = 0.0, -math.sqrt(2.0 * G * HEIGHT), []
-    fall = -speed / G
-    rows += [(fall * k / 40, RADIUS + HEIGHT - 0.5 * G * (fall * k / 40) ** 2) for k in range(41)]
-    start = fall
+    speed = math.sqrt(2.0 * G * HEIGHT)
+    start = speed / G
+    rows = [(start * k / 40, RADIUS + HEIGHT - 0.5 * G * (start * k / 40) ** 2) for k in range(41)]
     for _ in range(6):
-        speed = abs(speed) * E
+        speed *= E
         flight = 2.0 * speed / G
         times = [flight * k / 40 for k in range(41)]
         rows += [(start + t, RADIUS + speed * t - 0.5 * G * t * t) for t in times]

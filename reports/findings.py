@@ -11,19 +11,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from reports.wording import LABELS, mark_of, measured, number, params_text, quantity, reproduce, row_id
+from reports.wording import LABELS, MARKS, mark_of, measured, number, params_text, quantity, reproduce, row_id
 from validation.judging.rows import is_alarming
 from validation.posed import is_file
 
 Plain = Mapping[str, Any]
 #: Marks with exit status 1 of the command.
-ALARMING = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted")
+ALARMING = MARKS[: MARKS.index("fail")]
 #: Outcomes of cases without an answer that is judged, and their words.
 REFUSED = {"unsupported": "UNSUPPORTED", "not_installed": "NOT INSTALLED", "refused": "REFUSED"}
 #: Marks of cases without a valid result: their rows have one reason, and no worst metric.
-WHOLE = ("crashed", "timed_out", "missing", "invalid", "refused")
-#: Marks in display order.
-ORDER = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted", "fail", "known", "explained")
+WHOLE = MARKS[: MARKS.index("new")]
+#: Marks of findings in display order.
+ORDER = MARKS[: MARKS.index("pass")]
 
 
 def finding_line(row: Plain) -> str:

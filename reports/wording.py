@@ -27,18 +27,8 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 FEW = 4
 #: Priority of marks of a group of rows: the first that occurs is its mark.
 MARKS = (
-    "crashed",
-    "timed_out",
-    "missing",
-    "invalid",
-    "refused",
-    "new",
-    "drifted",
-    "fail",
-    "known",
-    "explained",
-    "pass",
-)
+    "crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted", "fail", "known", "explained", "pass",
+)  # fmt: skip
 LABELS = {
     "crashed": "CRASHED",
     "timed_out": "TIMED OUT",

@@ -88,9 +88,8 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command called ``name``; importing its module registers it."""
         if name in _MODULES:
-            stages = sys.modules.get(
-                "adapters.stages"
-            )  # where nothing is timed, a command need not import engines' types
+            # Only --timings loads `adapters.stages`: a command that needs nothing of adapters shall not import them.
+            stages = sys.modules.get("adapters.stages")
             with stages.stage(stages.START) if stages else contextlib.nullcontext():
                 import_module(f"reports.command.{_MODULES[name]}")
         return super().get_command(ctx, name)

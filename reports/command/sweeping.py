@@ -20,7 +20,7 @@ from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import print_roles, terminal
 from reports.wording import at, csv_of, plural
-from validation.judging.rows import rows_of
+from validation.judging.rows import ALARMING_OUTCOMES, rows_of
 from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
 from validation.records.store import Store
 from validation.workers import TIMEOUT
@@ -95,8 +95,7 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     absent = missing(options["engine"], request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    lost = ("invalid", "crashed", "timed_out", "missing")
-    broken = any(row.outcome in lost or (row.outcome == "refused" and row.alarming) for row in rows)
+    broken = any(row.outcome in ALARMING_OUTCOMES or (row.outcome == "refused" and row.alarming) for row in rows)
     sys.exit(statuses.verdict(broken, complete and not absent))
 
 

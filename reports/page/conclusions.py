@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.findings import has_answer
+from reports.findings import ALARMING, ORDER, has_answer
 from reports.matrix import UNJUDGED
 from reports.page.source import Source
 from reports.page.verdicts import (
-    ALARMS,
     SAID,
     family_of,
     ratio_of,
@@ -141,10 +140,10 @@ def _law_text(reason: str) -> str:
 def wrongs(source: Source) -> str:
     """Where something is wrong: unexpected results first, else the largest failures that are known."""
     counts = Counter(mark_of(row) for row in source.rows)
-    alarms = [f"{counts[mark]} {SAID[mark][1]}" for mark in ALARMS if counts[mark]]
+    alarms = [f"{counts[mark]} {SAID[mark][1]}" for mark in ALARMING if counts[mark]]
     said = ""
     if alarms:
-        worst = max((row for row in source.rows if mark_of(row) in ALARMS), key=severity)
+        worst = max((row for row in source.rows if mark_of(row) in ALARMING), key=severity)
         said = f"{joined(alarms)} checks need attention, first {_row_text(worst)}. "
     listed = [row for row in source.rows if mark_of(row) in ("known", "fail")]
     if not listed:
@@ -258,7 +257,7 @@ def findings(source: Source) -> list[tuple[str, int, list[FindingFamily]]]:
         if mark not in ("pass", *UNJUDGED):
             key = (row["engine"], row["profile"], row["scene"], row["dimension"], family_of(row["metric"]))
             groups[mark][key].append(row)
-    order = [mark for mark in (*ALARMS, "fail", "known", "explained") if mark in groups]
+    order = [mark for mark in ORDER if mark in groups]
     out = []
     for mark in order:
         families = sorted(groups[mark].items(), key=lambda item: -max(ratio_of(r) or 0.0 for r in item[1]))

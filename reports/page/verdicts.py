@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Any
 
+from reports.findings import ALARMING, ORDER
 from reports.matrix import UNJUDGED, Field, Matrix
 from reports.overview import share
 from reports.page.source import Source
@@ -37,9 +38,8 @@ SAID = {
     "not_installed": ("–", "not installed"),
     "none": ("–", "no value"),
 }
-ALARMS = ("crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted")
 #: Mark -> class of a value's background: one letter, because tables of every value contain it thousands of times.
-GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.fromkeys(ALARMS, "a")
+GROUNDS = {"explained": "e", "known": "k", "fail": "f", "diverged": "f"} | dict.fromkeys(ALARMING, "a")
 #: Meaning of the words, for the legend.
 MEANINGS = {
     "pass": "within the stated tolerance of the truth",
@@ -317,14 +317,10 @@ def _worst(column: tuple[str, str], rows: Sequence[Plain]) -> Worst:
         number(row["tolerance"], 2),
         times(ratio),
         f"{sum(r['physics'] == 'pass' for r in judged)}/{len(judged)}" if judged else "",
-        why_anchor(mark, row["engine"], row["profile"], row["reason"]) if mark in LISTED and row["reason"] else "",
+        why_anchor(mark, row["engine"], row["profile"], row["reason"]) if mark in ORDER and row["reason"] else "",
         times(row["skill"]) if mark != "pass" else "",
         reproduce(row["slot"]),
     )
-
-
-#: Marks that are listed by their reason.
-LISTED = (*ALARMS, "fail", "known", "explained")
 
 
 def why_anchor(mark: str, engine: str, profile: str, reason: str) -> str:

@@ -96,7 +96,7 @@ def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -
     kept = table()
     scene, fixes = kept["scenes"][name], {fix["engine"]: fix for fix in kept["fixes"].get(name, ())}
     match = next((match for match in found.matches if match.name == name), Match(name, 0.0, 0.0, 0.0, False, False, ""))
-    by_engine = {engine: of_engine(engine, name, found, fixes.get(engine)) for engine in kept["engines"]}
+    by_engine = {engine: _of_engine(engine, name, found, fixes.get(engine)) for engine in kept["engines"]}
     return {
         "answer": SCENE, "scene": name, "title": scene["title"], "law": scene["law"],
         "line": match.line if match.line != scene["title"] else "",
@@ -117,16 +117,15 @@ def _report(scene: str, source: str, line: str, asked: Sequence[str]) -> Plain:
     return {}
 
 
-def of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | None) -> Plain:
+def _of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | None) -> Plain:
     """What is on record of one engine on a scene: failed checks, a profile that passes, its fix, its defaults."""
     kept = table()["engines"][engine]
     rows = kept["scenes"].get(scene, [])
     failed, judged = sum(row[1] for row in rows), sum(row[2] for row in rows)
-    left = [row[3] for row in rows if row[3] is not None]
     return {
         "engine": engine, "release": kept["release"], "suite": kept["suite"], "failed": failed, "judged": judged,
-        "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong] if failed else [],
-        "better": kept["better"] if rows and left and sum(left) == 0 and len(left) == len(rows) else "",
+        "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong],
+        "better": kept["better"] if rows and all(row[3] == 0 for row in rows) else "",
         "fix": dict(fix or {}),
         "unset": _unset(kept["unset"], scene, found),
     }  # fmt: skip

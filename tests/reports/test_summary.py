@@ -304,16 +304,6 @@ def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
     assert finding_line(broken[0]).startswith(f"INVALID: bullet/tuned impact 2-D e=0.8 height=1: {why} | crosscheck")
 
 
-FILE_TEXT = """
-name = "ball"
-dimension = 2
-gravity = [0.0, -9.81]
-duration = 0.1
-[[bodies]]
-name = "ball"
-shape = { type = "disc", radius = 0.5 }
-mass = 1.0
-"""
 NOT_CERTIFIED = {"outcome": "refused", "physics": None, "standing": None, "reason": "the normal is not unique: 9e-8"}
 
 
@@ -325,7 +315,7 @@ def refused(scene, **changes):
 def test_refusal_of_a_file(tmp_path, monkeypatch):
     """It is told once, with its reason, and is neither a failure nor an alarm."""
     monkeypatch.chdir(tmp_path)
-    Path("ball.toml").write_text(FILE_TEXT)
+    Path("ball.toml").write_text(FALL)
     rows = [*refused("ball.toml"), row("impact", 2, "bullet", "tuned") | {"scene": "ball.toml"}]
     text = " ".join(" ".join(shown(rows, 100)).split())
     assert text.count("the normal is not unique: 9e-8") == 1 == as_markdown(rows).count("the normal is not unique: 9e")
