@@ -102,3 +102,8 @@ def deviations(
 def exactly(metric: str) -> str:
     """Pattern of a metric with an index: `fnmatch` reads a bare bracket as a set of characters."""
     return metric.replace("[", "[[]")
+
+
+def metric_of(pattern: str) -> str:
+    """The metric that `exactly` made a pattern of."""
+    return pattern.replace("[[]", "[")

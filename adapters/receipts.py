@@ -282,7 +282,7 @@ def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -
     if quantity in ("friction", "friction_impulse"):
         band = (FRICTION_SHARE + _jolts(case)) * case.friction + round_off
         because = "a sliding box is solved to a share of 1e-4 of its friction"
-        because += ", and what its place is rounded by rebounds" if case.restitution > 0.0 else ""
+        because += ", and the rounding of its position rebounds" if case.restitution > 0.0 else ""
     drag = _drag(quantity, case, declared)
     return (band + drag, f"{because}; and declared drag") if drag else (band, because)
 
@@ -290,9 +290,10 @@ def _default_band(quantity: str, case: Case, declared: Mapping[str, Declared]) -
 def _jolts(case: Case) -> float:
     """Share of the load on a sliding box that rebounds carry, which have no friction in engines that add them last.
 
-    A corner's place is rounded by epsilon/2 of the box's height and half width. A stiff contact corrects that within a
-    step of the engine's own, which is a speed; where e > 0 it rebounds, once in a step at most, with 1 + e times that.
-    In double precision this is nothing; in single precision .2 % of a step of 1/240 s with four of its own (e = 1).
+    The position of a corner is rounded by epsilon/2 of the box's height and half width. A stiff contact corrects that
+    within a step of the engine's own, which is a speed; where e > 0 it rebounds, once in a step at most, with 1 + e
+    times that. In double precision this is nothing; in single precision it is .2 % of a step of 1/240 s with four of
+    the engine's own (e = 1).
     """
     if case.restitution <= 0.0:
         return 0.0

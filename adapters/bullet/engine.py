@@ -161,8 +161,8 @@ class BulletEngine(CheckedEngine):
         if body:
             lines.append(f"p.changeDynamics(body, -1, {', '.join(body)})  # each body")
         if soft:
-            which = "that rebounds" if needs(scene).restitution > 0.0 else "that it is about"
-            lines.append(f"p.changeDynamics(body, -1, {', '.join(soft)})  # each body {which} alone")
+            which = "rebound" if needs(scene).restitution > 0.0 else "need it"
+            lines.append(f"p.changeDynamics(body, -1, {', '.join(soft)})  # only bodies that {which}")
         return "\n".join(["# p: pybullet", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:

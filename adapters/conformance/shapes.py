@@ -47,7 +47,7 @@ def sizes(engine: Engine) -> str:
         told = engine.declares(profile, needs(scene), DT).get("size")  # shares of the box of `adapters.probes`
         band = SIZE + (HALF_EXTENTS[0] * (abs(told.value - 1.0) + told.band) if told else 0.0)
         if not abs(off) <= band:
-            return f"{where}: its lowest place is {off:+.2g} m from its height, {band:.2g} m is allowed"
+            return f"{where}: its lowest position is {off:+.2g} m from its height, {band:.2g} m is allowed"
     return ""
 
 

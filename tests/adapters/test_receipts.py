@@ -296,7 +296,7 @@ def test_bands_of_properties_realised_as_requested():
         "impulse": (1e-6, "reported impulses must sum to m dv, up to the solver's tolerance"),
         "friction": (
             0.5e-4 + 1e-12 + 0.5 * jolts(2.0**-52),
-            "a sliding box is solved to a share of 1e-4 of its friction, and what its place is rounded by rebounds",
+            "a sliding box is solved to a share of 1e-4 of its friction, and the rounding of its position rebounds",
         ),
     }
     said["friction_impulse"] = said["friction"]

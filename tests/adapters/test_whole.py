@@ -1,15 +1,13 @@
-"""Files are written whole or not at all; text of a table starts no formula."""
+"""Files are written whole or not at all."""
 
 import os
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from adapters.trajectory import Trajectory, load_trajectory
 from adapters.whole import write
-from reports.wording import csv_of
 
 
 def test_file_that_cannot_be_written_whole(tmp_path):
@@ -41,8 +39,3 @@ def test_a_trajectory_that_is_read_while_another_is_written(tmp_path):
         found.save(path)
         assert reader.read() == b"old"
     assert load_trajectory(path).state_hash() == found.state_hash()
-
-
-def test_a_formula_in_a_table():
-    table = pd.DataFrame({"name": ["=cmd()", "-1", "plain"], "@x": [1.0, -2.5, 3.0]})
-    assert csv_of(table) == "name,'@x\n'=cmd(),1.0\n-1,-2.5\nplain,3.0\n"

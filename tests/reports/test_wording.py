@@ -4,6 +4,7 @@ import hashlib
 import json
 import shlex
 
+import pandas as pd
 import pytest
 from markdown_it import MarkdownIt
 from markdown_it.common.utils import escapeHtml
@@ -13,6 +14,7 @@ from reports.wording import (
     ROLE_WORDS,
     called,
     cell,
+    csv_of,
     first_of,
     mark_of,
     markdown,
@@ -188,3 +190,8 @@ def test_own_files_in_tables():
     assert called(["bounce", one]) == {"bounce": "bounce", one: "ball"}
     assert called([one, other]) == {one: one, other: other}
     assert called([named]) == {named: named}, "a scene of the catalogue has the name"
+
+
+def test_a_formula_in_a_table():
+    table = pd.DataFrame({"name": ["=cmd()", "-1", "plain"], "@x": [1.0, -2.5, 3.0]})
+    assert csv_of(table) == "name,'@x\n'=cmd(),1.0\n-1,-2.5\nplain,3.0\n"

@@ -274,7 +274,7 @@ def trials_of(monkeypatch, off, candidates, whole=None, handed=False, elsewhere=
         return found
 
     monkeypatch.setattr(cures, "observe", observe)
-    monkeypatch.setattr(cures, "_own", lambda slot: dict.fromkeys(NAMES, 0))
+    monkeypatch.setattr(cures, "values_of", lambda slot: dict.fromkeys(NAMES, 0))
     monkeypatch.setattr(cures, "load", lambda engine: Toy(off))
     monkeypatch.setattr(cures, "candidates_of", lambda engine: candidates)
     monkeypatch.setattr(cures, "belongs_of", lambda engine: {})

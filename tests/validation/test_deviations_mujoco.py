@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from adapters.engine_folder import covering
+from adapters.law import metric_of
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.contact_law import ContactLaw, Impedance, softness_of
 from adapters.mujoco.laws import DEVIATIONS
@@ -215,7 +216,7 @@ def test_laws_with_reason_source_version_and_scene() -> None:
         assert (
             law.because
             and law.source
-            and law.covers("mujoco", VERSION, law.profiles[0], law.scene, law.metric.replace("[[]", "["))
+            and law.covers("mujoco", VERSION, law.profiles[0], law.scene, metric_of(law.metric))
         )
         other = others.get(law.scene, make("impact"))
         assert law.law(other, DT, CATALOGUE[other.name].measure) is None

@@ -12,7 +12,7 @@ from validation.canonical import Check
 from validation.cells import Slot
 from validation.fixes import panel, search
 from validation.fixes.kept import cures_of, panels_of
-from validation.fixes.panel import ELSEWHERE, Cost, Panel, carried, compared, judged, other_cases
+from validation.fixes.panel import OWN_SCENE, Cost, Panel, carried, compared, judged, other_cases
 from validation.posed import pinned, resolve
 from validation.settings.switching import Reading, switched
 
@@ -36,8 +36,8 @@ def test_check_broken_after_pass_or_threefold_failure(before, after, breaks, men
 
 def test_check_of_many_variants_counted_once():
     good, bad = (reading(2.0), reading(0.5)), (reading(0.5), reading(2.0))
-    assert judged({(ELSEWHERE, "creep"): [good, good]}, 2).mends == 1
-    found = judged({(ELSEWHERE, "creep"): [good, bad, bad]}, 3)
+    assert judged({(OWN_SCENE, "creep"): [good, good]}, 2).mends == 1
+    found = judged({(OWN_SCENE, "creep"): [good, bad, bad]}, 3)
     assert found.mends == 0 and [each.case for each in found.breaks] == ["its own scene elsewhere"]
 
 
@@ -79,10 +79,10 @@ def test_a_contact_without_stiffness_sinks_on_the_panel():
 def test_fix_of_a_file_tried_in_cases_of_other_groups(tmp_path, monkeypatch):
     """It is pasted into a model that has more than this scene: a damper that mends its rebound lets a column sink."""
     pytest.importorskip("mujoco")
-    lively = panel._FILES / "lively_box_at_rest.toml"
-    (tmp_path / "own.toml").write_text(lively.read_text(encoding="utf-8").replace("lively box at rest", "own"))
+    bouncy = panel._FILES / "bouncy_box_at_rest.toml"
+    (tmp_path / "own.toml").write_text(bouncy.read_text(encoding="utf-8").replace("bouncy box at rest", "own"))
     monkeypatch.setattr(panel, "compared", lambda asked, jobs: [words for words, *_ in asked])
-    words = panel.tried([replace(SLOT, scene=pinned(str(tmp_path / "own.toml")))], [DAMPER])
+    words = panel.tried(replace(SLOT, scene=pinned(str(tmp_path / "own.toml"))), DAMPER)
     assert {"a bouncy body at rest", "a bouncy column of five", "a rebound"} <= set(words)
 
 
@@ -90,8 +90,8 @@ def test_settings_of_single_pairs_are_left_out_where_nothing_rebounds():
     pytest.importorskip("mujoco")
     thrown, rest = Slot("thin_wall", (), 3, "mujoco", "default", 1 / 240), replace(SLOT, scene="long_rest")
     assert panel._meant({"cone": "elliptic", **DAMPER}, thrown, rest) == {"cone": "elliptic"}
-    lively = replace(SLOT, scene=pinned(str(panel._FILES / "lively_box_at_rest.toml")))
-    assert panel._meant(DAMPER, thrown, lively) == DAMPER
+    bouncy = replace(SLOT, scene=pinned(str(panel._FILES / "bouncy_box_at_rest.toml")))
+    assert panel._meant(DAMPER, thrown, bouncy) == DAMPER
 
 
 def test_a_case_is_of_every_group_and_short():

@@ -17,7 +17,7 @@ from validation.judging import predicting, rows
 from validation.judging.comparison import Kind, compare_rows
 from validation.judging.rows import Row, frame, predictions_of, rows_of
 from validation.metrics import NEWER, UNTOLD
-from validation.posed import pinned
+from validation.posed import pinned, written
 from validation.running.execution import UNMEASURED, execute
 
 #: A box below the edge of the friction cone: one check, its creep.
@@ -424,25 +424,14 @@ def test_alarm_for_a_missed_number_of_a_scene_file(tmp_path, engine):
     assert met.physics == "pass" and not met.alarming and not met.failing
 
 
-FLOOR = """
-[[bodies]]
-name = "floor"
-shape = { type = "half_space", normal = [0.0, 1.0] }
-motion = "fixed"
-[[bodies]]
-name = "ball"
-pose = [0.0, 1.5, 0.0]
-"""
-
-
 @pytest.mark.parametrize(("profile", "named"), [("default", True), ("tuned", False)])
-def test_a_failure_of_a_file_has_the_cause_of_the_law_that_predicts_it(tmp_path, profile, named):
+def test_a_failure_of_a_file_has_the_cause_of_the_law_that_predicts_it(profile, named):
     """A ball without friction falls on the floor: as shipped MuJoCo does not throw it up again, whatever e is."""
     pytest.importorskip("mujoco")
-    text = FILE_TEXT.replace('[[bodies]]\nname = "ball"\n', FLOOR.lstrip()).replace("duration = 0.1", "duration = 0.6")
-    text = text.replace("restitution = 0.0", "restitution = 0.8").replace("value = 0.0", "value = 9.0")
-    (tmp_path / "ball.toml").write_text(text)
-    ran = execute(Slot(pinned(str(tmp_path / "ball.toml")), (), 2, "mujoco", profile, 1 / 240))
+    checks = [{"quantity": "ball.y", "value": 9.0, "tolerance": 0.01}]
+    fall = CATALOGUE["bounce"].scene(2, {"e": 0.8}).as_dict() | {"duration": 0.6, "checks": checks}
+    del fall["params"]
+    ran = execute(Slot(written(fall), (), 2, "mujoco", profile, 1 / 240))
     (row,) = [row for row in rows_of("r", [ran]) if row.metric == OWN_CHECK]
     assert (row.physics, row.standing, row.alarming) == ("fail", "new", True)
     assert ("and e is none of its parameters (predicted" in row.reason) == named

@@ -155,7 +155,7 @@ def cured(monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("defa
     asked, whole = Asked(off, unmeasured), whole or {}
     engine = SimpleNamespace(profiles=("default", "tuned", "other", "matched"))
     monkeypatch.setattr(cures, "observe", asked)
-    monkeypatch.setattr(cures, "_own", lambda slot: {"a": 0, "b": 0, "c": 0, "iterations": 4})
+    monkeypatch.setattr(cures, "values_of", lambda slot: {"a": 0, "b": 0, "c": 0, "iterations": 4})
     monkeypatch.setattr(cures, "load", lambda name: engine)
     monkeypatch.setattr(cures, "find", lambda name: SimpleNamespace(version=f"{name} 2.1"))
     monkeypatch.setattr(cures, "profile_of", lambda engine, role: "default" if role == "shipped" else None)

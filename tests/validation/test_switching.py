@@ -7,8 +7,10 @@ from dataclasses import replace
 import pytest
 
 from adapters import registry
-from adapters.engine_folder import candidates_of
+from adapters.engine_folder import candidates_of, instead_of, local_of
 from adapters.experiment import Experiment
+from adapters.needs import needs
+from adapters.own_settings import kinds_of
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of
@@ -137,10 +139,18 @@ def test_second_proof_of_a_family_with_its_own_switch(engine):
         assert switched_by[k] - elsewhere, (own.family, own.profile, own.params)
 
 
-def test_candidates_are_settings_that_the_engine_has():
-    for engine in OURS:
-        for name, values in candidates_of(engine).items():
-            assert len(set(values)) == len(values) > 1, (engine, name)
+@pytest.mark.parametrize("name", OURS)
+def test_settings_to_try_that_the_engine_has(name):
+    engine = registry.find(name).engine
+    if engine is None:
+        pytest.skip(f"{name} is not installed")
+    wanted = needs(resolve("impact").scene(resolve("impact").dimensions[-1]))
+    profiles = [engine.settings(profile, wanted, QUICK_DT) for profile in engine.profiles]
+    kinds = {setting: kind for profile in profiles for setting, kind in kinds_of(engine, profile).items()}
+    for setting, values in candidates_of(name).items():
+        assert len(set(values)) == len(values) > 1, setting
+        assert not any(kinds[setting](value) for value in values), setting
+    assert {*local_of(name), *(each for pair in instead_of(name) for part in pair for each in part)} <= set(kinds)
 
 
 CHECK = Check("x", "m", 0.0, 1.0, "because", "source")

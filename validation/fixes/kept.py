@@ -47,11 +47,8 @@ class Cure:
         Parameters of the cells that ran, where they differ from the scene's defaults.
     failing, left, judged
         Number of checks of these cells that fail as shipped and with the fix, and of all.
-    metric, unit, params
-        The check that is shown: the first of the scene's checks that the fix corrects (or that fails, if none), in the
-        cell with the largest error.
-    truth, tolerance, before, after
-        Its numbers; a value is None where the engine has no result.
+    metric, unit, params, truth, tolerance, before, after
+        The first of `shown`; older tables have only this one.
     changes
         Settings of the fix with their values in that cell; empty if no change helps.
     profile
@@ -73,7 +70,7 @@ class Cure:
     panel
         What it does in other cases; None where it was not tried there.
     shown
-        Of each kind that the fix corrects, as `metric`, the check with the largest error.
+        Of each kind of check that the fix corrects (or that fails, if none) the one with the largest error.
     """
 
     engine: str

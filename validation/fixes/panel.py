@@ -1,7 +1,7 @@
 """The panel: other cases on which a fix is tried before it is printed, and what it mends and breaks there.
 
     own       its scene at other steps, in another size and mass, from moved starts; a check counts once for all of them
-    others    cases of other groups: long rest, column, overlap, thrown ball, slide, rebound, grip
+    others    cases of other groups, those of ``panel.toml``
 
 A check that passes as shipped and fails with the fix is broken; so is one that fails by `WORSE` times as much. A check
 that fails as shipped and passes with the fix is mended. A fix that breaks more than it mends is withdrawn.
@@ -36,7 +36,7 @@ STEPS = (0.25, 4.0)
 #: Size of another model of the scene, `validation.scenes.sized`, and moves of its starts [units in the last place].
 SIZE, MOVES = 0.3, (-16, 16)
 #: The cases of its own scene in words.
-ELSEWHERE = "its own scene elsewhere"
+OWN_SCENE = "its own scene elsewhere"
 #: Error with a fix, over that as shipped, from which a failing check counts as broken too.
 WORSE = 3.0
 #: Factor of a number that is printed as a formula.
@@ -92,10 +92,14 @@ class Panel:
         return len(self.breaks) > self.mends
 
 
+def moved(slot: Slot, steps: Sequence[float]) -> list[Slot]:
+    """A case at multiples of its step, and from moved starts."""
+    return [*(replace(slot, dt=factor * slot.dt) for factor in steps), *(replace(slot, ulp=move) for move in MOVES)]
+
+
 def own_cases(slot: Slot) -> list[Slot]:
     """A case of a fix at other steps, from moved starts, and in another size and mass."""
-    found = [replace(slot, dt=factor * slot.dt) for factor in STEPS]
-    found += [replace(slot, ulp=move) for move in MOVES]
+    found = moved(slot, STEPS)
     return found if is_file(slot.scene) else [*found, replace(slot, scene=f"{slot.scene}@{SIZE:g}")]
 
 
@@ -115,13 +119,17 @@ def other_cases(engine: str, profile: str) -> tuple[tuple[str, Slot], ...]:
     return tuple(found)
 
 
+def values_of(slot: Slot) -> dict[str, Any]:
+    """Settings of a case by name."""
+    return {setting.name: setting.value for setting in settings_of(load(slot.engine), slot, scene_of(slot))}
+
+
 def carried(changes: Changes, here: Slot, there: Slot) -> dict[str, Any]:
     """Settings of a fix of one case in another: numbers that are printed as a share of g dt^2 are those of its fall."""
     loaded = adapter(here.engine)
     if loaded is None or not changes:
         return dict(changes)
-    own = {s.name: s.value for s in settings_of(load(here.engine), switched(here, changes), scene_of(here))}
-    told = loaded.words(own, scene_of(here), here.dt)
+    told = loaded.words(values_of(switched(here, changes)), scene_of(here), here.dt)
     fall = needs(scene_of(there)).pull * there.dt**2
     found = dict(changes)
     for name in changes:
@@ -140,16 +148,9 @@ def _meant(changes: Changes, here: Slot, there: Slot) -> dict[str, Any]:
     return {name: value for name, value in own.items() if name not in local_of(here.engine)}
 
 
-def tried(slots: Sequence[Slot], changes: Sequence[Changes], jobs: int = 1) -> Panel:
-    """Try a fix on the panel.
-
-    Parameters
-    ----------
-    slots, changes
-        Own cases as shipped, and the settings of the fix in each. The first that it changes is run elsewhere.
-    """
-    here, change = max(zip(slots, changes, strict=True), key=lambda pair: bool(pair[1]))
-    own = [(ELSEWHERE, there, carried(change, here, there)) for there in own_cases(here)]
+def tried(here: Slot, change: Changes, jobs: int = 1) -> Panel:
+    """Try the settings of a fix on the panel; ``here`` is its case as shipped."""
+    own = [(OWN_SCENE, there, carried(change, here, there)) for there in own_cases(here)]
     others = [
         (words, there, _meant(change, here, there))
         for words, there in other_cases(here.engine, here.profile)

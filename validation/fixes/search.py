@@ -13,8 +13,8 @@ step (`ELSEWHERE`), with the values that its profile has there. A change that wo
 or at one size by an engine's margin in metres, is no fix.
 
 Every engine has the same cells, candidates and rule. Error and cost are given side by side: CPU time per step, the
-least of interleaved rounds in the benchmark's process, as shipped and fixed. Results are in ``cures.csv`` of the
-engine's folder, by scene *and dimension*: a fix measured in 2-D is not claimed for 3-D.
+least of interleaved rounds in the benchmark's process, as shipped and fixed. Results are kept by
+`validation.fixes.kept`.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from adapters.registry import find, is_ranked, load, profile_of
 from adapters.stepping import step_count
 from validation.canonical import Params
 from validation.catalogue import CATALOGUE
-from validation.cells import Outcome, Slot, prepare, settings_of
+from validation.cells import Outcome, Slot, prepare
 from validation.fixes.kept import Cure, Shown
-from validation.fixes.panel import MOVES, Changes, Panel, carried, tried
+from validation.fixes.panel import SIZE, Changes, Panel, carried, moved, tried, values_of
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT, has_iterations
 from validation.settings.decisive import changes_of
@@ -47,9 +47,9 @@ BEST = 3
 NEAR = 10.0
 #: Simulated time of a timing [s].
 CLOCKED = 0.5
-#: Further sizes and the step [s] at which a fix must also hold: bodies of centimetres, as for grippers, instead of
+#: Another size and step [s] at which a fix must also hold: bodies of centimetres, as for grippers, instead of
 #: decimetres and metres, and the usual step in robotics.
-ELSEWHERE = (0.3, 1.0 / 500.0)
+ELSEWHERE = (SIZE, 1.0 / 500.0)
 #: Share of the tolerance below which an improvement does not count.
 INVISIBLE = 1e-3
 #: Largest share of the error that may remain for a single setting to be shown beside a fix with several.
@@ -96,7 +96,7 @@ class _Trials:
         self.slots, self.jobs = slots, jobs
         self.seen: dict[Slot, list[Reading]] = {}
         self.found: list[_Found] = []
-        self.own = [_own(slot) for slot in slots]
+        self.own = [values_of(slot) for slot in slots]
         #: Variants of all cells together.
         self.variants = list(zip(*map(variants, slots), strict=True))
         names = _profiles(slots[0].engine) if self.variants else []
@@ -167,11 +167,6 @@ class _Trials:
         return _Found(tuple(changes), failing, broken, sum(math.log10(b / INVISIBLE) for b in bad))
 
 
-def _own(slot: Slot) -> dict[str, Any]:
-    scene = resolve(slot.scene).scene(slot.dimension, dict(slot.params))
-    return {setting.name: setting.value for setting in settings_of(load(slot.engine), slot, scene)}
-
-
 def _differing(changes: Changes, own: Changes) -> Changes:
     """Settings that a change sets differently from the profile; an experiment may add others."""
     return {name: value for name, value in changes.items() if name not in own or own[name] != value}
@@ -185,8 +180,7 @@ def in_other_size(slot: Slot) -> list[Slot]:
 
 def at_other_steps(slot: Slot) -> list[Slot]:
     """A single case at half and double its step, and from moved starts: one that is mended at one step by chance."""
-    steps = [replace(slot, dt=factor * slot.dt) for factor in (0.5, 2.0)]
-    return [*steps, *(replace(slot, ulp=move) for move in MOVES)]
+    return moved(slot, (0.5, 2.0))
 
 
 @dataclass(frozen=True)
@@ -256,10 +250,10 @@ def on_panel(
     """
 
     def tried_on(each: _Found) -> Panel:
-        order = sorted(
-            range(len(trials.slots)), key=lambda k: k != trials.slots.index(_shown(trials, failing, each)[0].slot)
-        )
-        return tried([trials.slots[k] for k in order], [each.changes[k] for k in order], trials.jobs)
+        """In the case of the shown check, or the first that it changes."""
+        shown = _shown(trials, failing, each)[0].slot
+        cases = zip(trials.slots, each.changes, strict=True)
+        return tried(*max(cases, key=lambda case: (bool(case[1]), case[0] == shown)), trials.jobs)
 
     panels = [(each, tried_on(each)) for each in found[:BEST] if each.failing == found[0].failing]
     more = [each for each in _varied(engine, trials, panels) if each not in [known.changes for known in found]]
@@ -324,7 +318,7 @@ def _singles(engine: str, own: Sequence[Slot], wholes: Sequence[Sequence[Changes
             if belongs.get(name) is None:
                 singles.append([{n: v for n, v in each.items() if belongs.get(n, n) == name} for each in whole])
     if all(has_iterations(load(engine), slot) for slot in own):
-        counts = [int(_own(slot)["iterations"]) for slot in own]
+        counts = [int(values_of(slot)["iterations"]) for slot in own]
         singles.append([{"iterations": 10 * count} for count in counts])
     return [one for k, one in enumerate(singles) if one not in singles[:k]]
 
@@ -351,32 +345,26 @@ def _cure(
     if best and not changes:  # no setting corrects the shown check; show values of a cell with changes
         changes = next(each for each in best.changes if each)
     cured = switched(told.slot, best.changes[place]) if best else told.slot
-    after = _after(trials, told, best)
     before_cost, after_cost = clocked([told.slot, cured]) if best else (None, None)
     others = tuple(each.changes[place] for each in singles if best and each.changes != best.changes)
-    check, (truth, bound, before) = told.check, _numbers(told)
+    checks = tuple(_numbers(trials, one, best) for one in shown)
+    alone, alone_after = _alone(trials, told, best)
     return Cure(
         engine, find(engine).version, told.slot.profile, told.slot.scene, told.slot.dimension,
         tuple(dict(slot.params) for slot in trials.slots), len(failing), best.failing if best else len(failing),
-        len(trials.start), check.metric, check.unit, dict(told.slot.params), truth, bound, before,
-        after, changes, _profile_of(engine, trials.slots, best), others, len(trials.found), before_cost,
-        after_cost, _mended(trials, failing, best), told.slot.dt, *_alone(trials, told, best),
-        shown=tuple(
-            Shown(one.check.metric, one.check.unit, dict(one.slot.params), *_numbers(one), _after(trials, one, best))
-            for one in shown
-        ),
+        len(trials.start), **vars(checks[0]), changes=changes, profile=_profile_of(engine, trials.slots, best),
+        others=others, tried=len(trials.found), cost_before=before_cost, cost_after=after_cost,
+        mends=_mended(trials, failing, best), dt=told.slot.dt, alone=alone, alone_after=alone_after, shown=checks,
     )  # fmt: skip
 
 
-def _numbers(told: Reading) -> tuple[float, float, float | None]:
-    assert told.check.truth is not None and told.check.bound is not None  # only judged checks can fail
-    return told.check.truth, told.check.bound, told.value
-
-
-def _after(trials: _Trials, told: Reading, best: _Found | None) -> float | None:
-    """Value of a check with the fix."""
+def _numbers(trials: _Trials, told: Reading, best: _Found | None) -> Shown:
+    """A check with its values as shipped and with the fix."""
+    check = told.check
+    assert check.truth is not None and check.bound is not None  # only judged checks can fail
     cured = switched(told.slot, best.changes[trials.slots.index(told.slot)]) if best else told.slot
-    return next(each.value for each in trials.seen[cured] if each.check.metric == told.check.metric)
+    after = next(each.value for each in trials.seen[cured] if each.check.metric == check.metric)
+    return Shown(check.metric, check.unit, dict(told.slot.params), check.truth, check.bound, told.value, after)
 
 
 def _alone(trials: _Trials, told: Reading, best: _Found | None) -> tuple[Changes, float | None]:

@@ -68,9 +68,14 @@ class Change:
         return {**asdict(self), "kind": self.kind.value, "size": self.size if math.isfinite(self.size) else None}
 
 
+def _identity(row: Plain) -> tuple[str, str]:
+    """Rows of two runs correspond if slot and metric agree; run, versions and hashes may differ."""
+    return json.dumps(row["slot"], sort_keys=True), row["metric"]
+
+
 def checks_in(rows: Iterable[Plain]) -> dict[tuple[str, str], Plain]:
-    """Rows by slot and metric: rows of two runs correspond if these agree; run, versions and hashes may differ."""
-    return {(json.dumps(row["slot"], sort_keys=True), row["metric"]): row for row in rows if row.get("reason") != NEWER}
+    """Rows by slot and metric, without checks that are newer than their run."""
+    return {_identity(row): row for row in rows if row.get("reason") != NEWER}
 
 
 @stage("comparing runs")
@@ -79,7 +84,7 @@ def compare_rows(before: Iterable[Plain], after: Iterable[Plain]) -> list[Change
     before = list(before)
     a, b = checks_in(before), checks_in(after)
     ran = {slot for (slot, _), row in a.items() if row["outcome"] == "ok"}
-    newer = {(json.dumps(row["slot"], sort_keys=True), row["metric"]) for row in before} - a.keys()
+    newer = set(map(_identity, before)) - a.keys()
     changes = [change for key in a.keys() & b.keys() if (change := _row_change(a[key], b[key]))]
     changes += [_make(Kind.REMOVED, False, a[key], _state(a[key]), "-", 0.0) for key in a.keys() - b.keys()]
     changes += [_added(b[key], held=key[0] in ran and key not in newer) for key in b.keys() - a.keys()]

@@ -11,6 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from adapters.engine import EngineError
 from adapters.engine_folder import covering, laws_of
 from adapters.isolation import end_with
+from adapters.law import metric_of
 from adapters.registry import load_engines_here
 from adapters.scene import Scene
 from adapters.trajectory import Measured, Trajectory
@@ -50,11 +51,11 @@ def cause_in_file(slot: Slot, version: str, metric: str, value: float, scene: Sc
     """
     measure, known = resolve(slot.scene).measure, set[str]()
     for law in laws_of(slot.engine):
-        if not law.covers(slot.engine, version, slot.profile, law.scene, named(law.metric)) or law.because in known:
+        name, seen = metric_of(law.metric), list[Scene]()
+        if not law.covers(slot.engine, version, slot.profile, law.scene, name) or law.because in known:
             continue
-        seen: list[Scene] = []
 
-        def told(made: Scene, found: Trajectory, name: str = named(law.metric), seen: list[Scene] = seen) -> Measures:
+        def told(made: Scene, found: Trajectory, name: str = name, seen: list[Scene] = seen) -> Measures:
             seen.append(made)
             return {name: measure(made, found)[metric]}
 
@@ -69,11 +70,6 @@ def cause_in_file(slot: Slot, version: str, metric: str, value: float, scene: Sc
         if abs(value - centre) <= band:
             return f"{law.because} (predicted {centre:.6g} +- {band:.1g})"
     return ""
-
-
-def named(pattern: str) -> str:
-    """The metric of `adapters.law.exactly`."""
-    return pattern.replace("[[]", "[")
 
 
 def foretold(rows: Sequence[Asked], processes: int = 0) -> Mapping[Asked, list[Prediction]]:
