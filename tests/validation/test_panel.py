@@ -68,7 +68,7 @@ def test_formula_value_at_the_step_and_gravity_of_a_case():
     assert carried(margin, here, Slot("impact", (), 3, "mujoco", "default", 1 / 240))["margin"] == 0.0
 
 
-def test_a_contact_without_stiffness_sinks_on_the_panel():
+def test_sinking_contact_without_stiffness():
     """A damper holds nothing: a body that rests on it sinks without end."""
     pytest.importorskip("mujoco")
     words, slot = next(each for each in other_cases("mujoco", "default") if each[0] == "a bouncy body at rest")
@@ -86,7 +86,7 @@ def test_fix_of_a_file_tried_in_cases_of_other_groups(tmp_path, monkeypatch):
     assert {"a bouncy body at rest", "a bouncy column of five", "a rebound"} <= set(words)
 
 
-def test_settings_of_single_pairs_are_left_out_where_nothing_rebounds():
+def test_settings_of_single_pairs_left_out_where_nothing_rebounds():
     pytest.importorskip("mujoco")
     thrown, rest = Slot("thin_wall", (), 3, "mujoco", "default", 1 / 240), replace(SLOT, scene="long_rest")
     assert panel._meant({"cone": "elliptic", **DAMPER}, thrown, rest) == {"cone": "elliptic"}
@@ -94,7 +94,7 @@ def test_settings_of_single_pairs_are_left_out_where_nothing_rebounds():
     assert panel._meant(DAMPER, thrown, bouncy) == DAMPER
 
 
-def test_a_case_is_of_every_group_and_short():
+def test_short_cases_of_every_group():
     cases = other_cases("mujoco", "default")
     assert len({words for words, _ in cases}) == len(panel.OTHERS) == len(cases)
     assert all(resolve(slot.scene).scene(3, dict(slot.params)).duration <= 60.0 for _, slot in cases)
@@ -148,7 +148,7 @@ def test_committed_panels_for_installed_release_and_profiles(engine):
     assert set(panels_of(engine)) == {row["profile"] for row in rows} <= set(load(engine).profiles)
 
 
-def test_a_tuned_profile_says_what_it_breaks():
+def test_text_of_what_a_tuned_profile_breaks():
     """Bullet's drops friction's points of a cube that is pushed, which as shipped goes as far as it should."""
     (line,) = [each for each in profile_costs([("bullet", "tuned"), ("bullet", "default")]) if "a push" in each]
     assert line.startswith("bullet/tuned, against the engine as shipped, tried in 18 other cases: breaks a push")

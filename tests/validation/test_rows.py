@@ -425,7 +425,7 @@ def test_alarm_for_a_missed_number_of_a_scene_file(tmp_path, engine):
 
 
 @pytest.mark.parametrize(("profile", "named"), [("default", True), ("tuned", False)])
-def test_a_failure_of_a_file_has_the_cause_of_the_law_that_predicts_it(profile, named):
+def test_cause_of_a_failure_of_a_file_from_its_law(profile, named):
     """A ball without friction falls on the floor: as shipped MuJoCo does not throw it up again, whatever e is."""
     pytest.importorskip("mujoco")
     checks = [{"quantity": "ball.y", "value": 9.0, "tolerance": 0.01}]
