@@ -123,7 +123,7 @@ SAID = {
     "merge crosscheck-out --out both": "2 new runs",
     "prune --keep 50 --dry-run": "0 runs would be deleted",
     "list scenes": "incline",
-    "list suites": "as it is",
+    "list suites": "cases of quick",
     "list engines": "chipmunk",
     "list checks": "apex_growth",
     "list runs": "quick: bounce",
