@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.problem import OPEN, SLIP, STICK, Answer, Problem, nothing
+from reference_solver.exact.problem import OPEN, SLIP, STICK, Answer, Problem, directed, nothing
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
@@ -72,10 +72,9 @@ class Held:
         """Return directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
         if contacts.world.dimension == 2:
             return self.answer.directions
-        slip = contacts.rows.speed[:, 1:]
-        speed = np.linalg.norm(slip, axis=1)
-        turns = (self.answer.modes == SLIP) & (speed > SLIPPING)
-        return np.where(turns[:, None], slip / np.where(turns, speed, 1.0)[:, None], self.answer.directions)
+        before = self.answer.directions
+        now = directed(contacts.rows.speed[:, 1:], SLIPPING, before)
+        return np.where((self.answer.modes == SLIP)[:, None], now, before)
 
     def turned(self, slip: int, free: Array, directions: Array) -> Array:
         """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now."""
@@ -135,10 +134,8 @@ def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
     contacts = contacts.chosen(contacts.rows.speed[:, 0] < STILL)
     if not len(contacts):
         return Held(contacts, nothing(0, world.dimension), free)
-    slip = contacts.rows.speed[:, 1:]
-    speed = np.linalg.norm(slip, axis=1)
-    slips = speed > SLIPPING
-    directions = np.where(slips[:, None], slip / np.where(slips, speed, 1.0)[:, None], 0.0)
+    directions = directed(contacts.rows.speed[:, 1:], SLIPPING)
+    slips = np.asarray(directions.any(axis=1))
     if world.dimension == 3 and slips.any():
         # Frames take up the slip, so that its rows are along and across it.
         tangents = np.einsum("mk,mkp->mp", directions, contacts.rows.frame[:, 1:])

@@ -44,6 +44,13 @@ class Answer:
         return Answer(self.modes[which], self.directions[which], self.forces[which])
 
 
+def directed(slips: Array, least: float, otherwise: Array | float = 0.0) -> Array:
+    """Return the directions (m, k) of slips (m, k) that are larger than ``least``, and ``otherwise`` for the others."""
+    size = np.linalg.norm(slips, axis=1, keepdims=True)
+    moves = size > least
+    return np.where(moves, slips / np.where(moves, size, 1.0), otherwise)
+
+
 def nothing(count: int, d: int) -> Answer:
     """Return the answer of contacts that are open."""
     return Answer(np.zeros(count, np.int64), np.zeros((count, d - 1)), np.zeros((count, d)))
@@ -117,18 +124,10 @@ class Problem:
         """Modes and directions that forces (m, d) show."""
         u = (self.rows @ (self.yields @ forces.ravel()) + self.free).reshape(forces.shape)
         still = NONE * np.abs(self.free).max()
-        speed = np.linalg.norm(u[:, 1:], axis=1)
-        slides = speed > still
-        given = self.slipping
+        directions, given = directed(u[:, 1:], still), self.slipping
+        slides = np.asarray(directions.any(axis=1))
         # Friction is known to more digits than what it leaves of a slip.
-        friction = np.linalg.norm(forces[:, 1:], axis=1)
-        rubs = friction > 0.0
-        directions = np.where(
-            rubs[:, None],
-            -forces[:, 1:] / np.where(rubs, friction, 1.0)[:, None],
-            u[:, 1:] / np.where(slides, speed, 1.0)[:, None],
-        )
-        directions = np.where(slides[:, None], directions, 0.0)
+        directions = np.where(slides[:, None], directed(-forces[:, 1:], 0.0, directions), 0.0)
         directions = np.where(given[:, None], self.slips, directions)
         modes = np.where(given | slides | (self.friction == 0.0), SLIP, STICK)
         return np.where(u[:, 0] > still, OPEN, modes), directions

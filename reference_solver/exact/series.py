@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import STILL, accelerations, decide
 from reference_solver.exact.motion import free_acceleration
-from reference_solver.exact.problem import OPEN, SLIP, STICK, Problem
+from reference_solver.exact.problem import OPEN, SLIP, STICK, Problem, directed
 from reference_solver.exact.refusals import Refused
 from reference_solver.exact.rows import Contacts
 
@@ -56,11 +56,8 @@ def settled(world: World, state: State, contacts: Contacts) -> State:
     if not low.any():
         return state
     closed = low | np.array([name in stay for name in contacts.names])
-    slip = contacts.rows.speed[:, 1:]
-    speed = np.linalg.norm(slip, axis=1)
-    slides = speed > STILL
-    modes = np.where(closed, np.where(slides | low, SLIP, STICK), OPEN)
-    directions = np.where(slides[:, None], slip / np.where(slides, speed, 1.0)[:, None], 0.0)
+    directions = directed(contacts.rows.speed[:, 1:], STILL)
+    modes = np.where(closed, np.where(low | directions.any(axis=1), SLIP, STICK), OPEN)
     found = Problem.of(contacts, contacts.rows.speed.ravel()).with_modes(modes, directions)
     if found is None:
         return state

@@ -13,6 +13,8 @@ import argparse
 import signal
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +34,22 @@ LEAST = 1e-11
 
 class Late(Exception):
     """A world that takes longer than it may."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Raise `Late` in what takes more CPU."""
+
+    def late(*_: object) -> None:
+        raise Late
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 @dataclass(frozen=True)
@@ -64,19 +82,17 @@ def compared(known: Answer, limit: float) -> Verdict:
     """Return the verdict of a world."""
     world = world_of(known.key)
     begin = time.process_time()
-    signal.setitimer(signal.ITIMER_PROF, limit)
     try:
-        found, why = poses(world)
-        cpu = time.process_time() - begin
-        coarser, _ = poses(world, COARSER * Settings.exact(world.dt).accuracy)
+        with limited(limit):
+            found, why = poses(world)
+            cpu = time.process_time() - begin
+            coarser, _ = poses(world, COARSER * Settings.exact(world.dt).accuracy)
     except Late:
         return Verdict(known.key, "late", np.nan, np.nan, limit, f"after {limit:g} s")
     except Exception as error:  # what is no refusal is a fault of the loop
         return Verdict(
             known.key, "fault", np.nan, np.nan, time.process_time() - begin, f"{type(error).__name__}: {error}"
         )
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
     if not known.t:
         return Verdict(known.key, "unknown", np.nan, np.nan, cpu, known.reasons[0])
     count = min(len(found), len(coarser), len(known.t))
@@ -99,11 +115,6 @@ def compared(known: Answer, limit: float) -> Verdict:
     return Verdict(known.key, "different", *values, f"at {t[worst]:.4g} s; certificate: {known.reasons[:1]}")
 
 
-def late(*_: object) -> None:
-    """End a world."""
-    raise Late
-
-
 def main() -> None:
     """Print what became of every stored world."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -113,7 +124,6 @@ def main() -> None:
     asked = parser.parse_args()
     for key in ("standard pyramid 2-D", "standard pyramid 3-D", "standard masse 3-D"):
         poses(world_of(key))  # compiles what there is, before a limit counts
-    signal.signal(signal.SIGPROF, late)
     counts: dict[str, Counter[str]] = {}
     cpu: Counter[str] = Counter()
     for known in stored(asked.file):

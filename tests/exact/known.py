@@ -9,12 +9,11 @@ its truth as the loop's own bound says: twice what a coarser tolerance changes, 
 from __future__ import annotations
 
 import argparse
-import signal
 import time
 from collections import Counter
 
 import numpy as np
-from compare import COARSER, Late, late, poses
+from compare import COARSER, Late, limited, poses
 from oracle import World
 
 from reference_solver import Settings
@@ -44,7 +43,6 @@ def main() -> None:
     parser.add_argument("--only", default="", help="motions whose name has it")
     parser.add_argument("--limit", type=float, default=20.0, help="CPU of a motion")
     asked = parser.parse_args()
-    signal.signal(signal.SIGPROF, late)
     counts: Counter[str] = Counter()
     for name, draw in MOTIONS.items():
         if asked.only not in name:
@@ -52,17 +50,15 @@ def main() -> None:
         for seed in range(SEEDS):
             motion = draw(np.random.default_rng(seed))
             begin = time.process_time()
-            signal.setitimer(signal.ITIMER_PROF, asked.limit)
             try:
-                word, said = held(motion)
+                with limited(asked.limit):
+                    word, said = held(motion)
             except Late:
                 word, said = "late", f"after {asked.limit:g} s"
             except Refused as refused:
                 word, said = "refused", str(refused)
             except Exception as error:  # what is no refusal is a fault of the loop
                 word, said = "fault", f"{type(error).__name__}: {error}"
-            finally:
-                signal.setitimer(signal.ITIMER_PROF, 0.0)
             counts[word] += 1
             if word != "held":
                 print(f"{name} {seed}: {word} {said} ({time.process_time() - begin:.1f} s)", flush=True)
