@@ -285,8 +285,8 @@ def all_answers(problem: Problem) -> list[Array]:
 
 
 def _agree(problem: Problem, closed: NDArray[np.bool_], sticks: NDArray[np.bool_], slip: Array) -> NDArray[np.bool_]:
-    """Whether (m,) closed contacts with one velocity along their tangents, as of one face, do the same."""
-    rows = np.concatenate([problem.matrix[:, 1].reshape(len(problem.mu), -1), problem.free[:, 1:2]], axis=1)
+    """Whether (m,) closed contacts with one velocity along all their tangents, as of one face, do the same."""
+    rows = np.concatenate([problem.matrix[:, 1:].reshape(len(problem.mu), -1), problem.free[:, 1:]], axis=1)
     rows /= np.linalg.norm(rows, axis=1)[:, None]
     i, j = np.nonzero(np.triu(np.abs(rows[:, None] - rows).max(axis=2) <= ALIKE, 1))
     differs = (sticks[:, i] != sticks[:, j]) | (slip[:, i] != slip[:, j]).any(axis=2)

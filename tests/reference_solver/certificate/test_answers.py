@@ -260,6 +260,18 @@ def test_redundant_contacts_of_a_known_answer(monkeypatch):
     assert asked
 
 
+@pytest.mark.parametrize("second", [0.0, 0.5])
+def test_contacts_that_differ_in_their_second_tangent(second):
+    """One sticks and the other slips: with one velocity along both tangents they cannot, as those of a pivot they can."""
+    module = import_module(Answers.__module__)
+    matrix = np.tile(np.eye(3)[:, None], (2, 1, 2, 1))
+    free = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, second]])
+    slip = np.array([[0.0, 0.0], [0.0, 1.0]])
+    problem = module.Problem(matrix, free, np.ones(2), slip, free, np.zeros((1, 2), int))
+    closed, sticks = np.ones((1, 2), bool), np.array([[True, False]])
+    assert module._agree(problem, closed, sticks, slip[None])[0] == (second > 0.0)
+
+
 def test_what_has_too_many_contacts_says_so():
     """A pile of ten boxes: their modes are more than can be tried, and the verdict in one line tells."""
     boxes = [Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, 0.5 + k, 0.0)) for k in range(10)]
