@@ -19,10 +19,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.drives import Ability
 from adapters.needs import Needs
 from adapters.releases import Releases
 from adapters.scene import Scene
+from adapters.scene.drives import Ability
 
 Array = NDArray[np.float64]
 

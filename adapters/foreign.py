@@ -19,7 +19,6 @@ from importlib import import_module
 from multiprocessing.connection import Connection
 from typing import Any, cast, get_args
 
-from adapters.drives import Ability
 from adapters.engine import (
     ROLES,
     Declared,
@@ -37,6 +36,7 @@ from adapters.isolation import Child, IsolationError, Lost
 from adapters.needs import Needs
 from adapters.plain import NAME, kind_of, lines, one_line, plain
 from adapters.scene import Scene
+from adapters.scene.drives import Ability
 
 #: Time limit of an import [s]: the largest engines with Python bindings take about ten on a cold disk.
 PATIENCE = 30.0

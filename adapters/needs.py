@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from adapters.drives import top_speed, turns
 from adapters.scene import Box, HalfSpace, Hull, Polygon, Scene
-from adapters.shapes import ROUND
+from adapters.scene.drives import top_speed, turns
+from adapters.scene.shapes import ROUND
 
 Regime = Literal["free", "impact", "rest"]
 

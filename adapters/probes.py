@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adapters.lift import lift, lower_pose, lower_twist
-from adapters.near import rotation
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene.lift import lift, lower_pose, lower_twist
+from adapters.scene.near import rotation
 from adapters.trajectory import Sampling, Trajectory
 
 Samples = dict[str, tuple[float, ...]]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from adapters.meeting import told_pairs
 from adapters.scene import Scene
+from adapters.scene.meeting import told_pairs
 
 #: A value of each body in the engine, and the rule that combines two.
 Mixed = tuple[Sequence[Any], Callable[[Any, Any], float]]

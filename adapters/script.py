@@ -49,7 +49,7 @@ def imports(scene: Scene, *others: str, angles: bool = False) -> list[str]:
 
 
 def velocity(body: Body) -> str:
-    """Velocity over step number ``done`` (1 is the first) of a prescribed body: `adapters.drives.velocity_over`."""
+    """Velocity over step number ``done`` (1 is the first) of a prescribed body, as `drives.velocity_over` has it."""
     straight, course = body.twist[: len(body.force)], body.course
     if course is None:
         return literal(straight)
@@ -60,7 +60,7 @@ def velocity(body: Body) -> str:
 
 
 def place(body: Body) -> str:
-    """Place of a prescribed body at ``time`` [s]: `adapters.drives.place_after`."""
+    """Place of a prescribed body at ``time`` [s]: `adapters.scene.drives.place_after`."""
     course, size = body.course, len(body.force)
     moving = zip(body.pose[:size], body.twist[:size], strict=True)
     straight = [f"{literal(x)} + {literal(v)} * time" for x, v in moving]

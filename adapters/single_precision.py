@@ -23,8 +23,8 @@ import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift, lower_contacts, lower_twist, size_across
 from adapters.scene import Box, HalfSpace, Pair, Scene, Shape, Sphere
+from adapters.scene.lift import lift, lower_contacts, lower_twist, size_across
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 

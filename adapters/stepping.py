@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drives import as_moving, asked_abilities, top_speed
 from adapters.engine import Array, Contacts, Engine, EngineError, Recorded, Simulation
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
-from adapters.near import start_overlap
 from adapters.plain import kind_of
 from adapters.scene import Body, HalfSpace, Scene
-from adapters.shapes import reach
+from adapters.scene.drives import as_moving, asked_abilities, top_speed
+from adapters.scene.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
+from adapters.scene.near import start_overlap
+from adapters.scene.shapes import reach
 from adapters.stages import BUILDING, READING, STEPPING, stage
 from adapters.trajectory import ContactRecord, Sampling, Trajectory
 

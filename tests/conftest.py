@@ -17,7 +17,7 @@ from hypothesis import settings
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.isolation import IsolationError, Lost
-from adapters.shapes import SceneError
+from adapters.scene.shapes import SceneError
 from validation.findings import FindingsError
 from validation.records.store import StoreError
 from validation.workers.limits import LimitError

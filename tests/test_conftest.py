@@ -24,7 +24,7 @@ from click.testing import CliRunner
 from rich.console import Console
 from rich.table import Table
 from adapters.engine import EngineError
-from adapters.shapes import SceneError
+from adapters.scene.shapes import SceneError
 
 
 @click.command()

@@ -15,9 +15,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from adapters.lift import size_across
 from adapters.scene import Scene
-from adapters.shapes import reach
+from adapters.scene.lift import size_across
+from adapters.scene.shapes import reach
 from validation.canonical import Check
 from validation.metrics import OUT_OF_PLANE
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters.engine import Array
 from adapters.scene import Box, Cylinder, HalfSpace, Hull, Shape
-from adapters.shapes import reach
+from adapters.scene.shapes import reach
 from reference_solver.geometry import gap, rotation
 from validation import solids
 

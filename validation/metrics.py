@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array
-from adapters.near import near_pairs
 from adapters.receipts import QUANTITIES
 from adapters.scene import Scene
-from adapters.shapes import reach as reach
+from adapters.scene.near import near_pairs
+from adapters.scene.shapes import reach as reach
 from adapters.trajectory import Trajectory
 from reference_solver.geometry import rotation
 from validation.canonical import Measured

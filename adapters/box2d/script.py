@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from adapters.box2d.simulation import Box2DSimulation
-from adapters.meeting import common_material
 from adapters.recording import written
 from adapters.scene import HalfSpace, Scene
+from adapters.scene.meeting import common_material
 from adapters.script import constants, imports, literal, materials, stepped, text
 
 #: Variables of a script, and the calls that return their values.

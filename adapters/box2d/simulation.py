@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from adapters.copied import Copied
 from adapters.engine import Array, Contacts, EngineError
-from adapters.ground import reach
-from adapters.meeting import common_material
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.scene.ground import reach
+from adapters.scene.meeting import common_material
 
 
 class Box2DSimulation(Copied):

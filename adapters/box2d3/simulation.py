@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from adapters.box2d3.translation import frictions, restitutions
 from adapters.copied import Copied, by_pair
 from adapters.engine import Array, Contacts
-from adapters.ground import reach
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.scene.ground import reach
 
 
 class Box2D3Simulation(Copied):

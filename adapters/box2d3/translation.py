@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
+from adapters.scene.meeting import Meeting, representable
 
 #: Relative round-off of a logarithm, an exponential, a root and a product in double precision.
 ROUNDING = 1e-14

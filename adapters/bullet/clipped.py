@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
-from adapters.shapes import Hull, Shape
+from adapters.scene.shapes import Hull, Shape
 
 _BODY = """<robot name="body"><link name="body">
 <inertial><mass value="{mass!r}"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>

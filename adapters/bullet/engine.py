@@ -20,7 +20,6 @@ from adapters.bullet.simulation import BulletSimulation
 from adapters.bullet.translation import factors, moments
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
-from adapters.meeting import meeting_pairs
 from adapters.needs import Needs, needs
 from adapters.probes import (
     MOST_FRICTION,
@@ -34,6 +33,7 @@ from adapters.probes import (
 )
 from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
+from adapters.scene.meeting import meeting_pairs
 
 _QUIRKS = (
     Quirk(

@@ -10,9 +10,9 @@ from adapters.bullet import clipped
 from adapters.bullet.profiles import checked
 from adapters.bullet.simulation import HEAVY, WAITING_ROOM
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
-from adapters.drives import velocity_over
 from adapters.engine import EngineError
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.drives import velocity_over
 from adapters.script import constants, imports, keywords, literal, stepped, text, velocity
 
 

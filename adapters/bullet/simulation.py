@@ -16,9 +16,9 @@ from adapters.bullet import clipped
 from adapters.bullet.profiles import checked
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.copied import Copied
-from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.drives import velocity_over
 
 #: Waiting places of bodies while their inertia takes effect [m]: far from each other and from every scene.
 WAITING_ROOM = 1e5

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adapters.meeting import Meeting, representable
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.meeting import Meeting, representable
 
 #: Half thickness of the box for a half-space [m]: more than the motion in any step, and thin enough that contact
 #: distances, computed relative to its centre, are exact to 1e-14 m.

@@ -17,10 +17,10 @@ from adapters.chipmunk.releases import Point, points_of, shape_key
 from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors, made_body, made_shape
 from adapters.copied import Copied
-from adapters.drives import velocity_over
 from adapters.engine import EngineError
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Scene
+from adapters.scene.drives import velocity_over
 
 
 class ChipmunkSimulation(Copied):

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.meeting import Meeting, representable
 from adapters.needs import needs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene
+from adapters.scene.meeting import Meeting, representable
 
 #: A half-space is one thick static polygon. Detection is not swept, so a body deeper than half the depth in one step
 #: leaves on the wrong side: 1 km is safe to 1e5 m/s at 1/240 s. Results do not depend on either number (the ten-box

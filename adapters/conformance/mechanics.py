@@ -24,9 +24,9 @@ from adapters.conformance.scenes import (
     striking,
 )
 from adapters.engine import Array, Contacts, Engine
-from adapters.lift import lower_pose, lower_twist
 from adapters.needs import needs
 from adapters.scene import Scene
+from adapters.scene.lift import lower_pose, lower_twist
 from adapters.trajectory import Trajectory
 
 #: Error of impulses for a momentum of order 1 [N s]: a solver that stops at a tolerance reports the forces of its last

@@ -13,9 +13,9 @@ from typing import Any
 
 from adapters.conformance.finding import NotAsked
 from adapters.engine import Engine, Simulation
-from adapters.lift import lift
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
+from adapters.scene.lift import lift
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Sampling, Trajectory
 

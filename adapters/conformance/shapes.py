@@ -12,11 +12,11 @@ import numpy as np
 from adapters.conformance.finding import NotAsked
 from adapters.conformance.mechanics import BOOKKEEPING, loss
 from adapters.conformance.scenes import DT, driven
-from adapters.drives import asked_abilities
 from adapters.engine import Engine
 from adapters.needs import needs
 from adapters.probes import HALF_EXTENTS
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Pair, Polygon, Scene, Sphere
+from adapters.scene.drives import asked_abilities
 from adapters.stepping import posed_for
 
 #: Speed of approach [m/s], slow enough that neither a step nor a soft contact matters, and the gap before [m].

@@ -29,10 +29,10 @@ from adapters.conformance.scenes import (
     values,
 )
 from adapters.engine import ROLES, Engine, EngineError, EngineFacts, Setting
-from adapters.lift import lift
 from adapters.needs import Needs, needs
 from adapters.plain import one_line
 from adapters.scene import Scene
+from adapters.scene.lift import lift
 from adapters.stepping import posed_for
 
 

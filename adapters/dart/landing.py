@@ -13,8 +13,8 @@ from adapters.dart.profiles import solved
 from adapters.dart.shipped import FASTEST, MIXING, THRESHOLD
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift
 from adapters.scene import Body, Box, HalfSpace, Scene
+from adapters.scene.lift import lift
 
 #: Height above the lowest corner within which corners count as lowest [m].
 LEVEL = 1e-9

@@ -12,8 +12,8 @@ from adapters.dart.rubbing import rubbing_law
 from adapters.dart.shipped import MIXING, PUSH_OUT, Rebound
 from adapters.dart.slipping import slipping_law
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.lift import lift
 from adapters.scene import Box, Scene
+from adapters.scene.lift import lift
 from adapters.single_precision import ROUNDINGS, Method, rounded_law
 from adapters.unswept import passing_law, wall_law
 

@@ -18,8 +18,8 @@ from adapters.dart.profiles import SWEEPERS, solved
 from adapters.dart.shipped import FASTEST, MIXING, THRESHOLD
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift, lower_twist
 from adapters.scene import Body, Box, HalfSpace, Scene
+from adapters.scene.lift import lift, lower_twist
 from adapters.trajectory import Trajectory
 
 #: Least distance of a touch from a step's end in steps; below it round-off decides which step finds it.

@@ -13,9 +13,9 @@ from adapters.copied import Copied
 from adapters.dart.releases import keep_awake, may_sleep, second_choice, splits_impulses
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Array
-from adapters.ground import reach
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene.ground import reach
 
 #: Names of the detectors' classes.
 DETECTORS = {

@@ -17,8 +17,8 @@ from adapters.dart.rubbing import ended
 from adapters.dart.shipped import THRESHOLD, restitution
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift
 from adapters.scene import HalfSpace, Scene, Sphere
+from adapters.scene.lift import lift
 
 
 def slipping_law(metric: str, profile: str) -> Law:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
+from adapters.scene.meeting import Meeting, representable
 
 #: Relative round-off of a root and a product.
 ROUNDING = 1e-15

@@ -19,12 +19,12 @@ from adapters.drake.sdf import read
 from adapters.drake.simulation import DrakeSimulation
 from adapters.drake.translation import frictions
 from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
-from adapters.meeting import meeting_pairs
 from adapters.model import PROFILE
 from adapters.needs import Needs
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
 from adapters.scene import Capsule, Cylinder, Scene, Sphere
+from adapters.scene.meeting import meeting_pairs
 
 #: Residual of a convex step's solver, as a share of the change, and of a speed [m/s]; measured 6e-6 at most.
 SOLVED_SHARE, SOLVED = 1e-5, 1e-6

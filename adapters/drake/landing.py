@@ -20,8 +20,8 @@ import numpy as np
 from adapters.drake.shipped import DISSIPATION, NEAR_RIGID, POINT_STIFFNESS, RELAXATION
 from adapters.engine import Contacts
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift
 from adapters.scene import HalfSpace, Scene, Sphere
+from adapters.scene.lift import lift
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
+from adapters.scene.meeting import Meeting, representable
 
 #: Round-off of a quotient, and of the solution of a linear system in such numbers.
 ROUNDING, SOLVED = 1e-15, 1e-13

@@ -25,7 +25,7 @@ from adapters.mujoco.options import option_settings
 from adapters.mujoco.refusal import Refused
 from adapters.plain import one_line
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, SceneError, Shape, Sphere
-from adapters.shapes import MOST_VERTICES
+from adapters.scene.shapes import MOST_VERTICES
 
 
 def read(text: str, drop: bool) -> Model:

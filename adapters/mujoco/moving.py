@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drives import velocity_over
 from adapters.scene import Body, HalfSpace, Scene
+from adapters.scene.drives import velocity_over
 from adapters.script import literal, velocity
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.copied import Copied
-from adapters.drives import velocity_over
 from adapters.engine import Array, Contacts, EngineError, Worlds
 from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
 from adapters.mujoco.spec import Spec, has_joint, rotation, start
 from adapters.scene import Scene
+from adapters.scene.drives import velocity_over
 
 
 class MujocoSimulation(Copied):

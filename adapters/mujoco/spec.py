@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drives import velocity_over
 from adapters.engine import Array, EngineError
 from adapters.mujoco.moving import is_moved_face
 from adapters.mujoco.options import set_own
@@ -17,6 +16,7 @@ from adapters.mujoco.profiles import own_settings
 from adapters.mujoco.releases import empty_spec, geom_margin, no_autoreset
 from adapters.mujoco.shipped import NOSLIP_TOLERANCE
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.drives import velocity_over
 
 #: Mass of a prescribed body over the largest free mass: a blow changes its velocity by 1e-15 of the free body's, far
 #: below the round-off in every tolerance.

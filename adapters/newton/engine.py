@@ -14,7 +14,6 @@ from typing import final
 
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
-from adapters.means import no_means
 from adapters.needs import Needs
 from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS
 from adapters.newton.script import python
@@ -23,6 +22,7 @@ from adapters.newton.simulation import NewtonSimulation, imported
 from adapters.probes import GRAVITY, SLIDE_TIME
 from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
+from adapters.scene.means import no_means
 
 #: Largest ratio of a box's mass to the effective mass at a corner, for any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 +
 #: c^2).

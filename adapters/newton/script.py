@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.means import means
 from adapters.newton.simulation import ALONG_X, is_driven, triangles
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.means import means
 from adapters.script import constants, imports, keywords, literal, place, stepped, text, velocity
 
 

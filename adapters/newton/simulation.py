@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.drives import place_after, velocity_over
 from adapters.engine import Array, Contacts, EngineError, Row, Simulation
-from adapters.means import mean, means
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.drives import place_after, velocity_over
+from adapters.scene.means import mean, means
 
 #: Rotation of Newton's capsules, along z, to the scene's, along x (x, y, z, w).
 ALONG_X = (0.0, 0.7071067811865476, 0.0, 0.7071067811865476)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts
-from adapters.lift import lower_contacts, lower_pose, lower_twist
 from adapters.scene import Scene
+from adapters.scene.lift import lower_contacts, lower_pose, lower_twist
 from adapters.trajectory import ContactRecord, Trajectory
 
 

@@ -13,7 +13,6 @@ from typing import final
 
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
-from adapters.means import no_means
 from adapters.needs import Needs
 from adapters.physx.profiles import KINDS, PROFILES
 from adapters.physx.script import python
@@ -22,6 +21,7 @@ from adapters.physx.simulation import PhysxSimulation, imported
 from adapters.probes import REBOUND_SPEED
 from adapters.receipts import ROUNDINGS
 from adapters.scene import Scene
+from adapters.scene.means import no_means
 
 
 @final

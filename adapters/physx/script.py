@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.drives import velocity_over
 from adapters.physx.simulation import PhysxSimulation, imported
 from adapters.recording import written
 from adapters.scene import HalfSpace, Hull, Scene
+from adapters.scene.drives import velocity_over
 from adapters.script import constants, imports, literal, place, stepped, text
 
 #: Variables of a script, and the calls that return their values.

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from adapters.copied import Copied
-from adapters.drives import place_after, velocity_over
 from adapters.engine import EngineError
 from adapters.impulses import along_normal
-from adapters.means import mean, means
 from adapters.physx.translation import turn_to, turned
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
+from adapters.scene.drives import place_after, velocity_over
+from adapters.scene.means import mean, means
 
 #: Open worlds, and the typical size of each: there is one engine per process.
 _LIVING: weakref.WeakKeyDictionary[PhysxSimulation, float] = weakref.WeakKeyDictionary()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from adapters.meeting import common_material
 from adapters.rapier.simulation import Hooks, RapierSimulation
 from adapters.recording import written
 from adapters.scene import Scene
+from adapters.scene.meeting import common_material
 from adapters.script import constants, imports, literal, materials, stepped, text
 
 #: Variables of a script, and the calls and attributes of their values.

@@ -12,9 +12,9 @@ from typing import Any
 
 from adapters.copied import Copied
 from adapters.impulses import along_normal
-from adapters.meeting import common_material
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
+from adapters.scene.meeting import common_material
 
 
 class Hooks:

@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drives import as_moving
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.plain import Notice
@@ -36,6 +35,7 @@ from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, ReferenceWorlds, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
+from adapters.scene.drives import as_moving
 
 #: Largest integer of a kernel.
 LARGEST = 2**63 - 1

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts, Recorded, Simulation, Worlds
-from adapters.meeting import told_pairs
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
+from adapters.scene.meeting import told_pairs
 
 
 def _shape(shape: Shape) -> Any:

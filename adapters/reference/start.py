@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.near import near_pairs
 from adapters.scene import HalfSpace, Scene
+from adapters.scene.near import near_pairs
 
 
 def too_far_at_the_start(scene: Scene) -> str | None:

@@ -25,7 +25,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Sphere
-from adapters.shapes import reach
+from adapters.scene.shapes import reach
 from reports.page import figures
 from reports.page.figures import Figure
 from reports.page.opening import shown

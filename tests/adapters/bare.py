@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.drives import velocity_over
 from adapters.engine import Contacts
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
 from adapters.needs import needs
 from adapters.scene import Box, Capsule, Disc, HalfSpace, Hull, Sphere
-from adapters.shapes import reach
+from adapters.scene.drives import velocity_over
+from adapters.scene.lift import lift, lower_contacts, lower_pose, lower_twist, out_of_plane
+from adapters.scene.shapes import reach
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.scenes.sized import enlarged, told_in_units_of

@@ -11,9 +11,9 @@ from adapters.conformance.faults import FAULTS, FaultyToy
 from adapters.conformance.parameters import STEPS
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import EngineError, Setting, Simulation
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.needs import Needs
 from adapters.scene import Box, Scene
+from adapters.scene.lift import lift, lower_contacts, lower_pose, lower_twist
 
 #: Sweeps of each profile: they tell at `build` which of the two it is for. Few: no check hangs on how far they come.
 SWEEPS = {"first": 3, "second": 4}

@@ -11,8 +11,8 @@ import pybullet
 from adapters import Sampling, needs, run
 from adapters.bullet import BulletEngine
 from adapters.engine import EngineError
-from adapters.lift import lift
 from adapters.scene import SceneError
+from adapters.scene.lift import lift
 from validation.catalogue import CATALOGUE
 
 ENGINE = BulletEngine()

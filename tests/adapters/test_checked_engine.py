@@ -9,10 +9,10 @@ import pytest
 
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import EngineError, EngineFacts, Scheme
-from adapters.means import mean, means, no_means
-from adapters.meeting import common_material
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene.means import mean, means, no_means
+from adapters.scene.meeting import common_material
 from adapters.settings import number, whole
 
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")

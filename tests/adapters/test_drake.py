@@ -13,9 +13,9 @@ from adapters.drake.laws import DEVIATIONS, FALLING
 from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
 from adapters.drake.translation import frictions, pair_of
 from adapters.engine import EngineError
-from adapters.lift import lift
 from adapters.needs import needs
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.scene.lift import lift
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.drives import as_moving, asked_abilities, place_after, top_speed, velocity_over
 from adapters.engine import EngineError
-from adapters.lift import lift, lowered
 from adapters.needs import needs
 from adapters.registry import load
 from adapters.scene import Body, Box, Disc, HalfSpace, Harmonic, Pair, Scene, SceneError, Sphere, scene_from_dict
+from adapters.scene.drives import as_moving, asked_abilities, place_after, top_speed, velocity_over
+from adapters.scene.lift import lift, lowered
 from adapters.stepping import _fastest, posed_for, run
 from adapters.trajectory import Sampling
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist, lowered, out_of_plane
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Harmonic, Hull, Pair, Polygon, Scene, Sphere
+from adapters.scene.lift import lift, lower_contacts, lower_pose, lower_twist, lowered, out_of_plane
 
 
 def planar_scene(pose: tuple[float, ...], twist: tuple[float, ...]) -> Scene:

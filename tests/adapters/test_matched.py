@@ -14,12 +14,12 @@ pytest.importorskip("mujoco")
 from driven import driven
 
 from adapters.engine import EngineError
-from adapters.lift import lift
 from adapters.mujoco import MujocoEngine
 from adapters.mujoco.matched import AGREED, SETTLED, by_geoms, law_of, matched_step2, rebounding
 from adapters.needs import needs
 from adapters.registry import is_ranked
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.scene.lift import lift
 from adapters.trajectory import Trajectory
 from validation.posed import resolve
 

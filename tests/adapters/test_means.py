@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.means import means
 from adapters.scene import Body, Disc, HalfSpace, Pair, Scene
+from adapters.scene.means import means
 
 #: Bodies lie on each other, so that all of them can meet.
 NAMES = ("floor", "a", "b", "c")

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from adapters.lift import lift
-from adapters.meeting import meeting_pairs, representable
 from adapters.needs import needs
 from adapters.registry import load
 from adapters.scene import Body, Disc, HalfSpace, Harmonic, Pair, Scene
+from adapters.scene.lift import lift
+from adapters.scene.meeting import meeting_pairs, representable
 from validation.catalogue import CATALOGUE
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from adapters import registry
-from adapters.lift import lift, lowered
 from adapters.model import Model, model_from_dict, read, reader_of
 from adapters.scene import Box, HalfSpace, SceneError, Sphere
-from adapters.shapes import Capsule, Cylinder, Hull
+from adapters.scene.lift import lift, lowered
+from adapters.scene.shapes import Capsule, Cylinder, Hull
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 

@@ -6,9 +6,9 @@ import time
 import numpy as np
 import pytest
 
-from adapters.near import near_pairs, start_overlap
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Pair, Polygon, Scene, Sphere
-from adapters.shapes import reach
+from adapters.scene.near import near_pairs, start_overlap
+from adapters.scene.shapes import reach
 from reference_solver.geometry import gap
 
 

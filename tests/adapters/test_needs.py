@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from adapters.materials import Materials, Pair
 from adapters.needs import Needs, needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Harmonic, Polygon, Scene, SceneError
+from adapters.scene.materials import Materials, Pair
 
 FLOOR = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
 

@@ -16,7 +16,7 @@ from adapters.newton.roundings import LIMITS, ROUNDINGS, roundings_of
 from adapters.newton.shipped import GAP, ITERATIONS, REBOUND_ITERATIONS, RELAXATION, ROLLING, STOPPED, TORSIONAL
 from adapters.newton.simulation import imported
 from adapters.scene import Body, Box, HalfSpace, Harmonic, Pair, Scene, Sphere
-from adapters.shapes import Capsule, Hull
+from adapters.scene.shapes import Capsule, Hull
 from adapters.stepping import posed_for, run
 from validation import metrics
 from validation.catalogue import CATALOGUE

@@ -9,14 +9,14 @@ from driven import driven
 
 from adapters.conformance import items
 from adapters.engine import EngineError
-from adapters.means import means
 from adapters.physx import PhysxEngine
 from adapters.physx.laws import DEVIATIONS
 from adapters.physx.shipped import FRICTION_GAP, TOLERANCE_LENGTH
 from adapters.physx.simulation import imported
 from adapters.physx.translation import turn_to
 from adapters.scene import Body, Box, HalfSpace, Harmonic, Pair, Scene, Sphere
-from adapters.shapes import Capsule, Hull
+from adapters.scene.means import means
+from adapters.scene.shapes import Capsule, Hull
 from validation.catalogue import CATALOGUE
 
 pytestmark = pytest.mark.optional("physx")

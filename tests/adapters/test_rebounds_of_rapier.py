@@ -6,9 +6,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from adapters.lift import lift
 from adapters.needs import needs
 from adapters.rapier import RapierEngine
+from adapters.scene.lift import lift
 from adapters.stepping import run
 from validation.catalogue import CATALOGUE
 from validation.scenes import domino

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from adapters import script
-from adapters.drives import place_after, velocity_over
 from adapters.scene import Body, Box, Disc, Harmonic, Pair, Scene
+from adapters.scene.drives import place_after, velocity_over
 
 DT = 1 / 240
 COURSES = [None, Harmonic((0.25, -0.5), 2.0, 0.75), Harmonic((0.0, 0.1), 0.3, 0.0)]

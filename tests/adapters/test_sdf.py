@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from adapters import registry
 from adapters.drake.engine import DrakeEngine
 from adapters.drake.sdf import read
-from adapters.lift import lowered
 from adapters.model import read as read_apart
 from adapters.scene import Body, Capsule, Cylinder, HalfSpace, Pair, Scene, SceneError, Sphere
+from adapters.scene.lift import lowered
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 from reports.command import main

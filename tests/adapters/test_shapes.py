@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from adapters.engine import EngineError
-from adapters.lift import lift, lowered
 from adapters.needs import needs
 from adapters.registry import load
 from adapters.scene import (
@@ -25,7 +24,8 @@ from adapters.scene import (
     Sphere,
     scene_from_dict,
 )
-from adapters.shapes import area_and_centroid, reach
+from adapters.scene.lift import lift, lowered
+from adapters.scene.shapes import area_and_centroid, reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Sampling
 

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.drives import as_moving
 from adapters.reference.simulation import solver_model
+from adapters.scene.drives import as_moving
 from reference_solver import Model, Settings
 from reference_solver.certificate.truth import certify
 from reference_solver.verification import random_scenes

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from adapters import registry
-from adapters.near import start_overlap
+from adapters.scene.near import start_overlap
 from validation.bench import targets
 from validation.bench.errors import Found, column, drift, errors_of, heap, wall
 from validation.bench.scenes import RADII

@@ -3,7 +3,7 @@
 import pytest
 
 from adapters.scene import Body, Scene, SceneError
-from adapters.shapes import Box, Capsule, Sphere
+from adapters.scene.shapes import Box, Capsule, Sphere
 from validation.files.magnitudes import impossible_inertia
 from validation.posed import resolve
 

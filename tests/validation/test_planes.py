@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from adapters import stepping
-from adapters.lift import lift, size_across
 from adapters.needs import needs
 from adapters.planted_faults import Planted
 from adapters.receipts import Receipt
 from adapters.registry import find
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene
+from adapters.scene.lift import lift, size_across
 from adapters.stepping import run
 from reports import testing
 from validation import bounds

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.lift import size_across
 from adapters.scene import SceneError
+from adapters.scene.lift import size_across
 from adapters.trajectory import ContactRecord, Trajectory
 from reports.findings import refusals
 from validation.cells import Observation, Outcome, Slot, plane_of

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from adapters.foreign import said_by
-from adapters.near import start_overlap
 from adapters.scene import Scene
+from adapters.scene.near import start_overlap
 from adapters.stepping import advances, run, step_count
 from adapters.trajectory import Trajectory
 from validation import metrics

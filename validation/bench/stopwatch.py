@@ -19,9 +19,9 @@ import numpy as np
 
 from adapters.engine import Array, Engine, Simulation
 from adapters.foreign import said_by
-from adapters.lift import lower_pose, lower_twist
 from adapters.registry import find
 from adapters.scene import Scene
+from adapters.scene.lift import lower_pose, lower_twist
 from adapters.stepping import advances
 from validation.bench.units import COLLAPSED, Unit, many, own_error, prepared, scene_of
 

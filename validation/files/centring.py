@@ -8,7 +8,7 @@ import numpy as np
 
 from adapters.extras import install
 from adapters.scene import SceneError
-from adapters.shapes import CENTRED, Polygon, area_and_centroid, check_points
+from adapters.scene.shapes import CENTRED, Polygon, area_and_centroid, check_points
 from validation.solids import hull_properties
 
 #: Products of inertia that count as round-off of the given corners, as a share of the moments.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from adapters.engine import Array, Contacts
 from adapters.scene import Scene
-from adapters.shapes import ROUND
+from adapters.scene.shapes import ROUND
 from adapters.trajectory import Trajectory
 from validation import metrics
 from validation.canonical import Measured

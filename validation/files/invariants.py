@@ -17,10 +17,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from adapters.drives import turns
 from adapters.engine import Array
 from adapters.scene import Body, HalfSpace, Scene
-from adapters.shapes import ROUND, reach
+from adapters.scene.drives import turns
+from adapters.scene.shapes import ROUND, reach
 from adapters.trajectory import Trajectory
 from validation import metrics
 from validation.bounds import ROUND_OFF

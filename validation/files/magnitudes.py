@@ -9,7 +9,7 @@ from typing import Any
 
 from adapters.plain import NAME, one_line
 from adapters.scene import Body, Scene, SceneError
-from adapters.shapes import Box, Capsule, Cylinder, HalfSpace, Hull, reach
+from adapters.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Hull, reach
 
 #: Largest size of a number in SI units, and smallest mass, moment or length: products of five of them, such as an
 #: energy over a length, stay within what a double can hold, with digits.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Shape, Sphere
-from adapters.shapes import area_and_centroid
+from adapters.scene.shapes import area_and_centroid
 from validation.solids import hull_properties
 
 #: Words for moments that were computed here.

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from adapters import model
-from adapters.lift import lowered
 from adapters.model import PROFILE, Model, model_from_dict
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError
+from adapters.scene.lift import lowered
 from adapters.trajectory import Sampling, Trajectory
 from validation import metrics
 from validation.bounds import ROUND_OFF

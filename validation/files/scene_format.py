@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator
 
-from adapters.materials import Materials
 from adapters.plain import one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
-from adapters.shapes import MOST_VERTICES, check_length
+from adapters.scene.materials import Materials
+from adapters.scene.shapes import MOST_VERTICES, check_length
 from validation.files import forces
 from validation.files.centring import centre
 from validation.files.expressions import FUNCTIONS, FormulaError, value_of

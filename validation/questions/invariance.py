@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.drives import turns
 from adapters.engine import Array, Contacts
 from adapters.foreign import checked_refusal, said_by
 from adapters.registry import load
 from adapters.scene import Body, HalfSpace, Hull, Pair, Polygon, Scene, Shape
-from adapters.shapes import reach
+from adapters.scene.drives import turns
+from adapters.scene.shapes import reach
 from adapters.stepping import posed_for, run
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 from validation.canonical import CanonicalScene

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from adapters.scene import Body, Pair, Polygon, Scene, SceneError
-from adapters.shapes import area_and_centroid
+from adapters.scene.shapes import area_and_centroid
 from adapters.trajectory import Sampling, Trajectory
 from validation import bounds, metrics
 from validation.canonical import CanonicalScene, Check, Measured, Parameter, Params, Primary, Track, Variation

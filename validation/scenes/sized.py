@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from adapters.scene import Body, Scene
-from adapters.shapes import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Shape, Sphere
+from adapters.scene.shapes import Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Shape, Sphere
 from adapters.trajectory import Sampling, Trajectory
 from validation.canonical import CanonicalScene
 

@@ -7,11 +7,11 @@ import pytest
 from planted import failing, made
 
 from adapters import registry
-from adapters.drives import asked_abilities
-from adapters.lift import lift
-from adapters.meeting import meeting_pairs
 from adapters.needs import needs
 from adapters.scene import Pair, Scene, SceneError, scene_from_dict
+from adapters.scene.drives import asked_abilities
+from adapters.scene.lift import lift
+from adapters.scene.meeting import meeting_pairs
 from adapters.trajectory import Trajectory
 
 DT = 1 / 240

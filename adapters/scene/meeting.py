@@ -19,10 +19,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.drives import top_speed
-from adapters.near import near_pairs
 from adapters.scene import Body, HalfSpace, Pair, Scene
-from adapters.shapes import reach
+from adapters.scene.drives import top_speed
+from adapters.scene.near import near_pairs
+from adapters.scene.shapes import reach
 
 #: Pair of bodies, by index, with its material.
 Meeting = tuple[int, int, Pair]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from adapters.engine import Array
 from adapters.scene import Box, Capsule, Cylinder, Disc, HalfSpace, Scene, Sphere
-from adapters.shapes import Shape, reach
+from adapters.scene.shapes import Shape, reach
 
 #: Samples of a block: slow bodies keep small boxes, and a short run is one block.
 BLOCK = 32

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adapters.meeting import Meeting, representable
 from adapters.scene import Scene
+from adapters.scene.meeting import Meeting, representable
 
 #: Error of a solution of linear equations in doubles, for numbers of order 1.
 ROUNDING = 1e-12

@@ -20,7 +20,7 @@ import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Polygon, Scene, Shape, Sphere
-from adapters.shapes import reach
+from adapters.scene.shapes import reach
 
 
 def lift(scene: Scene) -> Scene:

@@ -29,9 +29,9 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any, Literal
 
-from adapters.materials import Materials, Pair, single
 from adapters.plain import NAME, REASON, is_visible, kind_of, one_line
-from adapters.shapes import (
+from adapters.scene.materials import Materials, Pair, single
+from adapters.scene.shapes import (
     SHAPE_NAMES,
     SHAPES,
     SHAPES_OF,
@@ -115,7 +115,7 @@ class Body:
         Of a body that is not free: velocity of its surface relative to the body [m/s], world axes; the component along
         the touched face drags by friction (a conveyor).
     course
-        Of a prescribed body: oscillation that is added to its twist (`adapters.drives`).
+        Of a prescribed body: oscillation that is added to its twist (`adapters.scene.drives`).
     """
 
     name: str

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 
-from adapters.shapes import SceneError
+from adapters.scene.shapes import SceneError
 
 
 @dataclass(frozen=True)
