@@ -8,9 +8,9 @@ from importlib.metadata import version
 from typing import Any
 
 from adapters.engine import Engine, EngineError, Simulation
+from adapters.law.single_precision import without_a_place
 from adapters.scene import Scene
 from adapters.settings import checked, checked_step
-from adapters.single_precision import without_a_place
 
 
 class CheckedEngine(Engine):

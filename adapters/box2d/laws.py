@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, deviations
+from adapters.law.single_motions import Chosen, booked_law, corner_law, kept_law, standstill_law
+from adapters.law.single_precision import Method, Threshold, rounded_law
 from adapters.needs import needs
 from adapters.scene import Scene
-from adapters.single_motions import Chosen, booked_law, corner_law, kept_law, standstill_law
-from adapters.single_precision import Method, Threshold, rounded_law
 
 #: Metrics of blows in free space, by scene.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -45,7 +45,7 @@ DEVIATIONS: tuple[Deviation, ...] = deviations(
     BLOWS,
     lambda metric, profile: blow_law(profile, metric),
     "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
-    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_precision.py",
+    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/law/single_precision.py",
     CHECKED_ON,
 )
 
@@ -66,7 +66,7 @@ DEVIATIONS += deviations(
     {"far_origin": ("stopping_distance",)},
     lambda metric, profile: standstill_law(metric, _chosen(profile)),
     "positions are in single precision: motion of a step below half their spacing (12 cm at 1e6 m) is lost",
-    "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/single_motions.py",
+    "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/law/single_motions.py",
     CHECKED_ON,
 )
 
@@ -76,7 +76,7 @@ DEVIATIONS += deviations(
     {"edge_drop": ("rise", "spin", "impulse")},
     lambda metric, profile: corner_law(metric, _chosen(profile), VELOCITY_THRESHOLD),
     "single precision, 2^-24 relative; restitution is 0 up to an approach of one unit a second",
-    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/single_motions.py",
+    "b2Settings.h, float32 and b2_velocityThreshold; motion in adapters/law/single_motions.py",
     CHECKED_ON,
 )
 
@@ -88,7 +88,7 @@ DEVIATIONS += tuple(
         metric,
         kept_law(metric),
         "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "b2Settings.h, float32; band in adapters/single_motions.py",
+        "b2Settings.h, float32; band in adapters/law/single_motions.py",
         CHECKED_ON,
     )
     # The threshold's loss of energy as shipped is no round-off, but a finding.
@@ -105,6 +105,6 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
-    "b2Settings.h, float32; band in adapters/single_motions.py",
+    "b2Settings.h, float32; band in adapters/law/single_motions.py",
     CHECKED_ON,
 )

@@ -26,8 +26,8 @@ import numpy as np
 from adapters.box2d3.shipped import SEEN_AHEAD, STIFFEST
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
+from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.scene import Disc, HalfSpace, Scene
-from adapters.single_precision import ROUNDINGS, UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 

@@ -10,10 +10,10 @@ from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, deviations
+from adapters.law.single_motions import booked_law, corner_law, kept_law, standstill_law
+from adapters.law.single_precision import Method, Threshold, rounded_law
 from adapters.needs import needs
 from adapters.scene import Scene
-from adapters.single_motions import booked_law, corner_law, kept_law, standstill_law
-from adapters.single_precision import Method, Threshold, rounded_law
 
 #: Metrics of blows in free space, by scene.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -68,7 +68,7 @@ DEVIATIONS: tuple[Deviation, ...] = deviations(
     lambda metric, profile: blow_law(profile, metric),
     "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
     "of compression only, as restitution is applied last",
-    "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/single_precision.py",
+    "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/law/single_precision.py",
     CHECKED_ON,
 )
 DEVIATIONS += deviations(
@@ -88,7 +88,7 @@ DEVIATIONS += deviations(
     {"far_origin": ("stopping_distance",)},
     lambda metric, profile: standstill_law(metric, _lengths(profile)),
     "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "math_functions.h, b2Vec2: a pair of floats; motion in adapters/single_motions.py",
+    "math_functions.h, b2Vec2: a pair of floats; motion in adapters/law/single_motions.py",
     CHECKED_ON,
 )
 DEVIATIONS += tuple(
@@ -102,7 +102,7 @@ DEVIATIONS += tuple(
             metric, _lengths(profile), math.nextafter(RESTITUTION_THRESHOLD, 0.0) if profile == "default" else 0.0
         ),
         "single precision, 2^-24 relative; restitution is 0 up to the threshold",
-        "types.h, restitutionThreshold; motion in adapters/single_motions.py",
+        "types.h, restitutionThreshold; motion in adapters/law/single_motions.py",
         CHECKED_ON,
     )
     for profile in PROFILES
@@ -115,7 +115,7 @@ DEVIATIONS += deviations(
     {"rack": ("momentum_defect",)},
     lambda metric, profile: kept_law(metric),
     "the impulse of every impact is rounded to single precision, 2^-24 relative",
-    "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
+    "math_functions.h, b2Vec2: a pair of floats; band in adapters/law/single_motions.py",
     CHECKED_ON,
 )
 
@@ -125,6 +125,6 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
-    "math_functions.h, b2Vec2: a pair of floats; band in adapters/single_motions.py",
+    "math_functions.h, b2Vec2: a pair of floats; band in adapters/law/single_motions.py",
     CHECKED_ON,
 )

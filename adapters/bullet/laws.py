@@ -19,13 +19,13 @@ from adapters.bullet.profiles import PROFILES, law_of
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
+from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
+from adapters.law.single_precision import Held
+from adapters.law.unswept import passing_law, shoved_law
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
-from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
-from adapters.unswept import passing_law, shoved_law
 
 
 def _is_one_ball_over_a_floor(scene: Scene) -> bool:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from adapters.chipmunk.profiles import PROFILES
 from adapters.chipmunk.shipped import CHECKED_ON
 from adapters.law import Deviation, exactly
+from adapters.law.unswept import Push, passing_law, shoved_law
 from adapters.needs import needs
 from adapters.scene import Scene
-from adapters.unswept import Push, passing_law, shoved_law
 
 
 def _pushed(profile: str) -> Push:

@@ -12,10 +12,10 @@ from adapters.dart.rubbing import rubbing_law
 from adapters.dart.shipped import MIXING, PUSH_OUT, Rebound
 from adapters.dart.slipping import slipping_law
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
+from adapters.law.single_precision import ROUNDINGS, Method, rounded_law
+from adapters.law.unswept import passing_law, wall_law
 from adapters.scene import Box, Scene
 from adapters.scene.lift import lift
-from adapters.single_precision import ROUNDINGS, Method, rounded_law
-from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which friction does not change.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -104,7 +104,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         blow_law(metric, profile),
         "a contact yields by 1e-5 of the speed that it changes; a rebound has 0.1 m/s to 100 m/s; overlaps are "
         "corrected at up to 1 mm/s",
-        "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
+        "ContactConstraint, constraint force mixing; motion in adapters/law/single_precision.py",
         ("6.20.",),
     )
     for profile in PROFILES
@@ -137,7 +137,7 @@ DEVIATIONS += deviations(
     {"flat_box": BLOWS["flat_box"]},
     shared_law,
     "a contact yields by 1e-5 of its response, and the iterations do not determine how corners share a blow",
-    "ContactConstraint, constraint force mixing; motion in adapters/single_precision.py",
+    "ContactConstraint, constraint force mixing; motion in adapters/law/single_precision.py",
     ("6.20.",),
 )
 DEVIATIONS += tuple(
@@ -219,6 +219,6 @@ DEVIATIONS += deviations(
     _wall_law,
     "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
     "other at the end of the next, passes through; other blows yield by 1e-5",
-    "measured with 6.20.0; motion in adapters/unswept.py and adapters/single_precision.py",
+    "measured with 6.20.0; motion in adapters/law/unswept.py and adapters/law/single_precision.py",
     ("6.20.",),
 )

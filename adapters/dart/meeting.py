@@ -21,10 +21,10 @@ import numpy as np
 from adapters.dart.shipped import FASTEST, MIXING, PUSH_OUT, PUSHED_SHARE, THRESHOLD
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
+from adapters.law.single_precision import Held
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.scene.lift import lift
 from adapters.scene.shapes import reach
-from adapters.single_precision import Held
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from adapters.engine import Array
 from adapters.law import Law, Measure, Prediction
-from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR
+from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR
 from adapters.mujoco.box_on_face import BoxOnFace, Triple
 from adapters.mujoco.contact_law import ContactLaw
 from adapters.mujoco.motions import along_a_heading

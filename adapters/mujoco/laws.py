@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from adapters.law import AskedLaw, Deviation, Law, deviations, exactly
+from adapters.law.unswept import passing_law, shoved_law
 from adapters.mujoco.ball_on_face import rolling_law
 from adapters.mujoco.belts import on_a_belt
 from adapters.mujoco.plates import on_a_plate
 from adapters.mujoco.predictions import ball_law, blow_law, column_asked, column_law, incline_law, stopping_law
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.shipped import CHECKED_ON
-from adapters.unswept import passing_law, shoved_law
 
 #: Profiles whose contacts are MuJoCo's own law.
 SOFT = ("default", "tuned")

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.law import AskedLaw, Law, Measure, Prediction
-from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
+from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.mujoco.blows import blow_of, metrics_of, steps_of
 from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.contact_law import ContactLaw

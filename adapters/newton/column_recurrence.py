@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.compiled import kernel
+from adapters.law.compiled import kernel
 
 Numbers = np.ndarray[Any, np.dtype[Any]]
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.law import Law, Measure, Prediction
+from adapters.law.single_precision import UNIT
 from adapters.scene import Box, Scene
-from adapters.single_precision import UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
 

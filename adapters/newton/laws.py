@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, exactly
+from adapters.law.single_precision import UNIT, Method, plane_law, rounded_law
+from adapters.law.unswept import passing_law
 from adapters.newton.hanging import hanging_law
 from adapters.newton.motion import motion_law, swept_law
 from adapters.newton.profiles import PROFILES
-from adapters.single_precision import UNIT, Method, plane_law, rounded_law
-from adapters.unswept import passing_law
 
 _SWEPT = "each iteration corrects a share of overlaps and slips, and its residual becomes a velocity"
 _REBOUNDS = (
@@ -130,7 +130,7 @@ DEVIATIONS += tuple(
         passing_law(metric, PLACES),
         "there is no swept collision detection: a body farther than two gaps from a thin body at the start of a "
         "step, and beyond it at the end, passes through",
-        "ModelBuilder.rigid_gap; motion in adapters/unswept.py",
+        "ModelBuilder.rigid_gap; motion in adapters/law/unswept.py",
         ("1.8.",),
     )
     for metric in ("rebound_ratio", "beyond")
@@ -143,7 +143,7 @@ DEVIATIONS += tuple(
         exactly(metric),
         rounded_law(metric, Method(lambda e, speed: e)),
         "single precision, 2^-24 relative",
-        "xpbd/restitution_kernels.py, built for floats; motion in adapters/single_precision.py",
+        "xpbd/restitution_kernels.py, built for floats; motion in adapters/law/single_precision.py",
         ("1.8.",),
     )
     for scene, metrics in (("closing_wall", ("speed[1]", "speed[2]", "speed[3]")),)
@@ -175,7 +175,7 @@ DEVIATIONS += tuple(
         "out_of_plane",
         plane_law,
         "single precision rounds differently on both sides of a plane",
-        "xpbd/kernels.py, built for floats; band in adapters/single_precision.py",
+        "xpbd/kernels.py, built for floats; band in adapters/law/single_precision.py",
         ("1.8.",),
     )
     for scene in ("edge_drop", "flat_box", "kane")

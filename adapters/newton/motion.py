@@ -47,6 +47,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from adapters.law import AskedLaw, Law, Measure, Prediction
+from adapters.law.single_precision import UNIT
 from adapters.needs import needs
 from adapters.newton.column import column_moved, column_of
 from adapters.newton.profiles import PROFILES
@@ -56,7 +57,6 @@ from adapters.newton.telling import told_contacts, told_trajectory
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.scene.lift import lift
 from adapters.scene.means import means
-from adapters.single_precision import UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import Measured, Trajectory
 

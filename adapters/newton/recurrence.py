@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.compiled import inner_kernel, kernel
+from adapters.law.compiled import inner_kernel, kernel
 
 Numbers = np.ndarray[Any, np.dtype[Any]]
 

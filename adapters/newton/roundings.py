@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from adapters.law.single_precision import UNIT
 from adapters.newton.shipped import INNER
 from adapters.scene import Body, Box, Scene, Sphere
-from adapters.single_precision import UNIT
 from adapters.trajectory import Trajectory
 
 #: Roundings of the place of two touching points, which determine depth and slip: each is transformed from the world to

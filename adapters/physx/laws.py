@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
+from adapters.law.single_motions import booked_law, kept_law, standstill_law
+from adapters.law.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
+from adapters.law.unswept import passing_law, wall_law
 from adapters.needs import needs
 from adapters.physx.profiles import PROFILES, least_rebound
 from adapters.physx.shipped import BOUNCE_THRESHOLD, CONTACT_OFFSET
 from adapters.scene import Scene
-from adapters.single_motions import booked_law, kept_law, standstill_law
-from adapters.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
-from adapters.unswept import passing_law, wall_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -57,7 +57,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         exactly(metric),
         blow_law(metric, profile),
         "restitution is 0 up to 2 m/s as shipped; single precision, 2^-24 relative",
-        "PxSceneDesc, bounceThresholdVelocity; motion in adapters/single_precision.py",
+        "PxSceneDesc, bounceThresholdVelocity; motion in adapters/law/single_precision.py",
         _RELEASES,
     )
     for profile in PROFILES
@@ -72,7 +72,7 @@ DEVIATIONS += deviations(
     _wall_law,
     "there is no swept collision detection: a body on one side of a thin body at the end of a step, and on the "
     "other at the end of the next, passes through",
-    "measured with 3.0.3; motion in adapters/unswept.py and adapters/single_precision.py",
+    "measured with 3.0.3; motion in adapters/law/unswept.py and adapters/law/single_precision.py",
     _RELEASES,
 )
 DEVIATIONS += deviations(
@@ -81,7 +81,7 @@ DEVIATIONS += deviations(
     {"far_origin": ("stopping_distance",)},
     lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
     "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "PxTransform, built of floats; motion in adapters/single_motions.py",
+    "PxTransform, built of floats; motion in adapters/law/single_motions.py",
     _RELEASES,
 )
 DEVIATIONS += tuple(
@@ -92,7 +92,7 @@ DEVIATIONS += tuple(
         "momentum_defect",
         kept_law("momentum_defect"),
         "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "PxVec3, built of floats; band in adapters/single_motions.py",
+        "PxVec3, built of floats; band in adapters/law/single_motions.py",
         _RELEASES,
     )
     for scene in ("cradle", "rack")
@@ -104,7 +104,7 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
-    "PxVec3, built of floats; band in adapters/single_motions.py",
+    "PxVec3, built of floats; band in adapters/law/single_motions.py",
     _RELEASES,
 )
 
@@ -122,7 +122,7 @@ DEVIATIONS += tuple(
         "out_of_plane",
         plane_law,
         "single precision rounds differently on both sides of a plane",
-        "PxVec3, built of floats; band in adapters/single_precision.py",
+        "PxVec3, built of floats; band in adapters/law/single_precision.py",
         _RELEASES,
     )
     for profile, scenes in PLANES.items()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, deviations, exactly
-from adapters.single_motions import booked_law, kept_law, standstill_law
-from adapters.single_precision import Method, rounded_law
+from adapters.law.single_motions import booked_law, kept_law, standstill_law
+from adapters.law.single_precision import Method, rounded_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -37,7 +37,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
         exactly(metric),
         rounded_law(metric, Method(newton, rebound_after_friction=True)),
         "single precision, 2^-24 relative",
-        "rapier3d, built for f32; motion in adapters/single_precision.py",
+        "rapier3d, built for f32; motion in adapters/law/single_precision.py",
         ("0.36.",),
     )
     for scene, metrics in BLOWS.items()
@@ -49,7 +49,7 @@ DEVIATIONS += deviations(
     {"far_origin": ("stopping_distance",)},
     lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
     "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "rapier3d, built for f32; motion in adapters/single_motions.py",
+    "rapier3d, built for f32; motion in adapters/law/single_motions.py",
     ("0.36.",),
 )
 DEVIATIONS += tuple(
@@ -60,7 +60,7 @@ DEVIATIONS += tuple(
         "momentum_defect",
         kept_law("momentum_defect"),
         "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "rapier3d, built for f32; band in adapters/single_motions.py",
+        "rapier3d, built for f32; band in adapters/law/single_motions.py",
         ("0.36.",),
     )
     for scene in ("cradle", "rack")
@@ -72,6 +72,6 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
-    "rapier3d, built for f32; band in adapters/single_motions.py",
+    "rapier3d, built for f32; band in adapters/law/single_motions.py",
     ("0.36.",),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from adapters.law import Deviation
-from adapters.unswept import passing_law, shoved_law
+from adapters.law.unswept import passing_law, shoved_law
 
 DEVIATIONS: tuple[Deviation, ...] = tuple(
     Deviation(

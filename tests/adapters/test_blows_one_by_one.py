@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from adapters import single_precision as singles
+from adapters.law.single_precision import LARGEST, SMALLEST, TOUCHING, Method
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
-from adapters.single_precision import LARGEST, SMALLEST, TOUCHING, Method
 
 EXACT = Method(lambda e, speed: e, 200, 2.0**-53)
 STILL = (1.0, 0.0, 0.0, 0.0)

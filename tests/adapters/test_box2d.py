@@ -13,9 +13,9 @@ from adapters.box2d.profiles import FINEST, units
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.law import exactly
+from adapters.law.single_precision import Method, rounded_law
 from adapters.needs import needs
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
-from adapters.single_precision import Method, rounded_law
 from validation.catalogue import CATALOGUE
 
 pytestmark = pytest.mark.optional("box2d")

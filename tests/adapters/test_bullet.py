@@ -20,7 +20,7 @@ from adapters.bullet.profiles import law_of
 from adapters.bullet.shipped import WARM_STARTING
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
-from adapters.moved_starts import GAP_ROUND_OFF
+from adapters.law.moved_starts import GAP_ROUND_OFF
 from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
 from adapters.scene import Hull, Polygon

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
+from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.mujoco import ball_on_face, blows, motions, predictions, profiles
 from adapters.mujoco.predictions import EITHER, ENOUGH
 from adapters.needs import needs

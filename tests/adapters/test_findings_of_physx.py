@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from driven import driven, measured_of
 
+from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.physx import PhysxEngine
 from adapters.scene import Body, HalfSpace, Pair, Scene, Sphere
-from adapters.single_precision import ROUNDINGS, UNIT
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE

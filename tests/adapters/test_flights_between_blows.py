@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from adapters import single_precision
+from adapters.law.single_precision import Held, Method, _Flight, _motion
 from adapters.scene import Body, Pair, Scene, Sphere
-from adapters.single_precision import Held, Method, _Flight, _motion
 
 DT = 1 / 64
 EXACT = Method(lambda e, speed: e, 200)

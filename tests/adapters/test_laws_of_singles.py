@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from adapters.law import Deviation
+from adapters.law.single_motions import corner_law, kept_law, standstill_law
+from adapters.law.single_precision import ROUNDINGS, UNIT, Method, Threshold, plane_law, rounded_law, without_a_place
 from adapters.scene import Box, Pair
-from adapters.single_motions import corner_law, kept_law, standstill_law
-from adapters.single_precision import ROUNDINGS, UNIT, Method, Threshold, plane_law, rounded_law, without_a_place
 from validation import bounds
 from validation.catalogue import CATALOGUE
 from validation.findings import Known

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from adapters import single_motions as motions
+from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
-from adapters.single_precision import ROUNDINGS, UNIT
 
 DT = 1 / 64
 FLOOR = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from planted import still
 
+from adapters.law.single_motions import booked_law
 from adapters.scene import SceneError
-from adapters.single_motions import booked_law
 from adapters.trajectory import Trajectory
 from validation.catalogue import CATALOGUE
 from validation.scenes import galperin, off_centre, stacked_balls

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from planted import failing, made, still
 
+from adapters.law.unswept import passing_law
 from adapters.stepping import step_count
 from adapters.trajectory import Trajectory
-from adapters.unswept import passing_law
 from validation.catalogue import CATALOGUE
 
 DT = 1 / 240

@@ -9,8 +9,8 @@ import numpy as np
 
 from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
+from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
-from adapters.single_precision import ROUNDINGS, UNIT
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Trajectory
 
