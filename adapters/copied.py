@@ -7,6 +7,7 @@ A conversion of one state by numpy takes longer than a step of most engines, one
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from itertools import chain
@@ -18,6 +19,9 @@ from numpy.typing import NDArray
 from adapters.engine import Array, Contacts, Recorded, Simulation
 from adapters.scene import Scene
 from adapters.stages import READING, stage
+
+#: Largest other component of a unit normal along an axis in single precision.
+ALONG = 1e-5
 
 
 class Copied(Simulation):
@@ -103,3 +107,12 @@ def by_pair(counts: NDArray[np.int64], told: Array) -> Contacts:
     order = np.lexsort((np.maximum(i, j), np.minimum(i, j), np.repeat(np.arange(len(counts)), counts)))
     point, normal, impulse = np.split(told[order, 2:-1], 3, axis=1)
     return Contacts.turned(i[order], j[order], point, normal, impulse, told[order, -1])
+
+
+def along_normal(impulse: float, normal: Sequence[float], rough: bool) -> list[float]:
+    """Known part of an impulse [N s] where an engine reports only the part along the ``normal`` (d,).
+
+    Without friction that is all of it. For a ``rough`` contact the components across the normal are unknown (NaN);
+    where the normal is not along an axis, all are.
+    """
+    return [math.nan if rough and abs(n) <= 1.0 - ALONG else impulse * n for n in normal]

@@ -9,7 +9,7 @@ is `adapters.stepping.run`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -139,11 +139,6 @@ class Contacts:
         """Turn pairs so that a < b; normals point from ``i`` to ``j``, impulses are on ``j``."""
         sign = np.where(i < j, 1.0, -1.0)[:, None]
         return cls(np.minimum(i, j), np.maximum(i, j), point, sign * normal, sign * impulse, np.asarray(gap, float))
-
-    @classmethod
-    def by_pair(cls, rows: Iterable[Row], dimension: int) -> Contacts:
-        """Build from rows, sorted by pair; those of a pair stay in their order."""
-        return cls.from_rows(sorted(rows, key=lambda row: (min(row[:2]), max(row[:2]))), dimension)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@
         releases.py       RELEASES: what older releases do differently (`adapters.releases`)
         changes.toml      notes of the engine on changes over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
-        tuning.toml       settings for tuning, and fixes whose settings are measured (`adapters.experiment_files`)
+        tuning.toml       settings for tuning, and fixes whose settings are measured (`adapters.experiment.files`)
         findings/         families.toml, which proves them too, and members.csv (`validation.findings`), breaks.toml
                           and breaks.csv
         experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
@@ -41,8 +41,8 @@ from typing import Any
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.experiment import Cured, Experiment
-from adapters.experiment_files import Tuning, read_tuning
-from adapters.foreign import importable, said_by
+from adapters.experiment.files import Tuning, read_tuning
+from adapters.isolation.foreign import importable, said_by
 from adapters.law import Deviation, Law, Measure, Prediction
 from adapters.plain import one_line
 from adapters.scene import Scene

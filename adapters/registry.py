@@ -12,7 +12,7 @@ from typing import Any
 
 from adapters.engine import UNRANKED, Engine, EngineError, EngineFacts, Role
 from adapters.extras import install, packages
-from adapters.foreign import Found, checked_facts, probe, said_by, serve, trace_of
+from adapters.isolation.foreign import Found, checked_facts, probe, said_by, serve, trace_of
 from adapters.plain import NAME, is_visible, one_line
 from adapters.stages import stage
 
@@ -152,7 +152,8 @@ def _place(entry: EntryPoint) -> tuple[bool, int]:
 def find(name: str) -> Found:
     """Look for the engine called ``name``; never raises for an engine that is missing or broken.
 
-    An engine of another package is loaded in its own process (`adapters.foreign`), except after `load_engines_here`.
+    An engine of another package is loaded in its own process (`adapters.isolation.foreign`), except after
+    `load_engines_here`.
 
     Raises
     ------

@@ -19,9 +19,9 @@ import pandas as pd
 from adapters import registry
 from adapters import scene as scene_module
 from adapters.engine import Engine, EngineError
-from adapters.own_settings import own
 from adapters.plain import NAME, kind_of, one_line
 from adapters.scene import SceneError
+from adapters.settings.own import own
 from adapters.trajectory import Trajectory, load_trajectory
 from contact_crosscheck.apart import apart
 from contact_crosscheck.models import AnyScene, scene_named

@@ -12,7 +12,7 @@ from typing import Any
 
 from adapters import engine_folder, registry
 from adapters.engine_folder import unset_of
-from adapters.foreign import said_by
+from adapters.isolation.foreign import said_by
 from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import Scene, SceneError

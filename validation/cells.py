@@ -17,13 +17,13 @@ import numpy as np
 
 from adapters import registry
 from adapters.engine import Engine, Setting
-from adapters.foreign import checked_settings
 from adapters.isolation import LOG_LINES
+from adapters.isolation.foreign import checked_settings
 from adapters.needs import needs
-from adapters.own_settings import suffix_of
 from adapters.plain import NAME, REASON, is_visible, lines, one_line, plain
 from adapters.registry import find
 from adapters.scene import Scene, SceneError
+from adapters.settings.own import suffix_of
 from adapters.stages import stage
 from validation.bounds import planar
 from validation.canonical import CanonicalScene, Check, Measured

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters import registry
-from adapters.engine_folder import located
+from adapters.engine_folder import folder_of, located
 from validation.catalogue import CATALOGUE, module_of
 
 
@@ -45,7 +45,8 @@ def adapter_hash(engine: str) -> str:
     the solver. Laws, experiments and findings judge a trajectory and are not part of it.
     """
     entry = registry.entry(engine)
-    shared = [path for path in _sources("adapters") if path.parent.name == "adapters"]
+    folders = {folder_of(name) for name in registry.names()}
+    shared = [path for path in _sources("adapters") if path.parent not in folders and path.parent.name not in JUDGING]
     if registry.is_introduced(engine):  # its source may not be a file; its cells are not stored
         return _hash_files(shared)
     if entry is None:
@@ -56,6 +57,8 @@ def adapter_hash(engine: str) -> str:
     return _hash_files(sorted({*shared, *own, *solver}))
 
 
+#: Rooms of `adapters` that judge a trajectory, and what a new adapter begins with.
+JUDGING = {"law", "experiment", "conformance", "new_adapter"}
 #: Our solver.
 SOLVER = "reference_solver"
 #: Code that runs and measures a cell of any scene.

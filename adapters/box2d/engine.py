@@ -18,7 +18,7 @@ from adapters.box2d.simulation import Box2DSimulation
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.probes import HALF_EXTENTS, LANDING_SPEED
+from adapters.receipts.probes import HALF_EXTENTS, LANDING_SPEED
 from adapters.scene import Scene
 
 

@@ -22,7 +22,7 @@ from adapters.box2d.shipped import (
 )
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.probes import slide_speed
+from adapters.receipts.probes import slide_speed
 
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {

@@ -21,7 +21,8 @@ from adapters.bullet.translation import factors, moments
 from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs, needs
-from adapters.probes import (
+from adapters.receipts import FRICTION_SHARE
+from adapters.receipts.probes import (
     MOST_FRICTION,
     REBOUND_LEAD,
     REBOUND_RADIUS,
@@ -31,7 +32,6 @@ from adapters.probes import (
     slide_load,
     slide_speed,
 )
-from adapters.receipts import FRICTION_SHARE
 from adapters.scene import Scene
 from adapters.scene.meeting import meeting_pairs
 

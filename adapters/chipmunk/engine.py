@@ -21,8 +21,8 @@ from adapters.chipmunk.simulation import ChipmunkSimulation
 from adapters.chipmunk.translation import factors, leaves_ground, moment
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs, needs
-from adapters.probes import SLIDE_TIME
 from adapters.receipts import IMPULSE_SHARE
+from adapters.receipts.probes import SLIDE_TIME
 from adapters.scene import Scene
 
 

@@ -14,7 +14,7 @@ from adapters.conformance.mechanics import BOOKKEEPING, loss
 from adapters.conformance.scenes import DT, driven
 from adapters.engine import Engine
 from adapters.needs import needs
-from adapters.probes import HALF_EXTENTS
+from adapters.receipts.probes import HALF_EXTENTS
 from adapters.scene import Body, Box, Capsule, Cylinder, Disc, HalfSpace, Hull, Pair, Polygon, Scene, Sphere
 from adapters.scene.drives import asked_abilities
 from adapters.stepping import posed_for
@@ -44,7 +44,7 @@ def sizes(engine: Engine) -> str:
     """A body of each shape that moves slowly to a floor comes down to its height, with each axis upwards."""
     for where, d, extent, _, scene, profile in _asked(engine, _landing):
         off = driven(engine, scene, profile).pose[:, 1, d - 1].min() - extent
-        told = engine.declares(profile, needs(scene), DT).get("size")  # shares of the box of `adapters.probes`
+        told = engine.declares(profile, needs(scene), DT).get("size")  # shares of the box of `adapters.receipts.probes`
         band = SIZE + (HALF_EXTENTS[0] * (abs(told.value - 1.0) + told.band) if told else 0.0)
         if not abs(off) <= band:
             return f"{where}: its lowest position is {off:+.2g} m from its height, {band:.2g} m is allowed"

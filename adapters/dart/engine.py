@@ -21,7 +21,7 @@ from adapters.dart.simulation import DartSimulation
 from adapters.dart.translation import frictions, restitutions
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.probes import MOST_FRICTION, REBOUND_SPEED
+from adapters.receipts.probes import MOST_FRICTION, REBOUND_SPEED
 from adapters.scene import Box, Scene
 
 

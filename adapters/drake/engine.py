@@ -21,8 +21,8 @@ from adapters.drake.translation import frictions
 from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
 from adapters.model import PROFILE
 from adapters.needs import Needs
-from adapters.probes import REBOUND_SPEED
 from adapters.receipts import FRICTION_SHARE, UNTOLD
+from adapters.receipts.probes import REBOUND_SPEED
 from adapters.scene import Capsule, Cylinder, Scene, Sphere
 from adapters.scene.meeting import meeting_pairs
 

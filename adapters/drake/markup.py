@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from adapters.markup import MOST_MADE, Element
+from adapters.model.markup import MOST_MADE, Element
 from adapters.plain import NAME, is_visible, one_line
 from adapters.scene import SceneError
 

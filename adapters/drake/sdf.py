@@ -23,8 +23,8 @@ from adapters.drake.markup import Stated, child, cleaned, cut, is_true, told
 from adapters.drake.profiles import OWN, rule
 from adapters.drake.translation import pair_of
 from adapters.engine import Setting
-from adapters.markup import Element, parsed, text_of
 from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, unique, unit
+from adapters.model.markup import Element, parsed, text_of
 from adapters.plain import one_line
 from adapters.scene import Body, Box, Capsule, Cylinder, HalfSpace, Scene, SceneError, Shape, Sphere
 

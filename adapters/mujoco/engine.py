@@ -31,8 +31,17 @@ from adapters.mujoco.simulation import MujocoSimulation, MujocoWorlds
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
-from adapters.probes import LANDING_LEAD, LANDING_SPEED, MOST_FRICTION, REBOUND_SPEED, SLIDE_TIME, STEPS, Case, slide
 from adapters.receipts import FRICTION_SHARE, IMPULSE_SHARE
+from adapters.receipts.probes import (
+    LANDING_LEAD,
+    LANDING_SPEED,
+    MOST_FRICTION,
+    REBOUND_SPEED,
+    SLIDE_TIME,
+    STEPS,
+    Case,
+    slide,
+)
 from adapters.scene import Scene
 from adapters.settings import Check, checked_step
 from adapters.stepping import step_count

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from adapters.markup import MOST_MADE, Element, named
+from adapters.model.markup import MOST_MADE, Element, named
 from adapters.plain import NAME, is_visible, one_line
 from adapters.scene import SceneError
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Setting
-from adapters.markup import Element, parsed, text_of
 from adapters.model import ALIGNED, ALONG, DURATION, ROUNDING, Model, pairs_of, unique, unit
+from adapters.model.markup import Element, parsed, text_of
 from adapters.mujoco.combination import Contact, contact_of
 from adapters.mujoco.markup import cleaned
 from adapters.mujoco.options import option_settings

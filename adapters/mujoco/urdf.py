@@ -9,8 +9,8 @@ are neither fixed nor floating, and meshes, are not supported.
 
 from __future__ import annotations
 
-from adapters.markup import Element, named, parsed
 from adapters.model import Model
+from adapters.model.markup import Element, named, parsed
 from adapters.mujoco import model
 from adapters.mujoco.markup import rid_of
 from adapters.plain import one_line

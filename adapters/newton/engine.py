@@ -19,8 +19,8 @@ from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS
 from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
 from adapters.newton.simulation import NewtonSimulation, imported
-from adapters.probes import GRAVITY, SLIDE_TIME
 from adapters.receipts import FRICTION_SHARE
+from adapters.receipts.probes import GRAVITY, SLIDE_TIME
 from adapters.scene import Scene
 from adapters.scene.means import no_means
 

@@ -252,7 +252,7 @@ class NewtonSimulation(Simulation):
             # The force acts on the first body; contacts out of range have none.
             impulse = np.full(3, np.nan) if self.settings["rebounds"] else -self.dt * force[k]
             rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], impulse, gap))
-        return Contacts.by_pair(rows, 3)
+        return Contacts.from_rows(sorted(rows, key=lambda row: sorted(row[:2])), 3)
 
     def _world(self, number: int, point: Array) -> Array:
         if number < 0:

@@ -18,8 +18,8 @@ from adapters.physx.profiles import KINDS, PROFILES
 from adapters.physx.script import python
 from adapters.physx.shipped import ANGULAR_DAMPING, BOUNCE_THRESHOLD
 from adapters.physx.simulation import PhysxSimulation, imported
-from adapters.probes import REBOUND_SPEED
 from adapters.receipts import ROUNDINGS
+from adapters.receipts.probes import REBOUND_SPEED
 from adapters.scene import Scene
 from adapters.scene.means import no_means
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.copied import Copied
+from adapters.copied import Copied, along_normal
 from adapters.engine import EngineError
-from adapters.impulses import along_normal
 from adapters.physx.translation import turn_to, turned
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere

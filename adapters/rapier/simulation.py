@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-from adapters.copied import Copied
-from adapters.impulses import along_normal
+from adapters.copied import Copied, along_normal
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, HalfSpace, Scene, Sphere
 from adapters.scene.meeting import common_material

@@ -28,8 +28,8 @@ import numpy as np
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Quirk, Scheme, Simulation
 from adapters.needs import Needs
 from adapters.plain import Notice
-from adapters.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.receipts import FRICTION_SHARE
+from adapters.receipts.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.reference.profiles import KINDS, PROFILES, SOURCE
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, ReferenceWorlds, json_ready, solver_model

@@ -9,8 +9,9 @@ from typing import Any
 
 import click
 
-from adapters import own_settings, registry
+from adapters import registry
 from adapters.scene import SceneError
+from adapters.settings.own import given, own
 from adapters.whole import write
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import FILE, FOLDER, writable
@@ -107,8 +108,8 @@ def _slot(scene: str, options: dict[str, Any]) -> Slot:
     engine = registry.load(options["engine"])
     name = pinned(scene) if is_file(scene) else scene
     canonical = resolve(name)
-    own = [d for d in canonical.dimensions if d in engine.facts.dimensions]
-    dimension = options["dim"] or (own or list(canonical.dimensions))[0]
+    possible = [d for d in canonical.dimensions if d in engine.facts.dimensions]
+    dimension = options["dim"] or (possible or list(canonical.dimensions))[0]
     brings = canonical.brings.get(options["engine"]) if options["set"] else None
     shipped = brings.profile if brings else engine.facts.profile("shipped")
     named = profiles_called(filter(None, [options["profile"]]), [options["engine"]])
@@ -118,4 +119,4 @@ def _slot(scene: str, options: dict[str, Any]) -> Slot:
     dt = parse_dt(options["dt"]) if options["dt"] else brought.dt if brought else QUICK_DT
     slot = Slot(name, params, dimension, options["engine"], profile, dt, options["iterations"])
     stock = settings_of(engine, slot, canonical.scene(dimension, dict(params)))
-    return slot.with_own(own_settings.own(engine, own_settings.given(options["set"]), stock))
+    return slot.with_own(own(engine, given(options["set"]), stock))

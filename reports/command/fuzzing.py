@@ -16,8 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
+from adapters.isolation.foreign import said_by
 from reference_solver.verification.fuzz.trial import attack
 from reports.wording import number
 

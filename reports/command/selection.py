@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from adapters import registry
-from adapters.own_settings import given
 from adapters.scene import SceneError
+from adapters.settings.own import given
 from reports.command.completion import engine_names, scene_names
 from reports.wording import profiles_called
 from validation.canonical import SUITES, Suite

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from adapters.own_settings import given, suffix_of
 from adapters.registry import is_ranked
 from adapters.scene import SceneError
+from adapters.settings.own import given, suffix_of
 from reports import brief
 from reports.answers import Costs, answers, choices
 from reports.command.completion import engine_names, row_ids, scene_names

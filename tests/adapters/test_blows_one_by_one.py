@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters import single_precision as singles
+from adapters.law import single_precision as singles
 from adapters.law.single_precision import LARGEST, SMALLEST, TOUCHING, Method
 from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 

@@ -21,8 +21,8 @@ from adapters.bullet.shipped import WARM_STARTING
 from adapters.bullet.translation import factors
 from adapters.engine import EngineError
 from adapters.law.moved_starts import GAP_ROUND_OFF
-from adapters.probes import Case, read_slide, slide
 from adapters.receipts import receipts
+from adapters.receipts.probes import Case, read_slide, slide
 from adapters.scene import Hull, Polygon
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, plane_of

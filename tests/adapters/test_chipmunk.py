@@ -17,8 +17,8 @@ from adapters.chipmunk.start import overlap_displacement, touching_pairs
 from adapters.chipmunk.translation import factors
 from adapters.engine import EngineError
 from adapters.needs import needs
-from adapters.probes import PROBES, Case
 from adapters.receipts import receipts
+from adapters.receipts.probes import PROBES, Case
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory

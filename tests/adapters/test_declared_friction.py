@@ -10,7 +10,7 @@ pytest.importorskip("mujoco")
 from adapters.mujoco.box_on_face import BoxOnFace
 from adapters.mujoco.engine import FRICTION_SHARE, MujocoEngine, _friction
 from adapters.needs import Needs
-from adapters.probes import SLIDE_TIME, Case, slide
+from adapters.receipts.probes import SLIDE_TIME, Case, slide
 from adapters.stepping import step_count
 
 DT = 1 / 240

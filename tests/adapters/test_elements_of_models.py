@@ -2,8 +2,8 @@
 
 import pytest
 
-from adapters import markup
-from adapters.markup import Element, named, parsed, text_of
+from adapters.model import markup
+from adapters.model.markup import Element, named, parsed, text_of
 from adapters.mujoco import markup as mjcf
 from adapters.plain import NAME
 from adapters.scene import SceneError

@@ -9,7 +9,7 @@ import pytest
 
 from adapters import extras, registry
 from adapters.engine import Engine, EngineFacts, Scheme
-from adapters.foreign import Found
+from adapters.isolation.foreign import Found
 from adapters.plain import NAME
 
 FACTS = EngineFacts("odd", "Odd", "odd-package", frozenset({2}), Scheme("none", 0), 0.01)

@@ -4,7 +4,7 @@ import pytest
 
 from adapters.engine import EngineError
 from adapters.experiment import Cured
-from adapters.experiment_files import Tuning, read_tuning
+from adapters.experiment.files import Tuning, read_tuning
 
 
 @pytest.fixture

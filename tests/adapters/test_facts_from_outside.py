@@ -6,10 +6,10 @@ from typing import get_args
 
 import pytest
 
-from adapters import foreign, registry
+from adapters import registry
 from adapters.engine import Ability, EngineError, EngineFacts, Precision, Quirk, Role, Scheme, Setting
-from adapters.foreign import ForeignEngine
-from adapters.isolation import IsolationError, Lost
+from adapters.isolation import IsolationError, Lost, foreign
+from adapters.isolation.foreign import ForeignEngine
 from adapters.needs import Needs, needs
 from validation.catalogue import CATALOGUE
 

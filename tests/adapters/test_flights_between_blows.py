@@ -6,7 +6,7 @@ Numbers are powers of two, so that a blow lies exactly on a sample and all is ex
 import numpy as np
 import pytest
 
-from adapters import single_precision
+from adapters.law import single_precision
 from adapters.law.single_precision import Held, Method, _Flight, _motion
 from adapters.scene import Body, Pair, Scene, Sphere
 

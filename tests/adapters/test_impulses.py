@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from adapters.impulses import along_normal
+from adapters.copied import along_normal
 
 
 def test_smooth_contact_from_its_normal_part():

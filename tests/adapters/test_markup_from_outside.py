@@ -2,7 +2,7 @@
 
 import pytest
 
-from adapters.markup import parsed
+from adapters.model.markup import parsed
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16", "of-my-own"])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from adapters.conformance.planted_faults import REPORTED, _Misread
 from adapters.engine import Contacts
-from adapters.planted_faults import REPORTED, _Misread
 
 DT, SIZE, STEPS = 0.125, 0.25, 3
 V = np.array([[0.0, 0.0, 0.0], [1.0, -2.0, 0.5], [0.5, 0.0, 4.0]])

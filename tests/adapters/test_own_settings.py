@@ -5,8 +5,8 @@ import pytest
 
 from adapters import registry
 from adapters.engine import EngineError, Setting
-from adapters.own_settings import given, near, own, read, suffix_of
 from adapters.settings import either, flag, like, number, one_of, row, rows, text_of, whole, word, words
+from adapters.settings.own import given, near, own, read, suffix_of
 from validation.cells import Slot, prepare, settings_of
 
 HERE = [name for name in registry.names() if registry.find(name).engine is not None]

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from adapters.conformance import CHECKS, self_test
 from adapters.conformance.faults import FAULTS, FaultyToy
+from adapters.conformance.planted_faults import _turned
 from adapters.needs import Needs
-from adapters.planted_faults import _turned
 from adapters.receipts import QUANTITIES, receipts
 from adapters.scene.lift import lower_pose, out_of_plane
 from reports.command import main

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from adapters.engine import Contacts
-from adapters.probes import HALF_EXTENTS, LANDING_LEAD, LANDING_SPEED, PROBES, Case
+from adapters.receipts.probes import HALF_EXTENTS, LANDING_LEAD, LANDING_SPEED, PROBES, Case
 from adapters.trajectory import ContactRecord, Trajectory
 from validation.geometry import separation
 

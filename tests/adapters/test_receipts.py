@@ -6,12 +6,12 @@ from dataclasses import replace
 import pytest
 
 from adapters.conformance.faults import FaultyToy
+from adapters.conformance.planted_faults import Planted
 from adapters.conformance.toy import ToyEngine
 from adapters.engine import Declared, EngineError, Scheme, Setting
 from adapters.needs import Needs
-from adapters.planted_faults import Planted
-from adapters.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
 from adapters.receipts import QUANTITIES, RECORDED, Receipt, _receipt, _starved, contradictions, receipts
+from adapters.receipts.probes import HALF_EXTENTS, LANDING_SPEED, PROBES, REBOUND_PHASES, REBOUND_SPEED, Case
 from adapters.registry import find
 
 DT = 1 / 60

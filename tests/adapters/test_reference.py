@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adapters.conformance.planted_faults import Planted
 from adapters.engine import EngineError
 from adapters.needs import needs
-from adapters.planted_faults import Planted
 from adapters.receipts import FRICTION_SHARE, receipts
 from adapters.reference import ReferenceEngine
 from adapters.reference.profiles import REASONS

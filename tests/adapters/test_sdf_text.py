@@ -9,9 +9,9 @@ from click.testing import CliRunner
 
 from adapters import registry
 from adapters.drake.markup import GRAVITY, STEP, cleaned, told
-from adapters.foreign import Found
-from adapters.markup import parsed, text_of
+from adapters.isolation.foreign import Found
 from adapters.model import ReaderMissing, read, reader_of
+from adapters.model.markup import parsed, text_of
 from adapters.scene import SceneError
 from reports.command import main, statuses
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters import single_motions as motions
+from adapters.law import single_motions as motions
 from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 

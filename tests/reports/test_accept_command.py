@@ -249,7 +249,7 @@ def test_run_fails_on_a_planned_cell_without_a_result(tmp_path, monkeypatch):
 FAULTY = """
 from dataclasses import replace
 from adapters.chipmunk import ChipmunkEngine
-from adapters.planted_faults import Planted
+from adapters.conformance.planted_faults import Planted
 
 
 class {name}(Planted):

@@ -16,7 +16,7 @@ pytest.importorskip("pymunk")
 
 ATTACKED = """
 from adapters.chipmunk import ChipmunkEngine
-from adapters.planted_faults import Planted
+from adapters.conformance.planted_faults import Planted
 
 
 class Low(Planted):

@@ -13,9 +13,9 @@ import pytest
 from click.testing import CliRunner
 
 from adapters import registry
-from adapters.own_settings import given, own
 from adapters.scene.lift import lower_pose, lower_twist
 from adapters.settings import text_of
+from adapters.settings.own import given, own
 from adapters.stepping import posed_for, run, step_count
 from adapters.trajectory import Sampling
 from reports.command import main

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from adapters import registry
+from adapters.conformance.planted_faults import REPORTED, SIZED, Planted
 from adapters.needs import Needs, needs
-from adapters.planted_faults import REPORTED, SIZED, Planted
 from adapters.receipts import receipts
 from validation import questions
 from validation.catalogue import CATALOGUE

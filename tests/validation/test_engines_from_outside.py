@@ -316,9 +316,10 @@ def test_own_imports_of_an_adapter_in_its_identity(site, name):
     assert {name for name in before if before[name] != after[name]} == {"toy"}
 
 
-def test_the_shared_vocabulary_is_in_every_identity(site, monkeypatch):
+@pytest.mark.parametrize("shared", ["stepping.py", "scene/shapes.py", "receipts/probes.py", "isolation/foreign.py"])
+def test_the_shared_vocabulary_is_in_every_identity(site, monkeypatch, shared):
     before, read = hashes(), Path.read_bytes
-    edited = ROOT / "adapters" / "stepping.py"
+    edited = ROOT / "adapters" / shared
     monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n" * (self == edited))
     assert not set(before.items()) & set(hashes().items())
 

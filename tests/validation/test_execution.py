@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from adapters.conformance.planted_faults import Planted
 from adapters.engine import EngineError
-from adapters.planted_faults import Planted
 from adapters.receipts import Receipt
 from adapters.registry import find
 from validation.cells import Outcome, Slot

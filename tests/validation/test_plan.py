@@ -8,7 +8,7 @@ import pytest
 
 from adapters import registry
 from adapters.engine import NOT_KNOWN
-from adapters.foreign import Found
+from adapters.isolation.foreign import Found
 from adapters.plain import Notice
 from adapters.scene import SceneError
 from validation import identity

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from adapters import stepping
+from adapters.conformance.planted_faults import Planted
 from adapters.needs import needs
-from adapters.planted_faults import Planted
 from adapters.receipts import Receipt
 from adapters.registry import find
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene

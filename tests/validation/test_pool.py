@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import pytest
 
-from adapters.foreign import Found
 from adapters.isolation import Lost
+from adapters.isolation.foreign import Found
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.running import warming
 from validation.workers import limits, pool, run_cells

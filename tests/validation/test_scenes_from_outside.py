@@ -85,7 +85,7 @@ def test_recipe_scene_through_all_commands(drop, tmp_path):
 
 def test_a_fault_fails_the_recipe_s_check(drop):
     from adapters import registry
-    from adapters.planted_faults import Planted
+    from adapters.conformance.planted_faults import Planted
     from validation.questions.detection import _watchers
 
     pytest.importorskip("pymunk")
@@ -112,7 +112,8 @@ def test_running_and_measuring_code_in_the_identity_of_a_cell(monkeypatch):
         cached.__wrapped__({identity.scene_code: "stack", identity.adapter_hash: "chipmunk"}[cached])
     ends = ("validation/running/execution.py", "validation/running/certification.py", "validation/scenes/stack.py",
             "validation/metrics.py", "validation/geometry.py", "validation/truths/columns.py", "adapters/stepping.py",
-            "adapters/receipts.py", "adapters/probes.py", "adapters/chipmunk/simulation.py")  # fmt: skip
+            "adapters/receipts/__init__.py", "adapters/receipts/probes.py",
+            "adapters/chipmunk/simulation.py")  # fmt: skip
     assert [end for end in ends if not any(path.endswith(end) for path in hashed)] == []
 
 

@@ -10,7 +10,7 @@ from adapters import registry
 from adapters.engine_folder import candidates_of, instead_of, local_of
 from adapters.experiment import Experiment
 from adapters.needs import needs
-from adapters.own_settings import kinds_of
+from adapters.settings.own import kinds_of
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, prepare, slot_from_dict
 from validation.findings.files import findings_of

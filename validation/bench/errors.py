@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adapters.foreign import said_by
+from adapters.isolation.foreign import said_by
 from adapters.scene import Scene
 from adapters.scene.near import start_overlap
 from adapters.stepping import advances, run, step_count

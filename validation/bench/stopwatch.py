@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Engine, Simulation
-from adapters.foreign import said_by
+from adapters.isolation.foreign import said_by
 from adapters.registry import find
 from adapters.scene import Scene
 from adapters.scene.lift import lower_pose, lower_twist

@@ -20,7 +20,7 @@ from packaging.specifiers import InvalidSpecifier, SpecifierSet
 
 from adapters import registry
 from adapters.engine_folder import FINDINGS, folder_of
-from adapters.experiment_files import NAME, Fields, Kind, checked, is_list_of, is_numbers, is_word, params_of
+from adapters.experiment.files import NAME, Fields, Kind, checked, is_list_of, is_numbers, is_word, params_of
 from adapters.plain import one_line
 from validation.findings import Family, Finding, Findings, FindingsError, Key, Unsupported, solutions_of
 from validation.findings.proofs import proof_of

@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from adapters.experiment import Experiment
-from adapters.experiment_files import (
+from adapters.experiment.files import (
     DIMENSION,
     NAME,
     TABLE,

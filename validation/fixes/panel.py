@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine_folder import local_of
-from adapters.experiment_files import params_of
+from adapters.experiment.files import params_of
 from adapters.needs import needs
 from adapters.registry import adapter, facts, load
 from validation.cells import Observation, Outcome, Slot, scene_of, settings_of

@@ -14,9 +14,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from adapters.conformance.planted_faults import SIZED, Planted
 from adapters.engine import Engine, EngineError
 from adapters.needs import needs
-from adapters.planted_faults import SIZED, Planted
 from adapters.receipts import receipts
 from adapters.scene import Scene
 from adapters.stepping import posed_for, run

@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 
-from adapters.foreign import checked_refusal, said_by
+from adapters.isolation.foreign import checked_refusal, said_by
 from adapters.registry import find, load
 from adapters.stepping import posed_for, run
 from validation.canonical import Frontier

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Array, Contacts
-from adapters.foreign import checked_refusal, said_by
+from adapters.isolation.foreign import checked_refusal, said_by
 from adapters.registry import load
 from adapters.scene import Body, HalfSpace, Hull, Pair, Polygon, Scene, Shape
 from adapters.scene.drives import turns

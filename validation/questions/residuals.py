@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array
-from adapters.foreign import checked_refusal, said_by
+from adapters.isolation.foreign import checked_refusal, said_by
 from adapters.registry import load
 from adapters.scene import Scene
 from adapters.stepping import posed_for, run

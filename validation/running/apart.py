@@ -14,8 +14,8 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import TypeVar, cast
 
-from adapters.foreign import said_by
 from adapters.isolation import Child, Lost
+from adapters.isolation.foreign import said_by
 from adapters.registry import load_engines_here
 from validation import posed
 from validation.running import state

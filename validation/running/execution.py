@@ -1,6 +1,6 @@
 """Runs one cell in this process: scene -> receipts -> trajectory -> metrics -> observation.
 
-All data of an engine are checked and converted here (`adapters.plain`, `adapters.foreign`).
+All data of an engine are checked and converted here (`adapters.plain`, `adapters.isolation.foreign`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, EngineError
-from adapters.foreign import checked_refusal, said_by
+from adapters.isolation.foreign import checked_refusal, said_by
 from adapters.needs import needs
-from adapters.own_settings import own
 from adapters.plain import kind_of, one_line, plain
 from adapters.receipts import Receipt, contradictions, receipts
 from adapters.registry import find
 from adapters.scene import SceneError
+from adapters.settings.own import own
 from adapters.stages import stage
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory

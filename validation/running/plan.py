@@ -20,10 +20,10 @@ from typing import Any
 
 from adapters.engine import NOT_KNOWN, Engine, EngineError
 from adapters.needs import needs
-from adapters.own_settings import kinds_of, near, own
 from adapters.plain import NAME, Notice, one_line
 from adapters.registry import facts, find, is_ranked
 from adapters.scene import Scene
+from adapters.settings.own import kinds_of, near, own
 from adapters.stages import stage
 from validation.canonical import CanonicalScene, Suite, Variation
 from validation.catalogue import CATALOGUE

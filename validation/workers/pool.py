@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters import registry, stages
-from adapters.foreign import said_by
 from adapters.isolation import Child, Lost, Mistaken
+from adapters.isolation.foreign import said_by
 from adapters.stages import stage
 from validation import posed
 from validation.cells import ALONE, Observation, Outcome, Slot, observation_from_dict, prepare

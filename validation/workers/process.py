@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters import registry, stages
-from adapters.foreign import said_by
+from adapters.isolation.foreign import said_by
 from adapters.stages import stage
 from validation import posed
 from validation.cells import Observation, Outcome, Slot, slot_from_dict

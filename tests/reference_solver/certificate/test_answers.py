@@ -262,7 +262,7 @@ def test_redundant_contacts_of_a_known_answer(monkeypatch):
 
 @pytest.mark.parametrize("second", [0.0, 0.5])
 def test_contacts_that_differ_in_their_second_tangent(second):
-    """One sticks and the other slips: with one velocity along both tangents they cannot, as those of a pivot they can."""
+    """One sticks and the other slips: with one velocity along both tangents they cannot, as at a pivot they can."""
     module = import_module(Answers.__module__)
     matrix = np.tile(np.eye(3)[:, None], (2, 1, 2, 1))
     free = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, second]])

@@ -21,7 +21,7 @@ from typing import Any
 from adapters.engine import Declared, Engine, EngineError, Setting
 from adapters.needs import Needs
 from adapters.plain import kind_of
-from adapters.probes import (
+from adapters.receipts.probes import (
     GRAVITY,
     HALF_EXTENTS,
     LANDING_LEAD,
