@@ -8,7 +8,7 @@ import random
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.piles import show_piles
-from reports.command.selection import JOBS, SECONDS, asked, missing, parameter, request_from, selection
+from reports.command.selection import JOBS, SECONDS, Cases, gathered, missing, option, parameter, selection
 from reports.command.targets import show_targets
 from reports.progress import run_plan
 from reports.stages import stage
@@ -44,29 +44,31 @@ from validation.workers import TIMEOUT
 AGREEMENT = 0.9
 
 
+@dataclass(frozen=True)
+class Benching:
+    """Options of ``bench`` beside its cases."""
+
+    jobs: int = option(0, "Worker processes for the errors; 0: one per core.", type=JOBS)
+    timeout: float = option(TIMEOUT, "Time limit per case [s].", type=SECONDS, show_default=True)
+    seed: int | None = option(None, "Seed of the random order of timings; drawn and printed if not given.", type=int)
+    against: str | None = option(None, "Compare the time ratios with an earlier benchmark, or 'latest'.", metavar="RUN")
+    dry_run: bool = option(False, "Print the number of cases, and stop.")
+    fresh: bool = option(False, "Start a new run, and reuse no result of an earlier one.")
+    piles: int | None = option(
+        None, "Instead, time the reference solver on piles of 20 to N bodies.", type=click.IntRange(20), metavar="N"
+    )
+    targets: bool = option(
+        False, "Instead, compare the textbook step with each engine, and the ratios with floors and targets."
+    )
+    brief: bool = option(False, "Print no tables; they are in OUT/bench and in the report.")
+
+
 @main.command(epilog="Example: crosscheck bench stack")
 @selection
-@click.option("--jobs", default=0, type=JOBS, help="Worker processes for the errors; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
-@click.option("--seed", type=int, help="Seed of the random order of timings; drawn and printed if not given.")
-@click.option("--against", metavar="RUN", help="Compare the time ratios with an earlier benchmark, or 'latest'.")
-@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
-@click.option("--fresh", is_flag=True, help="Start a new run, and reuse no result of an earlier one.")
-@click.option(
-    "--piles",
-    type=click.IntRange(20),
-    metavar="N",
-    help="Instead, time the reference solver on piles of 20 to N bodies.",
-)
-@click.option(
-    "--targets",
-    is_flag=True,
-    help="Instead, compare the textbook step with each engine, and the ratios with floors and targets.",
-)
-@click.option("--brief", is_flag=True, help="Print no tables; they are in OUT/bench and in the report.")
+@gathered("how", Benching)
 @AS_JSON
 @OUT
-def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: bool, **options: Any) -> None:
+def bench(cases: Cases, how: Benching, out: Path, as_json: bool) -> None:
     """Measure error against time, over steps and iterations.
 
     SCENES are names, globs, scene files or models, as for run. The error on a file is the distance from the certified
@@ -80,36 +82,36 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
     in under ten minutes on one core; a ratio below its floor is shown and is no failure.
     """
     console = terminal(stderr=True)
-    if piles is not None:
-        show_piles(console, as_json, piles, options["seed"] or 0)
+    if how.piles is not None:
+        show_piles(console, as_json, how.piles, how.seed or 0)
         return
-    if targets:
-        show_targets(console, as_json, out, options["scenes"], options["seed"])
+    if how.targets:
+        show_targets(console, as_json, out, cases.scenes, how.seed)
         return
-    if options["ulp"]:
+    if cases.ulp:
         raise SceneError("ulp: moves the start of a run; it has no meaning for a benchmark")
-    if options["standard"]:
+    if cases.standard:
         raise SceneError("standard: is a suite of judged cases; a benchmark is --quick or --full")
-    wanted, title, cells = plan_of(options)
+    wanted, title, cells = plan_of(cases)
     request = wanted.request
     if not cells:
         raise SceneError("scenes: no case fits this selection")
-    if options["dry_run"]:
+    if how.dry_run:
         click.echo(json.dumps({"cells": len(cells)}) if as_json else plural(len(cells), "case"))
         return
-    absent = missing(options["engine"], request.engines)
+    absent = missing(cases.engine, request.engines)
     for line in absent:
         click.echo(f"crosscheck: {line}", err=True)
     if all(registry.find(name).engine is None for name in request.engines):
         sys.exit(statuses.INCOMPLETE)
     store = Store(folder(out))
-    earlier = _earlier(store, options["against"])
-    seed = options["seed"] if options["seed"] is not None else random.SystemRandom().randrange(10**6)
-    source, known = ("", []) if options["fresh"] else answered(store, cells)
+    earlier = _earlier(store, how.against)
+    seed = how.seed if how.seed is not None else random.SystemRandom().randrange(10**6)
+    source, known = ("", []) if how.fresh else answered(store, cells)
     if known:
         console.print(f"reusing {len(known)} of {plural(len(cells), 'result')} of run {source}")
     run = run_plan(
-        store, title, cells, console, options["jobs"], options["timeout"], None, options["fresh"], finish=False,
+        store, title, cells, console, how.jobs, how.timeout, None, how.fresh, finish=False,
         recorded=False, known=known,
     )  # fmt: skip
     if not any(observation.outcome is Outcome.OK for observation in store.observations(run)):
@@ -125,19 +127,19 @@ def bench(out: Path, as_json: bool, brief: bool, piles: int | None, targets: boo
         time_units(store, run, request.scenes, units, limits, seed, console)
     if not store.missing(run):
         store.finish(run)
-    _show(store, run, out, as_json, brief, console if as_json else terminal())
+    _show(store, run, out, as_json, how.brief, console if as_json else terminal())
     agrees = _compare(store, earlier, run, console) if earlier else True
     store.close()
     sys.exit(statuses.verdict(not agrees, not absent))
 
 
-def plan_of(options: dict[str, Any]) -> tuple[Sweep, str, list[Slot]]:
+def plan_of(cases: Cases) -> tuple[Sweep, str, list[Slot]]:
     """Sweep, title and cases of a benchmark with these options."""
-    request = replace(request_from(options), ulps=(0,))
-    if not options["scenes"]:
+    request = replace(cases.request(), ulps=(0,))
+    if not cases.scenes:
         request = replace(request, scenes=benched(request.suite))
     wanted = Sweep(request, tuple(request.dts), tuple(request.iterations), dict(request.params or {}))
-    return wanted, f"bench {request.suite}: {asked(request, options)}", accuracy_slots(wanted)
+    return wanted, f"bench {request.suite}: {cases.words(request.scenes)}", accuracy_slots(wanted)
 
 
 def _measurable(store: Store, run: Run, units: Sequence[Unit]) -> bool:

@@ -13,9 +13,9 @@ from rich.text import Text
 
 from adapters import registry
 from reports.command import statuses
-from reports.command.completion import engine_names, scene_names
+from reports.command.completion import scene_names
 from reports.command.group import AS_JSON, main
-from reports.command.selection import WORKERS, missing
+from reports.command.selection import WORKERS, Cases, gathered, missing
 from reports.terminal import print_roles, terminal
 from reports.wording import profiles_called, reproduce
 from validation.catalogue import matching
@@ -27,28 +27,17 @@ FEW = 6
 
 @main.command(epilog="Example: crosscheck frontier thin_wall")
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
-@click.option("--engine", multiple=True, metavar="E", shell_complete=engine_names, help="Only this engine.")
-@click.option("--profile", multiple=True, metavar="P", help="Only this profile.")
-@click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D.")
+@gathered("cases", Cases, only=("engine", "profile", "dim"))
 @click.option(
     "--quick/--full",
-    "quick",
+    "coarse",
     default=True,
     help="Stop when the two ends are a factor 1.3 (quick, the default) or 1.03 (full) apart.",
 )
 @click.option("--jobs", default=1, show_default=True, type=WORKERS, help="Worker processes.")
 @click.option("--commands", is_flag=True, help="Print the commands that run both ends again.")
 @AS_JSON
-def frontier(
-    scenes: tuple[str, ...],
-    engine: tuple[str, ...],
-    profile: tuple[str, ...],
-    dim: tuple[int, ...],
-    quick: bool,
-    jobs: int,
-    commands: bool,
-    as_json: bool,
-) -> None:
+def frontier(cases: Cases, coarse: bool, jobs: int, commands: bool, as_json: bool) -> None:
     """Find breaking points: how far a scene goes until it fails.
 
     Bisects for each engine and profile the largest time step, stack height, mass ratio, overlap, spin and impact speed,
@@ -56,20 +45,20 @@ def frontier(
     commands that run both again. SCENES without such a quantity are refused. Exits with 4 if a named engine is not
     installed.
     """
-    names = list(dict.fromkeys(scene.name for pattern in scenes for scene in matching(pattern)))
+    names = list(dict.fromkeys(scene.name for pattern in cases.scenes for scene in matching(pattern)))
     known = dict.fromkeys(name for name, _ in axes())
     for name in names:
         if name not in known:
             raise click.BadParameter(
                 f"{name} has no breaking point to search; {', '.join(known)} have", param_hint="SCENES"
             )
-    engines = list(engine) or registry.usual()
+    engines = list(cases.engine) or registry.usual()
     for name in engines:
         registry.find(name)
-    found = brackets(names, engines, profiles_called(profile, engines), dim, quick)
+    found = brackets(names, engines, profiles_called(cases.profile, engines), cases.dim, coarse)
     console, progress = terminal(), terminal(stderr=True)
     said = None
-    for still, _ in search(found, QUICK_RATIO if quick else FULL_RATIO, jobs):
+    for still, _ in search(found, QUICK_RATIO if coarse else FULL_RATIO, jobs):
         if still != said:
             progress.print(f"{still} of {len(found)} searches left", style="dim", highlight=False)
         said = still
@@ -77,7 +66,7 @@ def frontier(
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))
     else:
         _show(found, commands or len(found) <= FEW, console)
-    absent = missing(engine, engines)
+    absent = missing(cases.engine, engines)
     for line in absent:
         progress.print(line, markup=False, highlight=False, soft_wrap=True)
     sys.exit(statuses.verdict(False, not absent))

@@ -11,6 +11,7 @@ from adapters.scene import SceneError
 from reports.brief import Kept
 from reports.command.files import FOLDER
 from reports.command.group import AS_JSON, OUT, main
+from reports.command.selection import gathered
 from reports.wording import plural
 from validation.records.keeping import Rules, doomed, prune
 from validation.records.keeping import merge as merge_stores
@@ -52,20 +53,18 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
 @click.option("--dry-run", is_flag=True, help="Only print what would be deleted.")
 @AS_JSON
 @OUT
-def prune_(
-    keep: int | None, days: float | None, unfinished: bool, recordings: bool, dry_run: bool, as_json: bool, out: Path
-) -> None:
+@gathered("rules", Rules)
+def prune_(rules: Rules, dry_run: bool, as_json: bool, out: Path) -> None:
     """Delete old runs.
 
     The options say which. The newest finished run of each title always stays in OUT.
     """
-    rules = Rules(keep, days, unfinished, recordings)
     if rules == Rules():
         raise SceneError("prune: needs --keep, --older-than, --unfinished or --recordings")
     store = Store(out, create=False, write=not dry_run)
     try:
         if dry_run:
-            going = [*doomed(store.runs(), rules), *(store.damaged().values() if unfinished else ())]
+            going = [*doomed(store.runs(), rules), *(store.damaged().values() if rules.unfinished else ())]
         else:
             going = prune(store, rules)
             kept = Kept(store.path.parent)

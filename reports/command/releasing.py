@@ -6,10 +6,10 @@ import json
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import click
 from rich.console import Console
@@ -21,12 +21,11 @@ from reports.command import statuses
 from reports.command.completion import engine_names, scene_names
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import HOW, JOBS, SECONDS, request_from
+from reports.command.selection import JOBS, SECONDS, Cases, Command, gathered
 from reports.progress import progress_on
 from reports.stages import say
 from reports.terminal import terminal
 from reports.wording import plural, profile_words
-from validation.canonical import SUITES
 from validation.cells import Observation, Slot, format_dt, plane_of, slot_from_dict
 from validation.posed import resolve
 from validation.records.store import Store
@@ -37,29 +36,25 @@ from validation.releases.driving import Effort, drive, planned, time
 from validation.releases.floors import moved_starts
 from validation.workers import TIMEOUT
 
-Command = Callable[..., None]
-
 
 def _cells(command: Command) -> Command:
-    """Options of both commands that select cases and say how they run."""
-    options = (
-        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
-        click.option("--profile", multiple=True, metavar="P", help="Only this profile (repeat for more)."),
-        *HOW,
+    """Options of both commands that select cases and say how they run: ``cases`` and ``effort``."""
+    for wrap in (
+        gathered("cases", Cases, only=("param", "profile", "set", "dim", "dt", "iterations")),
         click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core."),
         click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s]."),
         click.option("--fresh", is_flag=True, help="Run again what OUT has already."),
         click.option(
             "--try", "anyway", is_flag=True, help="Also releases outside the range that the adapter supports."
         ),
-    )
-    for option in reversed(options):
-        command = option(command)
+        gathered("effort", Effort),
+    )[::-1]:
+        command = wrap(command)
     return command
 
 
 @main.command(epilog="Example: crosscheck releases ENGINE latest stack")
-@click.argument("engine", required=False, shell_complete=engine_names)
+@click.argument("named", metavar="ENGINE", required=False, shell_complete=engine_names)
 @click.argument("which", metavar="A..B|LIST|latest", required=False)
 @click.argument("scenes", nargs=-1, shell_complete=scene_names)
 @_cells
@@ -72,15 +67,16 @@ def _cells(command: Command) -> Command:
 @AS_JSON
 @OUT
 def releases(
-    engine: str | None,
+    named: str | None,
     which: str | None,
+    cases: Cases,
+    effort: Effort,
     times: bool,
     listed: bool,
     remove: str | None,
     markdown: bool,
     as_json: bool,
     out: Path,
-    **options: Any,
 ) -> None:
     """Run scenes on releases of an engine.
 
@@ -91,9 +87,9 @@ def releases(
     if listed or remove:
         _environments(remove, as_json)
         return
-    if engine is None or which is None:
+    if named is None or which is None:
         raise SceneError("releases: name an engine and its releases, such as: crosscheck releases ENGINE 3.0.0..3.2.7")
-    asked, wanted, effort, console = _prepared(engine, which, options, out)
+    asked, wanted, console = _prepared(named, which, cases, effort, out)
     store = Store(out)
     results = [_drive(store, release, wanted, effort, console, times) for release in asked]
     results = _with_floors(store, asked, wanted, results, effort, console)
@@ -109,12 +105,11 @@ def releases(
 
 
 def _prepared(
-    engine: str, which: str, options: dict[str, Any], out: Path, least: int = 1
-) -> tuple[list[Release], list[Slot], Effort, Console]:
-    """Releases, cases and effort; raises for a wrong call before anything is installed."""
+    engine: str, which: str, cases: Cases, effort: Effort, out: Path, least: int = 1
+) -> tuple[list[Release], list[Slot], Console]:
+    """Releases and cases; raises for a wrong call before anything is installed."""
     console = terminal(stderr=True)
-    request = request_from({**options, **dict.fromkeys(SUITES, False), "standard": True, "engine": [engine], "ulp": ()})
-    effort = Effort(options["jobs"], options["timeout"], options["fresh"], options["anyway"])
+    request = replace(cases, engine=(engine,), standard=True).request()
     folder(out)
     asked = chosen(engine, which)
     if len(asked) < least:
@@ -122,7 +117,7 @@ def _prepared(
     wanted = planned(asked, request, effort, lambda line: say(console, line))
     if not wanted:
         raise SceneError("scenes: no case fits this selection")
-    return asked, wanted, effort, console
+    return asked, wanted, console
 
 
 def _drive(
@@ -168,7 +163,7 @@ def _with_floors(
 
 
 @main.command("bisect", epilog="Example: crosscheck bisect ENGINE A..B stack --check drift")
-@click.argument("engine", shell_complete=engine_names)
+@click.argument("named", metavar="ENGINE", shell_complete=engine_names)
 @click.argument("which", metavar="A..B")
 @click.argument("scene", shell_complete=scene_names)
 @click.option("--check", required=True, metavar="CHECK", help="Quantity: apex[1], or apex for all of them.")
@@ -177,7 +172,7 @@ def _with_floors(
 @AS_JSON
 @OUT
 def bisect_(
-    engine: str, which: str, scene: str, check: str, every: bool, as_json: bool, out: Path, **options: Any
+    named: str, which: str, scene: str, check: str, every: bool, cases: Cases, effort: Effort, as_json: bool, out: Path
 ) -> None:
     """Find the release that changed a check.
 
@@ -185,7 +180,7 @@ def bisect_(
     more than its noise. If there are several cases, it follows the one with the largest change. It runs log2(n) of n
     releases, and none whose results are in OUT already. Exits with 4 if A or B cannot run.
     """
-    asked, wanted, effort, console = _prepared(engine, which, {**options, "scenes": (scene,)}, out, 2)
+    asked, wanted, console = _prepared(named, which, replace(cases, scenes=(scene,)), effort, out, 2)
     known = dict.fromkeys(metric for slot in wanted for metric in _metrics(slot))
     if not any(is_meant(metric, check) for metric in known):
         kinds = ", ".join(dict.fromkeys(re.sub(r"\[\d+\]", "", metric) for metric in known))
@@ -200,8 +195,8 @@ def bisect_(
     versions = [release.version for release in asked]
     if isinstance(found, Unchanged):
         _say_unchanged(found, versions, check, scene, as_json)
-    commands = _commands(engine, versions[found.before], versions[found.after], slot_from_dict(found.change.slot), out)
-    plain = rendering.found_as_plain(found, engine, versions, commands)
+    commands = _commands(named, versions[found.before], versions[found.after], slot_from_dict(found.change.slot), out)
+    plain = rendering.found_as_plain(found, named, versions, commands)
     click.echo(json.dumps(plain, indent=1) if as_json else rendering.found_as_text(plain))
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import click
 from rich.console import Console
@@ -20,7 +19,7 @@ from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.posing import cells_of, compare_and_show
-from reports.command.selection import CLUSTER, JOBS, SECONDS, asked, missing, request_from, selection
+from reports.command.selection import JOBS, SECONDS, Cases, cluster, gathered, missing, option, selection
 from reports.progress import run_plan
 from reports.spread import spread_lines
 from reports.stages import compiling
@@ -38,34 +37,35 @@ from validation.running.warming import missing as kernels_missing
 from validation.workers import TIMEOUT, run_cells
 
 
+@dataclass(frozen=True)
+class Running:
+    """Options of ``run`` beside its cases."""
+
+    jobs: int = option(0, "Worker processes; 0: one per core.", type=JOBS)
+    timeout: float = option(TIMEOUT, "Time limit per case [s].", type=SECONDS, show_default=True)
+    dry_run: bool = option(False, "Print the number of cases, and stop.")
+    fresh: bool = option(False, "Start a new run even if one can be resumed.")
+    keep: bool = option(
+        False, "With --invariance: update the list of known violations, those with a reason in breaks.toml."
+    )
+    invariance: bool = option(
+        False, "Run metamorphic tests instead: the order, heading and place of bodies must not matter."
+    )
+    cluster: str = cluster()
+    for_bench: bool = option(False, "Also run the cases of bench --quick, which then only times them.")
+    keep_trajectories: bool = option(False, "Keep every trajectory as .npz in OUT/trajectories.")
+    drop: bool = option(False, "Leave out what a scene cannot have of a model, and print what was left out.")
+    strict: bool = option(False, "Exit with 1 for every failure, known or not, and every INVALID.")
+    junit: Path | None = option(None, "Also write JUnit XML to this file.", type=FILE)
+    markdown: Path | None = option(None, "Also write a Markdown summary to this file.", type=FILE)
+
+
 @main.command(epilog="Example: crosscheck run bounce --param e=0.7 --dt 1/240")
 @selection
-@click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
-@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
-@click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
-@click.option(
-    "--keep",
-    is_flag=True,
-    help="With --invariance: update the list of known violations, those with a reason in breaks.toml.",
-)
-@click.option(
-    "--invariance",
-    is_flag=True,
-    help="Run metamorphic tests instead: the order, heading and place of bodies must not matter.",
-)
-@CLUSTER
-@click.option("--for-bench", is_flag=True, help="Also run the cases of bench --quick, which then only times them.")
-@click.option("--keep-trajectories", is_flag=True, help="Keep every trajectory as .npz in OUT/trajectories.")
-@click.option(
-    "--drop", is_flag=True, help="Leave out what a scene cannot have of a model, and print what was left out."
-)
-@click.option("--strict", is_flag=True, help="Exit with 1 for every failure, known or not, and every INVALID.")
-@click.option("--junit", type=FILE, help="Also write JUnit XML to this file.")
-@click.option("--markdown", type=FILE, help="Also write a Markdown summary to this file.")
+@gathered("how", Running)
 @AS_JSON
 @OUT
-def run(out: Path, as_json: bool, **options: Any) -> None:
+def run(cases: Cases, how: Running, out: Path, as_json: bool) -> None:
     """Run scenes on engines and judge every check.
 
     SCENES are names, globs, scene files or models (.xml, .urdf, .sdf); all by default. All installed engines run,
@@ -81,34 +81,35 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     an answer changes.
     """
     console = terminal(stderr=True)
-    for name in ("junit", "markdown"):
-        if options[name]:
-            writable(options[name], name)
-    request = request_from(options)
+    for name, path in (("junit", how.junit), ("markdown", how.markdown)):
+        if path:
+            writable(path, name)
+    request = cases.request(how.drop)
     chosen = slots(request)
     if not chosen:
         raise SceneError("scenes: no case fits this selection")
-    if options["dry_run"]:
+    if how.dry_run:
         click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "case"))
         return
-    if options["invariance"]:
-        cells = cells_of(chosen, bool(options["param"] or options["iterations"] or options["dt"]))
-        sys.exit(statuses.verdict(not compare_and_show(cells, as_json, options["keep"]), True))
-    if options["keep"]:
+    if how.invariance:
+        cells = cells_of(chosen, bool(cases.param or cases.iterations or cases.dt))
+        sys.exit(statuses.verdict(not compare_and_show(cells, as_json, how.keep), True))
+    if how.keep:
         raise SceneError("keep: lists violations of metamorphic tests, and needs --invariance")
-    if options["cluster"] and options["keep_trajectories"]:
+    if how.cluster and how.keep_trajectories:
         raise SceneError("keep_trajectories: a cluster sends back no trajectories; run those cases here")
     folder(out)
     for name in request.scenes:
         for note in resolve(name).notes:
             console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
-    keep = out / "trajectories" if options["keep_trajectories"] else None
-    title = f"{request.suite}: {asked(request, options)}"
-    limits = options["jobs"], options["timeout"]
+    keep = out / "trajectories" if how.keep_trajectories else None
+    title = f"{request.suite}: {cases.words(request.scenes)}"
+    limits = how.jobs, how.timeout
     verdicts = Verdicts(chosen, console)
-    done = run_plan(store, title, chosen, console, *limits, keep, options["fresh"], cluster=options["cluster"],
-                    heard=verdicts.add, finish=False, beside=_of_bench(options))  # fmt: skip
+    beside = _of_bench(cases) if how.for_bench else ("", [])
+    done = run_plan(store, title, chosen, console, *limits, keep, how.fresh, cluster=how.cluster,
+                    heard=verdicts.add, finish=False, beside=beside)  # fmt: skip
     found = brief.Judged.of(verdicts.rows(done))
     observations, complete = store.observations(done), not store.missing(done)
     if complete:
@@ -116,36 +117,34 @@ def run(out: Path, as_json: bool, **options: Any) -> None:
     apart = spreads(observations, store.recordings(done)) if any(map(is_file, request.scenes)) else []
     # The answer goes to stdout, for a pipe or a file, unless --json prints there.
     answer = console if as_json else terminal()
-    _show(found, out, as_json, answer, options)
+    _show(found, out, as_json, answer, how)
     if complete:
         store.finish(done)  # after its files: the same command would write them again
     store.close()
     for line in spread_lines(apart):
         answer.print(line, markup=False, highlight=False, soft_wrap=True)
-    absent = missing(options["engine"], request.engines)
+    absent = missing(cases.engine, request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    alarm = any(row.failing if options["strict"] else row.alarming for row in found.rows)
+    alarm = any(row.failing if how.strict else row.alarming for row in found.rows)
     sys.exit(statuses.verdict(alarm, complete and not absent))
 
 
-def _of_bench(options: dict[str, Any]) -> tuple[str, list[Slot]]:
-    """Title and cases of the quick benchmark of the same selection; none unless they are asked for."""
-    if not options["for_bench"]:
-        return "", []
+def _of_bench(cases: Cases) -> tuple[str, list[Slot]]:
+    """Title and cases of the quick benchmark of the same selection."""
     from reports.command.benching import plan_of
 
-    _, title, cells = plan_of(options | {"quick": True, "standard": False, "full": False, "ulp": ()})
+    _, title, cells = plan_of(replace(cases, quick=True, standard=False, full=False, ulp=()))
     return title, cells
 
 
-def _show(found: brief.Judged, out: Path, as_json: bool, console: Console, options: dict[str, Any]) -> None:
+def _show(found: brief.Judged, out: Path, as_json: bool, console: Console, how: Running) -> None:
     plain = [row.as_dict() for row in found.rows]
     written = exports.write_all(out, plain, [row.as_dict() for row in found.nulls])
-    if options["junit"]:
-        write(options["junit"], exports.as_junit(plain))
-    if options["markdown"]:
-        write(options["markdown"], exports.as_markdown(plain))
+    if how.junit:
+        write(how.junit, exports.as_junit(plain))
+    if how.markdown:
+        write(how.markdown, exports.as_markdown(plain))
     if as_json:
         click.echo(exports.as_json(plain))
     show(plain, console, files=written.values(), out=out)
@@ -154,13 +153,13 @@ def _show(found: brief.Judged, out: Path, as_json: bool, console: Console, optio
 @main.command("compile", epilog="Example: crosscheck compile")
 @selection
 @AS_JSON
-def compile_kernels(as_json: bool, **options: Any) -> None:
+def compile_kernels(cases: Cases, as_json: bool) -> None:
     """Compile the solver's kernels.
 
     Compiles what these scenes and engines need for their first steps. `run` and `bench` do this by themselves. Call it
     before processes that run side by side, which would each compile the same.
     """
-    parts = kernels_missing(slots(request_from(options)))
+    parts = kernels_missing(slots(cases.request()))
     said = compiling(parts, terminal(stderr=True))
     for _ in run_cells((), jobs=0, parts=parts, compiled=said):
         pass

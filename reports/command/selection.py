@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
+from functools import wraps
 from typing import Any
 
 import click
@@ -19,6 +20,8 @@ from validation.catalogue import matching
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, parse_dt
 from validation.posed import is_file, pinned
 from validation.running.plan import Request, knowing
+
+Command = Callable[..., None]
 
 
 class _Seconds(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
@@ -36,12 +39,9 @@ class _Seconds(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 t
         return seconds
 
 
-#: Help of the options that name a suite.
-WHAT_SUITES_ARE: dict[Suite, str] = {
-    "quick": "A few cases per scene: the default.",
-    "standard": "More cases: those whose known failures are listed check by check.",
-    "full": "All cases of each scene, and other time steps.",
-}
+#: A user's own settings.
+WHAT_SET_IS = "Change a setting of the engine; it is shown as part of the profile's name."
+SET = click.option("--set", multiple=True, metavar="NAME=VALUE", help=WHAT_SET_IS)
 #: Longest time limit of a case [s]: a week.
 LONGEST = 7 * 86400.0
 SECONDS = _Seconds()
@@ -50,15 +50,6 @@ MOST_JOBS = 4096
 JOBS = click.IntRange(0, MOST_JOBS)
 #: Number of workers where the default is one, and zero has no meaning.
 WORKERS = click.IntRange(1, MOST_JOBS)
-
-
-#: A user's own settings.
-SET = click.option(
-    "--set",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Change a setting of the engine; it is shown as part of the profile's name.",
-)
 
 
 def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
@@ -70,13 +61,48 @@ def _cluster(ctx: click.Context, param: click.Parameter, value: str | None) -> s
     return checked(value)
 
 
-#: Cluster that runs the cases instead of this machine.
-CLUSTER = click.option(
-    "--cluster",
-    callback=_cluster,
-    metavar="ADDRESS",
-    help="Run on a Dask cluster: tcp://HOST:PORT, or local:N processes.",
-)
+def option(default: Any, says: str, *flags: str, **how: Any) -> Any:
+    """Field of a dataclass that is an option of the command line (`gathered`), called as it is or by ``flags``.
+
+    A default of False makes a switch, one of () an option that may be given several times.
+    """
+
+    def declared(name: str) -> Callable[[Command], Command]:
+        called = flags or (f"--{name.replace('_', '-')}",)
+        switch, several = default is False, default == ()
+        return click.option(*called, name, is_flag=switch, multiple=several, default=default, help=says, **how)
+
+    return field(default=default, metadata={"option": declared})
+
+
+def cluster() -> Any:
+    """Field of a cluster that runs the cases instead of this machine."""
+    says = "Run on a Dask cluster: tcp://HOST:PORT, or local:N processes."
+    return option("", says, callback=_cluster, metavar="ADDRESS")
+
+
+def taken(kind: Any, options: dict[str, Any]) -> Any:
+    """Take those of the options that are fields of a dataclass, as one."""
+    return kind(**{each.name: options.pop(each.name) for each in fields(kind) if each.name in options})
+
+
+def gathered(name: str, kind: type, only: Sequence[str] = ()) -> Callable[[Command], Command]:
+    """A command with its options as one argument ``name``, a dataclass ``kind``, in the order of its fields.
+
+    Fields that are no `option` take what the command has of that name; with ``only`` some, others keep their defaults.
+    """
+
+    def gathering(command: Command) -> Command:
+        @wraps(command)
+        def called(**options: Any) -> None:
+            command(**{name: taken(kind, options)}, **options)
+
+        for each in reversed(fields(kind)):
+            if "option" in each.metadata and (not only or each.name in only):
+                called = each.metadata["option"](each.name)(called)
+        return called
+
+    return gathering
 
 
 def missing(named: Sequence[str], chosen: Sequence[str]) -> list[str]:
@@ -116,84 +142,69 @@ def scene_names_of(arguments: Sequence[str], drop: bool = False) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def request_from(options: dict[str, Any]) -> Request:
-    """Turn the options of `selection` into a request; raises for a wrong call before anything runs."""
-    suite = _suite(options)
-    scenes = scene_names_of(options["scenes"], options.get("drop", False))  # before an engine is imported
-    registry.check_required()
-    for name in options["engine"]:
-        registry.find(name)
-    dimensions = list(options["dim"])
-    engines = list(options["engine"]) or registry.usual()
-    request = Request(
-        scenes=scenes,
-        engines=engines,
-        profiles=profiles_called(options["profile"], engines),
-        dimensions=dimensions,
-        dts=[parse_dt(text) for text in options["dt"]],
-        iterations=list(options["iterations"]),
-        params=fixed(options["param"]),
-        suite=suite,
-        ulps=tuple(dict.fromkeys((0, *options["ulp"]))),  # a moved start says how far the unmoved one scatters
-        floors=suite == "full" and not options["ulp"],
-        sets=given(options["set"]),
+@dataclass(frozen=True)
+class Cases:
+    """Options that select cases, as they were given."""
+
+    scenes: tuple[str, ...] = ()
+    param: tuple[str, ...] = option((), "Set a parameter of the scene.", metavar="NAME=VALUE")
+    engine: tuple[str, ...] = option(
+        (), "Only this engine (repeat for more).", metavar="E", shell_complete=engine_names
     )
-    return replace(request, engines=knowing(request)) if request.sets and not options["engine"] else request
-
-
-def _suite(options: dict[str, Any]) -> Suite:
-    """The selected suite; two are refused."""
-    named = [suite for suite in SUITES if options[suite]]
-    if len(named) > 1:
-        raise SceneError(f"{' and '.join(f'--{suite}' for suite in named)}: a run is of one suite")
-    return named[0] if named else SUITES[0]
-
-
-def asked(request: Request, options: dict[str, Any]) -> str:
-    """Options that select these cases without their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
-    names = ("param", "engine", "profile", "set", "dim", "dt", "iterations", "ulp")
-    narrowing = [word for name in names for value in options[name] for word in (f"--{name}", str(value))]
-    return shlex.join([*request.scenes, *narrowing])
-
-
-#: Settings, dimension, step and iterations of cases.
-HOW = (
-    SET,
-    click.option("--dim", multiple=True, type=click.IntRange(2, 3), help="Only 2-D or only 3-D."),
-    click.option("--dt", multiple=True, metavar="S", help="Time step [s], such as 1/240 (repeat for more)."),
-    click.option(
-        "--iterations",
-        multiple=True,
-        type=click.IntRange(1, MOST_ITERATIONS),
-        help="Solver iterations, instead of the profile's own.",
-    ),
-)
-
-
-def selection(command: Callable[..., None]) -> Callable[..., None]:
-    """Options that select cases, common to all commands that run some."""
-    options = (
-        click.argument("scenes", nargs=-1, shell_complete=scene_names),
-        click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene."),
-        click.option(
-            "--engine",
-            multiple=True,
-            metavar="E",
-            shell_complete=engine_names,
-            help="Only this engine (repeat for more).",
-        ),
-        click.option(
-            "--profile", multiple=True, metavar="P", help="Only this profile, by its name or role (repeat for more)."
-        ),
-        *HOW,
-        click.option(
-            "--ulp",
-            multiple=True,
-            type=click.IntRange(-MOST_ULPS, MOST_ULPS),
-            help="Also move the initial positions by this many units in the last place.",
-        ),
-        *(click.option(f"--{suite}", is_flag=True, help=WHAT_SUITES_ARE[suite]) for suite in SUITES),
+    profile: tuple[str, ...] = option((), "Only this profile, by its name or role (repeat for more).", metavar="P")
+    set: tuple[str, ...] = option((), WHAT_SET_IS, metavar="NAME=VALUE")
+    dim: tuple[int, ...] = option((), "Only 2-D or only 3-D.", type=click.IntRange(2, 3))
+    dt: tuple[str, ...] = option((), "Time step [s], such as 1/240 (repeat for more).", metavar="S")
+    iterations: tuple[int, ...] = option(
+        (), "Solver iterations, instead of the profile's own.", type=click.IntRange(1, MOST_ITERATIONS)
     )
-    for option in reversed(options):
-        command = option(command)
-    return command
+    ulp: tuple[int, ...] = option(
+        (),
+        "Also move the initial positions by this many units in the last place.",
+        type=click.IntRange(-MOST_ULPS, MOST_ULPS),
+    )
+    quick: bool = option(False, "A few cases per scene: the default.")
+    standard: bool = option(False, "More cases: those whose known failures are listed check by check.")
+    full: bool = option(False, "All cases of each scene, and other time steps.")
+
+    @property
+    def suite(self) -> Suite:
+        """The selected suite; two are refused."""
+        named = [suite for suite in SUITES if getattr(self, suite)]
+        if len(named) > 1:
+            raise SceneError(f"{' and '.join(f'--{suite}' for suite in named)}: a run is of one suite")
+        return named[0] if named else SUITES[0]
+
+    def words(self, scenes: Sequence[str]) -> str:
+        """These options without their suite, ready to paste: ``bounce --param e=0.8 --dt 1/120``."""
+        names = ("param", "engine", "profile", "set", "dim", "dt", "iterations", "ulp")
+        narrowing = [word for name in names for value in getattr(self, name) for word in (f"--{name}", str(value))]
+        return shlex.join([*scenes, *narrowing])
+
+    def request(self, drop: bool = False) -> Request:
+        """What they ask for; raises for a wrong call before anything runs."""
+        suite = self.suite
+        scenes = scene_names_of(self.scenes, drop)  # before an engine is imported
+        registry.check_required()
+        for name in self.engine:
+            registry.find(name)
+        engines = list(self.engine) or registry.usual()
+        request = Request(
+            scenes=scenes,
+            engines=engines,
+            profiles=profiles_called(self.profile, engines),
+            dimensions=list(self.dim),
+            dts=[parse_dt(text) for text in self.dt],
+            iterations=list(self.iterations),
+            params=fixed(self.param),
+            suite=suite,
+            ulps=tuple(dict.fromkeys((0, *self.ulp))),  # a moved start says how far the unmoved one scatters
+            floors=suite == "full" and not self.ulp,
+            sets=given(self.set),
+        )
+        return replace(request, engines=knowing(request)) if request.sets and not self.engine else request
+
+
+def selection(command: Command) -> Command:
+    """Options that select cases, common to all commands that run some: the argument ``cases``."""
+    return click.argument("scenes", nargs=-1, shell_complete=scene_names)(gathered("cases", Cases)(command))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -15,37 +15,42 @@ from reports.command import statuses
 from reports.command.files import FILE, folder, writable
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.reporting import extra
-from reports.command.selection import CLUSTER, JOBS, SECONDS, missing, request_from, selection
+from reports.command.selection import JOBS, SECONDS, Cases, cluster, gathered, missing, option, selection
 from reports.progress import run_plan
 from reports.sweep import counted
 from reports.terminal import print_roles, terminal
 from reports.wording import at, csv_of, plural
 from validation.judging.rows import ALARMING_OUTCOMES, rows_of
-from validation.questions.sweeping import Kind, Range, Study, grid, listed, points, range_from, study_slots, table
+from validation.questions.sweeping import Kind, Study, grid, listed, points, range_from, study_slots, table
 from validation.records.store import Store
 from validation.workers import TIMEOUT
 
 
+@dataclass(frozen=True)
+class Sweeping:
+    """Options of ``sweep`` beside its cases."""
+
+    grid: tuple[str, ...] = option((), "COUNT evenly spaced values.", metavar="N=LOW:HIGH:COUNT[:log]")
+    lists: tuple[str, ...] = option((), "These values.", "--list", metavar="N=A,B,C")
+    random: tuple[str, ...] = option((), "Values at random, --samples of them.", metavar="N=LOW:HIGH[:log]")
+    sobol: tuple[str, ...] = option((), "Values of a Sobol sequence, --samples of them.", metavar="N=LOW:HIGH[:log]")
+    samples: int = option(256, "Number of points of --random and --sobol.", show_default=True, type=int)
+    seed: int = option(0, "Seed of --random and --sobol.", show_default=True, type=click.IntRange(0))
+    jobs: int = option(0, "Worker processes; 0: one per core.", type=JOBS)
+    timeout: float = option(TIMEOUT, "Time limit per case [s].", type=SECONDS, show_default=True)
+    dry_run: bool = option(False, "Print the number of cases, and stop.")
+    cluster: str = cluster()
+    fresh: bool = option(False, "Start a new run even if one can be resumed.")
+    csv: Path | None = option(None, "Table of the cases; OUT/sweep.csv by default.", type=FILE)
+    parquet: Path | None = option(None, "Also write the table as Parquet to this file.", type=FILE)
+
+
 @main.command(epilog="Example: crosscheck sweep bounce --grid e=0:1:50")
 @selection
-@click.option("--grid", multiple=True, metavar="N=LOW:HIGH:COUNT[:log]", help="COUNT evenly spaced values.")
-@click.option("--list", "lists", multiple=True, metavar="N=A,B,C", help="These values.")
-@click.option("--random", multiple=True, metavar="N=LOW:HIGH[:log]", help="Values at random, --samples of them.")
-@click.option(
-    "--sobol", multiple=True, metavar="N=LOW:HIGH[:log]", help="Values of a Sobol sequence, --samples of them."
-)
-@click.option("--samples", default=256, show_default=True, type=int, help="Number of points of --random and --sobol.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of --random and --sobol.")
-@click.option("--jobs", default=0, type=JOBS, help="Worker processes; 0: one per core.")
-@click.option("--timeout", default=TIMEOUT, show_default=True, type=SECONDS, help="Time limit per case [s].")
-@click.option("--dry-run", is_flag=True, help="Print the number of cases, and stop.")
-@CLUSTER
-@click.option("--fresh", is_flag=True, help="Start a new run even if one can be resumed.")
-@click.option("--csv", "csv_file", type=FILE, help="Table of the cases; OUT/sweep.csv by default.")
-@click.option("--parquet", type=FILE, help="Also write the table as Parquet to this file.")
+@gathered("how", Sweeping)
 @AS_JSON
 @OUT
-def sweep(out: Path, as_json: bool, **options: Any) -> None:
+def sweep(cases: Cases, how: Sweeping, out: Path, as_json: bool) -> None:
     """Run scenes over grids of parameters, into one table.
 
     The table has one line per case. Grids and lists are crossed with each other and with --samples points. Failed
@@ -53,33 +58,32 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     timed out or missing, with 4 if not all of it ran.
     """
     console = terminal(stderr=True)
-    files = {"csv": options["csv_file"] or out / "sweep.csv", "parquet": options["parquet"]}
-    if not options["scenes"]:
+    csv = how.csv or out / "sweep.csv"
+    if not cases.scenes:
         raise SceneError("scenes: a sweep needs the name of a scene")
-    request, study = request_from(options), _study(options)
+    request, study = cases.request(), _study(how)
     chosen = study_slots(request, study)
     if not chosen:
         raise SceneError("scenes: no case fits this selection")
-    if options["dry_run"]:
+    if how.dry_run:
         click.echo(json.dumps({"cells": len(chosen)}) if as_json else plural(len(chosen), "case"))
         return
     folder(out)
-    for name in ("csv", "parquet"):
-        if options[f"{name}_file" if name == "csv" else name]:
-            writable(files[name], name)
-    if options["parquet"]:
+    if how.csv:
+        writable(csv, "csv")
+    if how.parquet:
+        writable(how.parquet, "parquet")
         with extra("sweep", "parquet"):
             import pyarrow  # noqa: F401  (asked for before anything runs, not after)
     store = Store(out)
     title = f"sweep: {' '.join(request.scenes)}"
-    limits = options["jobs"], options["timeout"]
-    done = run_plan(store, title, chosen, console, *limits, fresh=options["fresh"], cluster=options["cluster"],
+    done = run_plan(store, title, chosen, console, how.jobs, how.timeout, None, how.fresh, cluster=how.cluster,
                     finish=False)  # fmt: skip
     rows, complete = rows_of(done.id, store.observations(done), chosen), not store.missing(done)
     found = table(rows)
-    write(files["csv"], csv_of(found))
-    if options["parquet"]:
-        found.to_parquet(files["parquet"], index=False)
+    write(csv, csv_of(found))
+    if how.parquet:
+        found.to_parquet(how.parquet, index=False)
     if complete:
         store.finish(done)  # after its files: the same command would write them again
     store.close()
@@ -90,29 +94,26 @@ def sweep(out: Path, as_json: bool, **options: Any) -> None:
     if unsupported:
         console.print(f"unsupported: {plural(unsupported, 'case')}, which the engine cannot run", highlight=False)
     print_roles(((slot.engine, slot.profile) for slot in chosen), console)
-    console.print(f"table: {files['csv']}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"table: {csv}", markup=False, highlight=False, soft_wrap=True)
     console.print(f"what fails and why: crosscheck findings{at(out)}", markup=False, highlight=False, soft_wrap=True)
-    absent = missing(options["engine"], request.engines)
+    absent = missing(cases.engine, request.engines)
     for line in absent:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     broken = any(row.outcome in ALARMING_OUTCOMES or (row.outcome == "refused" and row.alarming) for row in rows)
     sys.exit(statuses.verdict(broken, complete and not absent))
 
 
-def _study(options: dict[str, Any]) -> Study:
+def _study(how: Sweeping) -> Study:
     crossed: dict[str, list[float]] = {}
-    for name, values in [*map(grid, options["grid"]), *map(listed, options["lists"])]:
+    for name, values in [*map(grid, how.grid), *map(listed, how.lists)]:
         if name in crossed:
             raise SceneError(f"sweep: {name} is varied twice")
         crossed[name] = values
-    kinds: list[tuple[Kind, str]] = [
-        *(("random", t) for t in options["random"]),
-        *(("sobol", t) for t in options["sobol"]),
-    ]
-    ranges: list[tuple[Kind, Range]] = [(kind, range_from(text, kind, 2)[0]) for kind, text in kinds]
+    kinds: dict[Kind, tuple[str, ...]] = {"random": how.random, "sobol": how.sobol}
+    ranges = [(kind, range_from(text, kind, 2)[0]) for kind, texts in kinds.items() for text in texts]
     names = [each.name for _, each in ranges]
     for name in names:
         if names.count(name) > 1 or name in crossed:
             raise SceneError(f"sweep: {name} is varied twice")
     with extra("sweep"):
-        return Study(crossed, points(ranges, options["samples"], options["seed"]))
+        return Study(crossed, points(ranges, how.samples, how.seed))

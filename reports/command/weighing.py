@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import click
 from rich.table import Table
@@ -11,7 +10,7 @@ from rich.text import Text
 
 from reports.command.group import AS_JSON, main
 from reports.command.posing import cells_of
-from reports.command.selection import request_from, selection
+from reports.command.selection import Cases, selection
 from reports.terminal import print_roles, terminal
 from reports.wording import number, reproduce
 from validation.questions.residuals import LAWS, Residuals, ask
@@ -22,13 +21,13 @@ from validation.running.plan import slots
 @main.command("residuals", epilog="Example: crosscheck residuals pinch")
 @selection
 @AS_JSON
-def residuals(as_json: bool, **options: Any) -> None:
+def residuals(cases: Cases, as_json: bool) -> None:
     """Check reported contact forces against the laws of contact.
 
     Runs one case of each scene. Numbers are relative to the largest impulse of the run (work: also to the fastest
     contact). For an engine that reports no forces, the reason is printed instead.
     """
-    cells = cells_of(slots(request_from(options)), bool(options["param"] or options["iterations"] or options["dt"]))
+    cells = cells_of(slots(cases.request()), bool(cases.param or cases.iterations or cases.dt))
     progress = terminal(stderr=True)
     found: list[Residuals] = []
     with Apart() as apart:

@@ -334,25 +334,24 @@ def test_bench_options_refused_before_the_run(tmp_path):
 
 
 def test_options_become_a_request_field_by_field_and_its_words():
-    options = {
-        "scenes": ("stack", "imp*", "stack"), "engine": ("chipmunk",), "profile": ("tuned", "default"), "dim": (3, 2),
-        "dt": ("1/60", "0.01"), "iterations": (4, 7), "param": ("n=2",), "ulp": (), "quick": False, "standard": False,
-        "full": True, "set": ("damping=0.5",),
-    }  # fmt: skip
-    found = selection.request_from(options)
+    options = selection.Cases(
+        scenes=("stack", "imp*", "stack"), engine=("chipmunk",), profile=("tuned", "default"), dim=(3, 2),
+        dt=("1/60", "0.01"), iterations=(4, 7), param=("n=2",), full=True, set=("damping=0.5",),
+    )  # fmt: skip
+    found = options.request()
     assert found == Request(
         scenes=["stack", "impact"], engines=["chipmunk"], profiles=["tuned", "default"], dimensions=[3, 2],
         dts=[1 / 60, 0.01], iterations=[4, 7], params={"n": 2.0}, suite="full", ulps=(0,), floors=True,
         sets=(("damping", 0.5),),
     )  # fmt: skip
-    assert selection.asked(found, options) == (
+    assert options.words(found.scenes) == (
         "stack impact --param n=2 --engine chipmunk --profile tuned --profile default --set damping=0.5 --dim 3 "
         "--dim 2 --dt 1/60 --dt 0.01 --iterations 4 --iterations 7"
     )
-    moved = selection.request_from(options | {"ulp": (1, -2), "engine": (), "param": (), "set": (), "scenes": ()})
+    moved = replace(options, ulp=(1, -2), engine=(), param=(), set=(), scenes=()).request()
     assert (moved.ulps, moved.floors, moved.engines, moved.params) == ((0, 1, -2), False, registry.usual(), None)
     assert moved.scenes == list(CATALOGUE)
-    assert not selection.request_from(options | {"full": False, "quick": True}).floors
+    assert not replace(options, full=False, quick=True).request().floors
     for wrong, why in (
         ({"quick": True}, "--quick and --full: a run is of one suite"),
         ({"param": ("n=2", "n=3")}, "param: n is given twice; crosscheck sweep --grid runs several values"),
@@ -361,7 +360,7 @@ def test_options_become_a_request_field_by_field_and_its_words():
         ({"param": ("n=two",)}, "param: n='two' is not a number"),
     ):
         with pytest.raises(SceneError) as error:
-            selection.request_from(options | wrong)
+            replace(options, **wrong).request()
         assert str(error.value) == why
 
 

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from reports import speed
 from reports.command import main
 from reports.command.benching import plan_of
+from reports.command.selection import Cases, taken
 from validation import workers
 from validation.bench import reading
 from validation.bench.lane import QUICK
@@ -171,7 +172,7 @@ def test_run_beside_its_benchmark(tmp_path, asked):
     assert {o.slot.dt for o in store.observations(judged)} == {1 / 240} and judged.finished and not begun.finished
     assert store.run() == judged  # the latest is what was judged
     options = main.get_command(None, "bench").make_context("bench", [str(word) for word in words]).params
-    _, title, cells = plan_of(options)
+    _, title, cells = plan_of(taken(Cases, options))
     known = {o.slot for o in store.observations(begun)} | {o.slot for o in answered(store, cells)[1]}
     assert (begun.title, begun.plan) == (title, tuple(slot.key() for slot in cells)) and known == set(cells)
     assert {slot.dt for slot in asked if slot in set(cells)} == steps

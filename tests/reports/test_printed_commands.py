@@ -8,7 +8,7 @@ import pytest
 from adapters.registry import facts
 from reports.command.benching import bench
 from reports.command.running import run
-from reports.command.selection import asked, request_from
+from reports.command.selection import Cases, taken
 from reports.page import again
 from reports.wording import reproduce
 from validation.field import notes
@@ -24,8 +24,7 @@ def asked_by(command):
     """Cells of a command, planned as the command plans them."""
     words = shlex.split(command)
     assert words[:2] == ["crosscheck", "run"]
-    options = run.make_context("run", words[2:]).params
-    return slots(request_from(options))
+    return slots(taken(Cases, run.make_context("run", words[2:]).params).request())
 
 
 @pytest.mark.parametrize(
@@ -44,17 +43,17 @@ def test_command_that_repeats_the_run_of_a_page(line, tmp_path):
         'name = "b"\ndimension = 2\ngravity = [0.0, -9.81]\nduration = 0.1\n'
         '[[bodies]]\nname = "ball"\nshape = { type = "disc", radius = 0.5 }\n'
     )
-    options = run.make_context("run", shlex.split(line.format(tmp_path))).params
-    request = request_from(options)
-    said = again("run", f"{request.suite}: {asked(request, options)}")
+    cases = taken(Cases, run.make_context("run", shlex.split(line.format(tmp_path))).params)
+    request = cases.request()
+    said = again("run", f"{request.suite}: {cases.words(request.scenes)}")
     assert said.endswith("--out again") and len(said) < 250  # all of our scenes are not named one by one
     assert asked_by(said) == slots(request)
 
 
 def test_page_with_the_command_of_its_bench():
     words = "impact --engine chipmunk --profile tuned --dt 1/60 --full"
-    options = bench.make_context("bench", shlex.split(words)).params
-    said = again("bench", f"full: {asked(request_from(options), options)}")
+    cases = taken(Cases, bench.make_context("bench", shlex.split(words)).params)
+    said = again("bench", f"full: {cases.words(cases.request().scenes)}")
     assert said == "crosscheck bench impact --engine chipmunk --profile tuned --dt 1/60 --full --out again"
 
 

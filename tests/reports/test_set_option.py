@@ -12,7 +12,7 @@ from rich.console import Console
 from reports.command import main
 from reports.command.releasing import _commands
 from reports.command.running import run
-from reports.command.selection import request_from
+from reports.command.selection import Cases, taken
 from reports.matrix import matrix_of, tables_of
 from reports.wording import reproduce
 from validation.cells import slot_from_dict
@@ -126,7 +126,7 @@ def test_the_command_that_runs_a_row_again_asks_for_the_same_cell(ran):
     for row in ran[1]:
         words = shlex.split(reproduce(row["slot"]))
         assert words[:2] == ["crosscheck", "run"]
-        (again,) = slots(request_from(run.make_context("run", words[2:]).params))
+        (again,) = slots(taken(Cases, run.make_context("run", words[2:]).params).request())
         assert again == slot_from_dict(row["slot"])
 
 
