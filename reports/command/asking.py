@@ -92,7 +92,9 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
     """What is on record of an engine on a scene."""
     name = told["engine"]
     if not told["judged"]:
-        yield _title(f"{name}: the scene is not run on it; crosscheck run {scene} --engine {name} says why")
+        why = told["refused"] or f"crosscheck run {scene} --engine {name} says why"
+        yield _title(f"{name} does not run the scene: {why}")
+        yield from _settings(told)
         return
     which = f"({told['suite']} suite, release {told['release']})"
     if not told["failed"]:
@@ -121,6 +123,14 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
         yield from _settings(told)
 
 
+def _unset(told: Plain) -> Iterator[str]:
+    """What engines that are asked for do, as far as the question is about it."""
+    for engine, rows in told["unset"].items():
+        if rows:
+            yield f"{engine}, where nothing is set:"
+            yield from _settings({"unset": rows})
+
+
 def _settings(told: Plain) -> Iterator[str]:
     for row in told["unset"]:
         both = "; set that of both bodies" if " and " in row["what"] else ""
@@ -138,10 +148,12 @@ def _several(told: Plain, text: str) -> Iterator[str]:
     named = next((each["scene"] for each in told["candidates"] if each["scene"]), "")
     if named:
         yield _wrapped(f"say more, or name one: crosscheck ask {' '.join([named, *told['asked']])}", "  ")
+    yield from _unset(told)
 
 
 def _command(told: Plain, text: str) -> Iterator[str]:
     yield _title(told["says"])
+    yield from _unset(told)
     yield _wrapped(told["command"], "  ")
     if told["scene"]:
         yield _wrapped(f"nearest scene: {told['scene']} ({told['title']})", "  ")

@@ -23,7 +23,7 @@ COLUMNS = {"title": 2.0, "symptoms": 1.0, "reports": 0.7, "physics": 0.3}
 #: Share of the nearest line in a rank; the rest is that of all that is known of a scene.
 LINE = 0.5
 #: Name of what is out of scope, and its weight in a rank: a rope or a camera says more than the verbs beside it.
-OUTSIDE, APART = "outside", 1.4
+OUTSIDE, APART = "outside", 1.5
 #: Weight of a word that nothing has; one that a single scene has weighs 4.5.
 UNKNOWN = 1.5
 #: A match is clear if its nearest line has this share of the question, by weight, if it is nearly the first both as a

@@ -33,6 +33,7 @@ def answer(question: str) -> Plain:
         "answer": NOTHING, "scene": "", "title": "", "law": "", "line": "", "says": "", "command": "", "report": {},
         "candidates": [], "missed": list(found.missed), "asked": list(found.engines),
         "strangers": list(found.strangers), "engines": [], "passes": [], "fails": [], "fixed": [], "page": "",
+        "unset": {},
     }  # fmt: skip
     named = [source for source in kept["reports"] if any(_is_number(word, source) for word in question.split())]
     name = "_".join(word for word in question.lower().split() if kept["names"].get(word) is None)
@@ -47,13 +48,15 @@ def answer(question: str) -> Plain:
     first = found.matches[0]
     if first.name.startswith(f"{OUTSIDE}/"):
         near = [each for each in _candidates(found) if each["scene"]]
-        return told | _of_topic(OUTSIDE) | {"answer": OUTSIDE, "missed": [], "candidates": near[:1]}
+        return told | _of_topic(OUTSIDE, ()) | {"answer": OUTSIDE, "missed": [], "candidates": near[:1]}
+    own = kept["topics"].get(first.name, {"terms": ()})["terms"] if found.is_clear else ()
+    unset = {engine: _unset(engine, found, own) for engine in found.engines}
     if not found.is_clear:
-        return told | {"answer": SEVERAL, "candidates": _candidates(found)}
+        return told | {"answer": SEVERAL, "candidates": _candidates(found), "unset": unset}
     if first.name in kept["scenes"]:
         return told | _of_scene(first.name, found.engines, found)
     if first.name in kept["topics"]:
-        return told | _of_topic(first.name) | {"answer": COMMAND, "missed": []}
+        return told | _of_topic(first.name, found.engines) | {"answer": COMMAND, "missed": [], "unset": unset}
     return told | {"answer": PAGE, "title": first.line, "page": f"{first.name}.md"}
 
 
@@ -70,11 +73,9 @@ def _candidates(found: Found) -> list[Plain]:
             verdicts = {engine: _verdict(kept["engines"][engine]["scenes"].get(name, ())) for engine in found.engines}
             told.setdefault(name, {"scene": name, "title": kept["scenes"][name]["title"], "command": ""})
             told[name]["verdicts"] = verdicts
-        elif name in kept["topics"]:
-            command = kept["topics"][name]["command"] if name != OUTSIDE else ""
-            told.setdefault(
-                name, {"scene": "", "title": kept["topics"][name]["says"], "command": command, "verdicts": {}}
-            )
+        elif name in kept["topics"] and name != OUTSIDE:
+            topic = _of_topic(name, found.engines)
+            told.setdefault(name, {"scene": "", "title": topic["says"], "command": topic["command"], "verdicts": {}})
         if len(told) == CANDIDATES:
             break
     return list(told.values())
@@ -84,11 +85,12 @@ def _verdict(rows: Sequence[Sequence[Any]]) -> str:
     return "fails" if any(row[1] for row in rows) else "passes" if rows else "does not run it"
 
 
-def _of_topic(name: str) -> Plain:
+def _of_topic(name: str, asked: Sequence[str]) -> Plain:
     topic = table()["topics"][name]
+    command = topic["command"].replace("ENGINE", next(iter(asked), "ENGINE"))
     near = topic["near"]
     nearest = {"scene": near, "title": table()["scenes"][near]["title"]} if near else {}
-    return {"says": topic["says"], "command": topic["command"]} | nearest
+    return {"says": topic["says"], "command": command} | nearest
 
 
 def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -> Plain:
@@ -124,16 +126,19 @@ def _of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | N
     failed, judged = sum(row[1] for row in rows), sum(row[2] for row in rows)
     return {
         "engine": engine, "release": kept["release"], "suite": kept["suite"], "failed": failed, "judged": judged,
+        "refused": kept["refused"].get(scene, ""),
         "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong],
         "better": kept["better"] if rows and all(row[3] == 0 for row in rows) else "",
         "fix": dict(fix or {}),
-        "unset": _unset(kept["unset"], scene, found),
+        "unset": _unset(engine, found, table()["scenes"][scene]["terms"]),
     }  # fmt: skip
 
 
-def _unset(rows: Sequence[Sequence[Any]], scene: str, found: Found) -> list[Plain]:
-    """What the engine does where nothing is set, as far as the question or the scene is about it: the nearest first."""
-    own, asked = set(table()["scenes"][scene]["terms"]), set(found.terms)
-    near = sorted(((-2 * len(asked & set(terms)) - len(own & set(terms)), k) for k, (_, _, terms) in enumerate(rows)))
+def _unset(engine: str, found: Found, own: Sequence[str] = ()) -> list[Plain]:
+    """What the engine does where nothing is set, as far as the question or ``own`` terms of its answer are about it."""
+    rows, asked = table()["engines"][engine]["unset"], set(found.terms)
+    near = sorted(
+        (-2 * len(asked & set(terms)) - len(set(own) & set(terms)), k) for k, (_, _, terms) in enumerate(rows)
+    )
     chosen = sorted(k for score, k in near[:LINES] if score < 0)
     return [{"what": rows[k][0], "how": rows[k][1]} for k in chosen]

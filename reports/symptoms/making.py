@@ -20,7 +20,9 @@ from reports.cures import nothing_to_paste, recorded_fixes, recorded_paste, reco
 from reports.symptoms import LITTLE, OUTSIDE, PHRASE, TABLE, opened, stems, terms
 from reports.symptoms.published import of_matrix, passed
 from validation.catalogue import CATALOGUE
+from validation.cells import Slot
 from validation.field import notes
+from validation.findings.files import findings_of
 from validation.metrics import WORDS
 from validation.running.plan import QUICK_DT
 from validation.scenes import OURS
@@ -63,7 +65,10 @@ def made() -> dict[str, Any]:
             name: {"title": CATALOGUE[name].title, "law": CATALOGUE[name].law, "terms": _own_terms(name, rows)}
             for name in OURS
         },
-        "topics": {name: {key: topic[key] for key in ("says", "command", "near")} for name, topic in topics.items()},
+        "topics": {
+            name: {key: topic[key] for key in ("says", "command", "near")} | {"terms": terms_of([topic["says"]])[0]}
+            for name, topic in topics.items()
+        },
         "right": {line: each["says"] for each in told["right"] for line in each["symptoms"]},
         "reports": {
             note.source: {"scene": note.scene, "symptom": note.symptom, "engines": [note.engine, note.about]}
@@ -75,6 +80,7 @@ def made() -> dict[str, Any]:
                 "suite": suite,
                 "better": registry.profile_of(name, "tuned"),
                 "scenes": scenes,
+                "refused": {scene: why for scene in OURS if scene not in scenes and (why := _refused(name, scene))},
                 "unset": _unset(name, terms_of),
             }
             for name, (release, suite, scenes) in _verdicts(engines).items()
@@ -133,10 +139,19 @@ def _own_terms(name: str, rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _unset(engine: str, terms_of: Callable[[Sequence[str]], list[list[str]]]) -> list[list[Any]]:
-    """What an engine does where nothing is set, as documented: what, how, and terms of the first."""
+    """What an engine does where nothing is set, as documented: what, how, and terms of the first without units."""
     rows = [row for row in unset_of(engine) if "not documented" not in row.documented]
-    own = terms_of([row.what for row in rows])
+    own = terms_of([re.sub(r"\[.*?\]|[\d.]+ m?m(/s)?", "", row.what) for row in rows])
     return [[row.what, row.documented, words] for row, words in zip(rows, own, strict=True)]
+
+
+def _refused(engine: str, scene: str) -> str:
+    """Why an engine cannot run a scene in any dimension, from its findings; empty where they do not say."""
+    profile = registry.profile_of(engine, "shipped") or ""
+    slots = [Slot(scene, (), dimension, engine, profile, QUICK_DT) for dimension in CATALOGUE[scene].dimensions]
+    findings = findings_of(engine)
+    found = [findings.unsupported_by(slot) if findings else None for slot in slots]
+    return found[0].reason if found[0] and all(found) else ""
 
 
 def _verdicts(engines: Sequence[str]) -> dict[str, tuple[str, str, dict[str, list[list[Any]]]]]:

@@ -99,6 +99,7 @@ SCENE = CanonicalScene(
         "bodies fall asleep too early, or never sleep",
         "a resting body keeps sliding with a tiny velocity",
         "a cube on level ground jitters in place",
+        "a resting body jitters or shakes where the time step is too large",
         "things on a table move around without reason",
         "a body that lies still sinks deeper and deeper",
         "a sleeping body does not wake up",

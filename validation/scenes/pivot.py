@@ -124,6 +124,7 @@ SCENE = CanonicalScene(
         "a box that falls over its edge slides away at its foot",
         "a tilting block does not rotate about its edge",
         "a falling chimney or tree tips too fast or too slowly",
+        "a pole or mast that falls over slides away at its end on the floor",
         "a board that falls over should turn about the edge it stands on",
         "the pivot edge of a toppling box slips or sinks in",
         "a tall box pushed past its balance falls wrongly",
