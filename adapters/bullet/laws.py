@@ -16,6 +16,7 @@ import numpy as np
 
 from adapters.bullet.contact_law import ContactLaw, Fall, fall
 from adapters.bullet.profiles import PROFILES, law_of
+from adapters.bullet.rolling import rolling_law
 from adapters.bullet.shipped import CHECKED_ON, SPLIT_DEPTH
 from adapters.engine import Contacts
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
@@ -177,4 +178,20 @@ DEVIATIONS += tuple(
     )
     for profile, push in (("tuned", None), ("one", _split_push))
     for metric in ("rebound_ratio", "beyond")
+)
+
+DEVIATIONS += deviations(
+    "bullet",
+    ("default",),
+    {
+        "slide_to_roll": ("final_speed", "rolling_time", "rolling_place"),
+        "roll_incline": ("acceleration", "turning"),
+        "rolling_spin": ("spin", "speed"),
+        "masse": ("final_vx", "final_vy", "end_x", "end_y", "turned"),
+    },
+    rolling_law,
+    "drag of the multibody path, 0.04 (1 + v) v and the same for the spin, brakes what slides, rolls and spins; "
+    "linearDamping=0 and angularDamping=0 end it",
+    "btMultiBody.cpp:843 (bullet3 6c888f4)",
+    CHECKED_ON,
 )

@@ -13,6 +13,8 @@ from adapters.scene import HalfSpace, Scene
 OPTIONS = ("integrator", "cone", "impratio", "iterations", "tolerance", "noslip_iterations")
 #: MuJoCo's torsional and rolling friction of a pair, which our materials do not have.
 TURNING = (0.005, 0.0001, 0.0001)
+#: Class of geoms without friction.
+SMOOTH = "smooth"
 #: Number of pairs of bodies that a comment names; others are counted.
 NAMED = 3
 
@@ -86,25 +88,38 @@ def _of_all(
 ) -> list[str]:
     """A class of geoms with priority over those without, and the same for explicit pairs.
 
-    With equal priority MuJoCo would mix the values of both geoms, and take the larger ``condim``.
+    With equal priority MuJoCo would mix the values of both geoms, and take the larger ``condim``. One that takes all
+    friction is a class of its own, within the other, so that a geom that rebounds need not lose its friction.
     """
-    pair = next(iter(asked.values()))
+    pair = dict(next(iter(asked.values())))
+    smooth = {"condim": pair.pop("condim")} if pair.get("condim", (3, ""))[0] == 1 else {}
     bounces = {restitution for restitution, _ in pairs} if "solref" in pair else set()
     name, which = ("rebounds", "rebound") if any(e > 0.0 for e, _ in pairs) else ("rests", "rest, slide or roll")
-    said = [f'give class="{name}" to geoms that {which}; their values count, friction too, not the other geom\'s']
-    if pair.get("condim", (3, ""))[0] == 1:
-        said.append('condim="1" takes all friction from them: leave it out of those with friction')
-    of_geoms = _comment([*said, *_holds(pair, bounces, scene, dt)])
-    of_pairs = _comment(["the same for explicit pairs, which take nothing from geoms", *_formulas(pair, bounces)])
-    geom: dict[str, Told] = {"priority": (1, ""), **pair}
-    lines = (of_geoms, _element("geom", geom), of_pairs, _element("pair", pair))
-    return [
-        "<default>",
-        f'  <default class="{name}">',
-        *(f"    {line}" for line in lines),
-        "  </default>",
-        "</default>",
-    ]
+    lines: list[str] = []
+    if smooth:
+        instead = "instead " if pair else ""
+        said = f'give class="{SMOOTH}" {instead}only to geoms without friction: condim="1" takes all of it from them'
+        lines = _class(SMOOTH, [said], [], {**({} if pair else {"priority": (1, "")}), **smooth}, smooth)
+    if pair:
+        said = f'give class="{name}" to geoms that {which}; their values count, friction too, not the other geom\'s'
+        of_geoms, of_pairs = [said, *_holds(pair, bounces, scene, dt)], _formulas(pair, bounces)
+        lines = _class(name, of_geoms, of_pairs, {"priority": (1, ""), **pair}, pair, lines)
+    return ["<default>", *lines, "</default>"]
+
+
+def _class(
+    name: str,
+    of_geoms: Sequence[str],
+    of_pairs: Sequence[str],
+    geom: Mapping[str, Told],
+    pair: Mapping[str, Told],
+    within: Sequence[str] = (),
+) -> list[str]:
+    """A default class with comments for geoms and explicit pairs; ``within``: lines of a class that has its values."""
+    same = _comment(["the same for explicit pairs, which take nothing from geoms", *of_pairs])
+    own = (_comment(of_geoms), _element("geom", geom), same, _element("pair", pair))
+    lines = [*(f"    {line}" for line in own), *(f"  {line}" for line in within)]
+    return [f'  <default class="{name}">', *lines, "  </default>"]
 
 
 def _of_pairs(

@@ -119,10 +119,11 @@ def mujoco(scene, dt, steps, paste):
     import mujoco as mj
 
     pasted, names = pasted_mjcf(paste), [body.name for body in scene.bodies]
-    named = [one.get("class") for element in pasted if element.tag == "default" for one in element]
-    classes = {"class": named[0]} if named else {}
     pairs = list(scene.contact_pairs())
     frictions = {material.friction for *_, material in pairs}
+    named = [one.get("class") for element in pasted if element.tag == "default" for one in element.iter("default")][1:]
+    rough = [name for name in named if name != "smooth"]  # as the comments of a paste say
+    classes = {"class": (rough if any(frictions) else named)[-1]} if (rough if any(frictions) else named) else {}
     shared = numbers(frictions.pop(), 0.005, 0.0001) if len(frictions) == 1 else None
     assets, bodies, contacts = [], [], []
     for body in scene.bodies:

@@ -177,11 +177,31 @@ def test_contact_classes_of_a_snippet_without_a_step():
     engine, scene = registry.load("mujoco"), drop(3, 0.8)
     settings, names = changed(engine, scene)
     text = engine.snippet(settings, names, scene, DT)
-    assert 'class="rebounds" to geoms that rebound;' in text and "takes all friction from them" in text
+    assert 'class="rebounds" to geoms that rebound;' in text
     assert "timestep" not in text
     assert engine.snippet(settings, [], scene, DT) == ""
-    for element in list(pasted_mjcf(text)[1].iter())[2:]:
-        assert element.get("solref") == "0 -432" and element.get("condim") == "1"
+    rebounds, smooth = (one for one in pasted_mjcf(text)[1].iter("default") if one.get("class"))
+    assert all(one.get("solref") == "0 -432" and "condim" not in one.attrib for one in rebounds if one.tag != "default")
+    assert {one.get("condim") for one in smooth} == {"1"} and smooth.get("class") == "smooth"
+
+
+def test_geom_with_friction_in_a_class_that_rebounds():
+    """`condim="1"` takes all friction: it stands in a class that nobody gives to a body with friction."""
+    mujoco = pytest.importorskip("mujoco")
+    paste = tuned_paste(drop(3, 0.8))
+    spins = []
+    for name in ("rebounds", "smooth"):
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco>{paste}<worldbody><geom type="plane" size="0 0 1"/><body pos="0 0 1"><freejoint/>'
+            f'<geom class="{name}" type="sphere" size=".1" mass="1" friction=".5"/></body></worldbody></mujoco>'
+        )
+        data = mujoco.MjData(model)
+        model.opt.timestep, data.qvel[0] = DT, 2.0
+        while data.time < 0.6:
+            mujoco.mj_step(model, data)
+        assert data.qvel[2] > 1.0
+        spins.append(data.qvel[4])
+    assert spins[0] > 10.0 and spins[1] == 0.0
 
 
 def test_a_start_overlap_of_chipmunk_has_its_formula():

@@ -138,3 +138,59 @@ def test_laws_silent_about_other_scenes():
     )
     assert not any(law.covers("bullet", "3.3.0", "default", "impact", "impulse") for law in DEVIATIONS)
     assert all(isinstance(law, Deviation) and law.because and law.source for law in DEVIATIONS)
+
+
+# ---- rolling -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scene", "params", "least"),
+    [
+        ("slide_to_roll", {"v": 5.3, "mu": 0.23, "radius": 0.11}, 3),
+        ("roll_incline", {"mu": 0.37, "ratio": 0.6}, 2),
+        ("roll_incline", {"mu": 0.37, "ratio": 1.9, "mass": 7.0}, 2),
+    ],
+)
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 777])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_body_that_rolls_or_slides_with_drag(scene, params, least, dt, dimension):
+    assert_predicted(compare(scene, params, "default", dt, dimension), least)
+
+
+@pytest.mark.parametrize(
+    ("scene", "params", "least"), [("rolling_spin", {"spin": 17.0}, 2), ("masse", {"back": 3.0, "side": 2.0}, 5)]
+)
+def test_ball_that_spins_with_drag(scene, params, least):
+    assert_predicted(compare(scene, params, "default", 1 / 240, 3), least)
+
+
+@pytest.mark.parametrize("scene", ["slide_to_roll", "rolling_spin"])
+def test_rolling_without_drag(scene):
+    """The cause switched off: what failed passes; another suspect switched off changes nothing."""
+    canonical = CATALOGUE[scene]
+    made = canonical.scene(3, {})
+    shipped = {s.name: s.value for s in ENGINE.settings("default", needs(made), 1 / 240)}
+    failing = []
+    suspects = ({"linearDamping": 0.0, "angularDamping": 0.0}, {"solverResidualThreshold": 0.0, "iterations": 1000})
+    for changes in ({}, *suspects):
+        found = canonical.measure(made, run(ENGINE, made, 1 / 240, shipped | changes, canonical.sampling(made)))
+        checks = [
+            check for check in canonical.checks(made, 1 / 240) if check.bound and found[check.metric][0] is not None
+        ]
+        failing.append([c.metric for c in checks if abs(found[c.metric][0] - c.truth) > c.bound])
+    assert failing[0] and not failing[1] and failing[2] == failing[0]
+
+
+def test_no_prediction_of_rolling_beyond_its_conditions():
+    canonical = CATALOGUE["rolling_spin"]
+    law = next(covering("bullet", VERSION, "default", "rolling_spin", "spin"))
+    scene = canonical.scene(3, {})
+    floor, ball = scene.bodies
+    lifted = replace(ball, pose=(0.0, 0.0, ball.pose[2] + 0.01, *ball.pose[3:]))
+    others = (
+        (replace(floor, surface_velocity=(1.0, 0.0, 0.0)), ball),
+        (floor, lifted),
+        (floor, replace(ball, torque=(0.0, 0.0, 1.0))),
+    )
+    assert law.law(scene, 1 / 240, canonical.measure) is not None
+    assert all(law.law(replace(scene, bodies=each), 1 / 240, canonical.measure) is None for each in others)

@@ -3,8 +3,9 @@
     own       its scene at other steps, in another size and mass, from moved starts; a check counts once for all of them
     others    cases of other groups, those of ``panel.toml``
 
-A check that passes as shipped and fails with the fix is broken; so is one that fails by `WORSE` times as much. A check
-that fails as shipped and passes with the fix is mended. A fix that breaks more than it mends is withdrawn.
+A check is broken if it fails with the fix, and its error is more than `WORSE` times that as shipped. It is mended if it
+fails as shipped and passes with the fix, and its error falls by as much. A smaller step over the tolerance tells
+nothing: MuJoCo's bouncy column sinks by 0.998 tolerances as shipped. A fix that breaks more than it mends is withdrawn.
 
 What is run is what is printed: a number with a formula in step and gravity has its value in each case. Settings that
 an engine has for single pairs or bodies (``local`` in its ``tuning.toml``) are meant for pairs that rebound, or do not,
@@ -37,17 +38,18 @@ STEPS = (0.25, 4.0)
 SIZE, MOVES = 0.3, (-16, 16)
 #: The cases of its own scene in words.
 OWN_SCENE = "its own scene elsewhere"
-#: Error with a fix, over that as shipped, from which a failing check counts as broken too.
-WORSE = 3.0
+#: Error with a fix, over that as shipped, from which it counts: what doubles is no round-off and no phase of a step.
+WORSE = 2.0
 #: Factor of a number that is printed as a formula.
 FALL = "*g*dt^2"
 #: Readings as shipped and fixed, by case and kind of check.
 Checks = dict[tuple[str, str], list[tuple[Reading, Reading]]]
 _seen: dict[Slot, Observation] = {}
 _FILES = Path(__file__).parent / "scenes"
-#: Cases of other groups: words, a scene of the catalogue with parameters or a file beside this module, and a step [s].
+#: Cases of other groups: words, a scene of the catalogue with parameters or a file beside this module, its dimensions
+#: where not all, and a step [s].
 OTHERS = tuple(
-    (case["words"], case["scene"], params_of(case.get("params", {})), float(case.get("dt", QUICK_DT)))
+    (case["words"], case["scene"], params_of(case.get("params", {})), case.get("dimensions"), case.get("dt", QUICK_DT))
     for case in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["case"]
 )
 
@@ -109,13 +111,11 @@ def other_cases(engine: str, profile: str) -> tuple[tuple[str, Slot], ...]:
     known = facts(engine)
     dimensions = known.dimensions if known else frozenset({2})
     found = []
-    for words, name, params, dt in OTHERS:
+    for words, name, params, own, dt in OTHERS:
         scene = pinned(str(_FILES / name)) if name.endswith(".toml") else name
-        fits = [d for d in resolve(scene).dimensions if d in dimensions]
+        fits = [d for d in own or resolve(scene).dimensions if d in dimensions]
         if fits:
-            cell = {name: value for name, value in params.items() if max(fits) == 3 or name != "heading"}
-            minimal = resolve(scene).minimal(cell)
-            found.append((words, Slot(scene, minimal, max(fits), engine, profile, dt)))
+            found.append((words, Slot(scene, resolve(scene).minimal(params), max(fits), engine, profile, dt)))
     return tuple(found)
 
 
@@ -197,10 +197,10 @@ def judged(checks: Checks, cases: int) -> Panel:
             assert before.check.truth is not None
             numbers = before.value, after.value, before.check.truth
             breaks.append((after.badness, Cost(words, before.check.metric, before.check.unit, *numbers, before.slot)))
-        mends += not worst and any(before.badness > 1.0 >= after.badness for before, after in both)
+        mends += not worst and any(after.badness <= 1.0 and _broken(after, before) for before, after in both)
     breaks.sort(key=lambda each: -each[0])
     return Panel(cases, mends, tuple(cost for _, cost in breaks))
 
 
 def _broken(before: Reading, after: Reading) -> bool:
-    return after.badness > max(1.0, WORSE * before.badness if before.badness > 1.0 else 1.0)
+    return after.badness > max(1.0, WORSE * before.badness)
