@@ -14,13 +14,13 @@ from functools import lru_cache
 import numpy as np
 
 from adapters.bullet.profiles import law_of
-from adapters.engine import Contacts
+from adapters.engine import Array, Contacts
 from adapters.law import Law, Measure, Prediction
-from adapters.lift import lift, lower_contacts, lower_pose, lower_twist
-from adapters.moved_starts import GAP_ROUND_OFF
+from adapters.law.moved_starts import GAP_ROUND_OFF
+from adapters.law.single_precision import Held
 from adapters.needs import needs
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
-from adapters.single_precision import Held
+from adapters.scene.lift import lift, lower_contacts, lower_pose, lower_twist
 from adapters.stepping import step_count
 from adapters.trajectory import ContactRecord, Measured, Trajectory
 
@@ -72,7 +72,8 @@ def _rolled(profile: str, scene: Scene, dt: float, short: float) -> Trajectory:
     normal, arm = np.array(face.shape.normal), body.shape.radius - short
     pull, moment = np.array(posed.gravity) + np.array(body.force) / body.mass, body.inertia[1]
     steps, material = step_count(scene.duration, dt), posed.material(face.name, body.name)
-    pose, twist = np.empty((steps + 1, 2, 7)), np.zeros((steps + 1, 2, 6))
+    pose: Array = np.empty((steps + 1, 2, 7))
+    twist: Array = np.zeros((steps + 1, 2, 6))
     pose[:] = [each.pose for each in posed.bodies]
     twist[0, 1] = body.twist
     pushed, gap = np.zeros((steps + 1, 3)), np.zeros(steps + 1)
@@ -99,4 +100,5 @@ def _rolled(profile: str, scene: Scene, dt: float, short: float) -> Trajectory:
         pose = np.array([lower_pose(each) for each in pose])
         twist = np.array([lower_twist(each) for each in twist])
     record = ContactRecord(np.arange(steps + 1), np.arange(steps + 2), rows)
-    return Trajectory(dt * np.arange(steps + 1), pose, twist, record, dt, "completed")
+    times = np.array([k * dt for k in range(steps + 1)])
+    return Trajectory(times, pose, twist, record, dt, "completed")
