@@ -185,7 +185,9 @@ def _cure(own: Mapping[str, Sequence[Plain]], profile: str) -> tuple[str, tuple[
     share = {name: len(_failing(group)) / len(group) for name, group in others.items()}
     best = min(share, key=lambda name: share[name], default=None)
     if best is None:
-        none = f"profile {' and '.join(silent)} gave no result" if silent else "no other profile was run in this case"
+        ran = any(name != profile and is_ranked(row["engine"], name) for name in own)
+        none = "other profiles ran in other cases or at other steps" if ran else "no other profile was run in this case"
+        none = f"profile {' and '.join(silent)} gave no result" if silent else none
         return "; ".join([none, *listed, *unlisted]), ()
     if share[best] >= len(failed) / len(own[profile]):
         return "; ".join(["no other profile does better", *listed, *unlisted]), ()
@@ -225,7 +227,7 @@ def _as_seen(row: Plain, metric: str) -> Plain | None:
 
 
 def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
-    """The error in words, by the first of the scene's kinds of metric with as large an error in tolerances as any."""
+    """The error in words, by the kind of `named_kind`."""
     lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
@@ -241,12 +243,17 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
 
 
 def named_kind(failing: Iterable[Plain]) -> str:
-    """The kind of metric that a headline names."""
+    """The kind of metric that a headline names: the first of the scene's with an error of the size of the largest.
+
+    Sizes are in tolerances. A scene file has no order of kinds: there it is the worst.
+    """
     worst: dict[str, float] = {}
+    near = NEAR
     for row in failing:
+        near = 1.0 if is_file(row["scene"]) else near
         kind = row["metric"].partition("[")[0]
         worst[kind] = max(worst.get(kind, 0.0), severity(row))
-    return next(name for name, error in worst.items() if NEAR * error >= max(worst.values()))
+    return next(name for name, error in worst.items() if near * error >= max(worst.values()))
 
 
 def _instead(row: Plain, kind: str, told_as_size: bool) -> str:

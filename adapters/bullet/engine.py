@@ -12,14 +12,14 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters.bullet.contact_law import ContactLaw, drag_share, loss_in_one_second, rebound_range
-from adapters.bullet.profiles import BODY, KINDS, PROFILES, SOFT, WORLD, checked, law_of
+from adapters.bullet.profiles import BODY, KINDS, PROFILES, SOFT, WORLD, law_of
 from adapters.bullet.releases import RELEASES
 from adapters.bullet.script import python
 from adapters.bullet.shipped import LARGEST_FRICTION, SMALLEST_INERTIA, SMALLEST_SIZE, WARM_STARTING
 from adapters.bullet.simulation import BulletSimulation
 from adapters.bullet.translation import factors, moments
 from adapters.checked_engine import CheckedEngine
-from adapters.engine import Declared, EngineFacts, Quirk, Scheme
+from adapters.engine import Declared, EngineError, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs, needs
 from adapters.receipts import FRICTION_SHARE
 from adapters.receipts.probes import (
@@ -34,6 +34,7 @@ from adapters.receipts.probes import (
 )
 from adapters.scene import Scene
 from adapters.scene.meeting import meeting_pairs
+from adapters.settings import checked
 
 _QUIRKS = (
     Quirk(
@@ -140,9 +141,10 @@ class BulletEngine(CheckedEngine):
         return None
 
     def checked(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """See `CheckedEngine.checked`."""
-        checked(settings)
-        return dict(settings)
+        """See `CheckedEngine.checked`; what is not set is as shipped."""
+        if len(SOFT & set(settings)) == 1:
+            raise EngineError("contactStiffness: bullet takes it together with contactDamping only")
+        return checked(self.name, self.kinds, settings, optional=self.kinds)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: parameters of the world, of how bodies are made, and of each body; none depends on the step."""

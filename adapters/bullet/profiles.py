@@ -15,9 +15,9 @@ from typing import Any
 
 from adapters.bullet.contact_law import ContactLaw
 from adapters.bullet.shipped import BREAKING_THRESHOLD, ITERATIONS, SLOP
-from adapters.engine import EngineError, ProfileRule, Setting
+from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.settings import LARGEST_INT, Check, finite, number, whole
+from adapters.settings import LARGEST_INT, Check, number, whole
 
 WORLD = frozenset(
     {
@@ -191,32 +191,8 @@ def law_of(profile: str, needs: Needs, dt: float) -> ContactLaw:
     return ContactLaw.of({setting.name: setting.value for setting in PROFILES[profile](needs, dt)})
 
 
-def checked(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """World and body parameters of a profile, validated: PyBullet silently ignores a bad value.
-
-    Raises
-    ------
-    EngineError
-        Naming an unknown setting, a value that is negative, not finite or no whole number where PyBullet takes an int,
-        or an iteration count below 1.
-    """
-    for name, value in settings.items():
-        if name not in WORLD | BODY | {"useMaximalCoordinates", "iterations"}:
-            raise EngineError(f"{name}: bullet has no such setting")
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise EngineError(f"{name}: {value!r} is not a number")
-        if not (finite(value) and value >= 0.0):
-            raise EngineError(f"{name}: {value!r} must be finite and not negative, bullet ignores it otherwise")
-    if settings.get("enableSAT", 0) not in (0, 1):
-        raise EngineError(f"enableSAT: {settings['enableSAT']!r} must be 0 or 1")
-    if len({"contactDamping", "contactStiffness"} & set(settings)) == 1:
-        raise EngineError("contactStiffness: bullet takes it together with contactDamping only")
-    iterations = settings.get("iterations", 50)
-    if iterations != int(iterations) or iterations < 1:
-        raise EngineError(f"iterations: {iterations!r} must be a whole number of at least 1")
-    for name in sorted(WHOLE & set(settings)):
-        if settings[name] != int(settings[name]) or settings[name] > LARGEST_INT:
-            raise EngineError(f"{name}: {settings[name]!r} must be a whole number of at most {LARGEST_INT}")
-    world = {name: int(value) if name in WHOLE else value for name, value in settings.items() if name in WORLD}
+def by_call(settings: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Valid settings as arguments of `setPhysicsEngineParameter` and of `changeDynamics`."""
+    world = {name: value for name, value in settings.items() if name in WORLD}
     body = {name: value for name, value in settings.items() if name in BODY}
-    return world | {"numSolverIterations": int(iterations)}, body
+    return world | {"numSolverIterations": settings.get("iterations", ITERATIONS)}, body

@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any
 
 from adapters.bullet import clipped
-from adapters.bullet.profiles import checked
+from adapters.bullet.profiles import by_call
 from adapters.bullet.simulation import HEAVY, WAITING_ROOM
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.engine import EngineError
@@ -18,7 +18,7 @@ from adapters.script import constants, imports, keywords, literal, stepped, text
 
 def python(scene: Scene, dt: float, settings: Mapping[str, Any], steps: int) -> str:
     """Python of a run with pybullet; see `adapters.engine.Writer`."""
-    world, material = checked(settings)
+    world, material = by_call(settings)
     restitution, friction = factors(scene, "restitution"), factors(scene, "friction")
     if restitution is None or friction is None:
         raise EngineError("pairs: no product of two bodies' values gives this table of materials")

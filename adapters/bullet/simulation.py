@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.bullet import clipped
-from adapters.bullet.profiles import checked
+from adapters.bullet.profiles import by_call
 from adapters.bullet.translation import Z_TO_X, factors, moments, placement
 from adapters.copied import Copied
 from adapters.engine import Array, Contacts, EngineError
@@ -45,7 +45,7 @@ class BulletSimulation(Copied):
     """One world in its own DIRECT client."""
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
-        world, material = checked(settings)
+        world, material = by_call(settings)
         self._p = pybullet_here()
         self._scene, self._dt = scene, dt
         self._world, self._material = world, material

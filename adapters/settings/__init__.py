@@ -6,7 +6,7 @@ An engine states its settings as a table, name by name: ``{"iterations": whole(1
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from adapters.engine import EngineError
@@ -115,8 +115,10 @@ def either(check: Check, *others: Any) -> Check:
     return wider
 
 
-def checked(engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Valid settings of ``engine``: all of ``kinds``, and no others.
+def checked(
+    engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any], optional: Collection[str] = ()
+) -> dict[str, Any]:
+    """Valid settings of ``engine``: all of ``kinds`` but ``optional`` ones, and no others.
 
     Raises
     ------
@@ -128,6 +130,8 @@ def checked(engine: str, kinds: Mapping[str, Check], settings: Mapping[str, Any]
             raise EngineError(f"{name}: {engine} has no such setting, it has {', '.join(kinds)}")
     for name, check in kinds.items():
         if name not in settings:
+            if name in optional:
+                continue
             raise EngineError(f"{name}: this setting is missing")
         wanted = check(settings[name])
         if wanted:

@@ -107,7 +107,10 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     _show_refused(proposal.refused)
     if left:
         drafts = any(change.is_draft for change in changed if change.family.id in left)
-        hint = f" (without a terminal: write reasons into {folder / FAMILIES}, and name them by --family)"
+        file = folder / FAMILIES
+        verb = "write them into" if file.exists() else "make"
+        fields = "a [[family]] with id, profiles, scene, metrics, reason and source for each"
+        hint = f" (without a terminal: {verb} {file}, {fields}; then name them by --family)"
         click.echo(f"not accepted: {', '.join(left)}{hint if drafts else ''}", err=True)
     if proposal.left_out:
         click.echo(f"not named by --family: {plural(len(proposal.left_out), 'check')} new or changed", err=True)

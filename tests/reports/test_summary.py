@@ -146,6 +146,17 @@ def test_number_of_a_scene_file_with_name_and_search_command(tmp_path):
     )
 
 
+def test_worst_kind_of_a_scene_file(tmp_path):
+    """An overlap of 20 tolerances stands first, a lost rebound of 100 is what is wrong."""
+    path = tmp_path / "a.toml"
+    path.write_text(FALL)
+    names = {"penetration": (0.02, 0.0), "final[ball.vy]": (0.9, 1.0)}
+    rows = [row("impact", 2, "bullet", "default", "new", value, truth) | {"scene": str(path), "metric": metric}
+            for metric, (value, truth) in names.items()]  # fmt: skip
+    (answer,) = answers([each | {"params": {}, "slot": each["slot"] | {"params": {}}} for each in rows])
+    assert answer.wrong == "final[ball.vy] is 0.9 instead of 1"
+
+
 @pytest.mark.parametrize(
     ("scene", "metric", "value", "words"),
     [
@@ -196,7 +207,7 @@ def test_a_profile_that_ran_at_another_step_cures_nothing(dt):
     rows += [row("stack", 2, "mujoco", "tuned", "pass", 0.0, 0.0, n=2.0) | {"dt": dt}]
     (answer,) = answers(rows)
     search = "crosscheck cure mujoco stack --param n=2 --dt 1/500 --dim 2"
-    assert answer.cure == f"no other profile was run in this case; {search} searches for settings"
+    assert answer.cure == f"other profiles ran in other cases or at other steps; {search} searches for settings"
     rows[1]["dt"] = 1 / 500
     assert answers(rows)[0].cure == "profile tuned fixes it"
 
@@ -205,7 +216,7 @@ def test_profile_that_ran_another_case_not_compared():
     rows = [row("incline", 2, "bullet", "default", "known", 0.1, 0.0, ratio=r) for r in (0.5, 0.9)]
     rows += [row("incline", 2, "bullet", "tuned", "pass", 0.0, 0.0, ratio=0.5)]
     (answer,) = answers(rows)
-    assert answer.cure.startswith("no other profile was run in this case; ")
+    assert answer.cure.startswith("other profiles ran in other cases or at other steps; ")
 
 
 def test_nearer_profile_not_called_a_cure():
