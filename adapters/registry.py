@@ -6,7 +6,7 @@ import difflib
 import json
 import os
 from functools import cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, PackageNotFoundError, entry_points
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -227,7 +227,9 @@ def loaded(entry: EntryPoint, distribution: str = "", imported: bool = True) -> 
                 raise EngineError(f"profiles: {one_line(profile, NAME)!r} is not the name of a profile")
         return Found(name, engine, one_line(engine.version() if imported else engine.listed(), NAME), "", facts)
     except ImportError as error:
-        reason = f"{one_line(error)}; {_remedy(entry, facts, distribution)}"
+        absent = isinstance(error, PackageNotFoundError)
+        why = f"{one_line(error.name, NAME)} is not installed" if absent else one_line(error)
+        reason = f"{why}; {_remedy(entry, facts, distribution)}"
         trace = "" if is_ours(entry) else trace_of(error)
         return Found(name, None, "", reason, facts, trace=trace)
     except BaseException as error:  # another package may raise anything; only its rows are lost

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reports.changes import kind_of
+from reports.terminal import print_table
 from reports.wording import at, markdown, number, plural
 from validation.judging.comparison import Change, Kind
 from validation.judging.verdicts import Physics
@@ -58,7 +59,7 @@ def as_text(releases: Sequence[Told], steps: Sequence[Step], console: Console, o
     table.add_column("", overflow="fold")
     for told in releases:
         table.add_row(*_line(told, first, steps))
-    console.print(table, highlight=False)
+    print_table(table, console, highlight=False)
     if first.times:
         console.print(Text(PACE, style="dim"))
     for version in dict.fromkeys(step.after for step in steps):

@@ -13,6 +13,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from reports.terminal import print_table
 from reports.wording import FEW, first_of, number, quantity, roles_line, setting_text, word_of
 from validation.cells import format_dt
 
@@ -25,8 +26,6 @@ AFTERWARDS = (
     "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
     "agreement is no test. The conditions in the reason of a contradiction were found afterwards too."
 )
-#: Below this width [columns] a listing has a paragraph for each entry, since columns would be a few letters wide.
-NARROW = 60
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
@@ -59,7 +58,6 @@ def _heading(text: str, console: Console) -> None:
 def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool = False) -> None:
     """Print a listing of scenes, engines, checks or runs; of checks with their reasons on demand."""
     columns = [(heading, name) for heading, name in LISTINGS[what] if reasons or name != "because"]
-    narrow = console.width < NARROW
     table = grid(*(heading for heading, _ in columns))
     last = ""
     for entry in entries:
@@ -67,13 +65,7 @@ def listed(what: str, entries: Sequence[Plain], console: Console, reasons: bool 
         if "because" in shown:  # equal reasons are printed once
             shown["because"], last = "as above" if shown["because"] == last else shown["because"], shown["because"]
         table.add_row(*map(Text, shown.values()))
-        if narrow:
-            first, *others = zip((heading for heading, _ in columns), shown.values(), strict=True)
-            console.print(Text(first[1], style="bold"))
-            told = "; ".join(f"{heading} {value}" for heading, value in others if value)
-            console.print(Padding(Text(told), (0, 0, 0, 2)))
-    if not narrow:
-        console.print(table)
+    print_table(table, console)
     if what == "engines" and (line := roles_line((e["name"], name) for e in entries for name in e["profiles"])):
         console.print(Text(line))
     if what == "suites":
@@ -131,7 +123,7 @@ def _scene(data: Plain, console: Console) -> None:
         table.add_row(
             p["name"], quantity(p["default"], p["unit"]), f"{left}{p['low']:g}, {p['high']:g}]", Text(p["because"])
         )
-    console.print(table)
+    print_table(table, console)
     _heading("Checks at the defaults, step 1/240 s", console)
     table = grid("metric", "truth", "tolerance", "because")
     last = ""
@@ -140,7 +132,7 @@ def _scene(data: Plain, console: Console) -> None:
         because = f"{check['because']} ({check['source']})"
         table.add_row(Text(check["metric"]), truth, bound, Text("as above" if because == last else because))
         last = because
-    console.print(table)
+    print_table(table, console)
     _heading("What it needs from an engine", console)
     _pairs(data["needs"], console)
 
@@ -152,8 +144,9 @@ def _engine(data: Plain, console: Console) -> None:
         console.print(Text(data["reason"]))
         _unset(data, console)
         return
-    facts = {name: data[name] for name in ("package", "dimensions", "customary_dt")}
-    _pairs(facts | {"order of a step": data["scheme"]["order"]}, console)
+    facts = {name: data[name] for name in ("package", "dimensions")}
+    step = f"{format_dt(data['customary_dt'])} s"
+    _pairs(facts | {"usual step": step, "order of a step": data["scheme"]["order"]}, console)
     _unset(data, console)
     for profile, scenes in data["profiles"].items():
         word = word_of(data["name"], profile)
@@ -164,13 +157,13 @@ def _engine(data: Plain, console: Console) -> None:
         table = grid("setting", "must be")
         for setting in data["settable"]:
             table.add_row(setting["name"], Text(setting["must_be"]))
-        console.print(table)
+        print_table(table, console)
     _heading("Quirks, and how the adapter handles them", console)
     table = grid("quirk", "what the adapter does", "source")
     table.columns[0].no_wrap = False
     for quirk in data["quirks"]:
         table.add_row(*(Text(quirk[name]) for name in ("what", "what_we_do", "source")))
-    console.print(table)
+    print_table(table, console)
     for version, why in data["known_bad_versions"].items():
         console.print(Text(f"version {version} is known to be bad: {why}"))
     if data["measured"]:
@@ -179,7 +172,7 @@ def _engine(data: Plain, console: Console) -> None:
         table.columns[0].no_wrap = False
         for fact in data["measured"]:
             table.add_row(Text(fact["says"]), Text(fact["standing"]), Text(_said_of(fact)))
-        console.print(table)
+        print_table(table, console)
         if any(fact["chosen"] or fact["because"] for fact in data["measured"]):
             console.print(Text(AFTERWARDS))
 
@@ -194,7 +187,7 @@ def _unset(data: Plain, console: Console) -> None:
     table.columns[0].no_wrap = False
     for row in rows:
         table.add_row(*(Text(text) for text in (row["what"], row["documented"], unset_text(row), row["source"])))
-    console.print(table)
+    print_table(table, console)
     for reason in dict.fromkeys(row["reason"] for row in rows if row["reason"]):
         console.print(Text(f"-: not measured: {reason}"))
 
@@ -236,7 +229,7 @@ def _settings(scenes: Mapping[str, Sequence[Plain]], console: Console) -> None:
     for (name, value, because), where in found.items():
         mark = marks.setdefault(tuple(where), f"({len(marks)})")
         table.add_row(name, Text(value), mark, Text(because))
-    console.print(table)
+    print_table(table, console)
     for names, mark in marks.items():
         if mark:
             others = tuple(scene for scene in scenes if scene not in names)
@@ -262,7 +255,7 @@ def health(data: Plain, console: Console) -> None:
     table = grid("engine", "version", "status")
     for engine in data["engines"]:
         table.add_row(engine["name"], engine["version"] or "-", Text(engine["reason"] or engine["status"]))
-    console.print(table)
+    print_table(table, console)
     console.print()
     table = grid("package", "folder")
     for name, folder in data["packages"].items():
@@ -271,7 +264,7 @@ def health(data: Plain, console: Console) -> None:
     table.add_row(
         "compiled kernels", Text(f"{cache['folder'] or 'no folder is writable, so every process compiles them'}")
     )
-    console.print(table)
+    print_table(table, console)
     console.print()
     problems = data["problems"]
     console.print(Text("no problem found" if not problems else f"{len(problems)} problem(s)", style="bold"))
@@ -291,7 +284,7 @@ def sensitivity(
     for entry in entries:
         seen = [f"{fault} {size}" for fault, size in entry.items() if fault != "name" and size]
         table.add_row(Text(entry["name"]), Text(", ".join(seen) or "none of these faults"))
-    console.print(table)
+    print_table(table, console)
     for fault, receipts in receipts_alone.items():
         console.print(
             Text(f"{fault}: no check of these scenes notices it; the property checks {', '.join(receipts)} do")
@@ -318,4 +311,4 @@ def sensitivity(
         numbers = (number(spot.moved), number(spot.allowed), f"{spot.seen_from:.1f} %", at)
         others = ", ".join(spot.seen_by) or "property checks only"
         table.add_row(*(Text(cell) for cell in (f"{spot.scene}/{spot.metric}", spot.fault, *numbers, others)))
-    console.print(table)
+    print_table(table, console)

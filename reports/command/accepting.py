@@ -11,13 +11,15 @@ from pathlib import Path
 
 import click
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
+from rich.text import Text
 
 from adapters import registry
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.selection import JOBS
 from reports.progress import run_plan
-from reports.terminal import terminal
+from reports.terminal import print_table, terminal
 from reports.wording import first_of, number, plural
 from validation.cells import Observation, prepare, slot_from_dict
 from validation.findings import Family, Findings, FindingsError, Key, files
@@ -77,7 +79,7 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
         raise FindingsError(f"family: {', '.join(sorted(unknown))}: no such cause of {engine} in {FAMILIES}")
     changed = [change for change in proposal.changes if change.asks]
     if changed:
-        console.print(_table(engine, changed))
+        _print_changes(engine, changed, console)
     chosen, written = _decide(changed, families, console)
     folder = files.findings_folder(engine)
     if folder is None:
@@ -168,16 +170,19 @@ def _is_of_this_code(observation: Observation) -> bool:
     return observation.cell == prepare(observation.slot).cell.key()
 
 
-def _table(engine: str, changes: Sequence[Change]) -> Table:
-    title = f"Known failures of {engine}: checks per cause"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name in ("cause", "listed", "new", "changed", "gone", "bands", "why"):
-        table.add_column(name, justify="left" if name in ("cause", "why") else "right", no_wrap=name == "cause")
+def _print_changes(engine: str, changes: Sequence[Change], console: Console) -> None:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in ("cause", "listed", "new", "changed", "gone", "other band"):
+        table.add_column(name, justify="left" if name == "cause" else "right", no_wrap=name == "cause")
     for change in changes:
         listed = len(change.same) + len(change.drifted) + len(change.gone) + len(change.bands)
         counts = (listed, len(change.new), len(change.drifted), len(change.gone), len(change.bands))
-        table.add_row(change.family.id, *map(str, counts), change.family.reason or "none yet")
-    return table
+        table.add_row(change.family.id, *map(str, counts))
+    console.print(Text(f"Known failures of {engine}: checks per cause", style="bold"))
+    print_table(table, console)
+    for change in changes:
+        reason = change.family.reason or "none yet"
+        console.print(Padding(Text(f"{change.family.id}: {reason}"), (0, 0, 0, 2)), highlight=False)
 
 
 def _decide(changed: Sequence[Change], named: Sequence[str], console: Console) -> tuple[set[str], list[Family]]:

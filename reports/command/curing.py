@@ -19,7 +19,7 @@ from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, fixed, scene_names_of
 from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste, panel_text
 from reports.speed import duration
-from reports.terminal import terminal
+from reports.terminal import print_table, terminal
 from reports.wording import number, params_text
 from validation.cells import parse_dt
 from validation.fixes.kept import Cure, cures_of, write, write_panels
@@ -126,7 +126,7 @@ def _show(engine: str, scene: str, dimension: int, found: Cure | Unsearched, con
     table.add_row("checks that fail", str(found.failing), str(found.left), "")
     costs = [duration(cost) if cost else "-" for cost in (found.cost_before, found.cost_after)]
     table.add_row("CPU time per step", *costs, f"{found.times:.2g} times" if found.times else "")
-    console.print(table, highlight=False)
+    print_table(table, console, highlight=False)
     if found.alone:
         text = ", ".join(f"{name} = {value}" for name, value in changes_in_words(found, found.alone))
         left = f"{found.metric} {number(found.before, 4)} -> {number(found.alone_after, 4)}"

@@ -16,7 +16,7 @@ from reports.command import statuses
 from reports.command.completion import scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, Cases, gathered, missing
-from reports.terminal import print_roles, terminal
+from reports.terminal import print_roles, print_table, terminal
 from reports.wording import profiles_called, reproduce
 from validation.catalogue import matching
 from validation.questions.frontier import FULL_RATIO, QUICK_RATIO, Bracket, axes, brackets, search, value_text
@@ -93,7 +93,7 @@ def _show(found: list[Bracket], commands: bool, console: Console) -> None:
             table.add_column(heading)
         for each in own:
             table.add_row(_who(each), *_cells(each))
-        console.print(table, highlight=False)
+        print_table(table, console, highlight=False)
         for each in own if commands else ():
             for end, said in ((each.survives, "works"), (each.fails, "fails")):
                 if end is not None:

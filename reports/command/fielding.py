@@ -12,7 +12,7 @@ from rich.text import Text
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.terminal import terminal
+from reports.terminal import print_table, terminal
 from reports.wording import number, reproduce
 from validation.field import CURED, Finding, ask, matching
 from validation.settings.switching import Reading
@@ -52,7 +52,7 @@ def _show(found: list[Finding], commands: bool) -> None:
         )
         table.add_row(Text(who), Text(note.symptom), Text(_said(each)))
         table.add_row("", "", "")
-    console.print(table, highlight=False)
+    print_table(table, console, highlight=False)
     for each in found if commands else ():
         console.print(Text(f"{each.note.source}: {reproduce(each.note.slot.as_dict())}"), soft_wrap=True)
     if not commands:

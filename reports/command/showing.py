@@ -29,7 +29,7 @@ from reports.findings import Family, families, grouped, has_answer, severity
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.tables import title_of
-from reports.terminal import print_roles, terminal
+from reports.terminal import print_roles, print_table, terminal
 from reports.wording import (
     LABELS,
     at,
@@ -276,7 +276,7 @@ def _print_families(found: Sequence[Family], console: Console, nothing: str, pla
         for family in own:
             who = f"{family.engine}/{family.profile} {names[family.scene]}"
             table.add_row(row_id(family.worst), who, _worst(family.worst), str(len(family.rows)))
-        console.print(table, highlight=False)
+        print_table(table, console, highlight=False)
     console.print()
     print_roles(((family.engine, family.profile) for family in found), console)
     said = f"crosscheck explain ID{place} says everything about a check; --all lists every check."
@@ -303,7 +303,7 @@ def _print_rows(rows: Sequence[Plain], console: Console) -> None:
     for row in rows:
         who = f"{row['engine']}/{row['profile']} {names[row['scene']]}"
         table.add_row(row_id(row), LABELS[mark_of(row)], who, _worst(row))
-    console.print(table, highlight=False)
+    print_table(table, console, highlight=False)
     print_roles(((row["engine"], row["profile"]) for row in rows), console)
 
 

@@ -147,16 +147,17 @@ def test_table_of_rows_per_family_aligned():
                *(dict.fromkeys(range(number)) for number in each)) for name, each in counts.items()
     ]  # fmt: skip
     told = io.StringIO()
-    Console(file=told, width=120).print(accepting._table("toy", changes))
-    title, header, first, second = (line for line in told.getvalue().splitlines() if re.search(r"\w", line))
+    accepting._print_changes("toy", changes, Console(file=told, width=80))
+    title, header, first, second, *reasons = (line for line in told.getvalue().splitlines() if re.search(r"\w", line))
     assert title.strip() == "Known failures of toy: checks per cause"
     assert [re.split(r" {2,}", line.strip()) for line in (header, first, second)] == [
-        ["cause", "listed", "new", "changed", "gone", "bands", "why"],
-        ["one", "150", "2", "30", "4", "5", "four sweeps"],
-        ["another", "0", "12345", "0", "0", "0", "none yet"],
+        ["cause", "listed", "new", "changed", "gone", "other band"],
+        ["one", "150", "2", "30", "4", "5"],
+        ["another", "0", "12345", "0", "0", "0"],
     ]
-    ends = [[found.end() for found in re.finditer(r"\S+", line)][1:6] for line in (header, first, second)]
+    ends = [[found.end() for found in re.finditer(r"other band|\S+", line)][1:] for line in (header, first, second)]
     assert ends[0] == ends[1] == ends[2]
+    assert [line.strip() for line in reasons] == ["one: four sweeps", "another: none yet"]
 
 
 def test_band_remeasured_from_further_starts_when_it_hides(out, findings):

@@ -239,6 +239,22 @@ def test_a_spatial_replay_offers_three_views(browser, page_file):
         assert picture(page) != front
 
 
+@pytest.mark.parametrize("width", [1200, 420])
+def test_labels_of_the_explorer_beside_its_markers(browser, page_file, width):
+    with opened(browser, page_file, "#explorer") as page:
+        page.set_viewport_size({"width": width, "height": 800})
+        page.locator(".preset[data-e='0.8']").click()
+        told = page.locator("#explorer-plot .halo").all_text_contents()
+        labels, markers = ([each.bounding_box() for each in page.locator(where).all()]
+                           for where in ("#explorer-plot .halo", "#explorer-plot path[role]"))  # fmt: skip
+    assert "e = 0.8" in told and markers
+    apart = [
+        any(a[x] + a[size] <= b[x] or b[x] + b[size] <= a[x] for x, size in (("x", "width"), ("y", "height")))
+        for a in labels for b in markers
+    ]  # fmt: skip
+    assert all(apart)
+
+
 def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
     with opened(browser, page_file, "#explorer") as page:
         curve = page.locator("#explorer-plot polyline").last

@@ -383,5 +383,15 @@ def test_listings_in_a_narrow_window():
     tables.listed("scenes", [entry], Console(file=printed, width=40))
     told = printed.getvalue().splitlines()
     assert [line.rstrip() for line in told] == [
-        "bounce", "  what Dropped ball, from the first", "  bounce to rest; dim. 2, 3"
+        "bounce", "  what: Dropped ball, from the first", "  bounce to rest; dim.: 2, 3"
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["bounce", "chipmunk"])
+def test_words_of_a_description_in_a_narrow_window(name):
+    """None is broken but those that are longer than a line."""
+    runners = [CliRunner(env={"COLUMNS": width}) for width in ("40", "400")]
+    narrow, wide = ([w.strip(";:") for w in run.invoke(main, ["describe", name]).output.split()] for run in runners)
+    long = [word for word in wide if len(word) > 36]
+    broken = [word for word in narrow if word not in wide and not any(word in each for each in long)]
+    assert len(narrow) > 200 and broken == []

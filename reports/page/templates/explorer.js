@@ -24,7 +24,11 @@
   function curve(e, opacity, width) {
     const points = Array.from({ length: bounces + 1 }, (_, n) => `${x(n)},${y(e ** (2 * n))}`);
     put("polyline", { points: points.join(" "), fill: "none", stroke: "currentColor", "stroke-opacity": opacity, "stroke-width": width });
-    put("text", { x: x(2.1), y: y(e ** 4.2) - 8, fill: "currentColor", "fill-opacity": 0.7, "font-size": 12 }, `e = ${e}`);
+  }
+  /* Right of the falling curve, between the first two clouds of markers and above the second; drawn after them. */
+  function label(e) {
+    const place = { x: x(1.5), y: (y(e ** 2) + y(e ** 4)) / 2 - 8, "font-size": 12 };
+    put("text", { ...place, fill: "currentColor", class: "halo" }, `e = ${e}`);
   }
   const shapes = {
     circle: "M-4.5,0a4.5,4.5 0 1,0 9,0a4.5,4.5 0 1,0 -9,0", square: "M-4,-4h8v8h-8z", diamond: "M0,-6 6,0 0,6 -6,0z",
@@ -63,6 +67,7 @@
     for (const faint of data.faint) curve(faint, 0.22, 1.5);
     curve(e, 0.85, 2);
     const near = points(e), list = data.measured.join(", ");
+    for (const each of [...data.faint.filter((faint) => faint !== e), e]) label(each);
     const said = e === 0 ? "The ball does not rise again." : e === 1 ? "Every bounce is as high as the last." :
       `After one bounce ${(100 * e * e).toPrecision(3)} % of the height is left, after five ${(100 * e ** 10).toPrecision(3)} %; ` +
       `half of it is gone after ${(Math.log(0.5) / (2 * Math.log(e))).toPrecision(2)} bounces.`;
