@@ -14,6 +14,9 @@
         experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
                           where there is no tuning.toml (`adapters.experiment`)
         unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
+        readings.py       READINGS: its ways to read contact forces (`adapters.readings`)
+        readings.csv      whether they are true, as measured (`validation.questions.kept_readings`)
+        force_script.py.txt   a script that reads a contact force rightly with the bare engine
         decisive.csv      decisive settings of its fixes, as measured (`validation.settings.decisive`)
         cures.csv         fixes by scene, and their cost, as measured (`validation.fixes`)
         panels.csv        what its profiles break in other cases (`validation.fixes.panel`)
@@ -45,10 +48,12 @@ from adapters.experiment.files import Tuning, read_tuning
 from adapters.isolation.foreign import importable, said_by
 from adapters.law import Deviation, Law, Measure, Prediction
 from adapters.plain import one_line
+from adapters.readings import Reading
 from adapters.scene import Scene
 from adapters.unset import Unset
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
+READINGS, READ, FORCE_SCRIPT = "readings", "readings.csv", "force_script.py.txt"
 CURES, PANELS, TUNING = "cures.csv", "panels.csv", "tuning.toml"
 
 
@@ -133,6 +138,19 @@ def unset_of(engine: str) -> tuple[Unset, ...]:
     return tuple(each for each in getattr(module, "UNSET", ()) if isinstance(each, Unset))
 
 
+@cache
+def readings_of(engine: str) -> tuple[Reading, ...]:
+    """Ways of ``engine`` to read contact forces; none if its folder lists none."""
+    module, _ = _module(engine, READINGS)
+    return tuple(each for each in getattr(module, "READINGS", ()) if isinstance(each, Reading))
+
+
+def force_script_of(engine: str) -> str:
+    """A script that reads a contact force rightly with the bare engine; empty if there is none."""
+    path = inside(engine, FORCE_SCRIPT)
+    return path.read_text(encoding="utf-8") if path else ""
+
+
 def fault_of_tuning(engine: str) -> str:
     """Error in the file or module with the tuning of ``engine``; empty if there is none."""
     return _tuning(engine)[1] or _experiments(engine)[1]
@@ -150,7 +168,7 @@ def problems() -> list[str]:
 def forget() -> None:
     """Clear caches, so that installed packages are searched again."""
     registry.forget()
-    for each in (laws_of, unset_of, _laws, _experiments, _tuning, _module):
+    for each in (laws_of, unset_of, readings_of, _laws, _experiments, _tuning, _module):
         each.cache_clear()
 
 

@@ -16,6 +16,7 @@ import pandas as pd
 import worked
 
 from adapters import registry
+from reports import readings
 from reports.cures import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.symptoms.published import passed
@@ -124,6 +125,7 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "tolerances", {"introduction": inspect.getdoc(bounds), "sections": tolerances(), "reasons": reasons()}
     yield "references", references()
     yield "worked-example", worked.example()
+    yield "forces", {"engines": [readings.told(name) for name in readings.engines()], "laws": readings.LAWS}
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
 
 

@@ -132,8 +132,8 @@ def test_the_rooms_of_validation_stand_in_a_line():
 #: What packages of others import: files and rooms, but for the folders of engines.
 GROUND = {
     "adapters": "checked_engine copied engine engine_folder experiment extras isolation law model needs plain readback "
-    "receipts recording registry releases scene script settings stages stepping trajectory unset whole conformance "
-    "new_adapter",
+    "readings receipts recording registry releases scene script settings stages stepping trajectory unset whole "
+    "conformance new_adapter",
     "validation": " ".join(["canonical catalogue posed bounds metrics geometry solids cells identity", *ROOMS]),
 }
 
@@ -215,6 +215,7 @@ OTHER_WORDS = {
     ("reports/command/inspecting.py", "tuned"): "a role",
     ("reports/command/tuning.py", "tuned"): "a role",
     ("reports/symptoms/making.py", "tuned"): "a role",
+    ("validation/questions/kept_readings.py", "tuned"): "a role",
     ("reports/tables.py", "default"): "the default of a parameter",
     ("contact_crosscheck/cases.py", "tuned"): "a role",
     ("contact_crosscheck/models.py", "default"): "the default of a parameter",

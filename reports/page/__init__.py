@@ -21,6 +21,8 @@ import jinja2
 import minify_html
 from markupsafe import Markup
 
+from adapters.engine_folder import readings_of
+from reports import readings
 from reports.answers import Answer
 from reports.findings import refusals
 from reports.matrix import leaving, unjudged, unranked
@@ -85,6 +87,8 @@ def render(source: Source) -> str:
             people=replay.people(source),
             explorer=explorer.explorer(source),
             speed=cost.speed(source),
+            forces=[readings.told(engine) for engine in source.engines if readings_of(engine)],
+            laws=readings.LAWS,
             sheet=sheet,
             take=takeaway.takeaway(source),
             said=verdicts.SAID,

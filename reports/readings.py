@@ -1,0 +1,88 @@
+"""What engines say of contact forces, as plain data for the terminal, the report and the docs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from adapters import registry
+from adapters.engine_folder import force_script_of, readings_of
+from adapters.readings import Cause, Reading
+from reports.wording import number, setting_text
+from validation.questions.kept_readings import Known, known_of
+from validation.questions.readings import SITUATIONS, STOPPED, WRONG, Judged, causes_of
+
+Plain = dict[str, Any]
+#: Names of the situations, and what is known in them.
+COLUMNS = tuple(each.name for each in SITUATIONS)
+LAWS = {each.name: each.what for each in SITUATIONS}
+
+
+def said(judged: Judged) -> str:
+    """The verdict in a word or a number, with the steps in which it is wrong if those are not all."""
+    if judged.verdict != WRONG:
+        return judged.verdict
+    if judged.where == "reads 0":
+        return judged.where
+    assert judged.off is not None
+    some = re.search(r"in (\d+) of (\d+) steps", judged.where)
+    return f"off {number(100.0 * judged.off, 2)} %" + (f" ({some[1]}/{some[2]})" if some else "")
+
+
+def told(engine: str, entries: Iterable[Known] | None = None) -> Plain:
+    """Readings of an engine with their verdicts, and its bare script.
+
+    Parameters
+    ----------
+    entries
+        What was measured; None: the kept table.
+    """
+    found, facts = list(known_of(engine) if entries is None else entries), registry.facts(engine)
+    return {
+        "engine": engine,
+        "title": facts.title if facts else engine,
+        "version": found[0].version if found else "",
+        "readings": [
+            _of_reading(reading, [e for e in found if e.call == reading.call]) for reading in readings_of(engine)
+        ],
+        "script": force_script_of(engine),
+    }
+
+
+def _of_reading(reading: Reading, entries: Sequence[Known]) -> Plain:
+    """One call: its meaning, a row for each profile or one for all, and why it is wrong or did not run."""
+    by_profile: dict[str, dict[str, Judged]] = {}
+    for each in entries:
+        by_profile.setdefault(each.profile, {})[each.judged.situation] = each.judged
+    rows = [
+        {"profile": name, "cells": {k: said(judged) for k, judged in own.items()}} for name, own in by_profile.items()
+    ]
+    if len(rows) > 1 and all(row["cells"] == rows[0]["cells"] for row in rows):
+        rows = [rows[0] | {"profile": "all"}]
+    reasons: dict[str, list[str]] = {}
+    for name, own in by_profile.items():
+        for judged in own.values():
+            texts = [judged.where] if judged.verdict == STOPPED else []
+            if judged.verdict == WRONG:
+                texts = [_text(cause) for cause in causes_of(reading, name, judged.situation)] or ["not explained"]
+            for text in texts:
+                reasons.setdefault(text, []).append(judged.situation)
+    return {
+        "call": reading.call,
+        "means": f"{reading.gives} of {reading.of}; {reading.on}; {reading.frame}; over {reading.over}",
+        "correction": reading.correction,
+        "hint": reading.hint,
+        "rows": rows,
+        "causes": [f"{', '.join(dict.fromkeys(where))}: {text}" for text, where in reasons.items()],
+    }
+
+
+def _text(cause: Cause) -> str:
+    changes = ", ".join(f"{name} = {setting_text(value)}" for name, value in cause.set.items())
+    return f"{cause.because}; right with {changes}" if changes else cause.because
+
+
+def engines() -> list[str]:
+    """Engines that list readings, in the order of the registry."""
+    return [name for name in registry.names() if readings_of(name)]
