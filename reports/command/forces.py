@@ -25,7 +25,7 @@ from validation.questions.kept_readings import measure_all, write
 @click.option("--keep", is_flag=True, help="Measure, and write the table into readings.csv of the engine's folder.")
 @AS_JSON
 def forces(engines: tuple[str, ...], measure: bool, keep: bool, as_json: bool) -> None:
-    """Show what contact forces of engines mean, and whether they are true.
+    """Show what contact forces of engines mean, and if true.
 
     For each public call that reads a contact force or impulse: what its number is, and how far it is off in six
     situations in which the forces are known: boxes at rest, on a slope, in a slide, through a blow, in flight, in a

@@ -38,7 +38,7 @@ SECTIONS = {
         "compare": ("comparing", "Show what changed between two runs."),
         "bench": ("benching", "Measure error against time, over steps and iterations."),
         "frontier": ("driving", "Find breaking points: how far a scene goes until it fails."),
-        "forces": ("forces", "Show what contact forces of engines mean, and whether they are true."),
+        "forces": ("forces", "Show what contact forces of engines mean, and if true."),
         "residuals": ("weighing", "Check reported contact forces against the laws of contact."),
         "nulls": ("guessing", "Score trivial answers that need no engine."),
         "field": ("fielding", "Run known reports (public questions and bugs) again."),
