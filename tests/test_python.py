@@ -400,7 +400,7 @@ def test_a_bench_of_an_engine_of_one_s_own(own):
 
 
 @pytest.mark.long
-def test_a_bench_measures_errors_and_times_and_draws_them(engine):
+def test_errors_times_and_plot_of_a_bench(engine):
     found = cc.bench("impact", engines=engine("chipmunk"), profiles=["tuned"], dimension=2, dts=["1/120", 1 / 240])
     points = found.frame()
     assert set(points.dt) == {1 / 120, 1 / 240} and (points.cost > 0.0).all() and points.error.notna().all()
@@ -473,7 +473,7 @@ def test_urdf_and_sdf_models_given_as_scenes(engine, read, name, reader):
     assert np.abs(there - here).max() < 9.81 * 0.05 / 240.0  # g t dt: what a step can make of a start from rest [m]
 
 
-def test_engines_and_scenes_are_tables(engine):
+def test_tables_of_engines_and_scenes(engine):
     engines, scenes = cc.engines(), cc.scenes().set_index("name")
     assert engines.set_index("name").loc[engine("chipmunk")].status == "installed"
     assert "bounce" in scenes.index and scenes.loc["bounce"].dimensions == [2, 3]

@@ -125,7 +125,7 @@ def test_contacts_name_their_bodies_in_a_wall_of_boxes(unit):
         assert point[1] == pytest.approx(heights[int(a)], abs=1e-3)
 
 
-def test_drawn_impulses_not_reported_as_momentum():
+def test_impulse_of_the_debug_drawing_left_unknown():
     """The reason of the families without values: twice the weight at rest, and of a blow what stops it."""
     rest = ENGINE.build(resting(), DT, settings(resting(), "default"))
     rest.advance(120)

@@ -26,7 +26,7 @@ def stock(engine, profile, scene="bounce"):
      ("elliptic", "elliptic", "elliptic"), ("true", True, "true"), ("False", False, "false"), ("none", None, "none"),
      ("0.01,1", (0.01, 1.0), "0.01,1"), ("warmstart,island", ("warmstart", "island"), "warmstart,island")],
 )  # fmt: skip
-def test_values_read_and_written_alike(text, value, again):
+def test_setting_value_read_from_its_own_text(text, value, again):
     found = read(text)
     assert found == value and type(found) is type(value)
     assert text_of(found) == again and read(again) == value

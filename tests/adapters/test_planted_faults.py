@@ -105,7 +105,7 @@ def test_fault_breaks_only_the_receipts_it_concerns(toy, fault, quantities):
 
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
-def test_healthy_toy_holds_every_receipt_in_both_dimensions(toy, dt):
+def test_property_checks_of_an_engine_without_faults(toy, dt):
     engine = toy()
     for dimension in (2, 3):
         needs = Needs(dimension, True, 0.5, 0.8, "impact", True, 1.0, 6.0, 1.0, 9.81, 9.81)

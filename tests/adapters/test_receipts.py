@@ -530,7 +530,7 @@ def test_measurement_at_unusual_frictions(engine, profile, friction, dt):
 @pytest.mark.optional("dart")
 @pytest.mark.parametrize("friction", [5.0, 10.0, 100.0])
 @pytest.mark.parametrize("asked", [REST, IMPACT], ids=["rest", "impact"])
-def test_measurement_with_unfinished_cones(asked, friction):
+def test_friction_measured_with_a_solver_that_stops_early(asked, friction):
     asked = replace(asked, dimension=3, friction=friction)
     assert all(slip.holds for slip in receipts(find("dart").engine, "fbf", asked, DT))
 

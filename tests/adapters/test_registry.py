@@ -105,7 +105,7 @@ def test_entry_points_read_twice(plugins: None, monkeypatch) -> None:
     assert registry.names() and calls == ["read", "read"]
 
 
-def test_a_healthy_engine_is_found_with_its_version(plugins: None) -> None:
+def test_version_of_an_installed_engine(plugins: None) -> None:
     found = registry.find("healthy")
     assert found.engine is not None and (found.version, found.reason) == ("1.2", "")
     assert registry.load("healthy").version() == "1.2"

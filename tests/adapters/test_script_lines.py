@@ -58,7 +58,7 @@ def test_numbers_are_written_as_python_reads_them_back(value, said):
     assert script.keywords({"a": value, "b": 2}) == f"a={said}, b=2"
 
 
-def test_a_state_is_told_at_the_start_at_every_tenth_and_at_the_end(capsys):
+def test_states_of_a_script_at_start_tenths_and_end(capsys):
     lines = ["import json", *script.constants(0.25, 25), "x = [0.0]", "def state():", "    return {'b': (x, [1.0])}"]
     exec(script.text([*lines, *script.stepped(["x[0] += DT"])]), {})
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]

@@ -242,7 +242,7 @@ def test_world_that_ends_early_and_fixed_body_that_moves():
         assert CHECKS["capabilities"](Sinking()) == said
 
 
-def test_the_package_on_the_path_is_ours(monkeypatch, tmp_path):
+def test_package_on_the_path_of_this_project(monkeypatch, tmp_path):
     assert CHECKS["packages"](Listening()) == ""
     elsewhere = tmp_path / "adapters" / "__init__.py"
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace(origin=str(elsewhere)))

@@ -76,7 +76,7 @@ def test_record_equal_to_readers_without_impulses(silent):
     [(without, "contacts"), (off("pose"), "poses"), (off("twist"), "twists"), (off("counts"), "counts"),
      *((off(name), f"contacts' {name}") for name in ("a", "b", "point", "normal", "impulse", "gap"))],
 )  # fmt: skip
-def test_deviating_part_of_a_record_named(change, said):
+def test_part_of_a_recorded_run_that_differs_named(change, said):
     engine = Recorder(change)
     assert worlds._recorded_otherwise(engine, sliding(), "second", 4, 3) == said
     assert all(world.closed == 1 and world.steps == 13 for world in engine.built)

@@ -51,7 +51,7 @@ def test_a_slow_down_is_the_factor_that_was_planted():
     assert change["engine"] == "bullet"
 
 
-def test_filters_and_exit_codes():
+def test_comparison_with_filters_and_its_exit_code():
     assert changes("flip", "base", "--only-regressed") == (0, [])
     assert changes("flip", "base", "--fail-on", "changes")[0] == 1
     assert changes("base", "flip", "--fail-on", "never")[0] == 0

@@ -67,7 +67,7 @@ def asked(monkeypatch):
         (None, None, "Failed", "there is no result of speed: the case did not finish"),
     ],
 )  # fmt: skip
-def test_how_a_check_ends(asked, found, finding, how, said):
+def test_outcome_of_a_check_by_result_and_listing(asked, found, finding, how, said):
     ended, told, item = asked(found, finding)
     assert (ended, told) == (how, said)
     numbers = [] if found is None else [("value", 1.0), ("truth", 2.0), ("tolerance", 0.1)]

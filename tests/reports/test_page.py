@@ -149,7 +149,7 @@ def test_one_changed_letter_of_the_script_breaks_the_policy():
     assert policy("a{}", "f()") != policy("a{}", "g()")
 
 
-def test_names_reasons_and_logs_are_escaped_everywhere(elements, text):
+def test_escaped_names_reasons_and_logs_of_the_page(elements, text):
     assert EVIL not in text and EVIL in elements.read
     assert not any("hacked" in code for (_, attributes), code in elements.code if "type" not in attributes)
     assert "img" not in {tag for tag, _ in elements.tags}

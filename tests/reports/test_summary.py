@@ -435,7 +435,7 @@ def call(*arguments):
     return CliRunner(env={"COLUMNS": "100"}).invoke(main, [str(a) for a in arguments])
 
 
-def test_findings_lists_every_failing_row_once_and_filters(two_engines):
+def test_findings_of_every_failing_row_and_with_filters(two_engines):
     out, _ = two_engines
     rows = json.loads(call("findings", "--all", "--json", "--out", out).stdout)
     every = json.loads(call("findings", "--json", "--out", out).stdout)

@@ -76,7 +76,7 @@ def test_a_ratio_below_its_floor_is_no_failure(measured, tmp_path):
     assert result.exit_code == 0 and "below floor" in result.stdout
 
 
-def test_only_scenes_of_the_table_can_be_chosen(measured):
+def test_scene_outside_the_table_refused(measured):
     assert call("stack").exit_code == 0
     ((table, _),) = measured
     assert {case.scene for case in table.cases} == {"stack"} and len(table.cases) == 5

@@ -207,7 +207,7 @@ def test_titles_of_scenes_are_listed_whole():
     assert all(" ".join(scene.title.split()) in told for scene in CATALOGUE.values())
 
 
-def test_profiles_are_listed_and_described_with_their_roles():
+def test_roles_of_profiles_in_list_and_describe():
     assert "Profiles: classical: textbook; reference: exact; default: as shipped" in call("list", "engines").stdout
     told = call("describe", "chipmunk").stdout.splitlines()
     assert "Profile default (as shipped)" in told and "Profile tuned" in told

@@ -142,7 +142,7 @@ def test_alarms_are_worse_than_everything_else():
     assert max(map(MARKS.index, alarms)) < min(map(MARKS.index, quiet))
 
 
-def test_fields_do_not_mix_scenes_dimensions_engines_or_profiles():
+def test_one_field_for_each_scene_dimension_engine_and_profile():
     rows = [ROW, replace(ROW, scene="bounce"), replace(ROW, dimension=3), replace(ROW, engine="bullet"),
             replace(ROW, profile="default")]  # fmt: skip
     matrix = matrix_of([row.as_dict() for row in rows])

@@ -141,7 +141,7 @@ def test_undetermined_motion_judged_before_the_branch_and_by_invariants(tmp_path
     [("at[0.05 s][box.x]", 0.05), ("at[1e-05 s][a.b.omega]", 1e-5), ("final[box.x]", None), ("energy_growth", None),
      ("at[0.5 s][box.fx]", None), ("at[0.5 s][floor/box.fz]", None), ("least at[0.5 s][box.fz]", None)],
 )  # fmt: skip
-def test_only_an_instantaneous_state_is_independent_of_the_future(metric, at):
+def test_instant_of_a_metric_by_its_name(metric, at):
     assert instant_of(metric) == at
 
 

@@ -233,7 +233,7 @@ def test_a_cure_is_pasted_with_the_values_of_its_own_cell():
     assert cure_paste(replace(CURE, changes={})) == ""
 
 
-def test_few_cells_stand_for_a_scene_of_many():
+def test_number_of_cases_searched_for_a_fix():
     for scene in ("impact", "bounce", "stack", "pinch"):
         found = asked_of(scene, 2)
         assert 1 <= len(found) <= cures.MOST_CELLS

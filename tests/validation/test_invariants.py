@@ -421,7 +421,7 @@ def test_infinite_energy_as_growth():
     assert not np.isfinite(growth)
 
 
-def test_growth_less_ripples_and_round_off_of_the_work():
+def test_energy_growth_without_round_off_of_the_work():
     """Two balls that fall at 4 m/s each under 8 m/s^2; and one that has come far under a load that moves little."""
     scene = over_floor(ball("a"), ball("b"), gravity=(0.0, -8.0))
     speed = np.array([0.0, -4.0])

@@ -69,7 +69,7 @@ def test_merging_twice_adds_nothing(tmp_path, monkeypatch):
     assert contents(ours) == before
 
 
-def test_runs_of_one_id_from_two_machines_are_both_kept(tmp_path, monkeypatch):
+def test_runs_of_one_id_from_two_machines_merged(tmp_path, monkeypatch):
     """Two machines that start in the same second give the same id."""
     ours = filled(tmp_path / "a", "one", monkeypatch)
     theirs = filled(tmp_path / "b", "two", monkeypatch, (0.9,))

@@ -224,7 +224,7 @@ def test_mujoco_throws_up_what_slides_as_measured():
     assert ran(slot).twist[1, 1, 2] == pytest.approx(-9.81 / 500)
 
 
-def test_mujoco_throws_apart_what_overlaps_as_measured():
+def test_speed_of_overlapping_bodies_on_mujoco_as_measured():
     """The speed falls with the step to a limit, and was measured there: 21.5 J of two bodies of 1 kg."""
     slots = [slot_of("overlap", "mujoco", "default", dt, depth=1.0, duration=0.1) for dt in (1 / 240, 1 / 1000, 1e-4)]
     each = [0.5 * float(np.diff(ran(slot).twist[-1, :, 0])[0]) for slot in slots]

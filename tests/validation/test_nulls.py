@@ -138,7 +138,7 @@ def test_touching_null_bodies_with_common_momentum():
     assert found.pose[-1, 1, 0] - found.pose[-1, 0, 0] == pytest.approx(1.0, abs=3.0 * DT)
 
 
-def test_three_null_bodies_in_a_row_stopped_by_a_wall():
+def test_row_of_inelastic_discs_stopped_by_a_wall():
     row = [disc("a", 0.0, 4.0), disc("b", 1.5), disc("c", 3.0)]
     free = perfectly_inelastic(scene_of(*row, duration=3.0), DT)
     assert free.twist[-1, :, 0] == pytest.approx([4.0 / 3.0] * 3)

@@ -113,7 +113,7 @@ def test_a_named_engine_that_does_not_know_a_setting_is_refused():
         slots(Request(["bounce"], ["chipmunk", "reference"], sets=(("damping", 0.5),)))
 
 
-def test_a_model_is_asked_with_its_own_profile():
+def test_profile_of_a_model_file():
     pytest.importorskip("mujoco")
     model = pinned(str(next(iter(sorted(MODELS.glob("*.xml"))))))
     for slot in slots(Request([model], ["mujoco"], sets=(("cone", "elliptic"),))):

@@ -183,7 +183,7 @@ def test_absent_system_facts_as_nothing(monkeypatch):
     assert state._open_files() == 0 and state._folder() is None
 
 
-def test_watched_functions_classes_and_modules():
+def test_names_watched_in_a_process():
     found = state._names()
     assert {"json", "numpy.linalg", "math", "validation.running.state", "validation.running.state.State"} <= set(found)
     assert "types" not in found and not any(name.startswith(("pytest", "reports")) for name in found)

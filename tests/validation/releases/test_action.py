@@ -76,7 +76,7 @@ def test_never_fails_for_no_change(job):
 
 
 @pytest.mark.long
-def test_without_a_base_nothing_is_installed_or_compared(job):
+def test_action_without_a_base(job):
     home = job("3.0", 0, BASE="")
     assert not (home / "crosscheck-out" / "base.json").exists()
     assert (home / "crosscheck-out" / "comment.md").read_text() == ""

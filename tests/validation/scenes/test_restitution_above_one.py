@@ -61,7 +61,7 @@ def test_wrong_gain_and_a_speed_across_fail(size):
     assert failing(canonical, scene, askew) == {"astray"}
 
 
-def test_clamped_restitution_or_a_resting_ball_fails():
+def test_clamped_restitution_and_resting_ball_detected():
     canonical, scene = made("restitution_above_one")
     assert failing(canonical, scene, thrown(scene, e=1.0)) == {"growth", "blows"}
     tired = thrown(scene)

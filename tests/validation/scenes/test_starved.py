@@ -85,7 +85,7 @@ def test_fully_solved_row_passes(n, dt):
 
 
 @pytest.mark.parametrize(("sweeps", "warm"), [(1, True), (1, False), (2, False), (4, False), (10, False)])
-def test_starved_row_gives_way(sweeps, warm):
+def test_displacement_of_a_row_with_too_few_iterations(sweeps, warm):
     """Impulses of the step before are half of the answer: who throws them away starves with ten sweeps."""
     canonical, scene = made("starved")
     found = failing(canonical, scene, swept(scene, sweeps, warm=warm))
