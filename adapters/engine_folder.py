@@ -8,6 +8,7 @@
         releases.py       RELEASES: what older releases do differently (`adapters.releases`)
         changes.toml      notes of the engine on changes over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
+        targets.toml      how the bench compares the engine with our textbook step (validation/bench/targets.toml)
         tuning.toml       settings for tuning, and fixes whose settings are measured (`adapters.experiment.files`)
         findings/         families.toml, which proves them too, and members.csv (`validation.findings`), breaks.toml
                           and breaks.csv

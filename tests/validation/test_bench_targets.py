@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from adapters import registry
+from adapters.engine import EngineError
 from adapters.scene.near import start_overlap
 from validation.bench import targets
 from validation.bench.errors import Found, column, drift, errors_of, heap, wall
@@ -18,6 +19,20 @@ from validation.bench.units import scene_of
 from validation.cells import Slot
 
 ASKED = table()
+
+
+def test_opponents_and_floors_from_the_folders_of_engines():
+    folders = {name for name in registry.names() if targets.inside(name, "targets.toml")}
+    assert set(ASKED.opponents) == folders >= {"chipmunk", "bullet", "mujoco"}
+    assert {name for case in ASKED.cases for name in case.against} == folders
+
+
+def test_scene_of_an_engine_that_is_not_in_the_table(monkeypatch, tmp_path):
+    file = tmp_path / "targets.toml"
+    file.write_text('role = "shipped"\nsweeps = true\nfloor = "10 sweeps"\n[against]\n"a tower" = []\n')
+    monkeypatch.setattr(targets, "inside", lambda name, _: file if name == "chipmunk" else None)
+    with pytest.raises(EngineError, match=r"targets.toml: 'a tower' is no title of targets.toml"):
+        table()
 
 
 # ---- the search for equal error --------------------------------------------------------------------------------------

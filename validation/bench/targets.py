@@ -1,6 +1,6 @@
 """Lead of the textbook step over each engine: ratios of time at 10 sweeps and at equal error, with floors and targets.
 
-    targets.toml     scenes, opponents, least ratio (floor) and desired ratio (target)
+    targets.toml     scenes; in engines' folders: how an engine is compared, least ratio (floor), desired ratio (target)
        |
     errors.py        errors of each opponent and of ours, in a process that may die
        |  search: our fewest sweeps whose errors are no larger than theirs
@@ -23,7 +23,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adapters import registry
-from adapters.engine import Role
+from adapters.engine import EngineError, Role
+from adapters.engine_folder import inside
 from adapters.stepping import step_count
 from validation.bench.agreement import ratio
 from validation.bench.errors import Found, errors_of
@@ -158,17 +159,40 @@ class Row:
 
 
 def table(path: Path = TABLE) -> Table:
-    """Read the table of scenes, opponents, floors and targets."""
+    """Read the table of scenes, and the opponents, floors and targets that engines' folders state.
+
+    Raises
+    ------
+    EngineError
+        If a folder names a scene that is not in the table.
+    """
     data = tomllib.loads(path.read_text(encoding="utf-8"))
-    sweeps = data["sweeps"]
+    sweeps, titles = data["sweeps"], {entry["title"] for entry in data["scenes"]}
+    files = {name: file for name in sorted(registry.names(), key=_apart) if (file := inside(name, TABLE.name))}
+    stated = {name: tomllib.loads(file.read_text(encoding="utf-8")) for name, file in files.items()}
+    against = {name: entry.pop("against") for name, entry in stated.items()}
+    timed_only = {name: entry.pop("timed_only", ()) for name, entry in stated.items()}
+    for name, file in files.items():
+        if unknown := {*against[name], *timed_only[name]} - titles:
+            raise EngineError(f"{file}: {min(unknown)!r} is no title of {path.name}")
     opponents = {
         name: Opponent(name, **{**entry, "sweeps": sweeps if entry["sweeps"] else None})
-        for name, entry in data["opponents"].items()
+        for name, entry in stated.items()
     }
-    cases = (
-        Case(**{"sweeps": sweeps, **entry, "dt": parse_dt(entry.get("dt", data["dt"]))}) for entry in data["scenes"]
-    )
+    cases = [
+        Case(
+            **{"sweeps": sweeps, **entry, "dt": parse_dt(entry.get("dt", data["dt"]))},
+            against={name: own[entry["title"]] for name, own in against.items() if entry["title"] in own},
+            timed_only=[name for name, own in timed_only.items() if entry["title"] in own],
+        )
+        for entry in data["scenes"]
+    ]
     return Table(tuple(cases), opponents, tuple(data["equal_error"]["twice"]))
+
+
+def _apart(name: str) -> bool:
+    told = registry.facts(name)
+    return told is None or told.apart
 
 
 def fewest_sweeps(reaches: Callable[[int], bool | None], least: int, most: int) -> int | None:
