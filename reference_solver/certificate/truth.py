@@ -13,6 +13,7 @@ What is decided within round-off (which of two corners strikes first, whether wh
 order of bodies and by signs: the mirrored world, its bodies in reverse order, is as true, and ends where the run does.
 What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
 tells that is made to a hundredth of the accuracy.
+Of the event loop steps say only when it is looked at: it is made again to a finer and to a coarser tolerance instead.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
 far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
 (`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
@@ -30,6 +31,7 @@ touch each other meet in one instant and round-off decides which of them comes f
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
 from math import gcd, sqrt
@@ -50,8 +52,9 @@ from reference_solver.certificate.audit import (
 )
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
+from reference_solver.exact.refusals import Refused
 from reference_solver.geometry import reach, rotation
-from reference_solver.model import Array, Model
+from reference_solver.model import POSE_SIZE, Array, Model
 from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
 from reference_solver.records import Record
 from reference_solver.settings import Settings
@@ -69,6 +72,9 @@ BLOCK, FINER, FINEST = 5, 5.618, 11.09
 #: Share of the accuracy of phases (E35) to which a run is made again: it tells what all runs are off alike, whatever
 #: their steps, since the solver judges by it how long its phases may be.
 CLOSER = 1e-2
+#: Shares of the tolerance of the event loop to which a run is made again. The finer one's steps are three quarters as
+#: long, those of the coarser one 1.3 times.
+TOLERANCES = (0.1, 10.0)
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
 #: Distances from the origin to which the run is moved, in smallest half widths. At the second one gaps are closed some
@@ -178,7 +184,7 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs twelve to twenty runs and the audit.
+    """Run ``model`` and certify the run; costs twelve to twenty runs, seven of the event loop, and the audit.
 
     Raises
     ------
@@ -188,7 +194,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     if steps < 1:
         raise ValueError(f"steps: {steps!r} must be a whole number of at least 1")
     run = Simulation(model, settings)
-    record = run.record(steps, stride, pieces=True)
+    try:
+        record = run.record(steps, stride, pieces=True)
+    except Refused as refused:
+        return _no_run(model, settings, steps // stride, stride, str(refused))
     growth, horizon, moved, size = _horizon(model, settings, record, steps, stride)
     beyond = f"a last-place disturbance has grown {GROWTH:.0g}-fold"
     beyond = f"beyond {horizon:.3g} s {beyond}: only laws hold there"
@@ -208,7 +217,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
-    findings = [*audit(model, record, settings.dt, located=settings.scheme == "located"), shared]
+    findings = [*audit(model, record, settings.dt, located=settings.scheme in ("located", "exact")), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
@@ -244,6 +253,30 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     if horizon < record.t[-1]:
         reasons.append(beyond)
     return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: str) -> Certificate:
+    """Return the certificate of a run that the event loop refuses."""
+    t = np.multiply(stride * settings.dt, np.arange(samples + 1), dtype=np.float64)
+    none = np.full(samples + 1, np.inf)
+    pose = np.full((samples + 1, len(model.bodies), POSE_SIZE[model.dimension]), np.nan)
+    light = Simulation(model, settings).certificate
+    made = (none, none, float("inf"), float("inf"), "", False, none, settings.dt, 0.0, none, light, pose)
+    return Certificate(False, (why,), (), t, *made)
+
+
+def _poses(model: Model, settings: Settings, steps: int, stride: int) -> Array:
+    """Return poses (s, n, 3 | 7) of a run, no numbers from where the event loop refuses it."""
+    simulation = Simulation(model, settings)
+    if settings.scheme != "exact":
+        return simulation.record(steps, stride).pose
+    found = np.full((steps // stride + 1, *simulation.pose.shape), np.nan)
+    found[0] = simulation.pose
+    with suppress(Refused):
+        for sample in range(1, len(found)):
+            simulation.advance(stride)
+            found[sample] = simulation.pose
+    return found
 
 
 def _determined(model: Model, t: Array, apart: Array, limit: float) -> float:
@@ -300,7 +333,7 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
     within = found.t < found.horizon
     for far in PLACES:
         change = away(model, far)
-        moved = Simulation(change.model(model), settings).record(steps, stride).pose
+        moved = _poses(change.model(model), settings, steps, stride)
         apart = distance(model, change.pose(found.pose, found.t), moved)
         # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
         error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
@@ -318,6 +351,8 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
 def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
     """Bound (s,) of what the record of ``run`` is off for its finite step [m]; the largest so far."""
     settings = run.settings
+    if settings.scheme == "exact":
+        return _error_of_loop(model, settings, record, steps, stride)
     half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
     error = 2.0 * distance(model, record.pose, half.pose)
     samples = len(record.t) - 1
@@ -327,8 +362,7 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     until = (np.arange(samples + 1) + each - 1) // each
     beyond = run.record(blocks * block - samples * stride, stride).pose[1:]
     coarse = np.concatenate([record.pose, beyond])[::each]
-    ends, way, speed = ends_of_series(model, record, settings.dt)
-    leaves_out = len(ends) > 0
+    leaves_out = len(ends_of_series(model, record, settings.dt)[0]) > 0
     for ratio in (FINER, FINEST) if leaves_out else (FINER,):
         more = next(k for k in count(round(ratio * block)) if gcd(k, block) == 1)
         share = block / more
@@ -342,13 +376,27 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
         # An error that falls with the accuracy that is asked for is made a hundredth of.
         closer = Simulation(model, replace(settings, accuracy=CLOSER * settings.accuracy)).record(steps, stride)
         error = np.maximum(error, distance(model, record.pose, closer.pose) / (1.0 - CLOSER))
+    return _with_ends(model, record, settings.dt, error)
+
+
+def _error_of_loop(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> Array:
+    """Bound (s,) of what a run of the event loop is off for its tolerance [m]: steps say only when it is looked at."""
+    error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
+    for share in TOLERANCES:  # bodies that nothing touches may turn as well
+        other = _poses(model, replace(settings, accuracy=share * settings.accuracy), steps, stride)
+        error = np.maximum(error, 2.0 * distance(model, record.pose, other))
+    return _with_ends(model, record, settings.dt, error)
+
+
+def _with_ends(model: Model, record: Record, dt: float, error: Array) -> Array:
+    """Return the error (s,) with round-off, and with what ends of slips and of series leave out [m]."""
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
     least = min(smallest_extent(body.shape) for body in model.bodies)
     if model.dimension == 3 and len(record.pieces.body_a if record.pieces else ()):
         noise += SLIP_ENDS * least
-    for end, at_once, onward in zip(ends, way, speed, strict=True):
+    for end, at_once, onward in zip(*ends_of_series(model, record, dt), strict=True):
         since = np.maximum(record.t - end, 0.0)
-        allowed = SERIES_ENDS * least * (1.0 + since / settings.dt / SERIES_STEPS)
+        allowed = SERIES_ENDS * least * (1.0 + since / dt / SERIES_STEPS)
         noise += np.where(record.t >= end, np.maximum(allowed, at_once + onward * since), 0.0)
     return np.maximum.accumulate(error + noise)
 
@@ -358,8 +406,8 @@ def _mirrored(model: Model, settings: Settings, steps: int, stride: int) -> Arra
     d = model.dimension
     mirror = Change(d, signs=(-1.0,) + (1.0,) * (d - 1))
     backwards = list(range(len(model.bodies)))[::-1]
-    record = Simulation(mirror.model(permuted(model, backwards)), settings).record(steps, stride)
-    return mirror.pose(record.pose[:, backwards], record.t)
+    pose = _poses(mirror.model(permuted(model, backwards)), settings, steps, stride)
+    return mirror.pose(pose[:, backwards], np.multiply(stride * settings.dt, np.arange(len(pose)), dtype=np.float64))
 
 
 def _horizon(
@@ -375,8 +423,7 @@ def _horizon(
         if body.motion == "free":
             twist[:d] += size * random.choice([-1.0, 1.0], d)
         bodies.append(replace(body, twist=tuple(twist)))
-    other = Simulation(replace(model, bodies=bodies), settings).record(steps, stride)
-    apart = distance(model, record.pose, other.pose)
+    apart = distance(model, record.pose, _poses(replace(model, bodies=bodies), settings, steps, stride))
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
     free_flight = size * np.sqrt(d) * max(record.t[-1], settings.dt) + noise
     growth = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf) / free_flight)

@@ -12,9 +12,11 @@ from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.forces import STILL, accelerations
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import Problem
+from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import NoImpulses, TooManyImpacts
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
+from reference_solver.pieces import CHAIN, FROZEN
 
 #: Impacts of one instant, and of how many of them the speeds are compared to tell a cycle.
 MOST, LOOK_BACK = 4096, 64
@@ -24,43 +26,46 @@ SLOW = 1e-6
 Pair = tuple[int, int]
 
 
-def strike(world: World, state: State, contacts: Contacts) -> State:
-    """Return the state after all impacts of the instant; the same state where nothing that touches approaches.
+def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
+    """Return all impacts of the instant, one after the other; none where nothing that touches approaches.
 
     Raises
     ------
     NoImpulses, TooManyImpacts
         If bodies cannot part, or impacts do not end.
     """
+    blows: list[Blow] = []
     if not len(contacts):
-        return state
+        return blows
     pairs = contacts.pairs
     stopped: set[Pair] = set()  # pairs whose rebounds are over
     cycle: set[Pair] = set()
     fastest: list[float] = []
-    struck = False
     for count in range(MOST):
         contacts.at_state(state)
         approach = _least_of_pairs(pairs, contacts.rows.speed[:, 0])
         closing = {pair for pair, speed in approach.items() if speed < -STILL}
         if not closing:
-            return series.settled(world, state, contacts) if struck else state
+            last = series.settled(world, state, contacts) if blows else None
+            return blows if last is None else [*blows, last]
         fastest.append(-min(approach.values()))
         takes_part = {pair for pair, speed in approach.items() if speed < _parting(world, pair, fastest[-1])}
+        scheme = FROZEN
         if count % (2 * LOOK_BACK) >= LOOK_BACK:
             cycle |= closing
         if count % (2 * LOOK_BACK) == 2 * LOOK_BACK - 1:
             # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22).
             if max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK]):
-                takes_part, stopped = cycle, stopped | cycle
+                takes_part, stopped, scheme = cycle, stopped | cycle, CHAIN
             cycle = set()
         part = contacts.chosen(np.array([pair in takes_part for pair in pairs]))
-        after = _struck(state, part, stopped)
-        low = series.too_low(world, after, part) - stopped
+        blow = _struck(state, part, stopped)
+        low = series.too_low(world, blow.after, part) - stopped
         if low:  # the impact again, without the rebounds that are too low
             stopped |= low
-            after = _struck(state, part, stopped)
-        state, struck = after, True
+            blow = _struck(state, part, stopped)
+        blows.append(replace(blow, scheme=scheme))
+        state = blow.after
     raise TooManyImpacts(count=MOST, t=state.t)
 
 
@@ -76,8 +81,8 @@ def _least_of_pairs(pairs: list[Pair], speeds: Array) -> dict[Pair, float]:
     return least
 
 
-def _struck(state: State, part: Contacts, stopped: set[Pair]) -> State:
-    """Return the state after one impact of contacts, solved without forces: u+ >= -e u- of each that approaches."""
+def _struck(state: State, part: Contacts, stopped: set[Pair]) -> Blow:
+    """Return one impact of contacts, solved without forces: u+ >= -e u- of each that approaches."""
     part.at_state(state)
     rebounds = np.array([pair not in stopped for pair in part.pairs]) * part.restitution
     wanted = part.rows.speed.copy()
@@ -86,11 +91,11 @@ def _struck(state: State, part: Contacts, stopped: set[Pair]) -> State:
         impulses = Problem.of(part, wanted.ravel()).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
-    return replace(state, velocity=state.velocity + part.changes(impulses))
+    return Blow.of(replace(state, velocity=state.velocity + part.changes(impulses)), part, impulses)
 
 
-def jam(world: World, state: State, contacts: Contacts, instant: float) -> State:
-    """Return the state after impulses of an instant [s] without forces: an impact without a collision (E54).
+def jam(world: World, state: State, contacts: Contacts, instant: float) -> Blow:
+    """Return the impulses of an instant [s] without forces: an impact without a collision (E54).
 
     Raises
     ------
@@ -101,4 +106,4 @@ def jam(world: World, state: State, contacts: Contacts, instant: float) -> State
     free = free_acceleration(world, state.axes, state.velocity)
     wanted = contacts.rows.speed.ravel() + instant * accelerations(contacts, free)
     impulses = Problem.of(contacts, wanted).solved(state.t).forces
-    return replace(state, velocity=state.velocity + contacts.changes(impulses))
+    return Blow.of(replace(state, velocity=state.velocity + contacts.changes(impulses)), contacts, impulses)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from reference_solver.exact.impacts import jam, strike
 from reference_solver.exact.motion import Piece, constant, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
 from reference_solver.exact.projection import projected
+from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
 from reference_solver.exact.rows import Contacts, touching_contacts
 from reference_solver.exact.stiff import step
@@ -45,6 +46,8 @@ class Loop:
         Error of a step of `Turning`.
     longest
         Longest piece [s]: longer ones would be the same.
+    blows
+        What came before the piece that is returned next.
     """
 
     world: World
@@ -54,11 +57,12 @@ class Loop:
     step: float = 0.0
     pieces: int = 0
     at_once: int = 0
+    blows: list[Blow] = field(default_factory=list)
     held: Held | None = None  # what goes on from the piece before
     left: frozenset[tuple[int, ...]] = frozenset()  # contacts at the end of a feature
 
-    def next_piece(self) -> Piece:
-        """Return the motion up to the next event, and move the world to its end.
+    def next_piece(self) -> tuple[list[Blow], Piece]:
+        """Return what strikes bodies now and the motion up to the next event, and move the world to its end.
 
         Raises
         ------
@@ -77,16 +81,19 @@ class Loop:
                 continue
             piece = self._cut(piece, event)
             check(self.world, piece)
+            blows, self.blows = self.blows, []
             self.held = self._entered(piece, event)
-            return piece
+            return blows, piece
 
     def _found(self) -> Held | None:
         """Find what touches, strike it, and decide forces; None where a jam changed velocities instead."""
         contacts = touching_contacts(self.world, self.state, self.left)
-        struck = strike(self.world, self.state, contacts)
-        if struck is not self.state:
+        blows = strike(self.world, self.state, contacts)
+        if blows:
+            struck = blows[-1].after
             velocity = np.where(np.abs(struck.velocity) < NO_SPEED, 0.0, struck.velocity)
             self.state = replace(struck, velocity=velocity)
+            self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
             contacts = touching_contacts(self.world, self.state, self.left)
         free = free_acceleration(self.world, self.state.axes, self.state.velocity)
         try:
@@ -95,14 +102,20 @@ class Loop:
             self._jam(contacts)
             return None
         self.step = 0.0
-        self.state = projected(self.world, self.state, held)
+        self._project(held)
         return held
+
+    def _project(self, held: Held) -> None:
+        self.state, blow = projected(self.world, self.state, held)
+        self.blows += [] if blow is None else [blow]
 
     def _jam(self, contacts: Contacts) -> None:
         try:
-            self.state = jam(self.world, self.state, contacts, INSTANT)
+            blow = jam(self.world, self.state, contacts, INSTANT)
         except NoSolution:
             raise NoForces(t=self.state.t) from None
+        self.blows.append(blow)
+        self.state = blow.after
         self._count("a jam")
 
     def _piece(self, held: Held) -> Piece:
@@ -149,7 +162,7 @@ class Loop:
         """Return contacts that stay closed, with their forces where the world is now."""
         if not len(held.contacts):
             return replace(held, acceleration=free_acceleration(self.world, self.state.axes, self.state.velocity))
-        self.state = projected(self.world, self.state, held)
+        self._project(held)
         return held.at(self.state, free_acceleration(self.world, self.state.axes, self.state.velocity))
 
     def _revised(self, held: Held, event: Event) -> Held | None:

@@ -11,34 +11,41 @@ from numpy.typing import NDArray
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import SLIPPING, Held
 from reference_solver.exact.problem import SINGULAR, STICK
+from reference_solver.exact.record import Blow
 from reference_solver.model import Array
+from reference_solver.pieces import ROCKING
 
 #: Gaps that are left alone, as a share of the smallest half width, and speeds [m/s].
 GAP, SPEED = 1e-14, 1e-13
 
 
-def projected(world: World, state: State, held: Held) -> State:
+def projected(world: World, state: State, held: Held) -> tuple[State, Blow | None]:
     """Return the state with gaps of held contacts closed, and speeds taken off along rows that are held.
 
-    Ways and changes of velocity are those of the least kinetic energy: M^-1 G'.
+    Ways and changes of velocity are those of the least kinetic energy: M^-1 G'. What is left of slips is more than
+    round-off: what takes it off is a blow of the record.
     """
     contacts, d = held.contacts, world.dimension
     if not len(contacts):
-        return state
+        return state, None
     rows = contacts.at_state(state).rows
     normal = np.arange(len(contacts)) * d
     if np.abs(rows.gap).max() > GAP * world.size:
         for _ in range(2):
-            state = state.moved(_least(contacts.matrices, normal, -contacts.rows.gap).reshape(state.velocity.shape))
+            least = _least(contacts.matrices, normal, -contacts.rows.gap)
+            state = state.moved((contacts.matrices[1] @ least).reshape(state.velocity.shape))
             contacts.at_state(state)
-    sticks = np.flatnonzero((held.answer.modes == STICK) | _at_end(held))
+    ended = _at_end(held)
+    sticks = np.flatnonzero((held.answer.modes == STICK) | ended)
     keeps = np.concatenate([normal, (sticks[:, None] * d + np.arange(1, d)).ravel()])
     speed = contacts.rows.speed.ravel()[keeps]
-    if np.abs(speed).max() > SPEED:
-        change = _least(contacts.matrices, keeps, -speed).reshape(state.velocity.shape)
-        state = replace(state, velocity=state.velocity + change)
-        contacts.at_state(state)
-    return state
+    if np.abs(speed).max() <= SPEED:
+        return state, None
+    impulses = _least(contacts.matrices, keeps, -speed).reshape(-1, d)
+    after = replace(state, velocity=state.velocity + contacts.changes(impulses))
+    blow = Blow.of(after, contacts, impulses, ROCKING) if ended.any() else None
+    contacts.at_state(after)
+    return after, blow
 
 
 def _at_end(held: Held) -> NDArray[np.bool_]:
@@ -51,7 +58,8 @@ def _at_end(held: Held) -> NDArray[np.bool_]:
 
 
 def _least(matrices: tuple[Array, Array], rows: NDArray[Any], wanted: Array) -> Array:
-    """Return the way (N,) of the least energy that changes rows by what is wanted (r,)."""
+    """Return the impulses (m d,) of the least energy that change rows by what is wanted (r,)."""
     row, yields = matrices
-    found = np.linalg.lstsq(row[rows] @ yields[:, rows], wanted, rcond=SINGULAR)[0]
-    return np.asarray(yields[:, rows] @ found)
+    out = np.zeros(len(row))
+    out[rows] = np.linalg.lstsq(row[rows] @ yields[:, rows], wanted, rcond=SINGULAR)[0]
+    return out

@@ -16,8 +16,10 @@ from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import STILL, accelerations, decide
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK, Problem, directed
+from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import Refused
 from reference_solver.exact.rows import Contacts
+from reference_solver.pieces import ROCKING
 
 #: Rebounds no higher than this share of the smallest half width are summed.
 LOW = 1e-13
@@ -50,16 +52,18 @@ def too_low(world: World, state: State, contacts: Contacts) -> set[tuple[int, in
     }
 
 
-def settled(world: World, state: State, contacts: Contacts) -> State:
-    """Return the state with contacts closed that rock or rebound too low to be followed."""
+def settled(world: World, state: State, contacts: Contacts) -> Blow | None:
+    """Return impulses that close contacts which rock or rebound too low to be followed; None if there are none."""
     low, stay = _low(world, state, contacts)
     if not low.any():
-        return state
+        return None
     closed = low | np.array([name in stay for name in contacts.names])
     directions = directed(contacts.rows.speed[:, 1:], STILL)
     modes = np.where(closed, np.where(low | directions.any(axis=1), SLIP, STICK), OPEN)
     found = Problem.of(contacts, contacts.rows.speed.ravel()).with_modes(modes, directions)
     if found is None:
-        return state
+        return None
     after = replace(state, velocity=state.velocity + contacts.changes(found.forces))
-    return after if contacts.at_state(after).rows.speed[:, 0].min() > -STILL else state
+    if contacts.at_state(after).rows.speed[:, 0].min() <= -STILL:
+        return None
+    return Blow.of(after, contacts, found.forces, ROCKING)

@@ -9,11 +9,11 @@ import numpy as np
 
 from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.loop import Loop
-from reference_solver.exact.motion import Piece
+from reference_solver.exact.record import Blow, Part, Recorder
 from reference_solver.model import Model
 from reference_solver.needs import Needs
 from reference_solver.pieces import allocate_journal
-from reference_solver.records import Contacts, Frames
+from reference_solver.records import Contacts, Frames, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.tally import new_tally
@@ -29,12 +29,13 @@ class World:
     """
 
     def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool = True) -> None:
-        self._dimension, self._dt, self._steps = model.dimension, settings.dt, 0
+        self._dt, self._steps = settings.dt, 0
         world, state = world_of(model), start_of(model)
         self._loop = Loop(world, state, settings.accuracy, LONGEST * float(np.sqrt(world.size / world.weight)))
-        self._piece: Piece | None = None
+        self._recorder = Recorder(world)
+        self._part: Part | None = None  # up to where the world was looked at
+        self._parts: list[Part | Blow] = []  # what happened in the last step
         self.pose, self.twist = state.pose, state.velocity.copy()
-        # The record of the audit is not written yet: nothing is counted and no pieces are kept.
         self.tally, self.journal = new_tally(), allocate_journal(model.dimension, len(model.bodies), 0)
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
@@ -45,28 +46,40 @@ class World:
         Refused
             Where the loop has no answer, in one sentence; the world is then where it was last looked at.
         """
-        poses, twists = [], []
+        kept, d = bool(len(self.journal.time)), self._loop.world.dimension
+        if kept:
+            self._recorder.begin(self.pose, self.twist)
+        none = Contacts.empty(0, d)
+        frames = [Frames(self.pose[None][:0], self.twist[None][:0], np.zeros(1, np.int64), none)]
         for k in range(1, steps + 1):
-            if k == steps or (stride and k % stride == 0):
-                self._look(self._steps + k)
-                if stride and k % stride == 0:
-                    poses.append(self.pose)
-                    twists.append(self.twist)
+            part = self._move_to(self._steps + k)
+            if kept:
+                self._recorder.write(self._steps + k - 1, self._dt, self._parts)
+            sampled = bool(stride) and k % stride == 0
+            if sampled or k == steps:
+                state = part.piece.state(part.last)
+                self.pose, self.twist = state.pose, state.velocity
+            if sampled:
+                found = self.contacts() if contacts else none
+                frames.append(Frames(self.pose[None], self.twist[None], np.array([0, len(found)]), found))
+        if kept:
+            self.journal = self._recorder.journal(self._steps, steps)
         self._steps += steps
-        n = len(self.pose)
-        return Frames(
-            np.array(poses).reshape(-1, n, self.pose.shape[1]),
-            np.array(twists).reshape(-1, n, self.twist.shape[1]),
-            np.zeros(len(poses) + 1, np.int64),
-            self.contacts(),
-        )
+        return joined(frames)
 
-    def _look(self, step: int) -> None:
-        t = step * self._dt
-        while self._piece is None or self._piece.start.t + self._piece.length < t:
-            self._piece = self._loop.next_piece()
-        state = self._piece.state((t - self._piece.start.t) / self._piece.length)
-        self.pose, self.twist = state.pose, state.velocity
+    def _move_to(self, step: int) -> Part:
+        """Move the world to the end of a step; return the part of a piece that ends there."""
+        t, self._parts = step * self._dt, []
+        part = self._part
+        while part is None or part.piece.start.t + part.piece.length < t:
+            if part is not None and part.last < 1.0:
+                self._parts.append(Part(part.piece, part.last, 1.0))
+            blows, piece = self._loop.next_piece()
+            self._parts += blows
+            part = Part(piece, 0.0, 0.0)
+        self._part = Part(part.piece, part.last, (t - part.piece.start.t) / part.piece.length)
+        self._parts.append(self._part)
+        return self._part
 
     def copy(self) -> Self:
         """Return a world of its own that goes on with the same bits."""
@@ -74,8 +87,8 @@ class World:
         return copy.deepcopy(self, {id(constant): constant})
 
     def contacts(self) -> Contacts:
-        """Return no contacts: their impulses are not recorded yet."""
-        return Contacts.empty(0, self._dimension)
+        """Return the contacts of the last step, with all that they did in it."""
+        return self._recorder.contacts(self._parts)
 
     def step_problem(self) -> StepProblem:
         """Refuse: the loop has no steps.

@@ -1,0 +1,268 @@
+"""What a run did, step by step, in the form that the audit reads (`reference_solver.pieces`).
+
+A piece of the loop may last longer than a step. It is recorded in parts that end where the world is looked at, so that
+the audit's bounds, which grow with the length of a part, stay those of ``dt``. Impulses of a part are integrals of the
+forces that contacts have along the piece, and bodies that share no contact have records of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from reference_solver.exact.bodies import State, World
+from reference_solver.exact.forces import Held
+from reference_solver.exact.motion import Piece, free_acceleration
+from reference_solver.exact.rows import Contacts
+from reference_solver.model import Array
+from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
+from reference_solver.records import Contacts as Handed
+
+#: Changes of velocity below this are round-off and no blow [m/s, rad/s].
+NO_BLOW = 1e-13
+#: Shares of a piece at which forces are asked for, so many as make a polynomial of the degree of the velocities, and
+#: the Chebyshev series of its integral from values there.
+NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(8) + 0.5) / 8)
+SERIES = chebyshev.chebint(np.linalg.inv(chebyshev.chebvander(2.0 * NODES - 1.0, 7)), scl=0.5)
+
+
+class Acting(NamedTuple):
+    """What contacts did: features (m, 6), gaps (m,), points, normals and impulses on B (m, d), moments (m, s)."""
+
+    features: Indices
+    gap: Array
+    point: Array
+    normal: Array
+    impulse: Array
+    moment: Array
+
+    def chosen(self, which: NDArray[np.bool_]) -> Acting:
+        """Return some of them."""
+        return self._replace(**{name: each[which] for name, each in self._asdict().items()})
+
+    @classmethod
+    def of(cls, contacts: Contacts, impulse: Array, moment: Array | None = None) -> Acting:
+        """Return what contacts did with impulses in world axes, which act where they are unless moments are told."""
+        rows = contacts.rows
+        own = about_origin(rows.place, impulse) if moment is None else moment
+        return cls(contacts.features, rows.gap.copy(), rows.place.copy(), rows.frame[:, 0].copy(), impulse, own)
+
+
+@dataclass(frozen=True)
+class Blow:
+    """Impulses at an instant.
+
+    Parameters
+    ----------
+    after
+        State after them.
+    acting
+        Contacts that took part, those without an impulse too.
+    scheme
+        See `reference_solver.pieces`.
+    """
+
+    after: State
+    acting: Acting
+    scheme: int = FROZEN
+
+    @classmethod
+    def of(cls, after: State, contacts: Contacts, impulses: Array, scheme: int = FROZEN) -> Blow:
+        """Return a blow of impulses (m, d) along the frames."""
+        return cls(after, Acting.of(contacts, along_axes(contacts, impulses)), scheme)
+
+
+class Part(NamedTuple):
+    """A piece between two shares."""
+
+    piece: Piece
+    first: float
+    last: float
+
+
+def along_axes(contacts: Contacts, forces: Array) -> Array:
+    """Return forces (m, d) along frames in world axes."""
+    return np.asarray(np.einsum("mk,mkp->mp", forces, contacts.rows.frame))
+
+
+def about_origin(place: Array, force: Array) -> Array:
+    """Return moments (m, 1 | 3) of forces at places (m, d)."""
+    if place.shape[1] == 2:
+        return (place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0])[:, None]
+    return np.cross(place, force)
+
+
+class Course:
+    """What contacts of a piece do on the way, looked at without moving the contacts that the loop goes on with."""
+
+    def __init__(self, world: World, piece: Piece) -> None:
+        self._piece, held = piece, piece.held
+        self._contacts = held.contacts.chosen(np.arange(len(held.contacts)))
+        self._turns = piece.turns and len(held.contacts) > 0
+        if not self._turns:
+            self._force = along_axes(self._contacts.at_state(piece.start), held.answer.forces)
+            return
+        own = Held(self._contacts, held.answer, held.acceleration)
+        values, self._place = [], self._contacts.at_state(piece.start).rows.place.copy()
+        for share in NODES:
+            place, axes, velocity = piece.at(share)
+            own.follow(place, axes, velocity, free_acceleration(world, axes, velocity))
+            force = along_axes(self._contacts, own.forces)
+            # Far from the origin the way of a place is known to more digits than the place.
+            values.append(np.concatenate([force, about_origin(self._contacts.rows.place - self._place, force)], axis=1))
+        self._series = np.einsum("ij,jmk->imk", SERIES, np.array(values))
+
+    def between(self, first: float, last: float) -> Acting:
+        """Return what contacts did between two shares."""
+        contacts, length = self._contacts.at(*self._piece.at(first)), self._piece.length
+        if not self._turns:
+            return Acting.of(contacts, (last - first) * length * self._force)
+        ends = chebyshev.chebvander(2.0 * np.array([first, last]) - 1.0, len(NODES))
+        found, d = length * np.einsum("i,imk->mk", ends[1] - ends[0], self._series), self._place.shape[1]
+        impulse = found[:, :d]
+        return Acting.of(contacts, impulse, found[:, d:] + about_origin(self._place, impulse))
+
+
+class Row(NamedTuple):
+    """A piece of the record: begin in its step and length [s], labels, bodies, states before and after, contacts."""
+
+    time: tuple[float, float]
+    label: tuple[int, ...]
+    bodies: Indices
+    before: Array
+    after: Array
+    acting: Acting
+
+
+class Recorder:
+    """Writes what a world does."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._course: tuple[Piece, Course] | None = None
+
+    def begin(self, pose: Array, twist: Array) -> None:
+        """Begin a record where bodies are."""
+        self._state = np.concatenate([pose, twist], axis=1)
+        self._rows: list[Row] = []
+        self._bodies = self._contacts = 0
+
+    def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
+        """Return contacts as a simulation hands them out: each once, as it was first, with the sum of its impulses."""
+        found = [part.acting if isinstance(part, Blow) else self._along(part) for part in parts]
+        if not found:
+            return Handed.empty(0, self._world.dimension)
+        every = Acting(*(np.concatenate(each) for each in zip(*found, strict=True)))
+        key = np.column_stack([every.features[:, :2], self._numbered(every.features)])
+        _, at, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        impulse = np.zeros((len(at), self._world.dimension))
+        np.add.at(impulse, which.ravel(), every.impulse)
+        a, b, feature = key[at].T
+        return Handed(a, b, feature, every.point[at], every.normal[at], impulse, every.gap[at])
+
+    def _along(self, part: Part) -> Acting:
+        """Return what contacts did in a part of a piece."""
+        if self._course is None or self._course[0] is not part.piece:
+            self._course = part.piece, Course(self._world, part.piece)
+        return self._course[1].between(part.first, part.last)
+
+    def _numbered(self, features: Indices) -> Indices:
+        """Return one number (m,) for the features of each contact (m, 6)."""
+        bodies = self._world.bodies
+        most = max(bodies.point.shape[1], bodies.normal.shape[1], bodies.line.shape[1])
+        return np.asarray(((features[:, 2] * most + features[:, 3]) * 3 + features[:, 4]) * most + features[:, 5])
+
+    def write(self, step: int, dt: float, parts: Sequence[Part | Blow]) -> None:
+        """Write what happened in a step."""
+        for is_blow, group in groupby(parts, lambda part: isinstance(part, Blow)):
+            if is_blow:
+                self._write_blows(step, dt, [part for part in group if isinstance(part, Blow)])
+                continue
+            for part in group:
+                if isinstance(part, Part):
+                    self._write_part(step, dt, part)
+
+    def _write_blows(self, step: int, dt: float, blows: list[Blow]) -> None:
+        """Write blows of one instant: those of bodies that share contacts follow each other."""
+        begin = blows[0].after.t - step * dt
+        self._bring(blows[0].after)
+        features = np.concatenate([blow.acting.features for blow in blows])
+        for bodies, _ in self._groups(features):
+            for blow in blows:
+                free = bodies[self._world.bodies.free[bodies] == 1]
+                own = np.asarray(np.isin(blow.acting.features[:, :2], free).any(axis=1))
+                gained = blow.after.velocity[bodies] - self._state[bodies, -self._world.shape[1] :]
+                if np.abs(gained).max() > NO_BLOW:
+                    rocks = blow.scheme == ROCKING
+                    label = (step, FORCES if rocks else IMPACT, blow.scheme)
+                    self._enter((begin, 0.0), label, bodies, blow.after, blow.acting.chosen(own))
+
+    def _write_part(self, step: int, dt: float, part: Part) -> None:
+        piece, start, end = part.piece, part.piece.state(part.first), part.piece.state(part.last)
+        self._bring(start)
+        length = (part.last - part.first) * piece.length  # to more digits than times have
+        acting = self._along(part)
+        for bodies, own in self._groups(acting.features):
+            turns = piece.turns and bool(own.any())
+            label = (step, FORCES, FIFTH_ORDER if turns else FROZEN)
+            self._enter((start.t - step * dt, length), label, bodies, end, acting.chosen(own))
+
+    def _bring(self, state: State) -> None:
+        """Bring bodies that are not free to a state: they are where they are, whether anything touches them or not."""
+        moved = self._world.bodies.free == 0
+        self._state[moved] = np.concatenate([state.pose, state.velocity], axis=1)[moved]
+
+    def _groups(self, features: Indices) -> Iterator[tuple[Indices, NDArray[np.bool_]]]:
+        """Yield bodies that share contacts, with what is moved and touches them, and which contacts (m,) are theirs."""
+        bodies, pairs = self._world.bodies, features[:, :2]
+        free = bodies.free == 1
+        both = pairs[free[pairs].all(axis=1)]
+        n = len(free)
+        joined = coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
+        label = connected_components(joined, directed=False)[1]
+        of = np.where(free[pairs[:, 0]], label[pairs[:, 0]], label[pairs[:, 1]])
+        moved = ~free & (self._state[:, -self._world.shape[1] :] != 0.0).any(axis=1)
+        for group in dict.fromkeys(label[free].tolist()):
+            own = of == group
+            touched = np.zeros(n, bool)
+            touched[pairs[own].ravel()] = True
+            yield np.flatnonzero(free & (label == group) | touched & moved), own
+
+    def _enter(
+        self, time: tuple[float, float], label: tuple[int, ...], bodies: Indices, after: State, acting: Acting
+    ) -> None:
+        state = np.concatenate([after.pose[bodies], after.velocity[bodies]], axis=1)
+        numbers = (*label, self._bodies, self._contacts)
+        self._rows.append(Row(time, numbers, bodies, self._state[bodies], state, acting))
+        self._bodies += len(bodies)
+        self._contacts += len(acting.gap)
+        self._state[bodies] = state
+
+    def journal(self, first: int, steps: int) -> Journal:
+        """Return what was written of ``steps`` steps from the step ``first`` on, as a journal without room for more."""
+        d = self._world.dimension
+        rows, number = self._rows, self._state.shape[1]
+        acting = [row.acting for row in rows]
+        feature = np.concatenate([np.zeros((0, 6), np.int64), *(each.features for each in acting)])
+        wrench = [np.concatenate([a.point, a.normal, a.impulse, a.moment], axis=1) for a in acting]
+        width = 3 * d + (1 if d == 2 else 3)
+        return Journal(
+            used=np.array([len(rows), self._bodies, self._contacts, steps]),
+            time=np.array([row.time for row in rows]).reshape(-1, 2),
+            label=np.array([row.label for row in rows], np.int64).reshape(-1, 5) - np.array([first, 0, 0, 0, 0]),
+            body=np.concatenate([np.zeros(0, np.int64), *(row.bodies for row in rows)]),
+            before=np.concatenate([np.zeros((0, number)), *(row.before for row in rows)]),
+            after=np.concatenate([np.zeros((0, number)), *(row.after for row in rows)]),
+            name=np.column_stack([feature[:, :2], self._numbered(feature)]),
+            wrench=np.concatenate([np.zeros((0, width)), *wrench]),
+            pose=np.zeros((0, 0)),
+            twist=np.zeros((0, 0)),
+        )

@@ -1,0 +1,223 @@
+"""Errors that are planted in the loop are seen by the certificate, or its error covers them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.certificate.truth import certify, distance
+from reference_solver.exact import Refused, events, forces, impacts, loop, rows, stiff, world
+from reference_solver.verification import self_test
+
+DT, G = 1 / 240, 9.81
+FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+GROUND = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
+#: Share by which something is planted wrong. On a hill the audit knows a mean normal to a few shares less.
+SIZE, ON_A_HILL = 1e-6, 1e-5
+#: Corruptions of the self-test that no run of the loop has, or that change nothing there: sweeps; a record of bodies
+#: that are fixed; friction of a sphere that rolls in the end, and has none at all.
+NOT_OF_THE_LOOP = (
+    "residual of the solves",
+    "place of a fixed body",
+    "friction across the slip [rad]",
+    "friction impulse of a slide",
+)
+
+
+def planar(body, restitution=0.0, friction=0.5, floor=FLOOR):
+    return Model(2, [floor, body], (0.0, -G), restitution, friction)
+
+
+def spatial(body, restitution=0.0, friction=0.5):
+    return Model(3, [GROUND, body], (0.0, 0.0, -G), restitution, friction)
+
+
+BOUNCE = planar(Body(Disc(0.5), 1.0, 0.125, (0.0, 0.7, 0.0), (1.0, -1.0, 3.0)), 0.8, 0.1)
+LANDS = planar(Body(Box((0.5, 0.5)), 1.0, 1 / 6, (0.0, 0.6, 0.0), (0.5, 0.0, 0.0)))
+SLIDES = planar(Body(Box((0.5, 0.25)), 1.0, 0.1, (0.0, 0.25, 0.0), (0.5, 0.0, 0.0)))
+FALLS = planar(Body(Capsule(0.4, 0.1), 1.0, 0.06, (0.0, 0.1 + 0.4 * np.sin(1.2), 1.2)), friction=3.0)
+HILL = planar(
+    Body(Disc(0.25), 1.0, 0.03125, (0.0, 1.25, 0.0), (1.0, 0.0, 0.0)),
+    friction=0.2,
+    floor=Body(Disc(1.0), motion="fixed"),
+)
+TABLE = planar(
+    Body(Disc(0.25), 1.0, 0.03125, (0.3, 0.75, 0.0), (1.0, 0.0, -4.0)), floor=Body(Box((0.5, 0.5)), motion="fixed")
+)
+TURNS = spatial(Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (1.0, 0.5, 0.0, 2.0, 0.0, 1.0)), 0.0, 0.1)
+
+
+def of_world(field, change):
+    """Change what the loop reads of its world, or of its bodies."""
+
+    def plant(monkeypatch):
+        def wrong(model):
+            found = world_of(model)
+            if hasattr(found.bodies, field):
+                return replace(found, bodies=found.bodies._replace(**{field: change(getattr(found.bodies, field))}))
+            return replace(found, **{field: change(getattr(found, field))})
+
+        world_of = world.world_of
+        monkeypatch.setattr(world, "world_of", wrong)
+
+    return plant
+
+
+def larger(values, size=SIZE):
+    return values * (1.0 + size)
+
+
+def larger_on_a_hill(values):
+    return larger(values, ON_A_HILL)
+
+
+def impulse(monkeypatch):
+    """Impulses that are too large, in the record as in the motion."""
+
+    def wrong(state, part, stopped):
+        blow = struck(state, part, stopped)
+        velocity = state.velocity + (1.0 + SIZE) * (blow.after.velocity - state.velocity)
+        acting = blow.acting._replace(impulse=larger(blow.acting.impulse), moment=larger(blow.acting.moment))
+        return replace(blow, after=replace(blow.after, velocity=velocity), acting=acting)
+
+    struck = impacts._struck
+    monkeypatch.setattr(impacts, "_struck", wrong)
+
+
+def missed_contact(monkeypatch):
+    find = rows.find
+    monkeypatch.setattr(rows, "find", lambda *asked: find(*asked)[:1])
+
+
+def missed_body(monkeypatch):
+    """Nothing meets the disc before it is a hundredth of a half width deep."""
+    meeting = events.next_meeting
+    monkeypatch.setattr(events, "next_meeting", lambda *asked: meeting(*asked)._replace(share=2.0))
+
+
+def late_impact(monkeypatch):
+    def wrong(world, piece, contacts):
+        found = meeting(world, piece, contacts)
+        return found._replace(share=found.share + SIZE * DT / piece.length)
+
+    meeting = events.next_meeting
+    monkeypatch.setattr(events, "next_meeting", wrong)
+
+
+def slip_direction(monkeypatch):
+    def wrong(self, contacts):
+        found = onward(self, contacts)
+        return found + SIZE * np.stack([-found[:, 1], found[:, 0]], axis=1)
+
+    onward = forces.Held.onward
+    monkeypatch.setattr(forces.Held, "onward", wrong)
+
+
+def rate_of_rows(monkeypatch):
+    """What contacts do by turning alone (gamma, E36) is left out in part."""
+
+    def wrong(self, *state):
+        found = at(self, *state)
+        found.rows.rate[:] *= 1.0 - 100.0 * SIZE
+        return found
+
+    at = rows.Contacts.at
+    monkeypatch.setattr(rows.Contacts, "at", wrong)
+
+
+def without_end(column):
+    """An end that is not looked for: of a slide (0), of a load (1), of a feature (-1)."""
+
+    def plant(monkeypatch):
+        def wrong(self, share):
+            found = call(self, share)
+            if column < 0:
+                found[:, : self.width] = np.inf
+            else:
+                found[:, self.width + column] = np.inf
+            return found
+
+        call = events.Monitors.__call__
+        monkeypatch.setattr(events.Monitors, "__call__", wrong)
+
+    return plant
+
+
+def rough_steps(monkeypatch):
+    """Steps whose errors are a hundred thousand times what is asked for."""
+    step = stiff.step
+    monkeypatch.setattr(loop, "step", lambda w, s, h, tolerance, length: step(w, s, h, 1e5 * tolerance, length))
+
+
+def forces_of_a_step(monkeypatch):
+    """Runge-Kutta steps with accelerations that are too large."""
+    follow = forces.Held.follow
+
+    def wrong(self, place, axes, velocity, free, directions=None):
+        return free + (1.0 + SIZE) * (follow(self, place, axes, velocity, free, directions) - free)
+
+    monkeypatch.setattr(forces.Held, "follow", wrong)
+
+
+PLANTED = {
+    "inertia": (BOUNCE, of_world("moment", larger)),
+    "inertia of a rod that falls": (FALLS, of_world("moment", larger)),
+    "mass": (FALLS, of_world("inverse_mass", larger)),
+    "gravity": (BOUNCE, of_world("load", larger)),
+    "friction of a slide": (SLIDES, of_world("friction", larger)),
+    "friction of a slide over a hill": (HILL, of_world("friction", larger_on_a_hill)),
+    "friction of a slide in space": (TURNS, of_world("friction", larger)),
+    "restitution": (BOUNCE, of_world("restitution", larger)),
+    "impulse": (BOUNCE, impulse),
+    "contact that is missed": (LANDS, missed_contact),
+    "body that is missed": (BOUNCE, missed_body),
+    "time of an impact": (BOUNCE, late_impact),
+    "direction of a slip": (TURNS, slip_direction),
+    "rate of rows": (FALLS, rate_of_rows),
+    "accelerations of a step": (FALLS, forces_of_a_step),
+    "end of a slide": (SLIDES, without_end(0)),
+    "end of a load": (HILL, without_end(1)),
+    "end of a feature": (TABLE, without_end(-1)),
+    "tolerance of steps": (FALLS, rough_steps),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_planted_error_is_seen_or_covered(name, monkeypatch):
+    model, plant = PLANTED[name]
+    truth = Simulation(model, Settings.exact(DT, 1e-12)).record(100).pose
+    plant(monkeypatch)
+    found = certify(model, Settings.exact(DT), 100)
+    if found.holds:
+        within = found.t < found.horizon
+        assert (distance(model, found.pose, truth) <= found.error)[within].all()
+
+
+@pytest.mark.parametrize("model", [BOUNCE, LANDS, SLIDES, FALLS, HILL, TABLE, TURNS])
+def test_run_without_error_is_certified(model):
+    """Errors are seen: what they are planted in is certified, to less than they are."""
+    found = certify(model, Settings.exact(DT), 100)
+    assert found.holds, found.reasons
+    assert found.error[-1] < 1e-9
+
+
+def test_refused_run_has_no_certificate():
+    roof = Body(HalfSpace((0.0, -1.0), -0.5), motion="prescribed", twist=(0.0, -1.0, 0.0))
+    model = Model(2, [FLOOR, roof, Body(Disc(0.2), 1.0, 0.02, (0.0, 0.25, 0.0))], (0.0, -G), 0.0, 0.0)
+    with pytest.raises(Refused):
+        Simulation(model, Settings.exact(DT)).advance(240)
+    found = certify(model, Settings.exact(DT), 240)
+    assert not found.holds and "crushed" in found.reasons[0] and np.isinf(found.error).all()
+
+
+def test_corruptions_of_the_self_test_are_seen():
+    """What is planted in runs of the reference solver is planted in runs of the loop."""
+    asked = [each for each in self_test.CORRUPTIONS if each.name not in NOT_OF_THE_LOOP]
+    missed = []
+    for each in asked:
+        scene = replace(self_test.SCENES[each.scene], settings=Settings.exact(DT))
+        if not self_test.seen_by(*each.plant(scene, self_test.JUDGED)):
+            missed.append(each.name)
+    assert len(asked) > 70 and not missed

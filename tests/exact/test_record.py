@@ -1,0 +1,75 @@
+"""What the loop says that contacts did, and that saying it changes nothing."""
+
+import copy
+import hashlib
+
+import numpy as np
+import pytest
+from oracle import world_of
+
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+
+DT, G = 1 / 240, 9.81
+KEYS = ["fuzz2 0", "fuzz2 3", "fuzz3 1", "chains2 2", "random 5"]
+
+
+def hashed(*arrays):
+    return hashlib.sha256(b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)).hexdigest()
+
+
+def of_pieces(record):
+    return hashed(*(each for name, each in vars(record.pieces).items() if name != "step"))
+
+
+@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("seed", range(3))
+def test_random_splits_have_the_bits_of_the_whole(key, seed):
+    """Whatever parts a run is made in, recorded or not, on a copy or not."""
+    world, random = world_of(key), np.random.default_rng(seed)
+    steps = world.samples * world.stride
+    whole = Simulation(world.model, Settings.exact(world.dt))
+    whole.advance(steps)
+    simulation, left = Simulation(world.model, Settings.exact(world.dt)), steps
+    while left:
+        part = int(random.integers(1, left + 1))
+        if random.random() < 0.5:
+            simulation.record(part, int(random.integers(1, part + 1)), pieces=random.random() < 0.5, contacts=True)
+        else:
+            simulation = copy.copy(simulation)
+            simulation.advance(part)
+        left -= part
+    assert hashed(whole.pose, whole.twist) == hashed(simulation.pose, simulation.twist)
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_record_in_parts_has_the_pieces_of_the_whole(key):
+    world = world_of(key)
+    steps = world.samples * world.stride
+    whole = Simulation(world.model, Settings.exact(world.dt)).record(steps, pieces=True)
+    simulation = Simulation(world.model, Settings.exact(world.dt))
+    parts = [simulation.record(each, pieces=True) for each in (steps // 3, steps - steps // 3)]
+    for name in ("impulse", "moment", "point", "pose_after", "twist_after", "body", "body_a", "feature"):
+        joined = np.concatenate([getattr(part.pieces, name) for part in parts])
+        assert np.array_equal(joined, getattr(whole.pieces, name)), name
+
+
+def test_contacts_carry_the_weight_of_a_step():
+    """Two boxes that rest on each other: corners carry their weights, and friction nothing."""
+    bodies = [Body(Box((0.5, 0.5)), 2.0, 1 / 3, (0.0, 0.5 + i, 0.0)) for i in range(2)]
+    model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), *bodies], (0.0, -G), 0.0, 0.5)
+    simulation = Simulation(model, Settings.exact(DT))
+    simulation.advance(10)
+    found = simulation.contacts()
+    for pair, weight in (((0, 1), 4.0 * G), ((1, 2), 2.0 * G)):
+        own = (found.body_a == pair[0]) & (found.body_b == pair[1])
+        assert own.sum() == 2
+        assert found.impulse[own].sum(axis=0) == pytest.approx([0.0, weight * DT], abs=1e-14)
+
+
+def test_contacts_of_a_step_with_a_blow():
+    """A disc that lands and stays: the blow and what holds it afterwards are one contact."""
+    disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5 + 0.5 * G * (2.5 * DT) ** 2, 0.0))
+    model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), disc], (0.0, -G), 0.0, 0.5)
+    record = Simulation(model, Settings.exact(DT)).record(4, contacts=True)
+    assert np.diff(record.offset).tolist() == [0, 0, 0, 1, 1]
+    assert record.contacts.impulse[:, 1] == pytest.approx([3.0 * G * DT, G * DT], rel=1e-12)
