@@ -126,8 +126,9 @@ class Problem:
         still = NONE * np.abs(self.free).max()
         directions, given = directed(u[:, 1:], still), self.slipping
         slides = np.asarray(directions.any(axis=1))
-        # Friction is known to more digits than what it leaves of a slip.
-        directions = np.where(slides[:, None], directed(-forces[:, 1:], 0.0, directions), 0.0)
+        # Friction is known to more digits than what it leaves of a slip, but for what carries nothing.
+        least = NONE * np.abs(forces).max()
+        directions = np.where(slides[:, None], directed(-forces[:, 1:], least, directions), 0.0)
         directions = np.where(given[:, None], self.slips, directions)
         modes = np.where(given | slides | (self.friction == 0.0), SLIP, STICK)
         return np.where(u[:, 0] > still, OPEN, modes), directions
