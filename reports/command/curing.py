@@ -20,7 +20,7 @@ from reports.command.selection import WORKERS, fixed, scene_names_of
 from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste, panel_text
 from reports.speed import duration
 from reports.terminal import print_table, terminal
-from reports.wording import number, params_text
+from reports.wording import called, number, params_text
 from validation.cells import parse_dt
 from validation.fixes.kept import Cure, cures_of, write, write_panels
 from validation.fixes.panel import of_profile
@@ -68,13 +68,13 @@ def cure(
     params, step = fixed(param), parse_dt(dt) if dt else None
     console, progress = terminal(), terminal(stderr=True)
     listed = {key: old for key, old in cures_of(engine).items() if old.version == version}
-    found: list[Cure] = []
+    found, shown = list[Cure](), called(names)
     for name in names:
         for dimension in resolve(name).dimensions:
             if dim and dimension not in dim:
                 continue
             case = {} if params is None and is_file(name) else params
-            progress.print(f"{engine} {name} {dimension}-D", style="dim", markup=False, highlight=False)
+            progress.print(f"{engine} {shown[name]} {dimension}-D", style="dim", markup=False, highlight=False)
             result = search(engine, name, dimension, jobs, case, step)
             listed.pop((name, dimension), None)
             if isinstance(result, Cure):
@@ -83,7 +83,7 @@ def cure(
             if keep:
                 _keep(engine, listed)
             if not as_json:
-                _show(engine, name, dimension, result, console)
+                _show(engine, shown[name], dimension, result, console)
     if keep and not scenes:
         _keep_panels(engine, version, jobs)
     if as_json:
