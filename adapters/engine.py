@@ -307,6 +307,8 @@ class Engine(ABC):
     #: Writers of a run for the engine alone, by format (``crosscheck export --to``). The scene has a dimension of the
     #: engine; what a format cannot express raises `EngineError`.
     exports: Mapping[str, Writer] = MappingProxyType({})
+    #: Files other than Python modules that its results depend on, such as a program that it starts.
+    sources: tuple[Path, ...] = ()
     #: Readers of model files of this engine, by file ending (`adapters.model`).
     reads: Mapping[str, Callable[[str, bool], Any]] = MappingProxyType({})
 

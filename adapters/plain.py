@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 import unicodedata
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class Notice(UserWarning):
@@ -22,6 +25,8 @@ REASON = 500
 NAME = 80
 #: Most characters and levels of a table that an engine reads back; real ones have some thousand, three deep.
 SIZE, LEVELS = 2**18, 8
+#: Wrong fields that are named; the rest are counted.
+MOST_ERRORS = 10
 #: Characters counted for a number.
 NUMBER = 20
 #: Categories of Unicode that are invisible or control the display: control, format (which changes the writing
@@ -133,3 +138,44 @@ def _escaped(character: str) -> str:
 
 def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 4] + " ..."
+
+
+def wrong_fields(errors: ValidationError, whole: str) -> str:
+    """All fields that pydantic found wrong in one line, or the first few; ``whole`` is the name of all of it."""
+    found = errors.errors(include_url=False, include_input=False)
+    # A number or a formula: pydantic has an error for each of both types, with the type as the last part of the place.
+    formulas = [e for e in found if e["type"] == "string_type" and e["loc"][-1:] == ("str",)]
+    either = {e["loc"][:-1] for e in formulas}
+    places = [(e["loc"][:-1] if e["loc"][:-1] in either else e["loc"], e) for e in found if e not in formulas]
+    return listed([one_line(f"{'.'.join(map(str, place)) or whole}: {_in_words(e)}") for place, e in places])
+
+
+def _in_words(error: Mapping[str, Any]) -> str:
+    """What is wrong with a field, for somebody who knows the text and not pydantic."""
+    told = error.get("ctx", {})
+    words = {
+        "missing": "is missing",
+        "extra_forbidden": "there is no such field",
+        "float_type": "must be a number",
+        "int_type": "must be a whole number",
+        "string_type": "must be a text",
+        "finite_number": "must be a finite number",
+        "greater_than": f"must be greater than {told.get('gt', 0):g}",
+        "greater_than_equal": f"must be at least {told.get('ge', 0):g}",
+        "tuple_type": "must be a list",
+        "dict_type": "must be a table",
+        "model_type": "must be a table",
+        "literal_error": f"must be {told.get('expected')}",
+        "too_short": f"needs at least {told.get('min_length')}, not {told.get('actual_length')}",
+        "too_long": f"has more than {told.get('max_length')}",
+        "string_too_short": "must not be empty",
+        "union_tag_invalid": f"there is no type {told.get('tag')!r}, only {told.get('expected_tags')}",
+        "union_tag_not_found": 'needs a type, such as type = "box"',
+    }
+    return words.get(error["type"], str(error["msg"]).removeprefix("Value error, "))
+
+
+def listed(wrong: list[str]) -> str:
+    """Errors in one line; of many the first, and the number of others."""
+    told = "; ".join(wrong[:MOST_ERRORS])
+    return told if len(wrong) <= MOST_ERRORS else f"{told}; and {len(wrong) - MOST_ERRORS} more"

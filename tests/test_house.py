@@ -133,7 +133,7 @@ def test_the_rooms_of_validation_stand_in_a_line():
 GROUND = {
     "adapters": "checked_engine copied engine engine_folder experiment extras isolation law model needs plain readback "
     "readings receipts recording registry releases scene script settings stages stepping trajectory unset whole "
-    "conformance new_adapter",
+    "conformance new_adapter pipe",
     "validation": " ".join(["canonical catalogue posed bounds metrics geometry solids cells identity", *ROOMS]),
 }
 

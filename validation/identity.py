@@ -41,8 +41,9 @@ def _sources(package: str) -> list[Path]:
 def adapter_hash(engine: str) -> str:
     """Hash of our code between a scene and this engine's trajectory.
 
-    The shared types and step loop, the engine's adapter with its imports from its package, and for our solver's adapter
-    the solver. Laws, experiments and findings judge a trajectory and are not part of it.
+    The shared types and step loop, the engine's adapter with its imports from its package and the programs that it
+    starts, and for our solver's adapter the solver. Laws, experiments and findings judge a trajectory and are not part
+    of it.
     """
     entry = registry.entry(engine)
     folders = {folder_of(name) for name in registry.names()}
@@ -54,7 +55,8 @@ def adapter_hash(engine: str) -> str:
     own = _closure(entry.module, {entry.module.partition(".")[0]}, {SOLVER})
     inside = _sources(SOLVER)
     solver = inside if set(inside) & set(own) else []
-    return _hash_files(sorted({*shared, *own, *solver}))
+    found = None if registry.is_ours(entry) else registry.find(engine).engine
+    return _hash_files(sorted({*shared, *own, *solver, *(found.sources if found is not None else ())}))
 
 
 #: Rooms of `adapters` that judge a trajectory, and what a new adapter begins with.

@@ -179,7 +179,7 @@ class Child:
                 _kill(other)
             process.kill()
         process.join()
-        self._reason = _cause(process.exitcode) if ended else "the process closed its connection"
+        self._reason = cause(process.exitcode) if ended else "the process closed its connection"
         self.drain()
         self.connection.close()
         self.log.close()
@@ -366,7 +366,8 @@ def _has_ended(process: Any) -> bool:
     return False
 
 
-def _cause(code: int | None) -> str:
+def cause(code: int | None) -> str:
+    """How a process with this exit code ended, in words."""
     if code is None or code >= 0:
         return f"the process ended with exit code {code}"
     try:

@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import import_module
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, cast, get_args
 
 from adapters.engine import (
@@ -69,6 +70,7 @@ class ForeignEngine(Engine):
         self.facts = facts_from(told["facts"])
         self.profiles = {name: partial(self._ask, name) for name in told["profiles"]}
         self._version = str(told["version"])
+        self.sources = tuple(map(Path, told["sources"]))
         self._child, self._again = child, again
 
     def version(self) -> str:
@@ -141,6 +143,7 @@ def serve(connection: Connection, found: Found) -> None:
         told["facts"] = plain_facts(found.facts)
     if found.engine is not None:
         told["profiles"] = list(found.engine.profiles)
+        told["sources"] = list(map(str, found.engine.sources))
     connection.send_bytes(json.dumps(told).encode())
     while found.engine is not None:
         try:

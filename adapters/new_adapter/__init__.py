@@ -3,6 +3,8 @@
 NAME/
 pyproject.toml                  the entry point that registers the engine
 crosscheck_NAME/__init__.py     the adapter, an engine of discs until another one stands in its place
+                engine.py       with --pipe: that engine as a program, in place of one in any language
+                PROTOCOL.txt    what such a program answers
 tests/test_conformance.py       one test for each check
 """
 
@@ -11,8 +13,10 @@ from __future__ import annotations
 import keyword
 import re
 from importlib.resources import files
+from inspect import cleandoc
 from pathlib import Path
 
+import adapters.pipe
 from adapters import registry
 from adapters.engine import EngineError
 from adapters.plain import NAME, one_line
@@ -33,6 +37,16 @@ test = ["pytest"]
 [project.entry-points."contact_crosscheck.engines"]
 NAME = "PACKAGE:CLASS"
 """
+PIPE = '''"""NAME: the program beside this file is the engine; `command` starts it here."""
+
+from adapters.pipe import PipeEngine
+
+
+class CLASS(PipeEngine):
+    """A program in any language: ("node", "engine.mjs"), ("./engine",)."""
+
+    command = ("python3", "engine.py")
+'''
 TEST = '''"""The adapter keeps its promises: one test for each check of the kit."""
 
 import pytest
@@ -46,8 +60,13 @@ def test_conformance(item):
 '''
 
 
-def write_package(name: str, into: Path) -> list[Path]:
+def write_package(name: str, into: Path, pipe: bool = False) -> list[Path]:
     """Write a package for the engine called ``name`` below ``into``; the files that were written.
+
+    Parameters
+    ----------
+    pipe
+        Whether the engine is a program of its own, which speaks the protocol of `adapters.pipe`.
 
     Raises
     ------
@@ -69,10 +88,15 @@ def write_package(name: str, into: Path) -> list[Path]:
     }
     texts = {
         "pyproject.toml": PYPROJECT,
-        f"{package}/__init__.py": (files(__name__) / "engine.py.txt").read_text(),
+        f"{package}/__init__.py": PIPE if pipe else (files(__name__) / "engine.py.txt").read_text(),
         "tests/test_conformance.py": TEST,
     }
+    if pipe:
+        texts[f"{package}/engine.py"] = (files(__name__) / "program.py.txt").read_text()
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(re.sub("|".join(words), lambda found: words[found[0]], text))
+    if pipe:
+        texts[f"{package}/PROTOCOL.txt"] = protocol = cleandoc(adapters.pipe.__doc__ or "") + "\n"
+        (folder / package / "PROTOCOL.txt").write_text(protocol)
     return [folder / path for path in texts]

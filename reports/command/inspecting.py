@@ -160,15 +160,17 @@ def _self_test(as_json: bool) -> NoReturn:
 @main.command("new-adapter", epilog="Example: crosscheck new-adapter myengine")
 @click.argument("name")
 @click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
+@click.option("--pipe", is_flag=True, help="The engine is a program, in any language, that speaks JSON lines.")
 @AS_JSON
-def new_adapter(name: str, into: Path, as_json: bool) -> None:
+def new_adapter(name: str, into: Path, pipe: bool, as_json: bool) -> None:
     """Write a package for an engine of your own.
 
-    It works as it is, and its test runs the conformance checks.
+    It works as it is, and its test runs the conformance checks. With --pipe the engine is a process; PROTOCOL.txt in
+    the package says on one page what it answers.
     """
     from adapters.new_adapter import write_package
 
-    written = [str(path) for path in write_package(name, into)]
+    written = [str(path) for path in write_package(name, into, pipe)]
     if as_json:
         click.echo(json.dumps({"name": name, "files": written}, indent=1))
         return

@@ -10,12 +10,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from adapters.plain import one_line
+from adapters.plain import one_line, wrong_fields
 from adapters.scene import Scene, SceneError
 from validation.canonical import CanonicalScene
 from validation.files import model_files
 from validation.files.scene_format import SceneModel, stated
-from validation.files.scene_text import parsed, read_text, said
+from validation.files.scene_text import parsed, read_text
 from validation.files.stated import Stated, canonical_of
 
 #: Identifiers of the schema language and of the schema; the number is that of `SceneModel.format`.
@@ -49,7 +49,7 @@ def stated_from_text(text: str, path: Path) -> Stated:
     try:
         model = SceneModel.model_validate(parsed(text, path))
     except ValidationError as errors:
-        raise SceneError(f"{shown}: {said(errors)}") from None
+        raise SceneError(f"{shown}: {wrong_fields(errors, 'file')}") from None
     try:
         return stated(model)
     except (SceneError, ArithmeticError) as error:  # overflow: numbers too large for masses and moments

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, field_validator
 
-from adapters.plain import one_line
+from adapters.plain import listed, one_line
 from adapters.scene import Box, Pair, Scene, SceneError, Shape, body_from_dict, check_body, scene_from_dict
 from adapters.scene.materials import Materials
 from adapters.scene.shapes import MOST_VERTICES, check_length
@@ -23,7 +23,6 @@ from validation.files.expressions import FUNCTIONS, FormulaError, value_of
 from validation.files.magnitudes import check_magnitudes, impossible_inertia
 from validation.files.mass_properties import HOW, moments, volume
 from validation.files.quantities import QUANTITIES, parts_of
-from validation.files.scene_text import listed
 from validation.files.stated import Stated, StatedCheck
 from validation.metrics import OVER_TIME
 

@@ -9,11 +9,8 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from adapters.plain import one_line
 from adapters.scene import SceneError
@@ -22,8 +19,6 @@ from adapters.scene import SceneError
 MOST_BYTES = 2**21
 #: Most bodies: our part of a cell of columns takes 2 to 3 ms a body, half a minute for these.
 MOST_BODIES = 10_000
-#: Wrong fields that are named; the rest are counted.
-MOST_ERRORS = 10
 #: Most parts of a TOML key: the format has three, and a parser takes time by the square of their number.
 MOST_PARTS = 8
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
@@ -79,44 +74,3 @@ def parsed(text: str, path: Path) -> Any:
     if isinstance(bodies, list) and len(bodies) > MOST_BODIES:
         raise SceneError(f"{shown}: bodies: {len(bodies)} are more than the {MOST_BODIES} that a scene file may have")
     return data
-
-
-def said(errors: ValidationError) -> str:
-    """All wrong fields in one line, or the first few."""
-    found = errors.errors(include_url=False, include_input=False)
-    # A number or a formula: pydantic has an error for each of both types, with the type as the last part of the place.
-    formulas = [e for e in found if e["type"] == "string_type" and e["loc"][-1:] == ("str",)]
-    either = {e["loc"][:-1] for e in formulas}
-    places = [(e["loc"][:-1] if e["loc"][:-1] in either else e["loc"], e) for e in found if e not in formulas]
-    return listed([one_line(f"{'.'.join(map(str, place)) or 'file'}: {_in_words(e)}") for place, e in places])
-
-
-def _in_words(error: Mapping[str, Any]) -> str:
-    """What is wrong with a field, for somebody who knows the file and not pydantic."""
-    told = error.get("ctx", {})
-    words = {
-        "missing": "is missing",
-        "extra_forbidden": "there is no such field",
-        "float_type": "must be a number",
-        "int_type": "must be a whole number",
-        "string_type": "must be a text",
-        "finite_number": "must be a finite number",
-        "greater_than": f"must be greater than {told.get('gt', 0):g}",
-        "greater_than_equal": f"must be at least {told.get('ge', 0):g}",
-        "tuple_type": "must be a list",
-        "dict_type": "must be a table",
-        "model_type": "must be a table",
-        "literal_error": f"must be {told.get('expected')}",
-        "too_short": f"needs at least {told.get('min_length')}, not {told.get('actual_length')}",
-        "too_long": f"has more than {told.get('max_length')}",
-        "string_too_short": "must not be empty",
-        "union_tag_invalid": f"there is no type {told.get('tag')!r}, only {told.get('expected_tags')}",
-        "union_tag_not_found": 'needs a type, such as type = "box"',
-    }
-    return words.get(error["type"], str(error["msg"]).removeprefix("Value error, "))
-
-
-def listed(wrong: list[str]) -> str:
-    """Errors in one line; of many the first, and the number of others."""
-    told = "; ".join(wrong[:MOST_ERRORS])
-    return told if len(wrong) <= MOST_ERRORS else f"{told}; and {len(wrong) - MOST_ERRORS} more"
