@@ -178,8 +178,10 @@ def main() -> None:
 def pytest_addoption(parser: Any) -> None:
     """Options of pytest (entry point ``pytest11``); without ``--crosscheck`` nothing else of this project is loaded."""
     group = parser.getgroup("crosscheck", "contact scenes as tests (contact-crosscheck)")
-    group.addoption("--crosscheck", metavar="ENGINE", help="add a test per check of the contact scenes on ENGINE")
-    group.addoption("--scenes", metavar="A,B", default="", help="of --crosscheck: these scenes (default: all)")
+    engine = "add a test per check of the contact scenes on ENGINE, which is installed, or FILE.py:CLASS"
+    scenes = "of --crosscheck: these scenes (default: all); core: twelve, judged by bound and by order over steps"
+    group.addoption("--crosscheck", metavar="ENGINE", help=engine)
+    group.addoption("--scenes", metavar="A,B", default="", help=scenes)
     group.addoption("--crosscheck-profile", metavar="P,Q", default="", help="of --crosscheck: these profiles")
 
 

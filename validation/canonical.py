@@ -155,6 +155,10 @@ class Primary:
         The state that is timed, in words.
     warm_up, window
         Simulated seconds before the timed call and within it; a window of None is the whole scene.
+    order
+        Order in the step at which the error of a correct first-order method falls at least, as its bounds do; 0: laws
+        of momentum alone decide, and the error is round-off. Scenes with an order are the core suite
+        (`validation.questions.core`).
     """
 
     name: str
@@ -166,6 +170,7 @@ class Primary:
     state: str
     warm_up: float = 0.0
     window: float | None = None
+    order: int | None = None
 
 
 def halves(first: float, last: float) -> tuple[float, ...]:

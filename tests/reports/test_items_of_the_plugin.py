@@ -24,7 +24,7 @@ def items(monkeypatch):
     def collect(dimensions):
         facts = dimensions and SimpleNamespace(dimensions=dimensions)
         monkeypatch.setattr(testing.registry, "facts", lambda engine: facts if engine == "toy" else None)
-        return list(_Cells.collect(SimpleNamespace(plugin=SimpleNamespace(engine="toy", slots=SLOTS))))
+        return list(_Cells.collect(SimpleNamespace(plugin=SimpleNamespace(engine="toy", slots=SLOTS, core=[]))))
 
     return collect
 

@@ -314,6 +314,7 @@ SCENE = CanonicalScene(
         lambda dt: [{"height": height} for height in HEIGHTS],
         apex_error,
         "the whole scene: fall, bounces, rest",
+        order=1,
     ),
     steps=Steps(full=halves(60.0, 7680.0), full_iterations=(1,)),
     searched=Searched(

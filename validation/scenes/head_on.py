@@ -165,6 +165,7 @@ SCENE = CanonicalScene(
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",
+        order=0,
     ),
     words={
         "first_speed": "leaves the first ball with {value}",

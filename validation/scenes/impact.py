@@ -181,6 +181,7 @@ SCENE = CanonicalScene(
         phases,
         rebound_error,
         "the whole scene: approach, contact, departure",
+        order=0,
     ),
     steps=Steps((1.0 / 60.0, 1.0 / 240.0), full_iterations=(1,)),
     searched=Searched(

@@ -192,6 +192,7 @@ SCENE = CanonicalScene(
         "the sliding box, half a second after the start",
         0.5,
         0.25,
+        order=1,
     ),
     steps=Steps((1.0 / 60.0, 1.0 / 240.0), full_iterations=(1, 4, 30)),
     smooth=("acceleration", "creep"),

@@ -195,6 +195,7 @@ SCENE = CanonicalScene(
         lambda dt: [cell | phase for cell in ({}, {"mu": 0.1}) for phase in phases(dt)],
         error,
         "the whole scene: approach, contact, departure",
+        order=1,
     ),
     words={
         "forward_speed": "leaves along the floor with {value}",

@@ -337,6 +337,7 @@ SCENE = CanonicalScene(
         phases,
         error,
         "the whole scene: approach, blow, departure",
+        order=0,
     ),
     words={
         "ball_speed": "sends the ball off with {value}",

@@ -161,6 +161,7 @@ SCENE = CanonicalScene(
         lambda dt: [{}, {"from": 1.0, "to": 30.0}],
         error,
         "the whole fall",
+        order=1,
     ),
     smooth=("passing_time", "passing_spin"),
     words=WORDS | {"twisted": "twists out of the plane with {value}"},

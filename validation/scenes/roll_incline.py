@@ -145,6 +145,7 @@ SCENE = CanonicalScene(
         "the rolling ball",
         0.1,
         0.5,
+        order=1,
     ),
     smooth=("acceleration", "turning"),
     words={

@@ -117,6 +117,7 @@ SCENE = CanonicalScene(
         "the sliding box",
         0.1,
         0.25,
+        order=1,
     ),
     steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     smooth=("stopping_distance",),

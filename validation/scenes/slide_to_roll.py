@@ -206,6 +206,7 @@ SCENE = CanonicalScene(
         lambda dt: [{}, {"mu": 0.1}],
         error,
         "the whole scene: the ball slides, then rolls",
+        order=2,
     ),
     smooth=("rolling_place",),
     words={

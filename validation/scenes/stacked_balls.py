@@ -211,6 +211,7 @@ SCENE = CanonicalScene(
         phases,
         error,
         "the whole scene: fall, two or three impacts, departure",
+        order=0,
     ),
     words={
         "small_speed": "throws the small ball up with {value}",

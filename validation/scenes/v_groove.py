@@ -167,6 +167,7 @@ SCENE = CanonicalScene(
         "the ball at rest, half a second after the start",
         0.5,
         0.25,
+        order=2,
     ),
     smooth=("displacement",),
     words={
