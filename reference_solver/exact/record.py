@@ -244,7 +244,8 @@ class Recorder:
         self._rows.append(Row(time, numbers, bodies, self._state[bodies], state, acting))
         self._bodies += len(bodies)
         self._contacts += len(acting.gap)
-        self._state[bodies] = state
+        free = self._world.bodies.free[bodies] == 1  # several groups may touch what is moved
+        self._state[bodies[free]] = state[free]
 
     def journal(self, first: int, steps: int) -> Journal:
         """Return what was written of ``steps`` steps from the step ``first`` on, as a journal without room for more."""

@@ -73,3 +73,15 @@ def test_contacts_of_a_step_with_a_blow():
     record = Simulation(model, Settings.exact(DT)).record(4, contacts=True)
     assert np.diff(record.offset).tolist() == [0, 0, 0, 1, 1]
     assert record.contacts.impulse[:, 1] == pytest.approx([3.0 * G * DT, G * DT], rel=1e-12)
+
+
+def test_record_of_bodies_that_a_belt_moves():
+    """Two boxes that share nothing but the belt have pieces of their own, and in each the belt is where it is."""
+    belt = Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(1.0, 0.0, 0.0))
+    boxes = [Body(Box((0.5, 0.5)), 1.0, 1 / 6, (2.0 * i, 0.5, 0.0)) for i in range(2)]
+    model = Model(2, [belt, *boxes], (0.0, -G), 0.0, 0.5)
+    pieces = Simulation(model, Settings.exact(DT)).record(10, pieces=True).pieces
+    begin = np.repeat(pieces.begin, np.diff(pieces.first_body))
+    own = pieces.body == 0
+    assert own.sum() == len(pieces) == 20
+    assert pieces.pose_before[own, 0] == pytest.approx(begin[own], abs=1e-15)
