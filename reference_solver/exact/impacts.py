@@ -22,6 +22,9 @@ from reference_solver.pieces import CHAIN, FROZEN
 MOST, LOOK_BACK = 4096, 64
 #: A pair without restitution that parts more slowly than this share of the fastest approach takes part (E21).
 SLOW = 1e-6
+#: A point that parts so many times as fast as the fastest approaches has no part in an impact: no lever stops it, and
+#: its speed is no measure of the others.
+FAST = 1e6
 
 Pair = tuple[int, int]
 
@@ -58,7 +61,8 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
             if max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK]):
                 takes_part, stopped, scheme = cycle, stopped | cycle, CHAIN
             cycle = set()
-        part = contacts.chosen(np.array([pair in takes_part for pair in pairs]))
+        near = contacts.rows.speed[:, 0] < FAST * fastest[-1]
+        part = contacts.chosen(np.array([pair in takes_part for pair in pairs]) & near)
         blow = _struck(state, part, stopped)
         low = series.too_low(world, blow.after, part) - stopped
         if low:  # the impact again, without the rebounds that are too low

@@ -8,6 +8,7 @@ import pytest
 from oracle import world_of
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver.certificate.truth import certify
 
 DT, G = 1 / 240, 9.81
 KEYS = ["fuzz2 0", "fuzz2 3", "fuzz3 1", "chains2 2", "random 5"]
@@ -85,3 +86,11 @@ def test_record_of_bodies_that_a_belt_moves():
     own = pieces.body == 0
     assert own.sum() == len(pieces) == 20
     assert pieces.pose_before[own, 0] == pytest.approx(begin[own], abs=1e-15)
+
+
+@pytest.mark.parametrize("key", ["standard slide 2-D", "standard domino 2-D"])
+def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
+    """Last places of speeds are an impact beside a corner that slides, or parts, a million million times as fast."""
+    world = world_of(key)
+    found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
+    assert found.holds and np.isinf(found.horizon)
