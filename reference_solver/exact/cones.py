@@ -1,14 +1,20 @@
-"""Which contacts hold, stick and slip: by complementary pivots in the plane, by sweeps over cones in space."""
+"""Which contacts hold, stick and slip: by complementary pivots for few planar contacts, else by the direct solver."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 
-from reference_solver.exact.kernels.cones import JAMMED, UNCONVERGED, sweep
+from reference_solver.compilation import kernel
+from reference_solver.direct import problem as direct
+from reference_solver.direct.rounds import solve_problem
 from reference_solver.exact.refusals import Refused, Unconverged
+from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
+
+#: Planar contacts up to which pivots are faster than Newton's rounds.
+FEW = 16
+#: Residual (E14) at which rounds end, one at which they have found the modes, and factorisations that they may take.
+RESIDUAL, FOUND, BUDGET = 1e-14, 1e-8, 300
 
 
 class NoSolution(Refused):
@@ -17,64 +23,112 @@ class NoSolution(Refused):
     sentence = "a contact problem has no solution"
 
 
-class Cone(ABC):
-    """How friction limits forces: an interval of each load in the plane, a disc in space."""
+def within_cones(contacts: Contacts, free: Array, slips: Array) -> Array:
+    """Return forces p (m d,) that obey the laws of contact, to about 1e-9.
 
-    @staticmethod
-    def of(dimension: int) -> Cone:
-        """Return that of a dimension."""
-        return PlanarCone() if dimension == 2 else SpatialCone()
+    Parameters
+    ----------
+    free
+        (m d,): what contacts would do without forces.
+    slips
+        (m, d - 1) directions of contacts that slip already, zeros elsewhere.
 
-    @abstractmethod
-    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
-        """Return forces p (m d,) that obey the laws of ``u = yields @ p + free``, to about 1e-9.
+    Raises
+    ------
+    NoSolution, Unconverged
+        If there are none, or none is found.
+    """
+    planar = contacts.world.dimension == 2
+    if not planar or len(contacts) > FEW:
+        forces, residual = _by_rounds(contacts, free, slips)
+        if residual <= FOUND:
+            return forces
+    if not planar:
+        raise Unconverged(count=len(contacts))
+    rows, yields = contacts.matrices
+    return _by_pivots(rows @ yields, free, contacts.friction, slips)
 
-        Parameters
-        ----------
-        slips
-            (m, d - 1) directions of contacts that slip already, zeros elsewhere.
 
-        Raises
-        ------
-        NoSolution, Unconverged
-            If there are none, or none is found.
-        """
+@kernel
+def solve(problem: direct.Problem, tolerance: float, budget: int) -> float:
+    """Solve a problem from no forces on; return its residual."""
+    return solve_problem(problem, tolerance, budget, True)
 
 
-class PlanarCone(Cone):
-    """Friction in two directions of either sign: a linear complementarity problem (Stewart and Trinkle, E45)."""
+def _by_rounds(contacts: Contacts, free: Array, slips: Array) -> tuple[Array, float]:
+    """Return forces and their residual by Newton's method for all contacts at once (E40 to E45).
 
-    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
-        """See `Cone.solved`."""
-        m, slip = len(friction), slips[:, 0]
-        # Every contact as stiff as any: ties of pivots are then told from round-off.
-        stiff = np.maximum(np.diag(yields)[::2], np.diag(yields)[1::2])
-        scale = np.repeat(1.0 / np.sqrt(stiff), 2)
-        matrix, wanted = scale[:, None] * yields * scale, scale * free
-        size = max(float(np.abs(wanted).max()), 1e-300)
-        rubs = np.flatnonzero((slip == 0.0) & (friction > 0.0))
-        n, k = 2 * np.arange(m), len(rubs)
-        # Forces by unknowns: loads, with the friction of slips; friction onward and backward of what may stick.
-        by = np.zeros((2 * m, m + 2 * k))
-        by[n, np.arange(m)] = 1.0
-        by[n + 1, np.arange(m)] = -friction * slip
-        by[2 * rubs + 1, m + np.arange(k)], by[2 * rubs + 1, m + k + np.arange(k)] = 1.0, -1.0
-        speeds = np.concatenate([n, 2 * rubs + 1])
-        rates = matrix[speeds] @ by
-        total = m + 3 * k
-        table, right = np.zeros((total, total)), np.zeros(total)
-        table[: m + k, : m + 2 * k], right[: m + k] = rates, wanted[speeds] / size
-        table[m + k : m + 2 * k, : m + 2 * k], right[m + k : m + 2 * k] = -rates[m:], -wanted[2 * rubs + 1] / size
-        slip_rows = np.arange(k)
-        table[m + slip_rows, m + 2 * k + slip_rows] = table[m + k + slip_rows, m + 2 * k + slip_rows] = 1.0
-        table[m + 2 * k + slip_rows, rubs] = friction[rubs]
-        table[m + 2 * k + slip_rows, m + slip_rows] = table[m + 2 * k + slip_rows, m + k + slip_rows] = -1.0
-        for attempt in range(6):  # pivots that round-off spoils: by another way
-            cover = np.asarray(1.0 + attempt * (0.37 + 0.61 * np.arange(total)) % 1.7, np.float64)
-            found = complementary(table, right, cover)
-            if found is not None and _solves(table, right, found):
-                return np.asarray(scale * (by @ found[: m + 2 * k]) * size)
+    What slips already is a normal that pushes where its friction leads as well.
+
+    Raises
+    ------
+    NoSolution
+        If friction presses a contact more than its load takes off.
+    """
+    world, rows, d = contacts.world, contacts.rows, contacts.world.dimension
+    n, q = world.shape
+    slides = slips.any(axis=1)
+    push = rows.yields.copy()
+    push[:, 0] -= contacts.friction[:, None, None] * np.einsum("mk,mksq->msq", slips, push[:, 1:])
+    own = np.einsum("mksq,mksq->mk", rows.row, push)
+    if own[:, 0].min() <= 0.0:
         raise NoSolution
+    problem = direct.allocate_problem(d, n, len(contacts), used=True)
+    problem.size[direct.CONTACTS] = len(contacts)
+    contact, body = problem.contact, problem.body
+    size = max(float(np.abs(free).max()), 1e-300)
+    # The direct solver reads velocities of bodies: those that do along tangents what ``free`` does, and targets.
+    tangents = np.repeat(~slides, d)
+    tangents[::d] = False
+    matrix = contacts.matrices[0]
+    twist = np.linalg.lstsq(matrix[tangents], free[tangents] / size)[0]
+    body.twist[:, :q] = twist.reshape(n, q)
+    contact.target[:] = matrix[::d] @ twist - free[::d] / size
+    mass, moment = world.bodies.inverse_mass, world.bodies.moment
+    body.weight[:, :d] = np.divide(1.0, mass, out=np.zeros(n), where=mass > 0.0)[:, None]
+    body.weight[:, d:q] = np.where(np.isfinite(moment), moment, 0.0).mean(axis=1, keepdims=True)
+    contact.body[:] = contacts.features[:, :2]
+    contact.friction[:] = np.where(slides, 0.0, contacts.friction)
+    contact.speed[:] = 1.0
+    contact.jacobian[:, :, :d, :q], contact.response[:, :, :d, :q] = rows.row.swapaxes(1, 2), push.swapaxes(1, 2)
+    contact.admittance[:, 0], contact.admittance[:, 1] = own[:, 0], own[:, 1:].mean(axis=1)
+    residual = solve(problem, RESIDUAL, BUDGET)
+    forces = contact.best[:, :d].copy()
+    forces[slides, 1:] = -(contacts.friction * forces[:, 0])[slides, None] * slips[slides]
+    return size * forces.ravel(), float(residual)
+
+
+def _by_pivots(yields: Array, free: Array, friction: Array, slips: Array) -> Array:
+    """Friction in two directions of either sign: a linear complementarity problem (Stewart and Trinkle, E45)."""
+    m, slip = len(friction), slips[:, 0]
+    # Every contact as stiff as any: ties of pivots are then told from round-off.
+    stiff = np.maximum(np.diag(yields)[::2], np.diag(yields)[1::2])
+    scale = np.repeat(1.0 / np.sqrt(stiff), 2)
+    matrix, wanted = scale[:, None] * yields * scale, scale * free
+    size = max(float(np.abs(wanted).max()), 1e-300)
+    rubs = np.flatnonzero((slip == 0.0) & (friction > 0.0))
+    n, k = 2 * np.arange(m), len(rubs)
+    # Forces by unknowns: loads, with the friction of slips; friction onward and backward of what may stick.
+    by = np.zeros((2 * m, m + 2 * k))
+    by[n, np.arange(m)] = 1.0
+    by[n + 1, np.arange(m)] = -friction * slip
+    by[2 * rubs + 1, m + np.arange(k)], by[2 * rubs + 1, m + k + np.arange(k)] = 1.0, -1.0
+    speeds = np.concatenate([n, 2 * rubs + 1])
+    rates = matrix[speeds] @ by
+    total = m + 3 * k
+    table, right = np.zeros((total, total)), np.zeros(total)
+    table[: m + k, : m + 2 * k], right[: m + k] = rates, wanted[speeds] / size
+    table[m + k : m + 2 * k, : m + 2 * k], right[m + k : m + 2 * k] = -rates[m:], -wanted[2 * rubs + 1] / size
+    slip_rows = np.arange(k)
+    table[m + slip_rows, m + 2 * k + slip_rows] = table[m + k + slip_rows, m + 2 * k + slip_rows] = 1.0
+    table[m + 2 * k + slip_rows, rubs] = friction[rubs]
+    table[m + 2 * k + slip_rows, m + slip_rows] = table[m + 2 * k + slip_rows, m + k + slip_rows] = -1.0
+    for attempt in range(6):  # pivots that round-off spoils: by another way
+        cover = np.asarray(1.0 + attempt * (0.37 + 0.61 * np.arange(total)) % 1.7, np.float64)
+        found = complementary(table, right, cover)
+        if found is not None and _solves(table, right, found):
+            return np.asarray(scale * (by @ found[: m + 2 * k]) * size)
+    raise NoSolution
 
 
 def _solves(table: Array, right: Array, found: Array) -> bool:
@@ -124,18 +178,3 @@ def complementary(table: Array, right: Array, cover: Array) -> Array | None:
             tied, rows, k = tied[least], rows[least], k + 1
         row = int(tied[0])
     return None
-
-
-class SpatialCone(Cone):
-    """Friction within a disc: contacts are solved one after the other until none changes (Gauss-Seidel, E11)."""
-
-    def solved(self, yields: Array, free: Array, friction: Array, slips: Array) -> Array:
-        """See `Cone.solved`."""
-        size = max(float(np.abs(free).max()), 1e-300)
-        found = np.zeros(len(free))
-        ended = sweep(yields, free / size, friction, slips, found)
-        if ended == UNCONVERGED:
-            raise Unconverged(count=len(friction))
-        if ended == JAMMED:
-            raise NoSolution
-        return size * found

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.problem import OPEN, SLIP, STICK, Answer, Problem, directed, nothing
+from reference_solver.exact.problem import OPEN, ROUND_OFF, SLIP, STICK, Answer, Problem, directed, nothing
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
@@ -76,6 +76,16 @@ class Held:
         now = directed(contacts.rows.speed[:, 1:], SLIPPING, before)
         return np.where((self.answer.modes == SLIP)[:, None], now, before)
 
+    @property
+    def slips_end(self) -> bool:
+        """Whether, where the contacts are now, a slip in space is over that its acceleration would turn back."""
+        contacts, answer = self.contacts, self.answer
+        if not len(contacts) or contacts.world.dimension == 2:
+            return False
+        change = accelerations(contacts, self.acceleration).reshape(answer.forces.shape)[:, 1:]
+        over = np.linalg.norm(contacts.rows.speed[:, 1:], axis=1) < 2.0 * SLIPPING
+        return bool((over & ((change * answer.directions).sum(axis=1) < 0.0))[answer.modes == SLIP].any())
+
     def turned(self, slip: int, free: Array, directions: Array) -> Array:
         """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now."""
         turned = directions.copy()
@@ -142,7 +152,9 @@ def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
         contacts.along = np.where(slips[:, None], tangents, contacts.along)
         contacts.at_state(state)
         directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
-    return held_by(contacts, Problem.of(contacts, accelerations(contacts, free), directions).solved(state.t), free)
+    wanted = accelerations(contacts, free)
+    wanted[np.abs(wanted) < ROUND_OFF * world.weight] = 0.0
+    return held_by(contacts, Problem.of(contacts, wanted, directions).solved(state.t), free)
 
 
 def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:

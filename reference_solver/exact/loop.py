@@ -152,7 +152,7 @@ class Loop:
             return None
         held = self._here(piece.held)
         if event.kind is Kind.LOOK:
-            return held
+            return None if held.slips_end else held
         if event.kind in GO_ON:
             free = free_acceleration(self.world, self.state.axes, self.state.velocity)
             return changed(held, {event.contact: GO_ON[event.kind]}, free)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.exact.cones import Cone
+from reference_solver.exact.cones import within_cones
 from reference_solver.exact.refusals import Undecided, Unlawful
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
@@ -56,39 +56,34 @@ def nothing(count: int, d: int) -> Answer:
     return Answer(np.zeros(count, np.int64), np.zeros((count, d - 1)), np.zeros((count, d)))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Problem:
     """One contact problem.
 
     Parameters
     ----------
-    rows, yields
-        G (m d, N) and M^-1 G' (N, m d).
+    contacts
+        With their rows at the instant.
     free
         q (m d,): what contacts would do without forces.
-    friction
-        (m,)
     slips
         (m, d - 1) directions of contacts that slip already; zeros where friction may do anything within its cone.
     """
 
-    rows: Array
-    yields: Array
+    contacts: Contacts
     free: Array
-    friction: Array
     slips: Array
 
     @classmethod
     def of(cls, contacts: Contacts, free: Array, slips: Array | None = None) -> Problem:
         """Return the problem of contacts; ``free`` (m d,)."""
         d = contacts.world.dimension
-        none = np.zeros((len(contacts), d - 1))
-        return cls(*contacts.matrices, free, contacts.friction, none if slips is None else slips)
+        return cls(contacts, free, np.zeros((len(contacts), d - 1)) if slips is None else slips)
 
-    @property
-    def dimension(self) -> int:
-        """2 or 3."""
-        return self.slips.shape[1] + 1
+    def __post_init__(self) -> None:
+        # G (m d, N) and M^-1 G' (N, m d).
+        self.rows, self.yields = self.contacts.matrices
+        self.friction, self.dimension = self.contacts.friction, self.contacts.world.dimension
 
     @property
     def slipping(self) -> NDArray[np.bool_]:
@@ -108,7 +103,7 @@ class Problem:
         guess = self.with_modes(*self._held())
         if guess is not None and self.broken(guess) < NONE:
             return guess
-        found = Cone.of(self.dimension).solved(self.rows @ self.yields, self.free, self.friction, self.slips)
+        found = within_cones(self.contacts, self.free, self.slips)
         answer = self._polished(found.reshape(-1, self.dimension), t)
         broken = self.broken(answer)
         if broken > BROKEN:

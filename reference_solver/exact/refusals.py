@@ -27,7 +27,7 @@ class NoImpulses(Refused):
 class Unconverged(Refused):
     """Friction of several contacts in space is not found."""
 
-    sentence = "friction of {count} contacts is not found: sweeps over them do not converge"
+    sentence = "friction of {count} contacts is not found: Newton's method ends far from a solution"
 
 
 class NoForces(Refused):

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.exact import cones, events, forces, impacts, loop, refusals
 from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.checks import check
-from reference_solver.exact.kernels.cones import CONVERGED, JAMMED, UNCONVERGED
 from reference_solver.exact.kernels.meeting import NEVER
 from reference_solver.exact.meeting import Meeting
 from reference_solver.exact.motion import Piece, free_acceleration
@@ -16,6 +15,7 @@ from reference_solver.exact.rows import touching_contacts
 
 G = 9.81
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+GROUND = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), motion="fixed")
 
 
 def ball(height, speed=0.0, mass=1.0, aside=0.0):
@@ -117,17 +117,32 @@ def test_neither_forces_nor_impulses(monkeypatch):
         advance([FLOOR, ball(0.5)], e=0.0)
 
 
-@pytest.mark.parametrize(
-    ("ended", "kind"), [(UNCONVERGED, refusals.Unconverged), (JAMMED, cones.NoSolution), (CONVERGED, None)]
-)
-def test_sweeps_in_space_that_end_otherwise(monkeypatch, ended, kind):
-    monkeypatch.setattr(cones, "sweep", lambda *_: ended)
-    asked = np.eye(3), np.ones(3), np.ones(1), np.zeros((1, 2))
-    if kind is None:
-        assert np.array_equal(cones.SpatialCone().solved(*asked), np.zeros(3))
+def test_friction_in_space_that_is_not_found(monkeypatch):
+    """Rounds that end far from a solution."""
+    monkeypatch.setattr(cones, "solve", lambda *_: 1.0)
+    ball_on_floor = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0))
+    contacts = posed(Model(3, [GROUND, ball_on_floor], (0.0, 0.0, -G), 0.0, 0.5)).contacts
+    with pytest.raises(refusals.Unconverged, match="friction of 1 contacts is not found"):
+        cones.within_cones(contacts, np.array([-G, 0.0, 0.0]), np.zeros((1, 2)))
+
+
+@pytest.mark.parametrize("mu", [0.5, 3.0])
+def test_friction_that_presses_a_sliding_rod_into_the_floor(mu):
+    """Painleve's rod: a load and its friction move the place of contact by 1 + (x^2 - mu x z) / k^2."""
+    half, radius, lean = 0.5, 0.1, 1.0
+    pose = (0.0, 0.0, half * np.sin(lean) + radius, np.cos(0.5 * lean), 0.0, -np.sin(0.5 * lean), 0.0)
+    rod = Body(Capsule(half, radius), 1.0, (half**2 / 3.0,) * 3, pose, (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    asked = posed(Model(3, [GROUND, rod], (0.0, 0.0, -G), 0.0, mu))
+    slip, push = asked.contacts.rows.speed[:, 1:], asked.rows @ asked.yields
+    x, z = half * np.cos(lean), half * np.sin(lean) + radius
+    left = push[0, 0] - mu * slip[0] @ push[0, 1:]
+    assert abs(left - (1.0 + 3.0 * (x * x - mu * x * z) / half**2)) < 1e-12
+    if left > 0.0:
+        found = cones.within_cones(asked.contacts, asked.free, slip)
+        assert np.abs(push @ found + asked.free)[0] < 1e-12 and abs(np.hypot(*found[1:]) - mu * found[0]) < 1e-12
     else:
-        with pytest.raises(kind):
-            cones.SpatialCone().solved(*asked)
+        with pytest.raises(cones.NoSolution):
+            cones.within_cones(asked.contacts, asked.free, slip)
 
 
 def test_every_refusal_is_one_sentence():
