@@ -213,26 +213,30 @@ def write_bounds(course, bounds):
 
 
 @kernel
-def third_derivative(bounds, o, w, arm, apart):
-    """Return bounds of |rho'''| and |rho'| of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
+def write_rates(bounds, o, w, arm, apart, out):
+    """Write bounds of |rho'|, |rho''|, T of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
     d0 = apart + bounds[o, 0, 0] + bounds[w, 0, 0] + arm
     d1 = bounds[o, 0, 0] + bounds[w, 0, 0] + arm * bounds[w, 1, 0]
     d2 = bounds[o, 0, 1] + bounds[w, 0, 1] + arm * bounds[w, 1, 1]
     d3 = bounds[o, 0, 2] + bounds[w, 0, 2] + arm * bounds[w, 1, 2]
-    return d0 * bounds[o, 1, 2] + 3.0 * d1 * bounds[o, 1, 1] + 3.0 * d2 * bounds[o, 1, 0] + d3, d1
+    out[0] = d0 * bounds[o, 1, 0] + d1
+    out[1] = d0 * bounds[o, 1, 1] + 2.0 * d1 * bounds[o, 1, 0] + d2
+    out[2] = d0 * bounds[o, 1, 2] + 3.0 * d1 * bounds[o, 1, 1] + 3.0 * d2 * bounds[o, 1, 0] + d3
 
 
 @kernel
 def write_directions(bodies, o, w, seen, out):
-    """Write directions (m, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
+    """Write directions (m, 3, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
 
     Normals of faces of o; of planes through edges of both; towards each other at the nearest places of lines and
-    points. Return their number.
+    points. The two vectors behind each say how it turns, n + n1 s + n2 s^2: with both edges, so that it stays square
+    to them but for s^3. Return how many there are.
     """
     d = seen.shape[2]
     count = 0
+    out[:] = 0.0
     for f in range(bodies.faces[o]):
-        out[count] = bodies.normal[o, f]
+        out[count, 0] = bodies.normal[o, f]
         count += 1
     lines_o, lines_w = bodies.lines[o], bodies.lines[w]
     share, u, v, z = np.zeros(2), np.zeros(d), np.zeros(d), np.zeros(d)
@@ -250,7 +254,7 @@ def write_directions(bodies, o, w, seen, out):
                 share[0], share[1] = (bb * aw - ab * bw) / spread, (ab * aw - aa * bw) / spread
                 inside = 0.0 < share[0] < 1.0 and 0.0 < share[1] < 1.0
             if inside and d == 3:
-                out[count] = cross(u, v)
+                out[count, 0] = cross(u, v)
             else:  # one is nearest with an end
                 best = 1e300
                 for end in range(4):
@@ -266,25 +270,34 @@ def write_directions(bodies, o, w, seen, out):
                     if square < best:
                         best = square
                         for p in range(d):
-                            out[count, p] = z[p] + v0 * v[p] - u0 * u[p]
-            size, way = dot(out[count], out[count]), dot(out[count], z)
-            if size > 1e-30:
-                for p in range(d):
-                    out[count, p] *= (1.0 if way > 0.0 else -1.0) / np.sqrt(size)
-                count += 1
+                            out[count, 0, p] = z[p] + v0 * v[p] - u0 * u[p]
+            n = out[count, 0]
+            size, way = dot(n, n), dot(n, z)
+            if size <= 1e-30:
+                continue
+            n *= (1.0 if way > 0.0 else -1.0) / np.sqrt(size)
+            if inside and d == 3:
+                along = cross(n, u)
+                along /= dot(along, v)
+                out[count, 1] = -dot(n, seen[b1, 1] - seen[b0, 1]) * along
+                turns = 0.5 * dot(n, seen[b1, 2] - seen[b0, 2]) + dot(out[count, 1], seen[b1, 1] - seen[b0, 1])
+                out[count, 2] = -turns * along
+            count += 1
     return count
 
 
 @kernel
-def clear_of_pair(bodies, course, who, s, bounds, room):
+def clear_of_pair(bodies, course, who, s, bounds, rates, room):
     """Return the gap of two bodies at a share s, and how far they stay clear of each other.
 
-    ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and T of points of
-    either body. Half-spaces of either body hold it.
+    ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and what touches.
+    ``rates``: of points of either body (`write_rates`). Half-spaces of either body hold it. One that turns with a
+    normal n(s) leaves a point of w and one of o apart by ``n . (rho - c) - r |n|``.
     """
-    lift, slow, ahead = bounds[0], bounds[1], bounds[2]
+    lift, slow, ahead, touches = bounds
     seen, directions = room
     gap, best = -1e300, 0.0
+    apart = np.zeros(seen.shape[2])
     for side in range(2):
         o, w = who[side], who[1 - side]
         if bodies.points[w] == 0:
@@ -294,43 +307,57 @@ def clear_of_pair(bodies, course, who, s, bounds, room):
             write_seen(course, bodies.generator, (o, w, 0, -1), bodies.point[w, k], s, seen[k])
         count = write_directions(bodies, o, w, seen, directions)
         for m in range(count):
+            n, n1, n2 = directions[m, 0], directions[m, 1], directions[m, 2]
             level, low = -1e300, 1e300
-            for k in range(bodies.points[o]):
-                level = max(level, dot(directions[m], bodies.point[o, k]))
+            for j in range(bodies.points[o]):
+                level = max(level, dot(n, bodies.point[o, j]))
             if bodies.points[o] == 0:
                 level = bodies.offset[o, m]
             for k in range(bodies.points[w]):
-                low = min(low, dot(directions[m], seen[k, 0]) - level - r)
+                low = min(low, dot(n, seen[k, 0]) - level - r)
             gap = max(gap, low)
             if low + lift < 0.0 or ahead <= best:
                 continue
-            far = ahead
+            far, third = ahead, rates[side, 2]
+            turn, bend = np.sqrt(dot(n1, n1)), np.sqrt(dot(n2, n2))
+            turns = turn + bend > 0.0
+            if turns:  # so far that 1/2 <= |n| <= 2
+                far = min(far, 0.25 / (turn + np.sqrt(bend)))
+                turn, bend = turn + 2.0 * bend * far, 2.0 * bend
+                third = 2.0 * third + 3.0 * turn * rates[side, 1] + 3.0 * bend * rates[side, 0]
+                third += r * (6.0 * bend * turn + 12.0 * turn**3)
             for k in range(bodies.points[w]):
-                h, h1 = dot(directions[m], seen[k, 0]) - level - r + lift, dot(directions[m], seen[k, 1])
-                # What touches counts only where it leaves, but for points that are away.
-                far = 0.0 if h <= lift + bounds[5] and h1 <= slow else far
-                far = min(far, safe(h, h1, dot(directions[m], seen[k, 2]), bounds[3 + side], far))
+                for j in range(bodies.points[o] if turns else 1):
+                    h, h1, h2 = dot(n, seen[k, 0]) - level - r + lift, dot(n, seen[k, 1]), dot(n, seen[k, 2])
+                    if turns:
+                        apart[:] = seen[k, 0] - bodies.point[o, j]
+                        h = dot(n, apart) - r + lift
+                        h1 += dot(n1, apart)
+                        h2 += 2.0 * dot(n1, seen[k, 1]) + 2.0 * dot(n2, apart) - r * (dot(n1, n1) + 2.0 * dot(n, n2))
+                    # What touches counts only where it leaves, but for points that are away.
+                    far = 0.0 if h <= lift + touches and h1 <= slow else far
+                    far = min(far, safe(h, h1, h2, third, far))
             best = max(best, far)
     return gap, best
 
 
 @kernel
-def clear_at(bodies, course, who, s, bounds, third, room):
+def clear_at(bodies, course, who, s, bounds, rates, room):
     """Return the gap and how far it stays clear: of point ``who[3]`` (`clear`), or of two bodies if that is -1.
 
     ``bounds``: the lift, the least rate of gaps that count, how far to look, the noise of `clear` and that of
-    `clear_of_pair`. ``third``: T of points of either body.
+    `clear_of_pair`. ``rates``: see there.
     """
     lift, slow, ahead, runs, touches = bounds
     if who[3] < 0:
-        return clear_of_pair(bodies, course, who, s, (lift, slow, ahead, third[0], third[1], touches), room)
+        return clear_of_pair(bodies, course, who, s, (lift, slow, ahead, touches), rates, room)
     seen = room[0][0]
     write_seen(course, bodies.generator, who, bodies.point[who[1], who[3]], s, seen)
-    return clear(bodies, course, who, s, seen, (lift, slow, third[0], ahead, runs))
+    return clear(bodies, course, who, s, seen, (lift, slow, rates[0, 2], ahead, runs))
 
 
 @kernel
-def meeting(bodies, course, who, limits, third, room):
+def meeting(bodies, course, who, limits, rates, room):
     """Return the first share below ``limits[0]`` at which a point or a body meets body ``who[0]``, or `NEVER`.
 
     ``limits``: the share to look up to, noise [m], speed of what leaves [m], round-off of gaps [m]. The second number
@@ -340,23 +367,23 @@ def meeting(bodies, course, who, limits, third, room):
     s, lift, leaves, before, runs = 0.0, 0.0, True, 0.0, noise
     for step in range(MOST_STEPS):
         ahead = until - s
-        gap, far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)
+        gap, far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)
         if step == 0 and gap <= noise:  # it touches, and leaves with a speed
             lift, runs = max(0.0, -gap), -1e300
-            far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), third, room)[1]
+            far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), rates, room)[1]
             if far == 0.0:  # or without one: no contact until it is deeper than now by the noise
                 lift, leaves = noise + lift, False
-                far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)[1]
+                far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)[1]
         elif not leaves and gap > noise:
             lift, leaves = 0.0, True
-            far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), third, room)[1]
+            far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)[1]
         if s > 0.0 and gap + lift <= least:
             low, high = before, s
             while gap + lift < 0.0:  # passed by round-off
                 middle = 0.5 * (low + high)
                 if not low < middle < high:
                     break
-                if clear_at(bodies, course, who, middle, (0.0, 0.0, 0.0, runs, 0.0), third, room)[0] + lift > 0.0:
+                if clear_at(bodies, course, who, middle, (0.0, 0.0, 0.0, runs, 0.0), rates, room)[0] + lift > 0.0:
                     low = middle
                 else:
                     high = middle
@@ -385,8 +412,9 @@ def first_meeting(bodies, course, held, pairs, scales):
     """
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
+    rates = np.zeros((2, 3))
     write_bounds(course, bounds)
-    room = np.zeros((1, 3, d)), np.zeros((1, d))
+    room = np.zeros((1, 3, d)), np.zeros((1, 3, d))
     first, stopped = NEVER, 0
     for o in range(n):
         for w in range(n):
@@ -412,17 +440,15 @@ def first_meeting(bodies, course, held, pairs, scales):
                 arm = 0.0
                 for p in range(d):
                     arm += bodies.point[w, k, p] ** 2
+                own = bounds[o, 1].copy()
                 if fixed == 1:
-                    own = bounds[o, 1].copy()
                     bounds[o, 1] = 0.0
-                    third, moves = third_derivative(bounds, o, w, np.sqrt(arm), apart)
-                    bounds[o, 1] = own
-                else:
-                    third, moves = third_derivative(bounds, o, w, np.sqrt(arm), apart)
-                if moves == 0.0 and third == 0.0 and (fixed == 1 or bounds[o, 1, 0] == 0.0):
+                write_rates(bounds, o, w, np.sqrt(arm), apart, rates[0])
+                bounds[o, 1] = own
+                if rates[0, 0] == 0.0:
                     continue
                 limits = (min(first, 1.0), scales[0], scales[1], 1e-16 * size)
-                s, ended = meeting(bodies, course, (o, w, fixed, k), limits, (third, 0.0), room)
+                s, ended = meeting(bodies, course, (o, w, fixed, k), limits, rates, room)
                 if s < first:
                     first, stopped = s, ended
     return first, stopped
@@ -433,9 +459,10 @@ def first_meeting_of_pairs(bodies, course, pairs, scales):
     """Return the first share of a piece at which pairs that no contact holds meet, or `NEVER`; see `first_meeting`."""
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
+    rates = np.zeros((2, 3))
     write_bounds(course, bounds)
     lines = bodies.line.shape[1]
-    room = np.zeros((bodies.point.shape[1], 3, d)), np.zeros((bodies.normal.shape[1] + lines * lines + 1, d))
+    room = np.zeros((bodies.point.shape[1], 3, d)), np.zeros((bodies.normal.shape[1] + lines * lines + 1, 3, d))
     first, stopped = NEVER, 0
     for o in range(n):
         for w in range(o + 1, n):
@@ -446,10 +473,10 @@ def first_meeting_of_pairs(bodies, course, pairs, scales):
             if apart - bodies.reach[o] - bodies.reach[w] - r > way or way + bounds[o, 1, 0] + bounds[w, 1, 0] == 0.0:
                 continue
             reach_o, reach_w = min(bodies.reach[o], 1e300), min(bodies.reach[w], 1e300)
-            third = third_derivative(bounds, o, w, reach_w, apart)[0]
-            other = third_derivative(bounds, w, o, reach_o, apart)[0] if bodies.points[o] > 0 else 0.0
+            write_rates(bounds, o, w, reach_w, apart, rates[0])
+            write_rates(bounds, w, o, reach_o, apart, rates[1])
             limits = (min(first, 1.0), scales[0], scales[1], 1e-15 * (apart + r))
-            s, ended = meeting(bodies, course, (o, w, 0, -1), limits, (third, other), room)
+            s, ended = meeting(bodies, course, (o, w, 0, -1), limits, rates, room)
             if s < first:
                 first, stopped = s, ended
     return first, stopped
