@@ -153,7 +153,8 @@ def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
         contacts.at_state(state)
         directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
     wanted = accelerations(contacts, free)
-    wanted[np.abs(wanted) < ROUND_OFF * world.weight] = 0.0
+    if np.abs(wanted).max() < ROUND_OFF * world.weight:
+        wanted[:] = 0.0
     return held_by(contacts, Problem.of(contacts, wanted, directions).solved(state.t), free)
 
 
