@@ -43,12 +43,19 @@ def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
     place, reach = poses[:, :, :d], bodies.reach + bodies.radius
     apart = np.linalg.norm(place[:, :, None] - place[:, None], axis=3) - reach[:, None] - reach
     moves = (bodies.free[:, None] + bodies.free) > 0
+    pairs = np.argwhere(np.triu((apart.min(axis=0) < 0.0) & moves, 1)).tolist()
+    alike: dict[tuple[object, object], list[tuple[int, int]]] = {}
+    for a, b in pairs:
+        alike.setdefault((world.shapes[a], world.shapes[b]), []).append((a, b))
     found = (0, 0, 0.0, -np.inf)
-    for a, b in np.argwhere(np.triu((apart.min(axis=0) < 0.0) & moves, 1)).tolist():
-        gaps = gap(world.shapes[a], poses[:, a], world.shapes[b], poses[:, b])
-        least = int((gaps < gaps.min() + DEEP * world.size).argmax())  # the first that is as deep
-        if -gaps[least] > found[3]:
-            found = (a, b, LOOK[least], -float(gaps[least]))
+    for (shape_a, shape_b), same in alike.items():
+        first, second = np.array(same).T
+        many = [poses[:, each].swapaxes(0, 1).reshape(-1, poses.shape[2]) for each in (first, second)]
+        gaps = gap(shape_a, many[0], shape_b, many[1]).reshape(len(same), -1)
+        worst = int(gaps.min(axis=1).argmin())
+        least = int((gaps[worst] < gaps[worst].min() + DEEP * world.size).argmax())  # the first that is as deep
+        if -gaps[worst, least] > found[3]:
+            found = (*same[worst], LOOK[least], -float(gaps[worst, least]))
     return found
 
 

@@ -7,7 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.problem import OPEN, ROUND_OFF, SLIP, STICK, Answer, Problem, directed, nothing
+from reference_solver.exact.kernels.forces import SHARED, UNKNOWN, solve_groups
+from reference_solver.exact.problem import (
+    OPEN,
+    ROUND_OFF,
+    SLIP,
+    STICK,
+    Answer,
+    Problem,
+    directed,
+    loads_shared,
+    nothing,
+)
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
@@ -59,8 +70,8 @@ class Held:
         if not len(self.contacts):
             return free
         contacts = self.contacts.at(place, axes, velocity)
-        self.forces = self._solved(contacts, free, self.onward(contacts) if directions is None else directions)
-        return free + contacts.changes(self.forces)
+        self.forces, acceleration = self._solved(free, self.onward(contacts) if directions is None else directions)
+        return acceleration
 
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
@@ -90,29 +101,24 @@ class Held:
         """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now."""
         turned = directions.copy()
         turned[slip] += TURN * np.array([-directions[slip, 1], directions[slip, 0]])
-        change = self._solved(self.contacts, free, turned) - self.forces
-        return self.contacts.changes(change).ravel() / TURN
+        return (self._solved(free, turned)[1] - self._solved(free, directions)[1]).ravel() / TURN
 
-    def _solved(self, contacts: Contacts, free: Array, directions: Array) -> Array:
-        answer = self.answer
-        problem = Problem.of(contacts, accelerations(contacts, free), directions)
-        rows, columns = problem.equations(answer.modes, directions)
-        matrix, wanted = problem.rows[rows] @ columns, -problem.free[rows]
-        if not self._is_redundant(matrix):
-            try:
-                found = np.asarray(np.linalg.solve(matrix, wanted), np.float64)
-                return problem.spread(answer.modes, directions, rows, found)
-            except np.linalg.LinAlgError:  # loads can be shared here, and not where the piece began
-                pass
-        nearest = problem.with_modes(answer.modes, directions, answer.forces)
-        return answer.forces if nearest is None else nearest.forces
-
-    def _is_redundant(self, matrix: Array) -> bool:
-        """Whether loads can be shared: asked once for all of a piece."""
-        if not hasattr(self, "_redundant"):
-            values = np.linalg.svd(matrix, compute_uv=False)
-            self._redundant = bool(values[-1] < 1e-9 * values[0])
-        return self._redundant
+    def _solved(self, free: Array, directions: Array) -> tuple[Array, Array]:
+        """Return forces (m, d) and accelerations (n, q) where the contacts are now."""
+        contacts, answer = self.contacts, self.answer
+        forces, acceleration = np.zeros(answer.forces.shape), np.empty(free.shape)
+        if not hasattr(self, "_groups"):
+            # Contacts in the order of their groups, where each begins; whether loads can be shared is asked only once.
+            groups = contacts.groups
+            self._groups = np.concatenate(groups), np.cumsum([0, *map(len, groups)]), np.full(len(groups), UNKNOWN)
+        held = answer.modes, directions, contacts.friction, answer.forces, loads_shared(contacts, answer.forces)
+        asked = contacts.features, held, contacts.rows, free, self._groups, forces, acceleration
+        try:
+            solve_groups(*asked)
+        except np.linalg.LinAlgError:  # loads can be shared here, and not where the piece began
+            self._groups[2][:] = SHARED
+            solve_groups(*asked)
+        return forces, acceleration
 
 
 def accelerations(contacts: Contacts, free: Array) -> Array:

@@ -68,11 +68,14 @@ class Problem:
         q (m d,): what contacts would do without forces.
     slips
         (m, d - 1) directions of contacts that slip already; zeros where friction may do anything within its cone.
+    size
+        What velocities or accelerations are measured by.
     """
 
     contacts: Contacts
     free: Array
     slips: Array
+    size: float = 0.0
 
     @classmethod
     def of(cls, contacts: Contacts, free: Array, slips: Array | None = None) -> Problem:
@@ -83,6 +86,7 @@ class Problem:
     def __post_init__(self) -> None:
         # G (m d, N) and M^-1 G' (N, m d).
         self.rows, self.yields = self.contacts.matrices
+        self.size = max(self.size, float(np.abs(self.free).max(initial=0.0)), 1e-300)
         self.friction, self.dimension = self.contacts.friction, self.contacts.world.dimension
 
     @property
@@ -100,6 +104,8 @@ class Problem:
         Undecided, Unlawful
             If none are found that obey the laws to `BROKEN`.
         """
+        if parts := self._parts():
+            return self._joined([part.solved(t) for _, part in parts])
         guess = self.with_modes(*self._held())
         if guess is not None and self.broken(guess) < NONE:
             return guess
@@ -110,6 +116,27 @@ class Problem:
             raise Unlawful(t=t, share=broken)
         return answer
 
+    def _parts(self) -> list[tuple[Indices, Problem]]:
+        """Contacts of each group, by their numbers, and their problem: groups share nothing."""
+        if not hasattr(self, "_each"):
+            groups, free = self.contacts.groups, self.free.reshape(len(self.contacts), -1)
+            self._each = [
+                (each, Problem(self.contacts.chosen(each), free[each].ravel(), self.slips[each], self.size))
+                for each in (groups if len(groups) > 1 else [])
+            ]
+        return self._each
+
+    def _joined(self, answers: list[Answer]) -> Answer:
+        """Return answers of all parts as one."""
+        whole = nothing(len(self.contacts), self.dimension)
+        for (group, _), answer in zip(self._parts(), answers, strict=True):
+            whole.modes[group], whole.directions[group], whole.forces[group] = (
+                answer.modes,
+                answer.directions,
+                answer.forces,
+            )
+        return whole
+
     def _held(self) -> tuple[Indices, Array]:
         """Modes and directions where every contact is held and sticks, but for what slips or has no friction."""
         sticks = (self.friction > 0.0) & ~self.slipping
@@ -118,7 +145,7 @@ class Problem:
     def _shown(self, forces: Array) -> tuple[Indices, Array]:
         """Modes and directions that forces (m, d) show."""
         u = (self.rows @ (self.yields @ forces.ravel()) + self.free).reshape(forces.shape)
-        still = NONE * np.abs(self.free).max()
+        still = NONE * self.size
         directions, given = directed(u[:, 1:], still), self.slipping
         slides = np.asarray(directions.any(axis=1))
         # Friction is known to more digits than what it leaves of a slip, but for what carries nothing.
@@ -157,22 +184,26 @@ class Problem:
         """
         if not (modes != OPEN).any():
             return nothing(len(modes), self.dimension)
+        if parts := self._parts():
+            answers = []
+            for group, part in parts:
+                answer = part.with_modes(modes[group], directions[group], None if near is None else near[group])
+                if answer is None:
+                    return None
+                answers.append(answer)
+            return self._joined(answers)
         rows, columns = self.equations(modes, directions)
         matrix, wanted = self.rows[rows] @ columns, -self.free[rows]
         scale, start = np.ones(len(rows)), np.zeros(len(rows))
         if near is not None:
-            bears = np.maximum(near[:, :1], 1e-12 * max(1e-300, near[:, 0].max()))
-            share = np.concatenate(
-                [np.ones((len(modes), 1)), np.repeat(self.friction[:, None], near.shape[1] - 1, 1)], 1
-            )
-            scale, start = np.sqrt(bears * share).ravel()[rows], near.ravel()[rows]
+            scale, start = loads_shared(self.contacts, near).ravel()[rows], near.ravel()[rows]
         found = start
         for _ in range(3):  # each round leaves of the last one's remainder what round-off does
             remainder = wanted - matrix @ found
             if np.abs(remainder).max() <= ROUND_OFF * np.abs(wanted).max():
                 break
             found = found + scale * np.linalg.lstsq(matrix * scale, remainder, rcond=SINGULAR)[0]
-        if np.abs(matrix @ found - wanted).max() > NONE * max(np.abs(self.free).max(), 1e-300):
+        if np.abs(matrix @ found - wanted).max() > NONE * self.size:
             return None
         return Answer(modes, directions, self.spread(modes, directions, rows, found))
 
@@ -180,7 +211,8 @@ class Problem:
         """Share of their size by which velocities or forces break a law."""
         p = answer.forces
         u = (self.rows @ (self.yields @ p.ravel()) + self.free).reshape(p.shape)
-        size_u, size_p = max(np.abs(self.free).max(), 1e-300), max(np.abs(p).max(), 1e-300)
+        size_u, stiffest = self.size, float(np.einsum("ij,ji->i", self.rows, self.yields).max())
+        size_p = max(np.abs(p).max(), size_u / stiffest)
         speed, friction = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
         limit = self.friction * p[:, 0]
         loaded = p[:, 0] > NONE * size_p
@@ -212,6 +244,14 @@ class Problem:
             modes = modes.copy()
             modes[least] = OPEN
         raise Undecided(t=t)
+
+
+def loads_shared(contacts: Contacts, near: Array) -> Array:
+    """Return how changes of redundant forces (m, d) are weighed: by what is carried there (E37)."""
+    bears = np.maximum(near[:, :1], 1e-12 * max(1e-300, near[:, 0].max()))
+    weight = np.repeat(bears, near.shape[1], axis=1)
+    weight[:, 1:] *= contacts.friction[:, None]
+    return np.sqrt(weight)
 
 
 def _pressing(answer: Answer) -> Answer:

@@ -13,6 +13,7 @@ where G a collects the accelerations a of the bodies. A kind of contact tells n,
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,6 +119,25 @@ class Contacts:
     def pairs(self) -> list[tuple[int, int]]:
         """Bodies of each contact."""
         return [(a, b) for a, b in self.features[:, :2].tolist()]
+
+    @cached_property
+    def groups(self) -> list[Indices]:
+        """Contacts that share free bodies, at first hand or not, by their numbers."""
+        free = self.world.bodies.free.tolist()
+        group = list(range(len(free)))  # of each body a number that all of its group have
+
+        def first(i: int) -> int:
+            while group[i] != i:
+                i = group[i]
+            return i
+
+        for a, b in self.pairs:
+            if free[a] and free[b]:
+                group[first(b)] = first(a)
+        of: dict[int, list[int]] = {}
+        for k, (a, b) in enumerate(self.pairs):
+            of.setdefault(first(a if free[a] else b), []).append(k)
+        return [np.array(each) for each in of.values()]
 
     def _spread(self, blocks: Array) -> Array:
         """Return rows (m, d, 2, q) as a matrix (m d, n q)."""
