@@ -22,6 +22,8 @@ from reference_solver.exact.stiff import step
 
 #: Pieces of a run, events that may follow each other without progress, and progress [s].
 MOST_PIECES, MOST_AT_ONCE, PROGRESS = 20_000, 50, 1e-12
+#: Pieces that may follow each other within this share of the longest one.
+MOST_IN_A_ROW, ROW = 1000, 1e-3
 #: An instant in which impulses do what no forces can (E54) [s].
 INSTANT = 4e-11
 #: First step of a motion that turns, in the time that the smallest half width falls through.
@@ -58,6 +60,7 @@ class Loop:
     pieces: int = 0
     at_once: int = 0
     blows: list[Blow] = field(default_factory=list)
+    row: float = 0.0  # where a count of pieces in a row began [s]
     held: Held | None = None  # what goes on from the piece before
     left: frozenset[tuple[int, ...]] = frozenset()  # contacts at the end of a feature
 
@@ -142,6 +145,10 @@ class Loop:
         self.pieces += 1
         if self.pieces > MOST_PIECES:
             raise TooManyPieces(count=MOST_PIECES, t=self.state.t)
+        if self.pieces % MOST_IN_A_ROW == 0:
+            if self.state.t - self.row < ROW * self.longest:
+                raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=event.kind.value)
+            self.row = self.state.t
         if piece.length > PROGRESS:
             self.at_once, self.left = 0, frozenset()
         else:

@@ -49,9 +49,9 @@ class Unlawful(Refused):
 
 
 class NoProgress(Refused):
-    """Events follow each other in no time."""
+    """Events follow each other in no time, or in hardly any."""
 
-    sentence = "{count} events follow each other at {t:.9g} s and time does not go on; the last: {last}"
+    sentence = "{count} events follow each other at {t:.9g} s and time hardly goes on; the last: {last}"
 
 
 class TooManyImpacts(Refused):

@@ -71,6 +71,14 @@ def test_events_without_progress(monkeypatch):
         advance([FLOOR, ball(1.0)], e=1.0, steps=24_000)
 
 
+def test_events_that_take_hardly_any_time(monkeypatch):
+    monkeypatch.setattr(loop, "MOST_IN_A_ROW", 4)
+    advance([FLOOR, ball(1.0)], e=1.0, steps=2400)
+    monkeypatch.setattr(loop, "ROW", 10.0)
+    with pytest.raises(refusals.NoProgress, match="4 events follow each other"):
+        advance([FLOOR, ball(1.0)], e=1.0, steps=2400)
+
+
 def test_contacts_that_create_energy():
     """A piece in which a body without load becomes faster."""
     model = Model(2, [ball(1.0)], (0.0, 0.0), 0.0, 0.0)

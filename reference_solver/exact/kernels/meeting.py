@@ -428,10 +428,8 @@ def first_meeting(bodies, course, held, pairs, scales):
                 apart += (course.place[o, p] - course.place[w, p]) ** 2
             apart = np.sqrt(apart)
             r = bodies.radius[o] + bodies.radius[w]
-            if (
-                bodies.points[o] > 0
-                and apart - bodies.reach[o] - bodies.reach[w] - r > bounds[o, 0, 0] + bounds[w, 0, 0]
-            ):
+            way = min(first, 1.0) * (bounds[o, 0, 0] + bounds[w, 0, 0])
+            if bodies.points[o] > 0 and apart - bodies.reach[o] - bodies.reach[w] - r > way:
                 continue
             size = apart + bodies.reach[w] + r + (bodies.reach[o] if bodies.points[o] > 0 else 0.0)
             for k in range(bodies.points[w]):
@@ -470,7 +468,10 @@ def first_meeting_of_pairs(bodies, course, pairs, scales):
                 continue
             apart = np.sqrt(dot(course.place[o] - course.place[w], course.place[o] - course.place[w]))
             way, r = bounds[o, 0, 0] + bounds[w, 0, 0], bodies.radius[o] + bodies.radius[w]
-            if apart - bodies.reach[o] - bodies.reach[w] - r > way or way + bounds[o, 1, 0] + bounds[w, 1, 0] == 0.0:
+            if (
+                apart - bodies.reach[o] - bodies.reach[w] - r > min(first, 1.0) * way
+                or way + bounds[o, 1, 0] + bounds[w, 1, 0] == 0.0
+            ):
                 continue
             reach_o, reach_w = min(bodies.reach[o], 1e300), min(bodies.reach[w], 1e300)
             write_rates(bounds, o, w, reach_w, apart, rates[0])
