@@ -1,6 +1,7 @@
 """The event loop against motions that are known in closed form, to 1e-10."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -175,3 +176,19 @@ def test_boxes_of_one_height_meet_on_a_floor():
     begin = 0.1  # the gap over the speed
     truth = np.minimum(found.t, begin), 0.6 + np.maximum(found.t - begin, 0.0)
     assert np.abs(found.pose[:, 1:, 0].T - truth).max() < SMALL
+
+
+@pytest.mark.parametrize(("closing", "steps"), [(1, 696), (1, 717), (Fraction(1, 2), 1437)])
+def test_ball_between_closing_walls(closing, steps):
+    """It goes back and forth ever faster, hundreds of times; here with whole numbers and shares of them."""
+    wall, end, x, v, now = Fraction(closing), Fraction(steps, 240), Fraction(1), Fraction(1), Fraction(0)
+    while True:
+        wait = (Fraction(7, 2) - wall * now - x) / (v + wall) if v > 0 else (x - Fraction(1, 2)) / -v
+        if now + wait >= end:
+            break
+        x, v, now = x + wait * v, -v - 2 * wall if v > 0 else -v, now + wait
+    fixed = Body(HalfSpace((1.0, 0.0)), motion="fixed")
+    lid = Body(HalfSpace((-1.0, 0.0)), pose=(4.0, 0.0, 0.0), twist=(-float(wall), 0.0, 0.0), motion="prescribed")
+    ball = Body(Disc(0.5), 1.0, 0.125, (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    found = record(Model(2, [fixed, lid, ball], (0.0, 0.0), 1.0, 0.0), float(end), steps)
+    assert abs(found.pose[-1, 2, 0] - float(x + v * (end - now))) < SMALL
