@@ -169,13 +169,15 @@ def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...
     """
     features = find(world, state, left)
     contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
-    keep: list[int] = []
     crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
-    pair, place = features[:, :2], contacts.rows.place
+    place = contacts.rows.place
     # Places differ by as much as two gaps and two distances from ends may be off.
     tol = 2e-10 * world.size
-    for k in range(len(features)):
-        others = [j for j in keep if not (crosses[j] and crosses[k])]
-        if not any((pair[j] == pair[k]).all() and np.abs(place[j] - place[k]).max() < tol for j in others):
+    of: dict[tuple[int, int], list[int]] = {}
+    keep: list[int] = []
+    for k, pair in enumerate(contacts.pairs):
+        others = of.setdefault(pair, [])
+        if all((crosses[j] and crosses[k]) or np.abs(place[j] - place[k]).max() >= tol for j in others):
+            others.append(k)
             keep.append(k)
     return contacts if len(keep) == len(features) else contacts.chosen(np.array(keep))

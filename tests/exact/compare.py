@@ -15,13 +15,14 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from oracle import KEPT, Answer, World, stored, world_of
 
 from reference_solver import Settings, Simulation
+from reference_solver.certificate.relations import Change
 from reference_solver.certificate.truth import distance
 from reference_solver.exact import Refused
 
@@ -78,9 +79,12 @@ def poses(world: World, tolerance: float | None = None) -> tuple[np.ndarray, str
     return np.array(found), why
 
 
-def compared(known: Answer, limit: float) -> Verdict:
-    """Return the verdict of a world."""
-    world = world_of(known.key)
+def compared(known: Answer, limit: float, change: Change | None = None) -> Verdict:
+    """Return the verdict of a world, or of the same as another observer sees it."""
+    world, truth = world_of(known.key), np.array(known.pose)
+    if change is not None:
+        world = replace(world, model=change.model(world.model))
+        truth = change.pose(truth, np.array(known.t))
     begin = time.process_time()
     try:
         with limited(limit):
@@ -100,7 +104,7 @@ def compared(known: Answer, limit: float) -> Verdict:
     end = min(horizon, np.inf if known.determined is None else known.determined)
     error = np.array([np.inf if x is None else x for x in known.error[:count]])
     own = 2.0 * distance(world.model, found[:count], coarser[:count])
-    apart = distance(world.model, found[:count], np.array(known.pose[:count]))
+    apart = distance(world.model, found[:count], truth[:count])
     allowed = error + own + LEAST
     told = t < end
     worst = int(np.argmax(np.where(told, apart / allowed, 0.0))) if told.any() else 0

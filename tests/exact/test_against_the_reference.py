@@ -5,6 +5,7 @@ import pytest
 from compare import compared
 from oracle import KEPT, SEEDED, Answer, stored, world_of
 
+from reference_solver.certificate.relations import Change
 from reference_solver.exact import loop
 from reference_solver.exact.refusals import NoForces
 
@@ -42,6 +43,20 @@ def test_slip_in_space_that_begins_or_ends_stiffly(monkeypatch, seed):
 @pytest.mark.parametrize("key", ["fuzz3 28", "chains3 59"])
 def test_contacts_that_sweeps_over_them_do_not_solve(key):
     assert compared(ANSWERS[key], LIMIT).word == "same"
+
+
+#: Moved along, turned by a quarter or a third, and mirrored.
+SEEN = {
+    2: (Change(2, boost=(0.3, -0.2)), Change(2, (1, 0), (-1.0, 1.0)), Change(2, None, (-1.0, 1.0))),
+    3: (Change(3, boost=(0.3, -0.2, 0.1)), Change(3, (1, 2, 0)), Change(3, None, (1.0, -1.0, 1.0))),
+}
+
+
+@pytest.mark.parametrize("key", ["fuzz2 0", "fuzz2 11", "fuzz3 3", "fuzz3 5"])
+@pytest.mark.parametrize("change", range(3))
+def test_world_seen_by_another_observer(key, change):
+    known = ANSWERS[key]
+    assert compared(known, LIMIT, SEEN[world_of(key).model.dimension][change]).word == "same"
 
 
 def moved(known, way):
