@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from contact_crosscheck.apart import apart
-from reports import listing
+from reports import listing, numbers
 
 
 def engines() -> pd.DataFrame:
@@ -15,7 +15,8 @@ def engines() -> pd.DataFrame:
     -------
     pandas.DataFrame
         One row for each engine: ``name``, ``version``, ``status``, ``profiles`` (list of names), ``reason`` if it is
-        not available.
+        not available; then what is kept of it as shipped, in words: ``cone``, ``combined_friction``, ``threshold`` and
+        the others of `reports.numbers.COLUMNS`.
 
     Examples
     --------
@@ -24,7 +25,7 @@ def engines() -> pd.DataFrame:
     >>> found[found.status == "installed"][["name", "version", "profiles"]]
     """
     with apart():
-        return pd.DataFrame(listing.engines())
+        return pd.DataFrame([told | numbers.of_engine(told["name"]) for told in listing.engines()])
 
 
 def scenes() -> pd.DataFrame:

@@ -16,7 +16,7 @@ import pandas as pd
 import worked
 
 from adapters import registry
-from reports import readings
+from reports import numbers, readings
 from reports.cures import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.symptoms.published import passed
@@ -118,13 +118,16 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"scenes/{scene.name}", describe(scene.name) | more | {"figure": parts(scene.figure)}
     yield "scenes/index", {"groups": groups}
     engines = [name for name in registry.names() if registry.adapter(name) is not None]
+    found = {}
     for name in engines:
         told = describe(name, measure=True)
         yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
+        found[name] = numbers.of_engine(name, told["unset"])
     yield "engines/index", {"engines": {name: registry.facts(name) for name in engines}}
     yield "tolerances", {"introduction": inspect.getdoc(bounds), "sections": tolerances(), "reasons": reasons()}
     yield "references", references()
     yield "worked-example", worked.example()
+    yield "numbers", {"engines": found, "groups": numbers.COLUMNS}
     yield "forces", {"engines": [readings.told(name) for name in readings.engines()], "laws": readings.LAWS}
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
 

@@ -475,7 +475,8 @@ def test_urdf_and_sdf_models_given_as_scenes(engine, read, name, reader):
 
 def test_tables_of_engines_and_scenes(engine):
     engines, scenes = cc.engines(), cc.scenes().set_index("name")
-    assert engines.set_index("name").loc[engine("chipmunk")].status == "installed"
+    chipmunk = engines.set_index("name").loc[engine("chipmunk")]
+    assert chipmunk.status == "installed" and chipmunk.combined_friction == "0.18, the product"
     assert "bounce" in scenes.index and scenes.loc["bounce"].dimensions == [2, 3]
 
 

@@ -50,7 +50,7 @@ def _whole(point: tuple[Any, ...]) -> Any:
 
 _AXES = "along contactNormalOnB, lateralFrictionDir1, lateralFrictionDir2 in world axes"
 _APART = Cause(
-    ("blow", "flight"),
+    ("blow", "airborne"),
     "points stay in the list after bodies part, with the force of the last step in touch: skip those with distance > 0",
     {"contactProcessingThreshold": 1e30}, "tuned",
 )  # fmt: skip

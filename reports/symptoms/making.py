@@ -123,8 +123,11 @@ def _of_topics(topics: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, s
 
 
 def _of_pages() -> Iterator[tuple[str, str, str]]:
-    """Title and headings of each page for users."""
-    for path in sorted([*DOCS.glob("*.md"), *DOCS.glob("howto/*.md"), *DOCS.glob("reference/*.md")]):
+    """Title and headings of each page for users that is written by hand."""
+    pages = sorted([*DOCS.glob("*.md"), *DOCS.glob("howto/*.md"), *DOCS.glob("reference/*.md")])
+    for path in pages:
+        if (DOCS / "templates" / f"{path.name}.j2").exists():
+            continue
         text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
         titles = re.findall(r"^##? (.+)$", text, re.MULTILINE)
         for title in titles if path.stem != "index" else ():

@@ -7,6 +7,7 @@ import gzip
 import json
 import re
 from collections.abc import Iterator
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -29,14 +30,20 @@ class _Links(HTMLParser):
             self.files[str(told["download"])] = str(told.get("href"))
 
 
-def passed() -> pd.DataFrame:
-    """Checks judged and failed of each scene, engine and profile in the published report, with the engine's release."""
+@cache
+def values() -> pd.DataFrame:
+    """Every value of the published report."""
     links = _Links()
     links.feed((FOLDER / "report.html").read_text(encoding="utf-8"))
     packed = links.files["rows.json.gz"].partition(",")[2]
-    rows = pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(packed))))
+    return pd.DataFrame(json.loads(gzip.decompress(base64.b64decode(packed))))
+
+
+def passed() -> pd.DataFrame:
+    """Checks judged and failed of each scene, engine and profile in the published report, with the engine's release."""
+    rows = values()
     rows = rows[rows.iterations.isna() & rows.physics.isin(["pass", "fail"])]
-    rows["failed"] = rows.physics == "fail"
+    rows = rows.assign(failed=rows.physics == "fail")
     by = ["scene", "engine", "profile", "dimension", "engine_version"]
     found = rows.groupby(by, sort=False)["failed"].agg(["size", "sum"])
     return found.reset_index().rename(columns={"size": "judged", "sum": "failed"})

@@ -1,11 +1,11 @@
 """Whether what an engine says of contact forces is true: six situations in which they are known.
 
-    rest    two boxes on each other             the floor carries 2 m g, the lower box m g
-    slope   a box at rest on a slope            m g cos a, m g sin a, (h/2) tan a downhill of the centre
-    sliding a box that slides to a stop         m g upwards, mu m g against its velocity
-    blow    a ball thrown at the floor          over the steps of the blow m v (1 + e), and what friction takes
-    flight  a ball between two bounces          0, from the step after it has left the floor
-    grip    a box between a wall and a pad      the grip N from both sides, which share its weight
+    rest      two boxes on each other           the floor carries 2 m g, the lower box m g
+    slope     a box at rest on a slope          m g cos a, m g sin a, (h/2) tan a downhill of the centre
+    sliding   a box that slides to a stop       m g upwards, mu m g against its velocity
+    blow      a ball thrown at the floor        over the steps of the blow m v (1 + e), and what friction takes
+    airborne  a ball between two bounces        0, from the step after it has left the floor
+    grip      a box between a wall and a pad    the grip N from both sides, which share its weight
 
 Two questions are kept apart. Does the body move as it must? Its momentum is compared with the law of the situation.
 Is the reading true? In every step the impulses that it names must be those that the body got, by Newton's second law:
@@ -175,18 +175,21 @@ def _downhill(scene: Scene) -> float:
 
 #: What is known in each situation: its law, normal axis, and functions as of `Situation`.
 _KNOWN: Mapping[str, Mapping[str, Any]] = {
-    "rest": {"what": "boxes at rest: m g", "law": _carried, "pairs": _on_each_other},
+    "rest": {"what": "two boxes on each other: 2 m g and m g", "law": _carried, "pairs": _on_each_other},
     "slope": {
-        "what": "at rest on a slope: m g cos a, m g sin a, (h/2) tan a downhill of the centre",
+        "what": "a box at rest: m g cos a, m g sin a, (h/2) tan a downhill of the centre",
         "law": _carried, "pairs": _on_floor, "placed": _downhill,
     },
-    "sliding": {"what": "sliding: m g, and mu m g against the velocity", "law": _slid, "pairs": _on_floor},
+    "sliding": {"what": "a box: m g, and mu m g against the velocity", "law": _slid, "pairs": _on_floor},
     "blow": {
-        "what": "through a blow: m v (1 + e), and what friction takes", "law": _struck, "pairs": _on_floor,
-        "is_sum": True,
+        "what": "a thrown ball, over its steps: m v (1 + e), and what friction takes", "law": _struck,
+        "pairs": _on_floor, "is_sum": True,
     },
-    "flight": {"what": "in flight: 0", "law": _nothing, "pairs": _on_floor, "flies": True},
-    "grip": {"what": "in a grip: N from both sides", "law": _gripped, "pairs": _between, "normal": 0},
+    "airborne": {"what": "between two bounces: 0", "law": _nothing, "pairs": _on_floor, "flies": True},
+    "grip": {
+        "what": "a box between wall and pad: N from both sides, which share its weight", "law": _gripped,
+        "pairs": _between, "normal": 0,
+    },
 }  # fmt: skip
 SITUATIONS = tuple(
     Situation(
