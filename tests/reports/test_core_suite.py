@@ -1,28 +1,32 @@
-"""The core suite of an adapter in a test file, called in an empty folder as someone new would."""
+"""The core suite of an adapter in a test file, by the commands of the how-to, in an empty folder."""
 
+import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from reports.command import main
-
+HOW_TO = Path(__file__).parents[2] / "docs" / "howto" / "ci.md"
 FILE = "test_contacts.py"
 
 
 @pytest.fixture
 def called(tmp_path):
-    """`called(old, new, options, status)`: output of pytest on the adapter that is written for one, changed."""
+    """`called(words, old, new, status)`: what the how-to's commands print, with another text in the adapter."""
 
-    def call(*options, old="", new="", named=f"{FILE}:Mine", status=0):
-        done = CliRunner().invoke(main, ["new-adapter", "mine", "--into", str(tmp_path / "written")])
-        text = (tmp_path / "written" / "mine" / "crosscheck_mine" / "__init__.py").read_text()
-        assert done.exit_code == 0 and old in text
+    def call(words, old="World", new="World", named=f"{FILE}:Myengine", status=0):
+        *made, asked = re.findall(r"^(?:crosscheck|mv|rm|pytest) .*$", HOW_TO.read_text(), re.MULTILINE)[:4]
+        assert asked == f"pytest --crosscheck {FILE}:Myengine --scenes core"
+        environment = os.environ | {"PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))}
+        subprocess.run("\n".join(made), cwd=tmp_path, env=environment, shell=True, check=True)
+        assert [path.name for path in tmp_path.iterdir()] == [FILE]
+        text = (tmp_path / FILE).read_text()
+        assert old in text
         (tmp_path / FILE).write_text(text.replace(old, new) + "\n\ndef test_own():\n    pass\n")
-        command = [sys.executable, "-m", "pytest", "--crosscheck", named, "--scenes", "core", "-p", "no:cacheprovider"]
-        command += ["-p", "no:randomly", "-rs", *options, FILE]
-        ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        command = [*asked.replace(f"{FILE}:Myengine", named).split(), "-p", "no:cacheprovider", "-p", "no:randomly"]
+        ran = subprocess.run([*command, "-k", words], cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert ran.returncode == status, ran.stdout + ran.stderr
         return ran.stdout + ran.stderr
 
@@ -30,10 +34,10 @@ def called(tmp_path):
 
 
 def test_core_suite_of_an_adapter_in_a_test_file(called):
-    said = called("-k", "impact or incline or own")
-    assert "3 passed, 1 skipped" in said and "crosscheck: mine 0.1, " in said
+    said = called("impact or incline or own")
+    assert "3 passed, 1 skipped" in said and "crosscheck: myengine 0.1, " in said
     table = said.partition("crosscheck: error over step [s]")[2].splitlines()[1:]
-    assert table[0].split() == ["plain", "1/60", "1/120", "1/240", "1/480", "order", "expected"]
+    assert table[0] in HOW_TO.read_text() and table[1] in HOW_TO.read_text()
     assert table[1].startswith("impact  ") and table[1].endswith("round-off ok   round-off")
     assert "incline       not run: box.shape: discs and half-spaces only" in table
     assert all(len(line) <= 80 for line in table[:4])
@@ -41,12 +45,12 @@ def test_core_suite_of_an_adapter_in_a_test_file(called):
 
 @pytest.mark.long
 def test_order_of_the_core_suite(called):
-    said = called("-k", "bounce or slide_to_roll or roll_incline")
+    said = called("bounce or slide_to_roll or roll_incline")
     assert "3 passed" in said and " ok   at least 1" in said and " ok   at least 2" in said
 
 
 def test_fault_in_the_core_suite(called):
-    said = called("-k", "impact", old="bounce = pair.restitution *", new="bounce = 0.99 * pair.restitution *", status=1)
+    said = called("impact", "bounce = pair.restitution *", "bounce = 0.99 * pair.restitution *", status=1)
     assert "rebound_ratio: 0.792, truth 0.8 +- 1e-12 at dt = 1/" in said and " and 63 more" in said
     assert "order: levels off at an error of 0.008; round-off is expected at every step" in said
     assert " 8.0e-03 " in said and "FAIL round-off" in said and "Traceback" not in said
@@ -61,5 +65,5 @@ def test_fault_in_the_core_suite(called):
      ("mine", "engine: there is no engine called 'mine'")],
 )  # fmt: skip
 def test_wrong_name_of_an_adapter_in_one_line(called, named, said):
-    output = called(named=named, status=4)
+    output = called("own", named=named, status=4)
     assert said in output and "Traceback" not in output
