@@ -126,7 +126,7 @@ releases: $(STAMP)
 		$(BIN)/crosscheck releases $$which --times --out $(RELEASES_OUT) || test $$? -eq 4 || exit 2; \
 	done
 	$(BIN)/crosscheck dashboard --out $(RELEASES_OUT) --output $(RELEASES_OUT)/releases.html
-	$(BIN)/python -m reports.history $(RELEASES_OUT) $(RELEASES_OUT)/releases.md
+	$(BIN)/python -m reports.releases $(RELEASES_OUT) $(RELEASES_OUT)/releases.md
 	cp $(RELEASES_OUT)/releases.html $(RELEASES_OUT)/releases.md reports/published/
 
 # Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.

@@ -17,7 +17,7 @@ import worked
 
 from adapters import registry
 from reports import numbers, readings
-from reports.cures import recorded_fixes, recorded_paste, recorded_text
+from reports.fixes import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.symptoms.published import passed
 from reports.tables import unset_text

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from adapters.registry import is_ranked
-from reports.cures import can_be_searched, decided_by, is_standard, search_command, told_cures
 from reports.findings import REFUSED, has_answer, severity
+from reports.fixes import can_be_searched, decided_by, is_standard, search_command, told_cures
 from reports.matrix import UNJUDGED
 from reports.wording import LABELS, NEVER, mark_of, measured, number, params_text, plural, quantity
 from validation.metrics import SILENT, WORDS

@@ -21,8 +21,8 @@ from rich.text import Text
 from adapters.stages import stage
 from reports import overview
 from reports.answers import Answer, Costs, answers, choices
-from reports.cures import profile_costs
 from reports.findings import REFUSED, alarms, families, refusals
+from reports.fixes import profile_costs
 from reports.matrix import (
     Matrix,
     leaving,

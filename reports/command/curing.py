@@ -17,7 +17,7 @@ from adapters.scene import SceneError
 from reports.command.completion import engine_names, scene_names
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, fixed, scene_names_of
-from reports.cures import changes_in_words, cure_paste, cure_text, nothing_to_paste, panel_text
+from reports.fixes import changes_in_words, cure_paste, cure_text, nothing_to_paste, panel_text
 from reports.speed import duration
 from reports.terminal import print_table, terminal
 from reports.wording import called, number, params_text

@@ -24,8 +24,8 @@ from reports.command.completion import engine_names, row_ids, scene_names
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.proving import proof_of, prove_and_show
 from reports.command.selection import SET
-from reports.cures import ROLES, Change, changes, fix, how_measured, profile_costs, told_cure
 from reports.findings import Family, families, grouped, has_answer, severity
+from reports.fixes import ROLES, Change, changes, fix, how_measured, profile_costs, told_cure
 from reports.matrix import matrix_of
 from reports.summary import show as show_summary
 from reports.tables import title_of

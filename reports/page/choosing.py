@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from adapters.registry import is_ranked, profile_of
-from reports.cures import ROLES, Change, changes, fix, how_measured
+from reports.fixes import ROLES, Change, changes, fix, how_measured
 from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug

@@ -11,7 +11,7 @@ from adapters import registry
 from adapters.conformance.faults import FAULTS
 from adapters.engine import EngineFacts
 from adapters.engine_folder import laws_of
-from reports.cures import Change
+from reports.fixes import Change
 from reports.page.choosing import Cure, cures
 from reports.page.conclusions import FindingFamily, findings
 from reports.page.source import Source

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from reports.answers import Answer, configured, named_kind
-from reports.cures import cure_paste, is_standard, known_cures, panel_text, told, told_cures
+from reports.fixes import cure_paste, is_standard, known_cures, panel_text, told, told_cures
 from reports.page.source import Source
 from reports.wording import mark_of
 from validation.fixes.kept import Cure

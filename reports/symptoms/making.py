@@ -16,7 +16,7 @@ from typing import Any
 
 from adapters import registry
 from adapters.engine_folder import unset_of
-from reports.cures import nothing_to_paste, recorded_fixes, recorded_paste, recorded_text
+from reports.fixes import nothing_to_paste, recorded_fixes, recorded_paste, recorded_text
 from reports.symptoms import LITTLE, OUTSIDE, PHRASE, TABLE, opened, stems, terms
 from reports.symptoms.published import of_matrix, passed
 from validation.catalogue import CATALOGUE

@@ -13,7 +13,7 @@ from adapters import registry
 from adapters.scene import SceneError
 from reports import speed
 from reports.command import accepting, benching, curing, driving, fielding, main, selection, statuses, weighing
-from reports.cures import cure_paste
+from reports.fixes import cure_paste
 from reports.spread import spread_lines
 from reports.wording import reproduce
 from validation import field

@@ -11,7 +11,7 @@ import pytest
 from bare import LENGTH, MASS, STEP, run
 
 from adapters.registry import names
-from reports.cures import cure_paste
+from reports.fixes import cure_paste
 from validation.cells import plane_of
 from validation.fixes.kept import cures_of
 from validation.metrics import OUT_OF_PLANE

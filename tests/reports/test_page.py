@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-import reports.cures
+import reports.fixes
 from reports import page
 from reports.answers import answers
 from reports.command import main
-from reports.cures import Change
+from reports.fixes import Change
 from reports.page import Source, as_data, first_answers, fixing, load_source, policy, render, replay
 from reports.page.choosing import Cure, choices, cures
 from reports.page.conclusions import NAMED, findings, scenes_text, sentences
@@ -274,12 +274,12 @@ def test_worst_of_each_engine_and_family_first(page_source, monkeypatch):
 def test_settings_with_mostly_failed_checks_counted_only(page_source, monkeypatch):
     wrong = answers(page_source.rows)
     mended = [each.answer for each in fixing.wrongs(page_source, wrong) if each.fixes]
-    listed = reports.cures.cures_of
+    listed = reports.fixes.cures_of
 
     def weak(engine):
         return {key: replace(cure, failing=20, left=19 if cure.helps else 20) for key, cure in listed(engine).items()}
 
-    monkeypatch.setattr("reports.cures.cures_of", weak)
+    monkeypatch.setattr("reports.fixes.cures_of", weak)
     found = [each for each in fixing.wrongs(page_source, wrong) if each.answer in mended]
     assert found and all(not each.fixes and "the best settings found fix 1 of 20 checks" in each.said for each in found)
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from reports import cures as told_cures
+from reports import fixes as told_fixes
 from reports.matrix import Field
 from reports.page import cost, fairness
 from reports.page.charts import log_scale
@@ -145,9 +145,9 @@ def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
 def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monkeypatch):
     """Where it was measured what decides, a setting that only completes another says so."""
     kept = page_source.observations
-    monkeypatch.setattr(told_cures, "belongs_of", lambda engine: {"useMaximalCoordinates": f"the solver of {engine}"})
-    monkeypatch.setattr(told_cures, "decisive", lambda *asked: SimpleNamespace(parts=()))
-    found = {change.name: change for change in told_cures.changes(kept, "impact", 2, "bullet", "default", "tuned")}
+    monkeypatch.setattr(told_fixes, "belongs_of", lambda engine: {"useMaximalCoordinates": f"the solver of {engine}"})
+    monkeypatch.setattr(told_fixes, "decisive", lambda *asked: SimpleNamespace(parts=()))
+    found = {change.name: change for change in told_fixes.changes(kept, "impact", 2, "bullet", "default", "tuned")}
     assert "part of the solver of bullet" in vars(found["useMaximalCoordinates"]).values()
 
 

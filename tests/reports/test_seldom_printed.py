@@ -13,7 +13,6 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from reports import history as written
 from reports import page, speed, starved, tables
 from reports import releases as told_releases
 from reports.command import accepting, benching, inspecting, main, piles, posing, releasing
@@ -246,11 +245,11 @@ def test_moved_rows_between_releases_counted_by_outcome():
 
     ends = "; first `creep` (3-D n=2 at 7 iterations) pass -> fail"
     every = [(kind, worse) for kind in (Kind.FLIP, Kind.OUTCOME, Kind.ERROR) for worse in (True, False)]
-    assert [written._moved([step(kind)]) for kind in every] == [
+    assert [told_releases._moved([step(kind)]) for kind in every] == [
         f"1 check {what}{ends}" for what in ("begins to fail", "ceases to fail", "ends without a result",
                                              "has a result again", "changes its value", "changes its value")
     ]  # fmt: skip
-    assert written._moved([step(*every), step(*every[::-1])]) == (
+    assert told_releases._moved([step(*every), step(*every[::-1])]) == (
         "2 checks begin to fail, 2 checks cease to fail, 2 checks end without a result, 2 checks have a result again, "
         f"4 checks change their value{ends}"
     )

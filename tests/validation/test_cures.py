@@ -13,7 +13,7 @@ from rich.console import Console
 from adapters.engine_folder import CURES, inside
 from adapters.registry import facts, find, names
 from reports.command import curing, main
-from reports.cures import (
+from reports.fixes import (
     changes_in_words,
     cure_of,
     cure_paste,
@@ -84,24 +84,24 @@ def test_a_cure_is_told_in_one_line_with_error_and_cost():
 def test_number_of_tried_settings_without_a_cure(monkeypatch):
     nothing = replace(CURE, left=CURE.failing, changes={})
     listed = {("pinch", 2): nothing, ("pinch", 3): replace(nothing, dimension=3, tried=30)}
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: listed)
     (said,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
     assert said == "no setting helps (45 tried in 2-D, 30 tried in 3-D)"
 
 
 def test_settings_with_mostly_failed_checks_not_recommended(monkeypatch):
     most = replace(CURE, failing=20, left=19)
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): most})
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("pinch", 2): most})
     assert told_cures("mujoco", "4.0.1", "pinch", "default", [2]) == [
         "2-D: the best settings found fix 1 of 20 checks (45 tried)"
     ]
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): replace(most, left=10)})
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("pinch", 2): replace(most, left=10)})
     (said,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2])
     assert said.startswith("best settings found, 2-D: cone=elliptic") and "10 of 20 checks still fail" in said
 
 
 def test_planar_cures_not_told_in_space(monkeypatch):
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): CURE})
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("pinch", 2): CURE})
     assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 1
     assert told_cures("mujoco", "4.0.1", "pinch", "default", [3]) == []
     assert told_cures("mujoco", "4.0.2", "pinch", "default", [2]) == []
@@ -113,7 +113,7 @@ def test_planar_cures_not_told_in_space(monkeypatch):
 
 def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     listed = {("pinch", 2): replace(CURE, mends=("creep", "turned"))}
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: listed)
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "turned"}
     assert told_cure(row) == cure_text(CURE)
@@ -146,7 +146,7 @@ def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
     ],
 )
 def test_cure_of_another_case_not_told(monkeypatch, case, command):
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): replace(CURE, mends=("creep",))})
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("pinch", 2): replace(CURE, mends=("creep",))})
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "creep", "params": {}, "dt": 1 / 240, "iterations": None, "outcome": "ok"}
     assert told_cure(row) == cure_text(CURE) and cure_of(row).changes == CURE.changes
@@ -163,7 +163,7 @@ def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
         CURE, scene="bounce", cells=({}, {"e": 1.0}), metric="apex", params={"e": 1.0}, mends=("apex",),
         changes={"solref": "reflect", "kappa_elastic": 0.0, "kappa_plastic": 0.1, "smooth_condim": 1}, others=(),
     )}  # fmt: skip
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: listed)
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "bounce", "dimension": 2, "profile": "default"}
     row |= {"metric": "apex[1]", "dt": 1 / 240, "iterations": None}
     for params, damping in (({"e": 1.0}, -1000), ({}, -900)):
@@ -173,15 +173,15 @@ def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
 
 def test_smallest_known_cure_for_pasting_or_none_without_lines(monkeypatch):
     listed = {("pinch", 2): replace(CURE, mends=("creep",))}
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: listed)
-    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "<option/>")
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: listed)
+    monkeypatch.setattr("reports.fixes.pasteable", lambda *asked: "<option/>")
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "creep", "params": {"margin": 1.05}, "dt": 1 / 240, "iterations": None}
     paste, said = fix(row, [], "tuned")
     assert paste == cure_paste(CURE) and "smallest" in said
     assert fix(row | {"dt": 1 / 500}, [], "tuned") == ("<option/>", "to paste (all that profile tuned changes):")
     assert fix(row | {"dt": 1 / 500}, [], "") == ("", "")
-    monkeypatch.setattr("reports.cures.pasteable", lambda *asked: "")
+    monkeypatch.setattr("reports.fixes.pasteable", lambda *asked: "")
     export = (
         "crosscheck export pinch --param margin=1.05 --dt 1/500 --dim 2 --engine mujoco --profile tuned --to python"
     )
@@ -192,7 +192,7 @@ def test_smallest_known_cure_for_pasting_or_none_without_lines(monkeypatch):
 def test_cure_of_an_engine_without_setting_lines_as_calls(monkeypatch):
     """Neither `explain` nor `cure` is silent about it, though no profile has the settings."""
     cure = replace(CURE, mends=("creep",), changes={"cone": "elliptic", "impratio": 10.0}, alone={}, profile="")
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: {("pinch", 2): cure})
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("pinch", 2): cure})
     monkeypatch.setattr("adapters.mujoco.engine.snippet", lambda *asked: "")
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
     row |= {"metric": "creep", "params": cure.params, "dt": 1 / 240, "iterations": None}
@@ -220,7 +220,7 @@ def test_printed_fixes_with_words_of_their_engine():
 
 def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
     both = {("pinch", 2): CURE, ("pinch", 3): replace(CURE, dimension=3, cost_after=4.5e-5)}
-    monkeypatch.setattr("reports.cures.cures_of", lambda engine: both)
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: both)
     (text,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
     assert text.startswith("smallest fix, 2-D and 3-D: cone=elliptic") and text.endswith("at 3 times the cost")
     both["pinch", 3] = replace(CURE, dimension=3, changes={"tolerance": 0.0})

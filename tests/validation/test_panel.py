@@ -7,7 +7,7 @@ import pytest
 
 from adapters.engine_folder import PANELS, inside
 from adapters.registry import find, load, names
-from reports.cures import panel_text, profile_costs, recorded_paste, recorded_text
+from reports.fixes import panel_text, profile_costs, recorded_paste, recorded_text
 from validation.canonical import Check
 from validation.cells import Outcome, Slot
 from validation.fixes import panel, search

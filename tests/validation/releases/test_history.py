@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from reports import history as published
+from reports import releases as published
 from reports.command import releasing
-from reports.history import sentences
+from reports.releases import sentences
 from validation.cells import Observation, Outcome, Slot
 from validation.findings import Family, Finding, Findings, FindingsError, row_key
 from validation.judging.comparison import Change, Kind
