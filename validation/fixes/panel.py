@@ -148,17 +148,20 @@ def _meant(changes: Changes, here: Slot, there: Slot) -> dict[str, Any]:
     return {name: value for name, value in own.items() if name not in local_of(here.engine)}
 
 
-def tried(here: Slot, change: Changes, jobs: int = 1) -> Panel:
-    """Try the settings of a fix on the panel; ``here`` is its case as shipped."""
+def cases_of(here: Slot, change: Changes) -> list[tuple[str, Slot, Slot]]:
+    """The cases of a fix in words, each as shipped and fixed; ``here`` is its own as shipped."""
     own = [(OWN_SCENE, there, carried(change, here, there)) for there in own_cases(here)]
     others = [
         (words, there, _meant(change, here, there))
         for words, there in other_cases(here.engine, here.profile)
         if there.scene != here.scene
     ]
-    return compared(
-        [(words, there, switched(there, change)) for words, there, change in [*own, *others] if change], jobs
-    )
+    return [(words, there, switched(there, change)) for words, there, change in [*own, *others] if change]
+
+
+def tried(here: Slot, change: Changes, jobs: int = 1) -> Panel:
+    """Try the settings of a fix on the panel; ``here`` is its case as shipped."""
+    return compared(cases_of(here, change), jobs)
 
 
 def of_profile(engine: str, shipped: str, profile: str, jobs: int = 1) -> Panel:
