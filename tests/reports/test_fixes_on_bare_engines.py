@@ -14,6 +14,7 @@ from adapters.registry import names
 from reports.fixes import cure_paste
 from validation.cells import plane_of
 from validation.fixes.kept import cures_of
+from validation.fixes.panel import WORSE, other_cases
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
@@ -46,6 +47,10 @@ def judged(engine, scene, dimension, params, paste, size):
     return errors
 
 
+def kind_of(metric):
+    return metric.partition("[")[0]
+
+
 def fails(error):
     return error is None or not error <= 1.0
 
@@ -58,16 +63,28 @@ def test_a_listed_cure_mends_a_bare_model_of_its_scene_in_both_sizes(key):
     """What it says is mended is, and what it tells fails without it; in other sizes by the formulas beside numbers."""
     cure = CURES[key]
     pytest.importorskip(PACKAGES[cure.engine])
-    kinds = cure.mends or (cure.metric.partition("[")[0],)
+    kinds = cure.mends or (kind_of(cure.metric),)
     paste = cure_paste(cure)
     asked = (cure.engine, cure.scene, cure.dimension, cure.params)
     for size in (SAME, OTHER):
         before, after = (
-            {m: e for m, e in judged(*asked, lines, size).items() if m.partition("[")[0] in kinds or m == cure.metric}
+            {m: e for m, e in judged(*asked, lines, size).items() if kind_of(m) in kinds or m == cure.metric}
             for lines in ("", paste)
         )
         assert not {metric: error for metric, error in after.items() if fails(error)}, size
         assert size == OTHER or any(map(fails, before.values()))
+
+
+@pytest.mark.parametrize("case", ["a thrown ball", "a bouncy body at rest"])
+@pytest.mark.parametrize("engine", ["mujoco", "bullet"])
+def test_bounce_fix_pasted_into_another_scene(engine, case):
+    """What its line says of other cases is what happens there, without our adapter."""
+    pytest.importorskip(PACKAGES[engine])
+    cure, slot = CURES[engine, "bounce", 3], dict(other_cases(engine, "default"))[case]
+    where = (engine, slot.scene, slot.dimension, slot.params)
+    before, after = (judged(*where, paste, (1.0, 1.0, slot.dt)) for paste in ("", cure_paste(cure)))
+    broken = {kind_of(metric) for metric, error in after.items() if error > max(1.0, WORSE * before[metric])}
+    assert broken == {kind_of(cost.metric) for cost in cure.panel.breaks if cost.case == case}
 
 
 def pastes(page):
