@@ -20,6 +20,11 @@ from validation.field import notes
 #: other contacts, 20 about what is no contact. Written before the search; the words and weights of the search were
 #: chosen with every second one, the others were held out.
 SENTENCES = list(csv.DictReader((Path(__file__).parent / "asked_sentences.csv").open(encoding="utf-8")))
+#: Public reports by their number in a survey, in words near to their own: those without a scene lead to a topic that
+#: says so.
+REPORTS = list(csv.DictReader((Path(__file__).parent / "asked_reports.csv").open(encoding="utf-8")))
+#: What leads elsewhere: twelve boxes that "do not stand", and friction that is too large "when slow".
+ELSEWHERE = {"43", "45"}
 TUNED, HELD_OUT = SENTENCES[::2], SENTENCES[1::2]
 
 
@@ -48,6 +53,16 @@ def test_symptoms_in_words_of_people_lead_to_their_scenes(part, least):
     assert len(part) == 60
     wrong = [(each["sentence"], each["right"], led_to(each["sentence"])) for each in part if not is_right(each)]
     assert len(wrong) <= (1.0 - least) * len(part), wrong
+
+
+def test_public_reports_lead_to_their_scenes():
+    wrong = {each["report"]: led_to(each["sentence"]) for each in REPORTS if not is_right(each)}
+    assert len(REPORTS) == 37 and set(wrong) <= ELSEWHERE, wrong
+
+
+def test_contact_force_that_reads_zero():
+    for question in ("contact force reads zero", "contact forces of a block at rest on a slope do not balance"):
+        assert "crosscheck forces ENGINE" in asked(*question.split())
 
 
 @pytest.mark.parametrize("part", [TUNED, HELD_OUT], ids=["tuned", "held-out"])
