@@ -15,9 +15,12 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+from compare import limited
 
 from adapters.engine import EngineError, Setting
 from adapters.reference import engine as adapter
@@ -26,6 +29,7 @@ from adapters.reference.simulation import ReferenceSimulation
 from reference_solver import Settings
 from reference_solver.exact import Refused
 from validation.catalogue import CATALOGUE
+from validation.cells import Slot
 from validation.judging.rows import rows_of
 from validation.running.execution import execute
 from validation.running.plan import QUICK_DT, Request, slots
@@ -58,21 +62,32 @@ def exact_profile(needs: Any, dt: float) -> list[Setting]:
     return [Setting(k, v, REASONS[k], SOURCE) for k, v in settings.items() if k not in ("dt", "iterations")]
 
 
-def run(path: Path, suite: str, only: str, reference: bool) -> None:
-    """Write a line for each cell."""
-    engine: Any = adapter.ReferenceEngine
-    adapter.ReferenceSimulation = Posed  # type: ignore[misc]
+def pose(change: Callable[[Any, str, Any], None] = setattr, reference: bool = False) -> None:
+    """Have the profile ``reference`` run the loop from here on, if not ``reference``; ``change`` sets attributes."""
+    engine = adapter.ReferenceEngine
+    change(adapter, "ReferenceSimulation", Posed)
     if not reference:
-        engine.profiles = MappingProxyType({**engine.profiles, "reference": exact_profile})
-        engine.kinds = MappingProxyType({**engine.kinds, "scheme": lambda value: None})
+        change(engine, "profiles", MappingProxyType({**engine.profiles, "reference": exact_profile}))
+        change(engine, "kinds", MappingProxyType({**engine.kinds, "scheme": lambda value: None}))
+
+
+def cells(suite: str, only: str = "") -> Iterator[tuple[str, Slot]]:
+    """Yield the cells of a suite that the profile ``reference`` has, by a key."""
     asked = Request(list(CATALOGUE), ["reference"], ["reference"], dts=(QUICK_DT,), suite=suite)
+    for slot in slots(asked):
+        key = f"{slot.scene} {slot.dimension}-D {slot.params_text()} {slot.ulp or ''} 1/{1 / slot.dt:g}"
+        if only in key:
+            yield key, slot
+
+
+def run(path: Path, suite: str, only: str, reference: bool, limit: float) -> None:
+    """Write a line for each cell."""
+    pose(reference=reference)
     with path.open("a") as lines:
-        for slot in slots(asked):
-            key = f"{slot.scene} {slot.dimension}-D {slot.params_text()} {slot.ulp or ''} 1/{1 / slot.dt:g}".strip()
-            if only not in key:
-                continue
+        for key, slot in cells(suite, only):
             Posed.cpu, begin = 0.0, time.process_time()
-            found = execute(slot)
+            with limited(limit):  # the harness makes an outcome, or a reason of the certificate, of it
+                found = execute(slot)
             cpu, whole = Posed.cpu, time.process_time() - begin
             rows = rows_of("", [found])
             full = found.certificate.get("full", {}) if found.certificate else {}
@@ -100,9 +115,10 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--reference", action="store_true")
     parser.add_argument("--against", type=Path)
+    parser.add_argument("--limit", type=float, default=60.0, help="CPU of a cell with its certificate")
     asked = parser.parse_args()
     if asked.against is None:
-        run(asked.file, asked.suite, asked.only, asked.reference)
+        run(asked.file, asked.suite, asked.only, asked.reference, asked.limit)
         return
     one, other = ({each["key"]: each for each in map(json.loads, path.open())} for path in (asked.file, asked.against))
     same = 0
