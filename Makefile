@@ -9,7 +9,7 @@ OUT ?= crosscheck-out
 SUITE ?= quick
 CONSTRAINTS ?= -c constraints.txt
 comma := ,
-EXTRAS := box2d,box2d3,rapier,dart,physx,drake,newton
+EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,newton
 
 .PHONY: run test test-all recipe extras soak lint setup publish apart releases tune cures mutants detection tables size nightly docs clean
 
@@ -65,6 +65,8 @@ nightly: test-all soak
 		$(MAKE) test PYTHON=python$$version VENV=.venv-$$version || exit 2; \
 	done
 	$(MAKE) test VENV=.venv-newest CONSTRAINTS=
+	$(MAKE) extras
+	CROSSCHECK_REQUIRE_ENGINES=$(EXTRAS) $(BIN)/python -m pytest -n auto -m optional
 
 # Lines of Python by room.
 size:

@@ -17,7 +17,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 #: What mutants are drawn from; optional engines are left out, whose tests are skipped where they are not installed.
 PACKAGES = ("adapters", "validation", "reports")
-OPTIONAL = tuple(f"adapters/{name}/" for name in ("box2d", "box2d3", "rapier", "dart", "drake", "physx", "newton"))
+OPTIONAL = tuple(
+    f"adapters/{name}/" for name in ("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "newton")
+)
 #: Rooms of the solver that have kernels, and how kernels are marked.
 ROOMS = ("stepping", "planar", "spatial", "direct")
 DECORATORS = ("kernel", "inner_kernel", "spliced_kernel")

@@ -19,6 +19,7 @@ ENGINES = {
     "Box2D",
     "pyb2d3",
     "rapier3d",
+    "robox3d",
     "dartpy",
     "pydrake",
     "sapien",

@@ -10,7 +10,7 @@ from validation.catalogue import CATALOGUE
 
 DT = 1 / 240
 #: Engines whose laws need no engine; Newton's take twenty seconds and have tests of their own.
-ENGINES = ("chipmunk", "bullet", "mujoco", "box2d", "box2d3", "rapier", "dart", "drake", "physx")
+ENGINES = ("chipmunk", "bullet", "mujoco", "box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx")
 
 
 def assert_whole(scene, motion):

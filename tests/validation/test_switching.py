@@ -69,13 +69,29 @@ def test_a_cell_runs_with_the_setting_and_says_so():
 
 #: Limits of an engine that no setting takes out: their reasons give the figures that settings change them by. Open: a
 #: prediction of their size.
-#: Those of Rapier are computed in `tests/adapters/test_rebounds_of_rapier.py`, those of PhysX in
-#: `tests/adapters/test_findings_of_physx.py`, that of Drake is in `tests/adapters/test_drake.py`, those of Newton in
-#: `tests/adapters/test_newton.py`, that of Bullet in `tests/adapters/test_bullet.py`. Those of MuJoCo are closed forms
-#: in `tests/adapters/test_findings_of_mujoco.py`, those of both Box2D in `tests/adapters/test_rods_of_box2d.py`.
+#: Those of Box3D are computed in `tests/adapters/test_box3d.py`, those of Rapier in
+#: `tests/adapters/test_rebounds_of_rapier.py`, those of PhysX in `tests/adapters/test_findings_of_physx.py`, that of
+#: Drake is in `tests/adapters/test_drake.py`, those of Newton in `tests/adapters/test_newton.py`, that of Bullet in
+#: `tests/adapters/test_bullet.py`. Those of MuJoCo are closed forms in `tests/adapters/test_findings_of_mujoco.py`,
+#: those of both Box2D in `tests/adapters/test_rods_of_box2d.py`.
 MEASURED_ONLY = {
     "box2d": {"kane-struck-half-way"},
     "box2d3": {"kane-rebound-after-friction"},
+    "box3d": {
+        "card-tent-friction-centre",
+        "cradle-stopped-in-small-steps",
+        "domino-friction-centre",
+        "edge-drop-rebound-by-points",
+        "flat-box-rebound-by-points",
+        "kane-rebound-after-friction",
+        "oblique-leaning-normal",
+        "oblique-rebound-after-friction",
+        "pair-matrix-compression-only",
+        "pivot-friction-centre",
+        "rack-order-of-pairs",
+        "rocking-block-friction-centre",
+        "tilt-table-friction-centre",
+    },
     "bullet": {"arch-hull-grid"},
     "drake": {"shove-slanted-edge"},
     "mujoco": {"kane-struck-half-way", "kane-struck-half-way-by-a-cone", "rack-short-rebounds"},

@@ -1,0 +1,107 @@
+"""Designed deviations of Box3D from the textbook, predicted from scene and step only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from adapters.box3d.profiles import PROFILES
+from adapters.box3d.shipped import CHECKED_ON
+from adapters.law import Deviation, Law, Measure, Prediction, deviations
+from adapters.law.single_motions import booked_law, kept_law, standstill_law
+from adapters.law.single_precision import Method, Threshold, plane_law, rounded_law
+from adapters.needs import needs
+from adapters.scene import Scene
+
+#: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "spin", "energy_lost", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "rod_gas": ("wrong_speed", "energy_defect", "misplaced"),
+    "thin_wall": ("rebound_ratio",),
+    "oblique": ("rebound_ratio",),
+    "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),
+}
+
+
+def _chosen(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
+    """Settings of a profile by name."""
+    return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+
+
+def blow_law(profile: str, metric: str) -> Law:
+    """Blows in single precision, with restitution above the threshold, after friction."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        threshold = Threshold(_chosen(profile, scene, dt)["restitution_threshold"], rebounds_at=True)
+        return rounded_law(metric, Method(threshold, rebound_after_friction=True))(scene, dt, measure)
+
+    return law
+
+
+DEVIATIONS: tuple[Deviation, ...] = deviations(
+    "box3d",
+    PROFILES,
+    BLOWS,
+    lambda metric, profile: blow_law(profile, metric),
+    "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
+    "of compression only, as restitution is applied last",
+    "contact_solver.c, b3ApplyRestitution_Mesh; types.h, restitutionThreshold; adapters/law/single_precision.py",
+    CHECKED_ON,
+)
+#: The same without blows at the threshold itself, which rounding decides, and where no ball turns within many substeps.
+for _profile, _scene, _metrics in (
+    ("default", "pair_matrix", tuple(f"restitution[{k}]" for k in range(1, 5))),
+    ("tuned", "galperin", ("small_speed", "large_speed", "energy_defect")),
+):
+    DEVIATIONS += deviations(
+        "box3d",
+        (_profile,),
+        {_scene: _metrics},
+        lambda metric, profile: blow_law(profile, metric),
+        "single precision, 2^-24 relative",
+        "math_functions.h, b3Vec3: three floats; motion in adapters/law/single_precision.py",
+        CHECKED_ON,
+    )
+DEVIATIONS += deviations(
+    "box3d",
+    PROFILES,
+    {"far_origin": ("stopping_distance",)},
+    lambda metric, profile: standstill_law(
+        metric, lambda scene, dt: (_chosen(profile, scene, dt)["units_per_metre"], 0.0)
+    ),
+    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+    "math_functions.h, b3Pos: three floats; motion in adapters/law/single_motions.py",
+    CHECKED_ON,
+)
+DEVIATIONS += deviations(
+    "box3d",
+    PROFILES,
+    {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
+    lambda metric, profile: kept_law(metric),
+    "the impulse of every impact is rounded to single precision, 2^-24 relative",
+    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_motions.py",
+    CHECKED_ON,
+)
+DEVIATIONS += deviations(
+    "box3d",
+    PROFILES,
+    {"off_centre": ("momentum_defect",)},
+    lambda metric, profile: booked_law(metric),
+    "single precision, 2^-24 relative",
+    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_motions.py",
+    CHECKED_ON,
+)
+#: Blows in free space, after which the motion is planar to round-off.
+DEVIATIONS += deviations(
+    "box3d",
+    PROFILES,
+    {scene: ("out_of_plane",) for scene in ("off_centre", "oblique", "pair_matrix")},
+    lambda metric, profile: plane_law,
+    "single precision rounds differently on both sides of a plane",
+    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_precision.py",
+    CHECKED_ON,
+)
