@@ -27,14 +27,15 @@ def _contact_f(simulation: NewtonSimulation) -> Ask:
 
 _AVERAGED = Cause(
     ("rest",),
-    "corrections of a body with several neighbours are averaged over its contacts (rigid_contact_con_weighting), and the "
-    "forces are not what moved it; off by 0.2 % without",
+    "corrections of a body with several neighbours are averaged over its contacts (rigid_contact_con_weighting), and "
+    "the forces are not what moved it; off by 0.2 % without",
 )
 _REBOUND = Cause(("blow",), "the rebound is a velocity of its own, in no force", {"rebounds": False})
 READINGS = (
     Reading(
         'observables contact_f: solver.observables({"contact_f"}, contacts=contacts)', "force",
         "each contact; add up those of a body", "on the body of rigid_contact_shape0", "world axes",
-        "the step just made", "with it: the correction of positions is the force", _contact_f, causes=(_AVERAGED, _REBOUND),
+        "the step just made", "with it: the correction of positions is the force", _contact_f,
+        causes=(_AVERAGED, _REBOUND),
     ),
 )  # fmt: skip
