@@ -136,7 +136,8 @@ tune: $(STAMP)
 	@test -n "$(ENGINE)" || { echo "which engine? make tune ENGINE=bullet"; exit 2; }
 	$(BIN)/crosscheck tune $(ENGINE) --jobs 2
 
-# What mends each engine as shipped, scene by scene, and at what cost: adapters/<engine>/cures.csv; minutes of CPU each.
+# What mends each engine as shipped, scene by scene, and at what cost: adapters/<engine>/cures.csv; half an hour of
+# CPU for MuJoCo, more for Bullet.
 cures: $(STAMP)
 	for engine in chipmunk mujoco bullet; do $(BIN)/crosscheck cure $$engine --keep || exit 2; done
 
