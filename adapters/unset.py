@@ -5,7 +5,7 @@ set but what an experiment names. The experiments stand here, once for all engin
 
     slide     a flat box with a speed along the ground: friction, and how that of two bodies combines
     blow      a ball flies at the ground without gravity: restitution, how it combines, below which speed it is none
-    flight    a ball far from everything: dampings, sleep, gravity as it is
+    flight    a ball far from everything: dampings, limit of speeds, sleep, gravity as it is
     roll      a ball on the ground: sleep, where only what touches another body may
     rest      a flat box on the ground, a ball in it: the gap at which they come to rest, below 0 an overlap
 """
@@ -32,6 +32,8 @@ PHASES = (1e-3, 0.5)
 #: Speed [m/s] and spin [rad/s] that a flight begins with, and its time [s]: too slow for drag to grow with the speed,
 #: too short for a body to fall asleep.
 FLIGHT_SPEED, FLIGHT_TIME = 1e-3, 0.2
+#: Speed of a throw [m/s]: far above every limit that is known, 4000 m/s.
+THROWN = 1e5
 #: Height of a flight [m], and time after which what still moves does not fall asleep [s].
 FAR, LONG = 10.0, 10.0
 #: Time in which a body comes to rest [s], and overlap from which it is pushed out [m].
@@ -191,6 +193,12 @@ def damping(make: Make, of: Literal["along", "spin"]) -> float:
     begun = Asked(along=FLIGHT_SPEED) if of == "along" else Asked(spin=FLIGHT_SPEED)
     flown, time = ran(make, begun, FLIGHT_TIME)
     return -math.log(getattr(flown, of) / FLIGHT_SPEED) / time + 0.0
+
+
+def limit(make: Make) -> float:
+    """Speed along the ground that is left of `THROWN` after a step, far from everything [m/s]; infinite if all is."""
+    after = abs(ran(make, Asked(along=THROWN), 0.0)[0].along)
+    return math.inf if after > 0.5 * THROWN else after
 
 
 def sleep(make: Make, rolls: bool = False) -> float:

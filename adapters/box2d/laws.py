@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, deviations
-from adapters.law.single_motions import Chosen, booked_law, corner_law, kept_law, standstill_law
+from adapters.law.single_motions import Chosen, booked_law, corner_law, flown_law, kept_law, standstill_law
 from adapters.law.single_precision import Method, Threshold, rounded_law
 from adapters.needs import needs
 from adapters.scene import Scene
@@ -105,6 +105,16 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
+    "b2Settings.h, float32; band in adapters/law/single_motions.py",
+    CHECKED_ON,
+)
+
+DEVIATIONS += deviations(
+    "box2d",
+    PROFILES,
+    {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    lambda metric, profile: flown_law(metric),
+    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
     "b2Settings.h, float32; band in adapters/law/single_motions.py",
     CHECKED_ON,
 )

@@ -8,6 +8,7 @@ from typing import Any
 from adapters import unset
 from adapters.box2d.shipped import (
     LINEAR_SLOP,
+    MAX_TRANSLATION,
     POLYGON_RADIUS,
     POSITION_ITERATIONS,
     VELOCITY_ITERATIONS,
@@ -64,6 +65,8 @@ UNSET = (
           partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "along"), 1e-6),
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-6),
+    Unset("limit of speed [m/s]", "120: b2_maxTranslation, 2 m a step", "b2Settings.h", MAX_TRANSLATION / Bare.dt,
+          partial(unset.limit, Bare), 1e-3),
     Unset("at 1 mm/s asleep after [s]", "0.5: b2_timeToSleep, below 1 cm/s and 2 degrees/s", _COMPILED, 0.5,
           partial(unset.sleep, Bare), 2.0 * Bare.dt),
     Unset("gap at rest [m]", "0.015: two skins of 1 cm, less the slop of 5 mm", _COMPILED,

@@ -50,6 +50,7 @@ BODY = frozenset(
         "contactProcessingThreshold",
         "contactStiffness",
         "linearDamping",
+        "maxJointVelocity",
         "rollingFriction",
         "spinningFriction",
     }

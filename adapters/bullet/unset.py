@@ -6,7 +6,7 @@ import math
 from functools import partial
 
 from adapters import unset
-from adapters.bullet.shipped import LARGEST_FRICTION, RESTITUTION_THRESHOLD
+from adapters.bullet.shipped import LARGEST_FRICTION, LARGEST_SPEED, RESTITUTION_THRESHOLD
 from adapters.bullet.simulation import pybullet_here
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
@@ -86,6 +86,8 @@ UNSET = (
           partial(unset.least_rebound, Bare, 3.0)),
     Unset("linear damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "along"), 2e-4),
     Unset("angular damping [1/s]", "0.04", _DRAG, 0.04, partial(unset.damping, Bare, "spin"), 2e-4),
+    Unset("limit of speed [m/s]", "100 along each axis: maxJointVelocity", "btMultiBody.h, m_maxCoordinateVelocity",
+          LARGEST_SPEED, partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "never: sleeping is asked for by a flag", f"{_GUIDE}, loadURDF", math.inf,
           partial(unset.sleep, Bare)),
     Unset("contacts from this gap on [m]", "0.02 of a size: contactBreakingThreshold", f"{_GUIDE}; {_BREAKS}", None,

@@ -61,6 +61,8 @@ UNSET = (
           partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0: damping is 1", _SPACE, 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0: damping is 1", _SPACE, 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
+    Unset("limit of speed [m/s]", "none", "cpBody.c, cpBodyUpdateVelocity", math.inf,
+          partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "never: sleep_time_threshold is infinite", _SPACE, math.inf,
           partial(unset.sleep, Bare)),
     Unset("gap at rest [m]", "an overlap: a contact needs one", "cpArbiter.c", None, partial(unset.rest, Bare)),

@@ -76,6 +76,8 @@ UNSET = (
     Unset("no rebound below [m/s]", "0.1", _CONTACT, THRESHOLD, partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", "FreeJoint", 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
+    Unset("limit of speed [m/s]", "none", "FreeJoint", math.inf,
+          partial(unset.limit, Bare)),
     Unset("in flight at 1 mm/s asleep after [s]", "never: only bodies in contact can sleep", _RESTS, math.inf,
           partial(unset.sleep, Bare)),
     Unset("rolling slower than 1 mm/s asleep after [s]", "0.5: mTimeUntilSleep, below a tenth of 1 cm/s", _RESTS, 0.5,

@@ -123,6 +123,8 @@ UNSET = (
           1.0 / DISSIPATION / BLOW_SPEED, partial(unset.restitution, Bare), 1e-4),
     Unset("linear damping [1/s]", "0", _CONFIG, 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", _CONFIG, 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
+    Unset("limit of speed [m/s]", "none", _CONFIG, math.inf,
+          partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "never: bodies do not sleep", _CONFIG, math.inf, partial(unset.sleep, Bare)),
     Unset("contacts from this gap on [m]", "0: no margin is set", _PROPERTIES, 0.0,
           partial(unset.ahead, Bare), 1e-12),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 from adapters import unset
@@ -81,6 +82,8 @@ UNSET = (
           partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", "XML reference: freejoint", 0.0,
           partial(unset.damping, Bare, "spin"), 1e-9),
+    Unset("limit of speed [m/s]", "none", "engine_forward.c", math.inf,
+          partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "never: the flag sleep is off", f"{_OPTION}/flag", float("inf"),
           partial(unset.sleep, Bare)),
     Unset("gap at rest [m]", "an overlap: d = 0.9 to 0.95 leaves a part of the load", _SOFT, None,

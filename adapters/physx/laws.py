@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.law.single_motions import booked_law, kept_law, standstill_law
+from adapters.law.single_motions import booked_law, flown_law, kept_law, standstill_law
 from adapters.law.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
 from adapters.law.unswept import passing_law, wall_law
 from adapters.needs import needs
@@ -127,4 +127,24 @@ DEVIATIONS += tuple(
     )
     for profile, scenes in PLANES.items()
     for scene in scenes
+)
+
+DEVIATIONS += deviations(
+    "physx",
+    PROFILES,
+    {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    lambda metric, profile: flown_law(metric),
+    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
+    "PxVec3, built of floats; band in adapters/law/single_motions.py",
+    _RELEASES,
+)
+
+DEVIATIONS += deviations(
+    "physx",
+    ("tuned",),
+    {"flight": ("ball_spin", "momentum_drift")},
+    lambda metric, profile: flown_law(metric),
+    "each update of a spin is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
+    "PxVec3, built of floats; band in adapters/law/single_motions.py",
+    _RELEASES,
 )

@@ -118,6 +118,8 @@ UNSET = (
     Unset("linear damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "along"), 1e-6),
     Unset("angular damping [1/s]", f"{ANGULAR_DAMPING:g}", _BODY, ANGULAR_DAMPING,
           partial(unset.damping, Bare, "spin"), 1e-4),
+    Unset("limit of speed [m/s]", "none", _BODY, math.inf,
+          partial(unset.limit, Bare)),
     Unset("no spin above [rad/s]", f"{FASTEST_SPIN:g}", _BODY, FASTEST_SPIN,
           lambda: unset.ran(Bare, Asked(spin=10.0 * FASTEST_SPIN), 0.0)[0].spin, 1e-4),
     Unset("at 1 mm/s asleep after [s]", "0.4: wakeCounterResetTime", _ASLEEP, 0.4, partial(unset.sleep, Bare), 0.025),

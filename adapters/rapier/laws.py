@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, deviations, exactly
-from adapters.law.single_motions import booked_law, kept_law, standstill_law
+from adapters.law.single_motions import booked_law, flown_law, kept_law, standstill_law
 from adapters.law.single_precision import Method, rounded_law
+from adapters.rapier.profiles import SUBSTEPS, TUNED_SUBSTEPS
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -72,6 +73,21 @@ DEVIATIONS += deviations(
     {"off_centre": ("momentum_defect",)},
     lambda metric, profile: booked_law(metric),
     "single precision, 2^-24 relative",
+    "rapier3d, built for f32; band in adapters/law/single_motions.py",
+    ("0.36.",),
+)
+
+DEVIATIONS += deviations(
+    "rapier",
+    ("default", "tuned"),
+    {
+        "flight": (
+            *("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across"),
+            *("ball_spin", "momentum_drift"),
+        )
+    },
+    lambda metric, profile: flown_law(metric, TUNED_SUBSTEPS if profile == "tuned" else SUBSTEPS),
+    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
     "rapier3d, built for f32; band in adapters/law/single_motions.py",
     ("0.36.",),
 )

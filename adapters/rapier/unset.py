@@ -55,6 +55,8 @@ UNSET = (
     Unset("no rebound below [m/s]", "no threshold", _STEP, 0.0, partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "along"), 1e-5),
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-5),
+    Unset("limit of speed [m/s]", "400: normalized_max_linear_velocity", "IntegrationParameters", 400.0,
+          partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "0.5, below 5 cm/s and 0.5 rad/s", _ASLEEP, 0.5,
           partial(unset.sleep, Bare), 0.05),
     Unset("gap at rest [m]", "an overlap: springs of 60 Hz against static bodies", _STEP, None,

@@ -47,6 +47,7 @@ UNSET = (
     Unset("no rebound below [m/s]", "no threshold", _NONE, 0.0, partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", _NONE, 0.0, partial(unset.damping, Bare, "along"), 1e-9),
     Unset("angular damping [1/s]", "0", _NONE, 0.0, partial(unset.damping, Bare, "spin"), 1e-9),
+    Unset("limit of speed [m/s]", "none", _NONE, math.inf, partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "never", _NONE, math.inf, partial(unset.sleep, Bare)),
     Unset("gap at rest [m]", "0", _NONE, 0.0, partial(unset.rest, Bare), 1e-9),
     Unset("left of 0.2 m of overlap [m]", "1e-4: slop", _SETTINGS, 1e-4, partial(unset.left, Bare), 1e-6),

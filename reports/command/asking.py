@@ -91,13 +91,17 @@ def _all_engines(told: Plain) -> Iterator[str]:
 def _engine(told: Plain, scene: str) -> Iterator[str]:
     """What is on record of an engine on a scene."""
     name = told["engine"]
-    if not told["judged"]:
-        why = told["refused"] or f"crosscheck run {scene} --engine {name} says why"
-        yield _title(f"{name} does not run the scene: {why}")
+    if not told["judged"] and not told["fix"]:
+        run = f"crosscheck run {scene} --engine {name}"
+        yield _title(
+            f"{name} does not run the scene: {told['refused'] or f'{run} says why'}"
+            if told["known"] or told["refused"]
+            else f"{name}: no result is on record yet; to see it: {run}"
+        )
         yield from _settings(told)
         return
     which = f"({told['suite']} suite, release {told['release']})"
-    if not told["failed"]:
+    if not told["failed"] and not told["fix"]:
         yield _title(f"{name} as shipped passes all {told['judged']} checks {which}")
         yield _wrapped(f"so it may be your model{'; where nothing is set:' if told['unset'] else POSED}", "  ")
         yield from _settings(told)

@@ -127,6 +127,7 @@ def _of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | N
     return {
         "engine": engine, "release": kept["release"], "suite": kept["suite"], "failed": failed, "judged": judged,
         "refused": kept["refused"].get(scene, ""),
+        "known": any(scene in each["scenes"] for each in table()["engines"].values()),
         "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong],
         "better": kept["better"] if rows and all(row[3] == 0 for row in rows) else "",
         "fix": dict(fix or {}),

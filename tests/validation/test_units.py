@@ -39,6 +39,7 @@ SIZES = {
     "scenes.edge_drop": {"m": "HEIGHT", "s": "AFTERMATH"},
     "scenes.far_origin": {"m": "HEIGHT THICKNESS"},
     "scenes.flat_box": {"m": "HEIGHT", "s": "AFTERMATH"},
+    "scenes.flight": {"m": "SIDES RADIUS APART"},
     "scenes.galperin": {"m": "SMALL LARGE", "s": "AFTERMATH"},
     "scenes.head_on": {"m": "RADIUS", "s": "AFTERMATH"},
     "scenes.heavy_on_light": {"m": "SIDE"},

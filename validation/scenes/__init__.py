@@ -33,6 +33,7 @@ OURS = (
     "pivot",
     "rocking_block",
     "tumble",
+    "flight",
     "pair_matrix",
     "rocker",
     "hilltop",

@@ -14,37 +14,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
 
 import numpy as np
 
-from adapters.engine import Array
 from adapters.scene import Body, Box, Scene
 from adapters.trajectory import Trajectory
-from reference_solver.geometry import rotation
-from validation import bounds, metrics
+from validation import metrics
 from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Steps, Variation
 from validation.scenes.parts import mass_of, pose_at, states
+from validation.truths import spinning
 
 #: Sides of the box [m]: three different moments.
 SIDES = (1.0, 0.6, 0.2)
 #: Time of the run after the turn, as a share of the time before.
 AFTERMATH = 0.5
-#: Factor on first-order errors for higher orders.
-BEYOND = 1.5
-#: Steps of the integration of a step's errors; four times as many change a bound by 1e-6 of it.
-STEPS = 2000
-
-
-def moments(mass: float) -> Array:
-    """Principal moments [kg m^2] about the axes along the sides."""
-    square = np.array(SIDES) ** 2
-    return np.asarray(mass * (square.sum() - square) / 12.0)
 
 
 def _flip(p: Params) -> float:
     """Time until the spin about the middle axis is 0 [s]."""
-    i1, i2, i3 = moments(1.0)
+    i1, i2, i3 = spinning.moments(1.0, SIDES)
     low, high = i2 * (i2 - i1), i3 * (i3 - i1) * p["delta"] ** 2
     rate = p["spin"] * math.sqrt((i3 - i2) * (low + high) / (i1 * i2 * i3))
     # K(m) = pi/2 over the arithmetic-geometric mean of 1 and sqrt(1 - m).
@@ -57,7 +45,7 @@ def _flip(p: Params) -> float:
 def make(dimension: int, params: Params) -> Scene:
     """Build the scene: one free body and nothing else."""
     p = params
-    own = moments(p["mass"])
+    own = spinning.moments(p["mass"], SIDES)
     body = Body(
         "box",
         Box((0.5 * SIDES[0], 0.5 * SIDES[1], 0.5 * SIDES[2])),
@@ -76,18 +64,8 @@ def exact(scene: Scene) -> dict[str, float]:
 
 
 def measure(scene: Scene, trajectory: Trajectory) -> dict[str, Measured]:
-    """Angular momentum as a vector in space, energy, and when the spin about the body's middle axis is 0."""
-    turned, own = rotation(trajectory.pose[:, 0]), np.array(scene.bodies[0].inertia)
-    spin = np.einsum("sij,si->sj", turned, trajectory.twist[:, 0, 3:])
-    momentum = np.einsum("sij,sj->si", turned, spin * own)
-    energy = spin**2 @ own
-    start = float(np.linalg.norm(momentum[0]))
-    flip, _ = metrics.crossing(trajectory.t, -spin[:, 1], -np.gradient(spin[:, 1], trajectory.t), 0.0)
-    return {
-        "flip_time": flip,
-        "momentum_drift": (float(np.linalg.norm(momentum - momentum[0], axis=1).max()) / start, ""),
-        "energy_drift": (float(np.abs(energy / energy[0] - 1.0).max()), ""),
-    }
+    """Angular momentum, energy, and when the spin about the middle axis is 0."""
+    return spinning.measure(np.array(scene.bodies[0].inertia), trajectory)
 
 
 #: Largest relative change of energy or angular momentum of a body that still spins on.
@@ -104,68 +82,10 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
     return "changed its spin" if metrics.largest([momentum, energy]) > HALF else ""
 
 
-def _euler(own: Array, spin: Array, other: Array) -> Array:
-    """I^-1 ((I w) x v) for principal moments I, spin w and another vector v: with v = w the rate of the spin."""
-    (i1, i2, i3), (x, y, z), (u, v, w) = own, spin, other
-    return np.array(((i2 * y * w - i3 * z * v) / i1, (i3 * z * u - i1 * x * w) / i2, (i1 * x * v - i2 * y * u) / i3))
-
-
-@lru_cache(maxsize=64)
-def _step_errors(start: tuple[float, ...], duration: float) -> tuple[float, float, float, float]:
-    """Errors of a first-order step, over dt: of angular momentum, energy, attitude [rad], and time [s].
-
-    A step of dt neglects dt^2/2 times the second derivative: w'' of the spin, w' of the attitude. Their magnitudes are
-    summed along the motion, which is integrated by a fourth-order Runge-Kutta method. An attitude error changes the
-    spin in body axes and moves the zero by that over the rate there.
-    """
-    own, h, spin = moments(1.0), duration / STEPS, np.array(start)
-    momentum, energy = float(np.linalg.norm(own * spin)), float(own @ spin**2)
-    lost, given, turned, crossing = 0.0, 0.0, 0.0, 0.0
-    for _ in range(STEPS):
-        rate = _euler(own, spin, spin)
-        second = _euler(own, rate, spin) + _euler(own, spin, rate)
-        lost += h * 0.5 * float(np.linalg.norm(own * second)) / momentum
-        given += h * abs(float(own * spin @ second)) / energy
-        turned += h * 0.5 * float(np.linalg.norm(rate))
-        half = spin + 0.5 * h * rate
-        k2 = _euler(own, half, half)
-        half = spin + 0.5 * h * k2
-        k3 = _euler(own, half, half)
-        whole = spin + h * k3
-        after = spin + h / 6.0 * (rate + 2.0 * k2 + 2.0 * k3 + _euler(own, whole, whole))
-        if spin[1] > 0.0 >= after[1]:
-            crossing = turned * float(np.linalg.norm(spin)) / abs(float(rate[1]))
-        spin = after
-    return lost, given, turned, crossing
-
-
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
-    """A first-order scheme: the sum of its errors in spin and attitude.
-
-    A growing disturbance of exp(lambda t) is too small by lambda^2 dt/2 a second, which is lambda dt t/2 of time; the
-    order of the scheme gives half a step, and sampled attitudes and spins may be half a step apart.
-    """
-    p = scene.params
-    i1, i2, i3 = moments(1.0)
-    growth = p["spin"] * math.sqrt((i2 - i1) * (i3 - i2) / (i1 * i3))
-    lost, given, turned, crossing = _step_errors((0.0, p["spin"], p["delta"] * p["spin"]), scene.duration)
-    time = bounds.Bound(
-        dt + 0.5 * growth * dt * truth["flip_time"] + crossing * dt,
-        "steps of first order let a disturbance grow lambda^2 dt/2 too slowly, and turn it by w' dt/2; and one step",
-    )
-    momentum = bounds.Bound(
-        BEYOND * (lost + turned) * dt + bounds.ROUND_OFF,
-        "error of a first-order scheme in spin and attitude, w'' and w'",
-    )
-    energy = bounds.Bound(
-        BEYOND * given * dt + bounds.ROUND_OFF, "error of a first-order scheme in the spin, w'' dt^2/2"
-    )
-    source = "Euler's equations: angular momentum and energy are kept; period of Jacobi's elliptic functions"
-    return [
-        time.check("flip_time", "s", truth["flip_time"], source),
-        momentum.check("momentum_drift", "1", truth["momentum_drift"], source),
-        energy.check("energy_drift", "1", truth["energy_drift"], source),
-    ]
+    """A first-order scheme: the sum of its errors in spin and attitude."""
+    start = (0.0, scene.params["spin"], scene.params["delta"] * scene.params["spin"])
+    return spinning.checks(spinning.moments(1.0, SIDES), start, scene.duration, dt, truth)
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:
@@ -232,9 +152,5 @@ SCENE = CanonicalScene(
     ),
     steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     smooth=("flip_time",),
-    words={
-        "flip_time": "turns over after {value}",
-        "momentum_drift": "changes its angular momentum by {value} (relative)",
-        "energy_drift": "changes its energy by {value} (relative)",
-    },
+    words=spinning.WORDS,
 )
