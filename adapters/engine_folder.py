@@ -9,7 +9,8 @@
         changes.toml      notes of the engine on changes over its releases (`validation.releases.notes`)
         laws.py           DEVIATIONS: what the engine does by design (`adapters.law`)
         targets.toml      how the bench compares the engine with our textbook step (validation/bench/targets.toml)
-        tuning.toml       settings for tuning, and fixes whose settings are measured (`adapters.experiment.files`)
+        tuning.toml       settings for tuning, fixes whose settings are measured, cases in which settings should act
+                          (`adapters.experiment.files`)
         findings/         families.toml, which proves them too, and members.csv (`validation.findings`), breaks.toml
                           and breaks.csv
         experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
@@ -19,6 +20,7 @@
         readings.csv      whether they are true, as measured (`validation.questions.kept_readings`)
         force_script.py.txt   a script that reads a contact force rightly with the bare engine
         decisive.csv      decisive settings of its fixes, as measured (`validation.settings.decisive`)
+        effects.csv       what each setting does in its case of tuning.toml (`validation.settings.effects`)
         cures.csv         fixes by scene, and their cost, as measured (`validation.fixes`)
         panels.csv        what its profiles break in other cases (`validation.fixes.panel`)
 
@@ -44,7 +46,7 @@ from typing import Any
 
 from adapters import registry
 from adapters.engine import EngineError
-from adapters.experiment import Cured, Experiment
+from adapters.experiment import Cured, Effect, Experiment
 from adapters.experiment.files import Tuning, read_tuning
 from adapters.isolation.foreign import importable, said_by
 from adapters.law import Deviation, Law, Measure, Prediction
@@ -55,7 +57,7 @@ from adapters.unset import Unset
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
 READINGS, READ, FORCE_SCRIPT = "readings", "readings.csv", "force_script.py.txt"
-CURES, PANELS, TUNING = "cures.csv", "panels.csv", "tuning.toml"
+CURES, PANELS, TUNING, EFFECTS = "cures.csv", "panels.csv", "tuning.toml", "effects.csv"
 
 
 def located(module: str) -> Path | None:
@@ -150,6 +152,11 @@ def force_script_of(engine: str) -> str:
     """A script that reads a contact force rightly with the bare engine; empty if there is none."""
     path = inside(engine, FORCE_SCRIPT)
     return path.read_text(encoding="utf-8") if path else ""
+
+
+def effects_of(engine: str) -> Mapping[str, Effect]:
+    """Cases in which settings should act, by setting."""
+    return _tuning(engine)[0].effects
 
 
 def fault_of_tuning(engine: str) -> str:

@@ -20,7 +20,7 @@ from reports import numbers, readings
 from reports.fixes import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.symptoms.published import passed
-from reports.tables import unset_text
+from reports.tables import shown_by, unset_text, verdict_of
 from reports.wording import first_of, markdown, number, setting_text, word_of
 from validation import bounds
 from validation.catalogue import CATALOGUE
@@ -37,7 +37,9 @@ def write(folder: Path) -> None:
     environment.filters |= {
         "md": lambda text: markdown(str(text)).replace("\n", " "),
         "number": number,
+        "shown_by": shown_by,
         "unset": unset_text,
+        "verdict_of": verdict_of,
         "law": law,
         "prose": prose,
     }

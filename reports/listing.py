@@ -24,6 +24,7 @@ from validation.field.measured import facts_of
 from validation.identity import commit, machine
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
+from validation.settings.effects import told_of
 
 
 def scenes() -> list[dict[str, Any]]:
@@ -156,6 +157,7 @@ def _describe_engine(name: str, measure: bool) -> dict[str, Any]:
         "quirks": [asdict(quirk) for quirk in facts.quirks],
         "measured": [asdict(fact) | {"standing": fact.standing} for fact in facts_of(name)],
         "known_bad_versions": dict(facts.known_bad_versions),
+        "effects": [asdict(told) for told in told_of(name)],
         "settable": [{"name": each, "must_be": kind(object())} for each, kind in settable.items()],
         "profiles": profiles,
     }

@@ -158,6 +158,10 @@ def _engine(data: Plain, console: Console) -> None:
         for setting in data["settable"]:
             table.add_row(setting["name"], Text(setting["must_be"]))
         print_table(table, console)
+    if data["effects"]:
+        versions = ", ".join(dict.fromkeys(told["version"] for told in data["effects"]))
+        _heading(f"What each setting does ({data['name']} {versions})", console)
+        print_table(effects_table(data["effects"]), console)
     _heading("Quirks, and how the adapter handles them", console)
     table = grid("quirk", "what the adapter does", "source")
     table.columns[0].no_wrap = False
@@ -175,6 +179,28 @@ def _engine(data: Plain, console: Console) -> None:
         print_table(table, console)
         if any(fact["chosen"] or fact["because"] for fact in data["measured"]):
             console.print(Text(AFTERWARDS))
+
+
+def effects_table(rows: Sequence[Plain]) -> Table:
+    """What settings do, where it shows, and whether the engine reads them back."""
+    table = grid("setting", "read back", "what it does")
+    for told in rows:
+        case = f"; {shown_by(told)}" if told["scene"] else ""
+        table.add_row(told["setting"], told["read"], Text(f"{verdict_of(told)}{case}"))
+    return table
+
+
+def verdict_of(told: Plain) -> str:
+    """What a setting does, and why; ``only with`` goes on with the names of others."""
+    between = " " if told["verdict"] == "only with" else ": "
+    return between.join(filter(None, (told["verdict"], told["because"])))
+
+
+def shown_by(told: Plain) -> str:
+    """The case of a setting: its value, scene and metric, and that without and with it."""
+    if not told["scene"]:
+        return ""
+    return f"{told['metric']} of {told['scene']} {told['before'] or '-'} -> {told['after'] or '-'} at {told['value']}"
 
 
 def _unset(data: Plain, console: Console) -> None:

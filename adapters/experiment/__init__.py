@@ -68,3 +68,42 @@ class Cured:
     cells: tuple[Mapping[str, float], ...]
     metrics: tuple[str, ...] = ()
     dimension: int = 2
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Where a setting should show that it acts; `validation.settings.effects` sets it there.
+
+    Parameters
+    ----------
+    set
+        A value other than the profile's.
+    scene, metric, params, dimension, profile
+        The case, and what is shown of it; the profile as shipped by default.
+    needs
+        Settings without which it is known to do nothing (``with``).
+    beyond
+        A value beyond a limit of the engine, which ``set`` is: both then give the same.
+    in_steps
+        Whether that limit is a multiple of the step; ``set`` is for 1/240 s.
+    unless
+        Settings with which it is not limited.
+    because, source
+        Why it does nothing, or is limited, as the engine has it.
+    untried
+        Why there is no such case.
+    """
+
+    set: Any = None
+    scene: str = ""
+    metric: str = ""
+    params: Mapping[str, float] = field(default_factory=dict)
+    dimension: int = 2
+    profile: str | None = None
+    needs: Mapping[str, Any] = field(default_factory=dict)
+    beyond: Any = None
+    in_steps: bool = False
+    unless: Mapping[str, Any] = field(default_factory=dict)
+    because: str = ""
+    source: str = ""
+    untried: str = ""

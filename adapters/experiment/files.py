@@ -18,6 +18,10 @@
     scene = "stack"
     cells = [{}, { n = 10 }]
 
+    [effects]               each setting with a case in which it should act (`adapters.experiment.Effect`), or why none
+    damping = { set = 0.9, scene = "flight", metric = "fall_speed" }
+    jacobian = { untried = "two ways to the same numbers" }
+
 None is written as ``"none"``, several values as a list. Proofs of families are read by
 `validation.findings.proofs`.
 """
@@ -31,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import EngineError
-from adapters.experiment import Cured
+from adapters.experiment import Cured, Effect
 from adapters.plain import one_line
 
 #: A test of a field's value, and what it must be, in words.
@@ -50,6 +54,7 @@ class Tuning:
     local: tuple[str, ...] = ()
     instead: tuple[tuple[Mapping[str, Any], Mapping[str, Any]], ...] = ()
     cured: tuple[Cured, ...] = ()
+    effects: Mapping[str, Effect] = field(default_factory=dict)
 
 
 def is_word(value: Any) -> bool:
@@ -81,6 +86,23 @@ _PARTS: Fields = {
     "local": (is_list_of(is_word), "a list of names"),
     "instead": (lambda value: isinstance(value, list), "a list of tables"),
     "cured": (lambda value: isinstance(value, list), "a list of tables"),
+    "effects": TABLE,
+}
+_ANYTHING: Kind = (lambda value: True, "a value")
+_EFFECT: Fields = {
+    "set": _ANYTHING,
+    "scene": NAME,
+    "metric": NAME,
+    "params": (is_numbers, "a table of numbers"),
+    "dimension": DIMENSION,
+    "profile": NAME,
+    "with": TABLE,
+    "beyond": _ANYTHING,
+    "in_steps": (lambda value: isinstance(value, bool), "true or false"),
+    "unless": TABLE,
+    "because": NAME,
+    "source": NAME,
+    "untried": NAME,
 }
 _INSTEAD: Fields = {"of": TABLE, "set": TABLE}
 _CURED: Fields = {
@@ -161,4 +183,14 @@ def _tuning(data: Mapping[str, Any]) -> Tuning:
     ]
     instead = [checked(f"instead {k}", each, _INSTEAD, _INSTEAD) for k, each in enumerate(data.get("instead", []), 1)]
     swaps = tuple((settings_of(each["of"]), settings_of(each["set"])) for each in instead)
-    return Tuning(settings_of(candidates), belongs, tuple(data.get("local", ())), swaps, tuple(found))
+    effects = {name: _effect(f"effects.{name}", table) for name, table in data.get("effects", {}).items()}
+    return Tuning(settings_of(candidates), belongs, tuple(data.get("local", ())), swaps, tuple(found), effects)
+
+
+def _effect(label: str, table: Any) -> Effect:
+    """A setting's case, or the reason why there is none."""
+    needed = ("untried",) if "untried" in checked(label, table, _EFFECT) else ("set", "scene", "metric")
+    given: dict[str, Any] = dict(checked(label, table, _EFFECT, needed))
+    given |= {name: setting_of(given[name]) for name in ("set", "beyond") if name in given}
+    given |= {"params": params_of(given.get("params", {})), "unless": settings_of(given.get("unless", {}))}
+    return Effect(needs=settings_of(given.pop("with", {})), **given)

@@ -34,6 +34,7 @@ from validation.questions.spread import spreads
 from validation.records.store import Store
 from validation.running.plan import slots
 from validation.running.warming import missing as kernels_missing
+from validation.settings.effects import idle_in
 from validation.workers import TIMEOUT, run_cells
 
 
@@ -102,6 +103,8 @@ def run(cases: Cases, how: Running, out: Path, as_json: bool) -> None:
     for name in request.scenes:
         for note in resolve(name).notes:
             console.print(f"{name}: {note}", markup=False, highlight=False, soft_wrap=True)
+    for line in idle_in(chosen):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     store = Store(out)
     keep = out / "trajectories" if how.keep_trajectories else None
     title = f"{request.suite}: {cases.words(request.scenes)}"

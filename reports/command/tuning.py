@@ -12,12 +12,23 @@ import click
 
 from adapters import registry
 from adapters.engine import EngineError
-from adapters.engine_folder import DECISIVE, TUNING, candidates_of, cured_of, fault_of_tuning, folder_of
+from adapters.engine_folder import (
+    DECISIVE,
+    EFFECTS,
+    TUNING,
+    candidates_of,
+    cured_of,
+    effects_of,
+    fault_of_tuning,
+    folder_of,
+)
 from adapters.registry import load, profile_of
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
-from reports.terminal import terminal
+from reports.tables import effects_table
+from reports.terminal import print_table, terminal
 from reports.wording import profiles_called
+from validation.settings import effects
 from validation.settings.decisive import measure_all, measured_of, write
 from validation.settings.tuning import Score, Search, groups, search
 
@@ -39,6 +50,7 @@ def known_groups(ctx: click.Context, param: click.Parameter, names: tuple[str, .
 @click.option(
     "--decisive", "which", is_flag=True, help="Measure which settings of its fixes matter, and keep the result."
 )
+@click.option("--effects", "acts", is_flag=True, help="Measure which settings do anything, and keep the result.")
 @AS_JSON
 def tune(
     engine: str,
@@ -47,6 +59,7 @@ def tune(
     dim: tuple[int, ...],
     jobs: int,
     which: bool,
+    acts: bool,
     as_json: bool,
 ) -> None:
     """Search better stock settings for a profile.
@@ -57,8 +70,14 @@ def tune(
     With --decisive, each setting that a fix changes is tried alone and left out, to measure which ones matter. The
     result is written to decisive.csv in the engine's folder, which the report and `explain` read. Exits with 1 if it
     differs from what was listed.
+
+    With --effects, every setting of ENGINE is set to another value where it should act. The table, by release of the
+    engine, is written to effects.csv, which `describe`, `run --set` and models read. Exits with 1 if a verdict is not
+    the listed one.
     """
     console = terminal(stderr=True)
+    if acts:
+        sys.exit(0 if _effects(engine, jobs, as_json) else 1)
     if which:
         sys.exit(0 if _decisive(engine, jobs, as_json) else 1)
     registry.find(engine)
@@ -111,6 +130,24 @@ def _decisive(engine: str, jobs: int, as_json: bool) -> bool:
         for entry in found:
             console.print(f"{engine}/{entry.shipped} {entry.scene}: fixed by {entry.text}", soft_wrap=True)
     return listed == {(e.scene, e.shipped, e.better): e.text for e in found}
+
+
+def _effects(engine: str, jobs: int, as_json: bool) -> bool:
+    """Measure and store what each setting of an engine does; whether the verdicts equal the listed ones."""
+    registry.load(engine)
+    folder = folder_of(engine)
+    if not effects_of(engine) or folder is None:
+        raise EngineError(f"tune: {_missing(engine, 'cases of settings', 'try')}")
+    found = effects.measure(engine, jobs)
+    listed = effects.of_release(engine, found[0].version)
+    effects.write(found, folder / EFFECTS)
+    if as_json:
+        click.echo(json.dumps([asdict(entry) for entry in found], indent=1))
+    else:
+        console = terminal()
+        console.print(f"{engine} {found[0].version}", highlight=False)
+        print_table(effects_table([asdict(entry) for entry in found]), console, highlight=False)
+    return {name: told.verdict for name, told in listed.items()} == {told.setting: told.verdict for told in found}
 
 
 def _score(score: Score) -> str:

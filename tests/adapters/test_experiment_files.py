@@ -46,7 +46,7 @@ def test_values_are_read_in_their_order_and_with_their_kinds(read):
     ("text", "said"),
     [
         ("cured", "Expected '=' after a key in a key/value pair (at end of document)"),
-        ("tried = 1\n", "tuning: tried is not a field; fields are candidates, belongs, local, instead, cured"),
+        ("tried = 1\n", "tuning: tried is not a field; fields are candidates, belongs, local, instead, cured, effects"),
         ("candidates = 1\n", "tuning: candidates must be a table"),
         ("[candidates]\nslop = 0.1\n", "candidates: slop must be a list of values"),
         ("[belongs]\nslop = 0.1\n", "belongs: slop must be a name"),

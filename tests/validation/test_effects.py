@@ -1,0 +1,200 @@
+"""Settings that do nothing and settings that act, each with its verdict; kept tables follow cases and engines."""
+
+from dataclasses import replace
+
+import pytest
+
+from adapters.engine import EngineError
+from adapters.engine_folder import EFFECTS, effects_of, fault_of_tuning, inside
+from adapters.experiment import Effect
+from adapters.experiment.files import read_tuning
+from adapters.registry import find, load, names
+from validation.cells import Observation, Outcome, Slot
+from validation.running.plan import QUICK_DT
+from validation.settings import effects
+from validation.settings.effects import (
+    ACTS,
+    CLAMPED,
+    NOTHING,
+    ONLY_WITH,
+    REFUSED,
+    UNTRIED,
+    Told,
+    beyond,
+    idle,
+    idle_in,
+    judged,
+    measure,
+    of_release,
+    read,
+    settings_known,
+    told_of,
+    write,
+)
+
+ENGINES = [name for name in names() if effects_of(name)]
+BASE = Slot("stack", (), 2, "toy", "default", QUICK_DT)
+
+
+def seen(**bits):
+    """Runs of a case, each with its bits; None: refused."""
+    return {
+        part: Observation(BASE, part, 1, "1.0", Outcome.OK if own else Outcome.UNSUPPORTED, "no such", {}, own or "")
+        for part, own in bits.items()
+    }
+
+
+NEEDS = Effect(1, "stack", "drift", needs={"other": 2})
+LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
+
+
+@pytest.mark.parametrize(
+    ("effect", "runs", "verdict"),
+    [
+        (Effect(1, "stack", "drift"), {"base": "a", "set": "b"}, ACTS),
+        (Effect(1, "stack", "drift"), {"base": "a", "set": "a"}, NOTHING),
+        (Effect(1, "stack", "drift"), {"base": "a", "set": None}, REFUSED),
+        (NEEDS, {"base": "a", "set": "a", "ready": "c", "both": "d"}, ONLY_WITH),
+        (NEEDS, {"base": "a", "set": "a", "ready": "c", "both": "c"}, NOTHING),
+        (NEEDS, {"base": "a", "set": None, "ready": None, "both": "d"}, ONLY_WITH),
+        (NEEDS, {"base": "a", "set": "b", "ready": "c", "both": "c"}, ACTS),
+        (LIMITED, {"base": "a", "set": "b", "beyond": "b"}, CLAMPED),
+        (LIMITED, {"base": "a", "set": "b", "beyond": "c"}, ACTS),
+        (LIMITED, {"base": "a", "set": "a", "beyond": "a"}, NOTHING),
+    ],
+)
+def test_verdict_on_a_setting_by_the_bits_of_its_runs(effect, runs, verdict):
+    assert judged("toy", "1.0", "knob", effect, seen(**runs)).verdict == verdict
+
+
+def test_setting_that_changes_a_metric_alone():
+    """Contacts are no part of a state."""
+    runs = seen(base="a", set="a")
+    runs["set"] = replace(runs["set"], metrics={"load": (1.0, "")}, readback={"knob": 1})
+    told = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs)
+    assert (told.verdict, told.after, told.read) == (ACTS, "1", "yes")
+
+
+def test_planted_setting_without_effect_and_one_that_acts(monkeypatch):
+    """Bodies that nothing touches have no contacts to keep, and are slowed by damping."""
+    pytest.importorskip("pymunk")
+    cases = {name: Effect(value, "flight", "fall_speed") for name, value in
+             (("collision_persistence", 1), ("damping", 0.5), ("collision_bias", 2.0))}  # fmt: skip
+    monkeypatch.setattr(effects, "effects_of", lambda engine: cases)
+    monkeypatch.setattr(effects, "settings_known", lambda engine: [*cases, "iterations"])
+    told = {each.setting: each for each in measure("chipmunk")}
+    verdicts = {name: each.verdict for name, each in told.items()}
+    assert verdicts == {
+        "collision_persistence": NOTHING, "damping": ACTS, "collision_bias": REFUSED, "iterations": UNTRIED,
+    }  # fmt: skip
+    assert told["collision_persistence"].read == "yes" and told["damping"].before == "98.1"
+    assert told["collision_persistence"].because == "no bit of flight changes"
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    """``kept(cases)``: a toy's settings with their cases, all measured with the verdict that is given."""
+
+    def keep(**told):
+        cases = {name: effect for name, (effect, _) in told.items()}
+        rows = {name: Told("toy", "1.0", name, v, because=cases[name].because) for name, (_, v) in told.items()}
+        monkeypatch.setattr(effects, "effects_of", lambda engine: cases)
+        monkeypatch.setattr(effects, "of_release", lambda engine, version: rows if version == "1.0" else {})
+
+    return keep
+
+
+def told(asked, own=None, version="1.0", dt=QUICK_DT):
+    return list(idle("toy", version, list(asked.items()), (own or {}) | asked, dt))
+
+
+def test_line_on_a_value_that_does_nothing(kept):
+    kept(erp=(Effect(because="of joints"), NOTHING), knob=(Effect(), ACTS), new=(Effect(), UNTRIED))
+    assert told({"erp": 0.5, "knob": 1, "new": 2, "other": 3}) == ["erp=0.5 does nothing in toy 1.0: of joints"]
+    assert told({"erp": 0.5}, version="2.0") == []
+
+
+def test_line_on_a_value_that_needs_another(kept):
+    kept(wind=(Effect(needs={"density": 1.2}), ONLY_WITH), tilt=(Effect(needs={"cone": "round"}), ONLY_WITH),
+         doze=(Effect(needs={"flags": ("sleep",)}), ONLY_WITH))  # fmt: skip
+    assert told({"wind": 3.0}) == ["wind=3 acts in toy 1.0 only with another setting, such as density=1.2"]
+    assert told({"wind": 3.0}, {"density": 0.0}) != [] == told({"wind": 3.0}, {"density": 9.0})
+    assert told({"tilt": 1}, {"cone": "flat"}) != [] == told({"tilt": 1}, {"cone": "round"})
+    assert told({"doze": 1}, {"flags": ("wake",)}) != [] == told({"doze": 1}, {"flags": ("wake", "sleep")})
+
+
+def test_line_on_a_clamped_value(kept):
+    soft = Effect((2 * QUICK_DT, 1.0), beyond=(1e-4, 1.0), in_steps=True, unless={"off": ("safe",)}, because="safe")
+    kept(soft=(soft, CLAMPED))
+    assert told({"soft": (0.001, 1.0)}) == ["soft=0.001,1 acts as 0.008333 in toy 1.0: safe"]
+    assert told({"soft": (0.001, 1.0)}, dt=1e-4) == [] == told({"soft": (0.02, 1.0)})
+    assert told({"soft": (-100.0, -1.0)}) == [] == told({"soft": (0.001, 1.0)}, {"off": ("safe",)})
+    assert beyond(3.0, Effect(1.0, beyond=2.0), QUICK_DT) == 1.0
+    assert beyond("reflect", soft, QUICK_DT) is None
+
+
+def test_settings_of_a_user_that_mujoco_does_not_heed():
+    pytest.importorskip("mujoco")
+    slot = Slot("impact", (), 3, "mujoco", "default", QUICK_DT)
+    (line,) = idle_in([slot, slot.with_own((("solref", (0.001, 1.0)),))])
+    assert line == "solref=0.001,1 acts as 0.008333 in mujoco 4.0.1: time constants are at least two steps (refsafe)"
+    assert idle_in([slot.with_own((("solref", (0.05, 1.0)),))]) == []
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_kept_table_has_a_row_for_every_setting(engine):
+    if find(engine).engine is None:
+        pytest.skip(f"{engine} is not installed")
+    assert fault_of_tuning(engine) == ""
+    own, rows = settings_known(engine), of_release(engine, load(engine).version())
+    assert sorted(effects_of(engine)) == own == sorted(rows)
+    assert len(told_of(engine)) == len({(each.version, each.setting) for each in told_of(engine)})
+    untried = [each for each in rows.values() if each.verdict == UNTRIED]
+    assert len(untried) <= 0.1 * len(own) and all(each.because for each in untried)
+    for name, effect in effects_of(engine).items():
+        assert rows[name].verdict == UNTRIED if effect.untried else (rows[name].scene, rows[name].metric) == (
+            effect.scene, effect.metric
+        )  # fmt: skip
+
+
+def test_kept_table_of_chipmunk_as_measured():
+    pytest.importorskip("pymunk")
+    assert measure("chipmunk") == list(of_release("chipmunk", load("chipmunk").version()).values())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", [name for name in ENGINES if name != "chipmunk"])
+def test_kept_table_as_measured(engine):
+    if find(engine).engine is None:
+        pytest.skip(f"{engine} is not installed")
+    rows = of_release(engine, load(engine).version())
+    assert {each.setting: each.verdict for each in measure(engine)} == {n: each.verdict for n, each in rows.items()}
+
+
+def test_table_of_another_release_stays(tmp_path):
+    path, old, new = tmp_path / EFFECTS, Told("toy", "1.0", "a", ACTS), Told("toy", "2.0", "a", NOTHING)
+    write([old], path)
+    write([new], path)
+    assert list(read(path)) == [old, new]
+    write([replace(old, verdict=NOTHING)], path)
+    assert list(read(path)) == [new, replace(old, verdict=NOTHING)]
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("a = 1", "effects.a must be a table"),
+        ('a = { set = 1, scene = "stack" }', "effects.a: metric is missing"),
+        ('a = { set = 1, scene = "stack", metric = "drift", sets = 2 }', "effects.a: sets is not a field"),
+        ('a = { untried = "" }', "effects.a: untried must be a name"),
+    ],
+)
+def test_wrong_case_of_a_setting_in_one_line(tmp_path, table, said):
+    path = tmp_path / "tuning.toml"
+    path.write_text(f"[effects]\n{table}\n")
+    with pytest.raises(EngineError, match=said):
+        read_tuning(path)
+
+
+def test_engine_without_a_table():
+    assert told_of("newton") == () and inside("newton", EFFECTS) is None
