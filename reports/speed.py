@@ -195,10 +195,10 @@ def overhead_table(overhead: pd.DataFrame) -> Table:
         show_edge=False,
         pad_edge=False,
     )
-    columns = [("empty", False), ("empty", True), ("flight", False), ("flight", True)]
+    columns = [("empty", False), ("empty", True), ("free", False), ("free", True)]
     table.add_column("engine", no_wrap=True)
     for scene, sampled in columns:
-        table.add_column({"empty": "empty", "flight": "free body"}[scene] + (", sampled" if sampled else ""))
+        table.add_column({"empty": "empty", "free": "free body"}[scene] + (", sampled" if sampled else ""))
     ordered = in_order(overhead, ["dimension"])
     for (dimension, engine, profile), rows in reading.grouped(ordered, ["dimension", "engine", "profile"]):
         found = {(row["scene"], row["sampled"]): row for row in rows.to_dict("records")}

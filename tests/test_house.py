@@ -261,6 +261,7 @@ OTHER_MEANINGS = {
     ("adapters/receipts/__init__.py", "impact"): "a regime of `Needs`",
     ("adapters/receipts/probes.py", "slide"): "a probe",
     ("adapters/receipts/__init__.py", "slide"): "a probe",
+    ("adapters/receipts/probes.py", "flight"): "a probe",
     ("validation/bench/units.py", "pyramid"): "the pile on which iteration counts are timed",
     ("reports/command/certifying.py", "impact"): "a part of `reference_solver.verification`",
 }

@@ -291,7 +291,7 @@ def _scaling_figure(purpose: str, scene: str, dimension: int, group: pd.DataFram
 
 
 def _overhead(table: pd.DataFrame, columns: Sequence[tuple[str, str]]) -> Sequence[Plain]:
-    """One row per dimension, engine and profile, in the page's order: empty and flight, plain and with states read."""
+    """One row per dimension, engine and profile, in the page's order: empty and free, plain and with states read."""
     rows: dict[tuple[Any, ...], dict[Hashable, Any]] = {}
     for r in table.to_dict("records"):
         key = (r["engine"], r["profile"], r["dimension"])

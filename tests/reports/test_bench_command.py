@@ -47,7 +47,7 @@ def test_a_bench_tells_error_and_time_of_every_point(bench):
     assert points[1]["cost"] > 1.5 * points[0]["cost"]
     assert data["protocol"]["seed"] == 3 and data["protocol"]["primary"]["impact"]["because"]
     assert data["run"]["machine"]["cpu"] and data["run"]["title"].startswith("bench quick: impact --engine ")
-    assert {row["scene"] for row in data["overhead"]} == {"empty", "flight"}
+    assert {row["scene"] for row in data["overhead"]} == {"empty", "free"}
 
 
 def test_every_raw_timing_has_the_error_and_the_state_beside_it(bench):

@@ -147,7 +147,7 @@ def timings() -> list[Timing]:
         for dt in (1 / 60, 1 / 240, 1 / 960):
             first = Slot("impact", tuple(primary_of("impact").variations(dt)[0].items()), 2, *who, dt)
             found += _rounds("work", first, round(0.5 / dt), (1 + k // 2) * 1e-5 / dt, 1, "busy" if k == 7 else "")
-        for scene in ("empty", "flight"):
+        for scene in ("empty", "free"):
             found += _rounds("overhead", Slot(scene, (), 2, *who, DT), 100, (k + 1) * 1e-4, 1)
         for bodies in (10, 30, 100):
             pile = Slot("stack", (("n", float(bodies)),), 2, *who, DT)

@@ -219,7 +219,7 @@ def test_pyramids_have_as_many_boxes_as_they_say_and_none_overlaps():
 
 
 def test_the_error_of_a_fall_is_its_distance_from_the_parabola():
-    scene = scene_of(Slot("flight", (), 2, "reference", "classical", 1 / 240))
+    scene = scene_of(Slot("free", (), 2, "reference", "classical", 1 / 240))
     start = np.array([body.pose for body in scene.bodies], float)
     fallen = start.copy()
     fallen[0, 1] += 0.5 * scene.gravity[1] * 0.25
@@ -241,7 +241,7 @@ def test_pile_error_by_motion_and_not_by_the_declared_start():
 def test_overhead_is_timed_for_every_engine_that_has_the_dimension(clockwork):
     units = list(overhead_units([("clockwork", "one"), ("clockwork", "two")], [2, 3]))
     assert {(u.slot.scene, u.slot.dimension, u.sampled) for u in units} == {
-        (scene, 2, sampled) for scene in ("empty", "flight") for sampled in (False, True)
+        (scene, 2, sampled) for scene in ("empty", "free") for sampled in (False, True)
     }
 
 

@@ -177,7 +177,7 @@ def test_heap_error_by_deepest_overlap_and_final_energy(dimension):
 
 def test_a_free_fall_is_measured_as_a_sag_of_the_discrete_fall():
     pytest.importorskip("numba")
-    slot = Slot("flight", (), 2, registry.solver(), "classical", 1 / 240)
+    slot = Slot("free", (), 2, registry.solver(), "classical", 1 / 240)
     found = errors_of("column", slot, 0.25)
     steps = found.steps
     assert steps == 60 and found.contacts == 0 and not found.reason
@@ -187,7 +187,7 @@ def test_a_free_fall_is_measured_as_a_sag_of_the_discrete_fall():
 
 
 def test_refusing_engine_with_its_reason():
-    slot = Slot("flight", (), 3, "chipmunk", "default", 1 / 240)
+    slot = Slot("free", (), 3, "chipmunk", "default", 1 / 240)
     assert "planar" in errors_of("column", slot, 0.1).reason
 
 

@@ -111,7 +111,7 @@ def identity(slot: Slot) -> dict[str, Any]:
 def overhead(summary: pd.DataFrame) -> pd.DataFrame:
     """Cost of a step without contact: an empty scene, and one free body. It is mostly the binding's own.
 
-    One row per dimension, engine, profile, scene (``empty``, ``flight``) and way of sampling. Columns as in
+    One row per dimension, engine, profile, scene (``empty``, ``free``) and way of sampling. Columns as in
     `timings_summary`, with ``per_step``, ``per_step_low``, ``per_step_high`` [s].
     """
     table = summary[summary["purpose"] == "overhead"].copy()

@@ -1,7 +1,7 @@
 """Scenes of the bench that no suite has, because they have no truth to check.
 
     empty    only the floor, for the cost of a step without contact
-    flight   one free body without contact
+    free     one body without contact
     wall     rows of boxes as in a pyramid, of any number, ``gap`` apart; with 0 the sides of neighbours touch
     heap     n discs or spheres between walls, which fall a little from the places of a grid
 
@@ -33,9 +33,9 @@ def empty(dimension: int, params: Params) -> Scene:
     return _scene("empty", dimension, (floor(dimension),), params)
 
 
-def flight(dimension: int, params: Params) -> Scene:
+def free(dimension: int, params: Params) -> Scene:
     """One ball without contact."""
-    return _scene("flight", dimension, (ball("ball", dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), params)
+    return _scene("free", dimension, (ball("ball", dimension, 1.0, 0.5 * SIDE, 0.5 * SIDE),), params)
 
 
 def wall(dimension: int, params: Params) -> Scene:
@@ -76,4 +76,4 @@ def _scene(name: str, dimension: int, bodies: tuple[Body, ...], params: Params) 
     return Scene(name, 1, dimension, bodies, pairs, upward(dimension, -GRAVITY), 1.0, params)
 
 
-OWN: Mapping[str, Callable[[int, Params], Scene]] = {"empty": empty, "flight": flight, "wall": wall, "heap": heap}
+OWN: Mapping[str, Callable[[int, Params], Scene]] = {"empty": empty, "free": free, "wall": wall, "heap": heap}

@@ -21,7 +21,7 @@ class Timing:
     Parameters
     ----------
     slot
-        Scene, parameters, engine, profile, step, iterations. ``empty`` and ``flight`` are scenes of the bench, see
+        Scene, parameters, engine, profile, step, iterations. ``empty`` and ``free`` are scenes of the bench, see
         `validation.bench.units`.
     cell
         Case of the catalogue with this error; empty for scenes of the bench.

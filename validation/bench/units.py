@@ -83,7 +83,7 @@ def work_unit(slot: Slot, cell: str, error: float | None, sampled: bool = False)
 def overhead_units(engines: Sequence[tuple[str, str]], dimensions: Sequence[int]) -> Iterator[Unit]:
     """Empty scene and one free body for every ``(engine, profile)``, plain and sampled; one second of steps each."""
     for dimension in dimensions:
-        for name in ("empty", "flight"):
+        for name in ("empty", "free"):
             for engine, profile in engines:
                 slot = Slot(name, (), dimension, engine, profile, PILE_DT)
                 steps = step_count(1.0, PILE_DT)
@@ -166,7 +166,7 @@ def prepared(slot: Slot) -> tuple[Engine, Scene, dict[str, Any], bool]:
 def own_error(scene: Scene, time: float, start: Array, pose: Array) -> float | None:
     """Error of a scene of the bench at ``time`` [s]; None without free bodies.
 
-    Piles: largest displacement of a body since the start, in sides. Flight: distance from the exact fall [m].
+    Piles: largest displacement of a body since the start, in sides. Free body: distance from the exact fall [m].
     ``start`` has the poses before the first step as the engine reports them: changes of poses by an adapter are
     declared elsewhere, and add up over a tall pile.
     """
@@ -175,7 +175,7 @@ def own_error(scene: Scene, time: float, start: Array, pose: Array) -> float | N
         return None
     d = scene.dimension
     expected = start[free, :d]
-    if scene.name == "flight":
+    if scene.name == "free":
         expected = expected + 0.5 * time**2 * np.array(scene.gravity)
     moved = np.linalg.norm(pose[free, :d] - expected, axis=1)
     return float(moved.max()) if np.isfinite(moved).all() else math.inf

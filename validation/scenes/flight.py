@@ -21,7 +21,7 @@ from adapters.engine import Array
 from adapters.scene import Body, Box, Scene
 from adapters.trajectory import Trajectory
 from validation import bounds, metrics
-from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Steps, Variation
+from validation.canonical import CanonicalScene, Check, Frontier, Measured, Parameter, Params, Primary, Variation
 from validation.scenes.parts import ball, mass_of, pose_at, standard_gravity, states, upward
 from validation.truths import spinning
 
@@ -240,7 +240,6 @@ SCENE = CanonicalScene(
         error,
         "six free bodies",
     ),
-    steps=Steps((1.0 / 60.0, 1.0 / 240.0, 1.0 / 960.0)),
     smooth=("fall",),
     words=spinning.WORDS
     | {

@@ -36,8 +36,6 @@ from validation.settings.switching import observe, switched
 ACTS, NOTHING, CLAMPED, ONLY_WITH, REFUSED, UNTRIED = (
     "acts", "without effect", "clamped", "only with", "refused", "not tried",
 )  # fmt: skip
-#: A scene whose needs show which settings a profile has: with contact, load, friction and restitution.
-TYPICAL = ("bounce", "stack", "slide", "flight")
 
 
 @dataclass(frozen=True)
@@ -76,8 +74,7 @@ def settings_known(engine: str) -> list[str]:
     found = load(engine)
     names: dict[str, None] = {}
     for profile in found.profiles:
-        for scene in TYPICAL:
-            canonical = CATALOGUE[scene]
+        for canonical in CATALOGUE.values():
             for dimension in canonical.dimensions:
                 own = found.settings(profile, needs(canonical.scene(dimension)), QUICK_DT)
                 names |= dict.fromkeys(kinds_of(found, own))
