@@ -12,6 +12,7 @@ from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import SLIPPING, Held
 from reference_solver.exact.problem import SINGULAR, STICK
 from reference_solver.exact.record import Blow
+from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 
@@ -32,7 +33,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     normal = np.arange(len(contacts)) * d
     if np.abs(rows.gap).max() > GAP * world.size:
         for _ in range(2):
-            least = _least(contacts.matrices, normal, -contacts.rows.gap)
+            least = _least(contacts, normal, -contacts.rows.gap)
             state = state.moved((contacts.matrices[1] @ least).reshape(state.velocity.shape))
             contacts.at_state(state)
     ended = _at_end(held)
@@ -41,7 +42,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     speed = contacts.rows.speed.ravel()[keeps]
     if np.abs(speed).max() <= SPEED:
         return state, None
-    impulses = _least(contacts.matrices, keeps, -speed).reshape(-1, d)
+    impulses = _least(contacts, keeps, -speed).reshape(-1, d)
     after = replace(state, velocity=state.velocity + contacts.changes(impulses))
     blow = Blow.of(after, contacts, impulses, ROCKING) if ended.any() else None
     contacts.at_state(after)
@@ -57,9 +58,12 @@ def _at_end(held: Held) -> NDArray[np.bool_]:
     return np.asarray((slip <= 2.0 * SLIPPING) & (contacts.friction > 0.0))
 
 
-def _least(matrices: tuple[Array, Array], rows: NDArray[Any], wanted: Array) -> Array:
+def _least(contacts: Contacts, rows: NDArray[Any], wanted: Array) -> Array:
     """Return the impulses (m d,) of the least energy that change rows by what is wanted (r,)."""
-    row, yields = matrices
-    out = np.zeros(len(row))
-    out[rows] = np.linalg.lstsq(row[rows] @ yields[:, rows], wanted, rcond=SINGULAR)[0]
+    row, yields = contacts.matrices
+    out, contact = np.zeros(len(row)), rows // contacts.world.dimension
+    for group in contacts.groups:
+        own = np.isin(contact, group)
+        matrix = row[rows[own]] @ yields[:, rows[own]]
+        out[rows[own]] = np.linalg.lstsq(matrix, wanted[own], rcond=SINGULAR)[0]
     return out
