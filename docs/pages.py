@@ -130,7 +130,14 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "references", references()
     yield "worked-example", worked.example()
     yield "numbers", {"engines": found, "groups": numbers.COLUMNS}
-    yield "forces", {"engines": [readings.told(name) for name in readings.engines()], "laws": readings.LAWS}
+    yield (
+        "forces",
+        {
+            "engines": [readings.told(name) for name in readings.engines()],
+            "laws": readings.LAWS,
+            "scale": readings.SCALE,
+        },
+    )
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
 
 

@@ -16,6 +16,8 @@ from validation.questions.readings import SITUATIONS, STOPPED, WRONG, Judged, ca
 Plain = dict[str, Any]
 #: Names of the situations, and what is known in them.
 COLUMNS = tuple(each.name for each in SITUATIONS)
+#: What the numbers of a table mean.
+SCALE = "largest error of a step over the largest impulse of a step; (1/480): in 1 of 480 steps"
 LAWS = {each.name: each.what for each in SITUATIONS}
 
 

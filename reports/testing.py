@@ -68,6 +68,7 @@ class Plugin:
             raise pytest.UsageError(f"crosscheck: {error}") from None
         self.version = found.version
         self.lines: list[Line] = []
+        self.asked = self.judged = 0
         self.rows: dict[tuple[Slot, str], Row] = {}
         self.ran: set[str] = set()
         self.mended: list[str] = []
@@ -92,12 +93,25 @@ class Plugin:
                 self.rows.setdefault((slot_from_dict(row.slot), row.metric), row)
         return self.rows.get((slot, metric))
 
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count own tests, and those that gave a verdict."""
+        if report.nodeid.startswith("crosscheck::") and report.when == "call":
+            self.asked += 1
+            self.judged += not report.skipped or hasattr(report, "wasxfail")
+
+    def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
+        """A run in which the engine refuses everything is no success, as in ``crosscheck run``."""
+        if self.asked and not self.judged and exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.NO_TESTS_COLLECTED
+
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Show the table of the core suite, and list findings of other releases that pass here."""
         if self.lines:
             terminalreporter.section("crosscheck: error over step [s]")
             for text in _table(self.lines):
                 terminalreporter.line(text)
+        if self.asked and not self.judged:
+            terminalreporter.section("crosscheck: nothing was judged, the engine runs none of it")
         if self.mended:
             terminalreporter.section("crosscheck: fixed")
             for line in self.mended:
@@ -114,6 +128,8 @@ def _introduced(named: str) -> str:
     """
     path, colon, name = named.rpartition(":")
     if not colon:
+        if named.endswith(".py"):
+            raise EngineError(f"engine: {one_line(named, NAME)}: name its class as well, {one_line(named, NAME)}:CLASS")
         return named
     file = Path(path).resolve()
     module = ModuleType(f"crosscheck_{file.stem}")

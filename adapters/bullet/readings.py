@@ -51,7 +51,8 @@ def _whole(point: tuple[Any, ...]) -> Any:
 _AXES = "along contactNormalOnB, lateralFrictionDir1, lateralFrictionDir2 in world axes"
 _APART = Cause(
     ("blow", "airborne"),
-    "points stay in the list after bodies part, with the force of the last step in touch: skip those with distance > 0",
+    "with contactProcessingThreshold = 0 points stay in the list after bodies part, with the force of the last step in "
+    "touch: skip those with distance > 0, but never as shipped, where such points carry force",
     {"contactProcessingThreshold": 1e30}, "tuned",
 )  # fmt: skip
 _WARM = Cause(

@@ -109,7 +109,8 @@ READINGS = (
     Reading(
         "data.efc_force[contact.efc_address]", "force", "the first row of a contact's constraint",
         "on the body of contact.geom[1]", "along the normal, with elliptic cones or without friction",
-        _STEP, _SOFT, _efc_force, "normal", causes=(_PYRAMID,),
+        _STEP, _SOFT, _efc_force, "normal",
+        hint="efc_address is -1 where a contact has no force: skip it, or the last row is read.", causes=(_PYRAMID,),
     ),
     Reading(
         "touch sensor", "force", "all contacts of a body inside the sensor's site", "on the site's body",

@@ -73,8 +73,10 @@ def write_package(name: str, into: Path, pipe: bool = False) -> list[Path]:
     EngineError
         If that is no name for a module, if an engine has it already, or if there is such a folder.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name) or len(name) > NAME:
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or len(name) > NAME:
         raise EngineError(f"name: {one_line(name, NAME)!r} must be made of a-z, 0-9 and _, and begin with a letter")
+    if keyword.iskeyword(name):
+        raise EngineError(f"name: {name!r} is a word of Python")
     if name in registry.names():
         raise EngineError(f"name: there is an engine called {name!r} already")
     folder, package = into / name, f"crosscheck_{name}"

@@ -57,8 +57,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     RUN is an id that `list runs` prints; the latest by default. Each check that fails, here or from a moved start, is
     listed with its value and a band around it, and with its cause. To measure the band, failed cases are run again from
     initial positions moved by some units in the last place; if the scatter is too wide to notice an improvement, from
-    twelve more. If nothing fails, the list is empty. Once an engine has a list, every other failure is new, and `run`
-    exits with 1.
+    twelve more. If nothing is accepted, the list is empty. Once an engine has a list, every other failure is new, and
+    `run` exits with 1.
 
     The command shows the causes whose lists would change. Those named by --family are accepted. On a terminal you are
     asked about the others; without a terminal they stay as they are. The command refuses checks that a law of the
@@ -88,9 +88,8 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     path = folder / MEMBERS
     left = [change.family.id for change in changed if change.family.id not in chosen]
     done = not (left or proposal.refused or proposal.left_out)
-    if members or findings is not None or done:  # a list makes every other failure of the engine new
-        add_entries(folder, [*written, *proposal.unsupported])
-        write_members(folder, members)
+    add_entries(folder, [*written, *proposal.unsupported])
+    write_members(folder, members)  # an empty list, too, makes every other failure of the engine new
     listed = sorted({m.family.id for m in members.values()})
     if as_json:
         result = {"engine": engine, "rows": len(members), "families": listed, "file": str(path)}
@@ -99,20 +98,18 @@ def accept(run: str, engine: str, families: tuple[str, ...], jobs: int, as_json:
     else:
         counted = f"{plural(len(members), 'check')} with {plural(len(listed), 'cause')} listed in {path}"
         if findings is None:
-            gated = f"{counted}; from now on every other failure is new, and run exits with 1"
-            click.echo(f"{engine}: {gated if members or done else 'nothing is listed'}")
+            click.echo(f"{engine}: {counted}; from now on every other failure is new, and run exits with 1")
         else:
             click.echo(f"{engine}: {counted}{', as before' if members == findings.members else ''}")
-    if proposal.unsupported and (members or findings is not None or done):
+    if proposal.unsupported:
         told = first_of([f"{each.scene} {each.dimension}-D".replace("* ", "all ") for each in proposal.unsupported])
         click.echo(f"cannot run, and listed as that: {told}", err=True)
     _show_refused(proposal.refused)
     if left:
         drafts = any(change.is_draft for change in changed if change.family.id in left)
         file = folder / FAMILIES
-        verb = "write them into" if file.exists() else "make"
         fields = "a [[family]] with id, profiles, scene, metrics, reason and source for each"
-        hint = f" (without a terminal: {verb} {file}, {fields}; then name them by --family)"
+        hint = f" (without a terminal: write into {file} {fields}; then name them by --family)"
         click.echo(f"not accepted: {', '.join(left)}{hint if drafts else ''}", err=True)
     if proposal.left_out:
         click.echo(f"not named by --family: {plural(len(proposal.left_out), 'check')} new or changed", err=True)

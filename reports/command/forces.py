@@ -10,7 +10,7 @@ from rich.text import Text
 
 from adapters.engine import EngineError
 from adapters.engine_folder import READ, folder_of
-from adapters.registry import load
+from adapters.registry import find
 from reports import readings
 from reports.command.completion import engine_names
 from reports.command.group import AS_JSON, main
@@ -32,7 +32,7 @@ def forces(engines: tuple[str, ...], measure: bool, keep: bool, as_json: bool) -
     grip. With one engine, a script of the bare engine follows that reads a force rightly.
     """
     for engine in engines:
-        load(engine)  # raises if there is no such engine
+        find(engine)  # raises if there is no such engine; its kept table needs no installation
     names = list(engines) or readings.engines()
     found = {}
     for engine in names:
@@ -49,6 +49,8 @@ def forces(engines: tuple[str, ...], measure: bool, keep: bool, as_json: bool) -
     console = terminal()
     for told in found.values():
         _show(told, console)
+    if any(each["rows"] for told in found.values() for each in told["readings"]):
+        console.print(Text(f"\noff: {readings.SCALE}"))
     if len(names) == 1 and found[names[0]]["script"]:
         console.print(Text("\nreads it rightly:", style="bold"))
         console.print(Text(found[names[0]]["script"].rstrip()), soft_wrap=True)

@@ -36,6 +36,11 @@ def test_invalid_name_of_an_adapter_refused(tmp_path, name):
     assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
 
 
+def test_word_of_python_as_a_name(tmp_path):
+    """It said that 'class' must be made of letters."""
+    assert "name: 'class' is a word of Python" in make(tmp_path, "class").output
+
+
 def test_existing_folder_of_an_adapter_unchanged(tmp_path):
     (tmp_path / "mine").mkdir()
     done = make(tmp_path, "mine")

@@ -73,12 +73,14 @@ def test_no_listing_without_a_terminal_unless_named(out, findings):
     assert members(findings) == []
 
 
-def test_no_list_written_without_accepted_rows(out, findings):
-    """An engine with an empty list fails with every check that is new."""
+def test_run_after_nothing_was_accepted(out, findings):
+    """Without a list no failure is new: `run` exited with 0 after every check had been refused."""
+    assert call(*CELL, "--out", out).exit_code == 0
     result = accept(out)
-    assert result.exit_code == 1 and "chipmunk: nothing is listed" in result.stdout, result.output
+    assert result.exit_code == 1 and "0 checks with 0 causes listed" in result.stdout, result.output
     assert "default-stack-interface-impulse" in result.stderr.partition("not accepted")[0], "an id is not cut off"
-    assert f"make {findings / files.FAMILIES}, a [[family]] with id" in result.stderr and not findings.exists()
+    assert f"write into {findings / files.FAMILIES} a [[family]] with id" in result.stderr
+    assert members(findings) == [] and call(*CELL, "--out", out).exit_code == 1
 
 
 def test_engine_without_failures(findings, tmp_path):

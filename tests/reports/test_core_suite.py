@@ -56,11 +56,18 @@ def test_fault_in_the_core_suite(called):
     assert " 8.0e-03 " in said and "FAIL round-off" in said and "Traceback" not in said
 
 
+def test_adapter_that_refuses_every_scene(called):
+    """Twelve skipped tests were a success."""
+    said = called("impact", "not isinstance(body.shape, Disc | HalfSpace)", "body.shape", status=5)
+    assert "1 skipped" in said and "nothing was judged, the engine runs none of it" in said
+
+
 @pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("named", "said"),
     [("absent.py:Mine", "engine: absent.py cannot be loaded: FileNotFoundError"),
      (f"{FILE}:Absent", f"engine: {FILE} has no class 'Absent'"),
+     (FILE, f"engine: {FILE}: name its class as well, {FILE}:CLASS"),
      (f"{FILE}:World", "engine: cannot be made: TypeError"),
      ("mine", "engine: there is no engine called 'mine'")],
 )  # fmt: skip

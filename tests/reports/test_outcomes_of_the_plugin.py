@@ -81,9 +81,9 @@ def test_listed_failures_that_pass_told_at_the_end(asked):
     ]
     said = []
     terminal = SimpleNamespace(section=lambda title: said.append(f"= {title}"), line=said.append)
-    Plugin.pytest_terminal_summary(SimpleNamespace(lines=[], mended=[]), terminal)
+    Plugin.pytest_terminal_summary(SimpleNamespace(lines=[], asked=0, mended=[]), terminal)
     assert said == []
-    Plugin.pytest_terminal_summary(SimpleNamespace(lines=[], mended=["one", "two"]), terminal)
+    Plugin.pytest_terminal_summary(SimpleNamespace(lines=[], asked=0, mended=["one", "two"]), terminal)
     assert said == ["= crosscheck: fixed", "one", "two"]
 
 
