@@ -30,7 +30,8 @@ INSTANT = 4e-11
 FIRST_STEP = 0.1
 #: Modes that end while others go on: forces do not jump there.
 GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
-#: Share of the tolerance that is asked for where nothing touches: free rotation is known to nearly round-off.
+#: Share of the tolerance that is asked for where a body that turns touches nothing: free rotation is known to nearly
+#: round-off.
 FREE = 1e-2
 #: Speeds that are round-off [m/s].
 NO_SPEED = 1e-14
@@ -130,9 +131,17 @@ class Loop:
             if piece is not None:
                 return piece
             self.step = FIRST_STEP * float(np.sqrt(self.world.size / self.world.weight))
-        tolerance = self.tolerance if len(held.contacts) else FREE * self.tolerance
+        tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
         piece, self.step = step(self.world, self.state, held, tolerance, min(self.step, self.longest))
         return piece
+
+    def _turns_freely(self, held: Held) -> bool:
+        """Whether a body in space turns that nothing touches."""
+        d = self.world.dimension
+        loose = self.world.bodies.free == 1
+        loose[held.contacts.features[:, :2]] = False
+        turns = (self.state.velocity[:, d:] != 0.0) | (held.acceleration[:, d:] != 0.0)
+        return d == 3 and bool(turns[loose].any())
 
     def _cut(self, piece: Piece, event: Event) -> Piece:
         """Return the piece up to its event: a step is made anew with that length, so that its end is exact."""

@@ -161,10 +161,14 @@ class Turning:
         rates = np.zeros((16, 2 * count))
         rates[0] = self._rates(start)
         while True:
-            for k in range(1, 12):
-                rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
-            change = length * (DOP853.B @ rates[:12])
-            rates[12] = self._rates(start + change)
+            try:
+                for k in range(1, 12):
+                    rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
+                change = length * (DOP853.B @ rates[:12])
+                rates[12] = self._rates(start + change)
+            except np.linalg.LinAlgError:  # so far ahead that nothing is finite
+                length *= SHORTER
+                continue
             scale = self._tolerance * (least + np.abs(change))
             fifth = ((DOP853.E5 @ rates[:13] / scale) ** 2).sum()
             third = ((DOP853.E3 @ rates[:13] / scale) ** 2).sum()

@@ -43,13 +43,16 @@ def _low(world: World, state: State, contacts: Contacts) -> tuple[NDArray[np.boo
 
 
 def too_low(world: World, state: State, contacts: Contacts) -> set[tuple[int, int]]:
-    """Return the pairs with restitution that part too slowly to be followed."""
+    """Return the pairs with restitution that part too slowly to be followed with all contacts that part."""
     if not (contacts.restitution > 0.0).any():
         return set()
     low, _ = _low(world, state, contacts)
-    return {
-        pair for pair, is_low, e in zip(contacts.pairs, low, contacts.restitution, strict=True) if is_low and e > 0.0
-    }
+    high = (contacts.rows.speed[:, 0] > STILL) & ~low
+
+    def pairs(which: NDArray[np.bool_]) -> set[tuple[int, int]]:
+        return {pair for pair, is_one in zip(contacts.pairs, which, strict=True) if is_one}
+
+    return pairs(low & (contacts.restitution > 0.0)) - pairs(high)
 
 
 def settled(world: World, state: State, contacts: Contacts) -> Blow | None:

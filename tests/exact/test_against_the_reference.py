@@ -5,6 +5,7 @@ import pytest
 from compare import compared
 from oracle import KEPT, SEEDED, Answer, stored, world_of
 
+from reference_solver import Settings, Simulation
 from reference_solver.certificate.relations import Change
 from reference_solver.exact import loop
 from reference_solver.exact.refusals import NoForces
@@ -43,6 +44,17 @@ def test_slip_in_space_that_begins_or_ends_stiffly(monkeypatch, seed):
 @pytest.mark.parametrize("key", ["fuzz3 28", "chains3 59"])
 def test_contacts_that_sweeps_over_them_do_not_solve(key):
     assert compared(ANSWERS[key], LIMIT).word == "same"
+
+
+def test_first_step_that_leads_beyond_all_numbers():
+    """A light capsule is squeezed out from under a heavy ball, without friction: momentum along the floor stays."""
+    world = world_of("fuzz3 1018")
+    simulation = Simulation(world.model, Settings.exact(world.dt))
+    mass = np.array([body.mass for body in world.model.bodies])
+    before = mass @ simulation.twist[:, :2]
+    simulation.advance(world.samples * world.stride)
+    assert np.linalg.norm(simulation.twist[1, :2]) > 10.0
+    assert np.abs(mass @ simulation.twist[:, :2] - before).max() < 1e-9
 
 
 #: Moved along, turned by a quarter or a third, and mirrored.

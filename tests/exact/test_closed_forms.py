@@ -152,21 +152,39 @@ def test_capsule_rolls_over_its_round_end():
     assert abs(turned[-1] - angle) > 0.1
 
 
-def test_symmetric_top_precesses():
-    """Without torque its axis goes round its momentum L at |L| / I_1 (Euler)."""
+@pytest.mark.parametrize("beside", [False, True])
+def test_symmetric_top_precesses(beside):
+    """Without torque its axis goes round its momentum L at |L| / I_1 (Euler), whatever a ball does that slides by."""
     moments, spin = (0.2, 0.2, 0.1), (0.5, 0.0, 3.0)
-    body = Body(Box((0.5, 0.5, 0.1)), 1.0, moments, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, *spin))
-    found = record(Model(3, [body], (0.0, 0.0, 0.0), 0.0, 0.0), 4.0, 48)
+    top = Body(Box((0.5, 0.5, 0.1)), 1.0, moments, (0.0, 0.0, 99.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, *spin))
+    others = [ground(3), ball(3, up(3, 0.5), (3.0, 1.0, 0.0))] if beside else []
+    found = record(Model(3, [*others, top], up(3, -G), 0.0, 0.1), 4.0, 48)
     momentum = np.array(moments) * spin
     rate = np.linalg.norm(momentum) / moments[0]
     along = momentum / np.linalg.norm(momentum)
-    w, x, y, z = found.pose[:, 0, 3:].T
+    w, x, y, z = found.pose[:, -1, 3:].T
     axis = np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
     start = np.array([0.0, 0.0, 1.0])
     kept = (start @ along) * along
-    across, beside = start - kept, np.cross(along, start)
+    across, beyond = start - kept, np.cross(along, start)
     turn = (rate * found.t)[:, None]
-    assert np.abs(axis - kept - np.cos(turn) * across - np.sin(turn) * beside).max() < SMALL
+    error = np.abs(axis - kept - np.cos(turn) * across - np.sin(turn) * beyond).max()
+    assert error < 1e-12
+
+
+@pytest.mark.parametrize("slow", [1e-9, 1e-7])
+def test_rod_that_rebounds_at_one_end_as_the_other_hardly_leaves(slow):
+    """A blow P at one end of a uniform rod slows the other by 2 P / m; about the other it falls with 1.5 g."""
+    e, half, radius, fast, short = 0.8, 0.4, 0.1, 0.01, 1e-5
+    blow = (1.0 + e) * fast / 4.0  # 1 / m + a^2 / I = 4 / m
+    left, right = 2.0 * blow + slow, -fast
+    twist = (0.0, 0.5 * (left + right), 0.5 * (right - left) / half)
+    rod = Body(Capsule(half, radius), 1.0, half**2 / 3.0, (0.0, radius, 0.0), twist)
+    simulation = Simulation(Model(2, [ground(2), rod], (0.0, -G), e, 0.0), Settings.exact(short))
+    simulation.advance(1)
+    speed, spin = simulation.twist[1, 1:]
+    assert abs(speed - half * spin) < SMALL
+    assert abs(speed + half * spin - (e * fast - 1.5 * G * short)) < slow
 
 
 def test_boxes_of_one_height_meet_on_a_floor():
