@@ -16,7 +16,7 @@ from reports.wording import number, params_text, setting_text
 from validation.cells import Observation, Slot, format_dt, scene_of
 from validation.cells import settings_of as settings_in
 from validation.fixes.kept import Cure, cures_of, panels_of
-from validation.fixes.panel import Panel, carried
+from validation.fixes.panel import OTHERS, Panel, carried
 from validation.fixes.search import asked_of
 from validation.posed import is_file, resolve
 from validation.running.plan import QUICK_DT
@@ -27,6 +27,8 @@ from validation.settings.switching import switched
 NONE_HELPS = "no setting helps"
 #: Most cases that a fix breaks with their numbers.
 NAMED = 2
+#: Cases of the panel in its order.
+ORDER = [words for words, *_ in OTHERS]
 #: Words for the role of a setting in a fix.
 ROLES = {
     ALONE: "enough alone",
@@ -336,12 +338,13 @@ def cure_text(cure: Cure, where: str = "") -> str:
 def panel_text(panel: Panel | None) -> str:
     """``tried in 24 other cases: breaks a thrown ball (forward_speed 1.4 -> 0.953 m/s, true 1.43)``.
 
-    Every case that breaks is named, as a reader has to find their own among them; the worst ones with numbers.
+    Every case that breaks is named, as a reader has to find their own among them: in the panel's order, where what most
+    scenes have comes first, and those with numbers.
     """
     if panel is None:
         return ""
     named: dict[str, str] = {}
-    for cost in panel.breaks:
+    for cost in sorted(panel.breaks, key=lambda each: each.case in ORDER and ORDER.index(each.case)):
         before, after, truth = told_apart(cost.before, cost.after, cost.truth)
         unit = "" if cost.unit == "1" else f" {cost.unit}"
         named.setdefault(cost.case, f"{cost.case} ({cost.metric} {before} -> {after}{unit}, true {truth})")

@@ -61,6 +61,8 @@ def test_every_case_that_a_fix_breaks_named():
     cases = ("a spinning rebound", "a slide at 45 degrees", "a bouncy body at rest", "a column of ten")
     text = panel_text(Panel(24, 9, tuple(Cost(case, "drift", "m", 0.0, 0.1, 0.0) for case in cases)))
     assert all(case in text for case in cases) and "more" not in text
+    rest, column = (f"{case} (drift 0 -> 0.1 m, true 0)" for case in ("a bouncy body at rest", "a column of ten"))
+    assert text.endswith(f"breaks {rest}, {column}, a spinning rebound, a slide at 45 degrees")
 
 
 def test_formula_value_at_the_step_and_gravity_of_a_case():

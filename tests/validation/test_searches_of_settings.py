@@ -17,6 +17,7 @@ from validation.cells import Observation, Outcome, Slot
 from validation.fixes import kept
 from validation.fixes import search as cures
 from validation.fixes.kept import Cure
+from validation.fixes.panel import Cost, Panel
 from validation.fixes.search import Unsearched
 from validation.settings import decisive, tuning
 from validation.settings.decisive import ALONE, COMPLETES, NEEDED, Part
@@ -150,7 +151,14 @@ def test_engine_without_a_shipped_profile_has_no_needless_settings(monkeypatch):
 JUDGED = 3 * (1 + 1 + 2 + 4 + 1)
 
 
-def cured(monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("default", "tuned", "other"), **more):
+def first(engine, trials, failing, found):
+    """No panel: the best fix of the scene."""
+    return (found[0] if found else None), None
+
+
+def cured(
+    monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("default", "tuned", "other"), panel=first, **more
+):
     """A search on the standard cells of a box in a pinch; `clocked` is told twice and three times a millisecond."""
     asked, whole = Asked(off, unmeasured), whole or {}
     engine = SimpleNamespace(profiles=("default", "tuned", "other", "matched"))
@@ -165,7 +173,7 @@ def cured(monkeypatch, off, candidates, whole=None, unmeasured=(), ranked=("defa
     monkeypatch.setattr(cures, "has_iterations", lambda engine, slot: more.get("counts", False))
     monkeypatch.setattr(cures, "changes_of", lambda slot, name: dict(whole.get(name, {})))
     monkeypatch.setattr(cures, "carried", lambda changes, here, there: changes)
-    monkeypatch.setattr(cures, "on_panel", lambda engine, trials, failing, found: (found[0] if found else None, None))
+    monkeypatch.setattr(cures, "on_panel", panel)
     clocks = []
     monkeypatch.setattr(cures, "clocked", lambda slots: clocks.append(slots) or (2e-3, 3e-3))
     return cures.search("toy", "pinch", 2, jobs=2), asked, clocks
@@ -198,6 +206,24 @@ def test_cure_with_mended_checks_and_cost(monkeypatch):
     assert (shipped.params, shipped.switched) == ((("margin", 1.05),), ()) and shipped.engine == "toy"
     assert (with_it.params, with_it.switched) == (shipped.params, (("a", 1),)) and len(clocks) == 1
     assert {jobs for _, jobs in asked.calls} == {2} and {slot.dt for slot in asked.slots} == {DT, cures.ELSEWHERE[1]}
+
+
+def test_settings_of_a_profile_that_a_fix_needs_on_the_panel(monkeypatch):
+    """``a`` alone breaks two cases, which ``b`` of the profile mends; its ``d`` and ``e`` do nothing."""
+
+    def tried(here, change, jobs):
+        broken = Cost("a body at rest", "drift", "m", 0.0, 1.0, 0.0, here)
+        return Panel(20, 1, () if "b" in change else (broken, broken))
+
+    monkeypatch.setattr(cures, "tried", tried)
+    monkeypatch.setattr(cures, "local_of", lambda engine: ())
+    monkeypatch.setattr(cures, "instead_of", lambda engine: ())
+    whole = {"tuned": {"a": 1, "b": 1, "d": 1, "e": 1}}
+    turned = {True: 0.25, False: 2.0}
+    found, *_ = cured(
+        monkeypatch, lambda slot: (0.5, turned["a" in dict(slot.switched)]), {"a": (1,)}, whole, panel=cures.on_panel
+    )
+    assert found.changes == {"a": 1, "b": 1} and found.panel == Panel(20, 1, ())
 
 
 def test_search_without_a_cure_told_by_the_worst_failure(monkeypatch):

@@ -261,7 +261,18 @@ def on_panel(
         if not each.broken and each.failing <= found[0].failing:
             panels.append((each, tried_on(each)))
     panels.sort(key=lambda each: (each[1].withdrawn, each[0].failing + len(each[1].breaks), *each[0].rank()))
-    return panels[0] if panels else (None, None)
+    if not panels:
+        return None, None
+    best, panel = panels[0]
+
+    def as_good(fewer: _Found) -> bool:
+        """Elsewhere too: for what profiles have in broken cases, not every setting is needed."""
+        now = tried_on(fewer)
+        return now.withdrawn <= panel.withdrawn and len(now.breaks) <= len(panel.breaks)
+
+    if best not in found:
+        best = _smallest(trials, engine, best, as_good)
+    return best, tried_on(best)
 
 
 def _varied(engine: str, trials: _Trials, panels: Sequence[tuple[_Found, Panel]]) -> list[list[Changes]]:
@@ -323,14 +334,16 @@ def _singles(engine: str, own: Sequence[Slot], wholes: Sequence[Sequence[Changes
     return [one for k, one in enumerate(singles) if one not in singles[:k]]
 
 
-def _smallest(trials: _Trials, engine: str, whole: _Found) -> _Found:
-    """A profile's changes after removing unnecessary ones, one at a time."""
+def _smallest(
+    trials: _Trials, engine: str, whole: _Found, as_good: Callable[[_Found], bool] = lambda fewer: True
+) -> _Found:
+    """Changes after removing unnecessary ones, one at a time."""
     belongs = belongs_of(engine)
     best = whole
     for name in dict.fromkeys(name for each in whole.changes for name in each if name not in belongs):
         fewer = [{n: v for n, v in each.items() if belongs.get(n, n) != name} for each in best.changes]
         tried = trials.all([fewer])
-        if tried and not tried[0].broken and tried[0].failing <= best.failing:
+        if tried and not tried[0].broken and tried[0].failing <= best.failing and as_good(tried[0]):
             best = tried[0]
     return best
 
