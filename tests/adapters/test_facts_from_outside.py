@@ -125,6 +125,7 @@ ANSWER = {
     "trace": "",
     "facts": foreign.plain_facts(FACTS),
     "profiles": ["fine", "fast"],
+    "sources": [],
 }
 
 

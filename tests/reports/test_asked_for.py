@@ -41,9 +41,9 @@ def shown(data):
 def test_engine_description_with_habits_and_bad_versions():
     data = {
         "name": "toy", "version": "1.2", "title": "Toy", "status": "installed", "package": "toy", "dimensions": [2],
-        "customary_dt": "1/60", "scheme": {"order": "velocity first"}, "profiles": {},
+        "customary_dt": 1.0 / 60.0, "scheme": {"order": "velocity first"}, "profiles": {},
         "quirks": [{"what": "sinks", "what_we_do": "nothing", "source": "its manual"}],
-        "known_bad_versions": {"1.1": "it forgets contacts"}, "measured": [], "unset": [],
+        "known_bad_versions": {"1.1": "it forgets contacts"}, "measured": [], "unset": [], "effects": [],
         "settable": [{"name": "sweeps", "must_be": "a whole number from 1 to 9"}],
     }  # fmt: skip
     text = shown(data)

@@ -232,7 +232,7 @@ def test_plane_checks_for_spatial_engines_alone(monkeypatch, engine, owed):
     if find(engine).engine is None:
         pytest.skip(f"{engine} is not installed")
     monkeypatch.setattr(testing._Check, "from_parent", lambda parent, **said: said["metric"])
-    plugin = SimpleNamespace(engine=engine, slots=[Slot("impact", (), 2, engine, "tuned", DT)])
+    plugin = SimpleNamespace(engine=engine, core=(), slots=[Slot("impact", (), 2, engine, "tuned", DT)])
     assert list(testing._Cells.collect(SimpleNamespace(plugin=plugin))).count("out_of_plane") == owed
 
 
