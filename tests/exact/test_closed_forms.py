@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.exact.refusals import NoImpulses
 
 G, DT = 9.81, 1.0 / 240.0
 SMALL = 1e-10
@@ -185,6 +186,25 @@ def test_rod_that_rebounds_at_one_end_as_the_other_hardly_leaves(slow):
     speed, spin = simulation.twist[1, 1:]
     assert abs(speed - half * spin) < SMALL
     assert abs(speed + half * spin - (e * fast - 1.5 * G * short)) < slow
+
+
+@pytest.mark.parametrize(("e", "speed"), [(0.0, 1.0), (0.5, 1e-8), (0.5, 1.0)])
+def test_disc_thrown_into_a_wedge_that_friction_closes(e, speed):
+    """Rebounds from both sides at once would need friction beyond its cone; which of them comes first matters."""
+    half, radius = 0.2, 0.5
+    sides = [
+        Body(HalfSpace((side * math.cos(half), math.sin(half))), motion="fixed", pose=(0.0, 0.0, 0.0))
+        for side in (1.0, -1.0)
+    ]
+    place = (0.0, radius / math.sin(half))
+    model = Model(2, [*sides, ball(2, place, (0.0, -speed))], (0.0, -G), e, 1.0)
+    if e * speed > 1e-6:
+        with pytest.raises(NoImpulses):
+            record(model, 0.1)
+        return
+    found = record(model, 0.1)
+    assert np.abs(found.pose[:, 2, :2] - place).max() < SMALL
+    assert np.abs(found.twist[1:, 2]).max() < SMALL
 
 
 def test_boxes_of_one_height_meet_on_a_floor():
