@@ -16,8 +16,8 @@ from validation.catalogue import CATALOGUE
 
 #: Picture -> the part of the page that it shows.
 SHOTS = {"verdicts": "#verdicts", "restitution": "#shot-restitution", "cost": "#shot-cost"}
-#: Room around a picture, without anything that can be clicked.
-STYLE = ".save { display: none } #verdicts, .shot { padding: 16px }"
+#: Room around a picture, without anything that can be clicked or that stays in place when the page moves.
+STYLE = ".save { display: none } .top { position: static } #verdicts, .shot { padding: 16px }"
 WIDTH, HEIGHT = 1280, 860
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 
