@@ -256,7 +256,7 @@ def test_accepted_refused_and_omitted_rows_counted(monkeypatch, tmp_path):
         "refused": 14, "left_out": 2, "not_accepted": ["f-2"],
     }  # fmt: skip
     fields = "a [[family]] with id, profiles, scene, metrics, reason and source for each"
-    reasons = f"make {tmp_path / accepting.FAMILIES}, {fields}; then name them by --family"
+    reasons = f"write into {tmp_path / accepting.FAMILIES} {fields}; then name them by --family"
     told = [
         "refused: 14 checks: a law covers it",
         *["  chipmunk/default stack 3-D n=2 creep 0.123457"] * accepting.SHOWN,
