@@ -174,7 +174,7 @@ def test_symmetric_top_precesses(beside):
 
 
 @pytest.mark.parametrize("slow", [1e-9, 1e-7])
-def test_rod_that_rebounds_at_one_end_as_the_other_hardly_leaves(slow):
+def test_rebound_of_a_rod_beside_a_negligible_one(slow):
     """A blow P at one end of a uniform rod slows the other by 2 P / m; about the other it falls with 1.5 g."""
     e, half, radius, fast, short = 0.8, 0.4, 0.1, 0.01, 1e-5
     blow = (1.0 + e) * fast / 4.0  # 1 / m + a^2 / I = 4 / m

@@ -44,7 +44,7 @@ def test_forces_of_groups_are_those_of_all_at_once(monkeypatch, spin):
     assert np.abs(apart.answer.forces - whole.answer.forces).max() < 1e-12 * G
 
 
-def test_forces_while_modes_are_held_solve_the_equations_of_the_modes():
+def test_forces_of_held_modes():
     """One kernel for all groups, against one system of all rows."""
     world, state, contacts = rods_and_a_stack()
     free = free_acceleration(world, state.axes, state.velocity)

@@ -31,7 +31,7 @@ def test_cones_by_headings_of_the_published_report():
     assert numbers.of_engine("chipmunk")["cone"] == ""  # a plane has one heading
 
 
-def test_groups_have_the_largest_and_the_smallest_share_of_passed_checks():
+def test_strongest_and_weakest_group():
     told = numbers.of_engine("mujoco")
     for end in ("strongest", "weakest"):
         assert told[end]

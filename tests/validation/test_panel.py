@@ -91,7 +91,7 @@ def test_fix_of_a_file_tried_in_cases_of_other_groups(tmp_path, monkeypatch):
     assert {"a bouncy body at rest", "a bouncy column of five", "a rebound"} <= set(words)
 
 
-def test_settings_of_single_pairs_left_out_where_nothing_rebounds():
+def test_settings_of_single_pairs_without_a_rebound():
     pytest.importorskip("mujoco")
     thrown, rest = Slot("thin_wall", (), 3, "mujoco", "default", 1 / 240), replace(SLOT, scene="long_rest")
     assert panel._meant({"cone": "elliptic", **DAMPER}, thrown, rest) == {"cone": "elliptic"}

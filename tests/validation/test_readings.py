@@ -141,7 +141,7 @@ def test_the_momentum_of_damped_bodies_is_no_impulse():
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_the_kept_table_has_every_reading_and_no_wrong_one_without_a_cause(engine):
+def test_kept_readings_complete_and_explained(engine):
     known = known_of(engine)
     calls = {reading.call: reading for reading in readings_of(engine)}
     profiles = [name for name in map(load(engine).facts.profile, PROFILES) if name]
