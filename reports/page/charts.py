@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import altair as alt
@@ -48,11 +49,29 @@ _CONFIG: dict[str, Any] = {
 _SKIPPED = re.compile(
     r' (?:class|role|aria-hidden|aria-roledescription|pointer-events|stroke-miterlimit|font-family)="[^"]*"'
     r'| (?:opacity|fill-opacity|stroke-width)="1"| transform="translate\(0,0\)"| aria-label="[XY]-axis[^"]*"'
-    r'|<path class="(?:background|foreground)"[^>]*d="(?:M0,0h0v0h0Z)?"[^>]*/>'
+    r'| stroke-dasharray="1,0"'
+    r'|<path class="(?:background|foreground)" aria-hidden="true" d="[^"]*"(?: (?:pointer-events|display)="none")*/>'
 )
+#: Lines of a grid, and ticks: beside each other, of one colour.
+_LINES = re.compile(
+    r'<line transform="translate\([^)]*\)" x2="[^"]*" y2="[^"]*" (stroke="[^"]*" stroke-opacity="[^"]*")/>'
+    r'(?:<line transform="translate\([^)]*\)" x2="[^"]*" y2="[^"]*" \1/>)+'
+)
+_LINE = re.compile(r'<line transform="translate\(([^)]*)\)" x2="([^"]*)" y2="([^"]*)" [^>]*/>')
 #: Attributes with places and lengths; tenths of a pixel are visible, smaller digits are not.
 _PLACES = re.compile(r' (?:d|transform|[xy][12]?)="[^"]*"')
 _DIGITS = re.compile(r"-?\d+\.\d{2,}(?:e-?\d+)?")
+#: A curve through several points.
+_CURVE = re.compile(r' d="M([-\d.]+,[-\d.]+(?:L[-\d.]+,[-\d.]+)+)"')
+#: A zero before the point, and a comma before a sign.
+_NEEDLESS = re.compile(r"(?<!\d)0(?=\.)|,(?=-)")
+
+
+def _from_point_to_point(curve: re.Match[str]) -> str:
+    """The curve by steps, which have fewer digits than places: in whole tenths of a pixel, so that none is lost."""
+    places = [[round(10.0 * float(value)) for value in place.split(",")] for place in curve[1].split("L")]
+    steps = "".join(f"l{(b[0] - a[0]) / 10.0:g},{(b[1] - a[1]) / 10.0:g}" for a, b in pairwise(places))
+    return f' d="M{curve[1].partition("L")[0]}{_NEEDLESS.sub("", steps)}"'
 
 
 def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
@@ -61,6 +80,8 @@ def svg(chart: alt.TopLevelMixin, title: str) -> Markup:
     spec["config"] = _CONFIG
     text = _SKIPPED.sub("", vl_convert.vegalite_to_svg(spec)).replace(" aria-label=", " data-is=")
     text = _PLACES.sub(lambda place: _DIGITS.sub(lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), place[0]), text)
+    text = _CURVE.sub(_from_point_to_point, text)
+    text = _LINES.sub(lambda lines: _LINE.sub(r"M\1l\2,\3", f'<path d="{lines[0]}" {lines[1]}/>'), text)
     return Markup(text.replace("<svg", f'<svg role="img" aria-label="{Markup.escape(title)}"', 1))
 
 

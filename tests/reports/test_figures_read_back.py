@@ -31,11 +31,11 @@ def drawn(of, dt=1 / 240):
 
 
 def corners(path):
-    """Corners of a path of straight lines [px]; a step along an axis is told by one number."""
+    """Corners of a path of straight lines [px]; small letters are steps, one along an axis is told by one number."""
     place, found = np.zeros(2), []
-    for kind, text in re.findall(r"([MLhv])([^MLhvZ]*)", path):
-        values = [float(x) for x in re.findall(r"-?[\d.]+", text)]
-        place = np.array(values) if kind in "ML" else place + (values * np.eye(2)["hv".index(kind)])
+    axes = {"M": np.eye(2), "l": np.eye(2), "h": np.eye(2)[:1], "v": np.eye(2)[1:]}
+    for kind, text in re.findall(r"([Mlhv])([^MlhvZ]*)", path):
+        place = place * kind.islower() + [float(x) for x in re.findall(r"-?[\d.]+", text)] @ axes[kind]
         found.append(place)
     return np.array(found)
 

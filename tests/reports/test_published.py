@@ -3,8 +3,8 @@
 from pathlib import Path
 
 PUBLISHED = Path(__file__).parents[2] / "reports" / "published"
-#: What the report and all that is published may take [bytes]: what a phone loads in 1.5 s at 24 Mbit/s.
-REPORT, ALL = 4_500_000, 6_500_000
+#: What the report and all that is published may take [bytes]: what a phone loads in 1.3 s at 24 Mbit/s.
+REPORT, ALL = 4_000_000, 6_000_000
 
 
 def test_the_published_report_is_one_small_file():
