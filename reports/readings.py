@@ -17,7 +17,7 @@ Plain = dict[str, Any]
 #: Names of the situations, and what is known in them.
 COLUMNS = tuple(each.name for each in SITUATIONS)
 #: What the numbers of a table mean.
-SCALE = "largest error of a step over the largest impulse of a step; (1/480): in 1 of 480 steps"
+SCALE = "largest error of a step over the largest true force of that pair or body; (1/480): in 1 of 480 steps"
 LAWS = {each.name: each.what for each in SITUATIONS}
 
 

@@ -89,6 +89,7 @@ def render(source: Source) -> str:
             speed=cost.speed(source),
             forces=[readings.told(engine) for engine in source.engines if readings_of(engine)],
             laws=readings.LAWS,
+            scale=readings.SCALE,
             sheet=sheet,
             take=takeaway.takeaway(source),
             said=verdicts.SAID,

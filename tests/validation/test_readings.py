@@ -64,6 +64,7 @@ FAULTS = {
     "the other sign": scaled(-np.eye(2)),
     "axes of the contact": scaled(np.array([[0.0, 1.0], [-1.0, 0.0]])),
     "one of four substeps": scaled(0.25 * np.eye(2)),
+    "no number": scaled(math.nan * np.eye(2)),
 }
 
 
@@ -78,6 +79,13 @@ def test_a_true_reading_is_right(situation):
 def test_a_planted_fault_of_a_reading_fails(situation, fault):
     scene, run, keeps = made_up(situation)
     assert judge(situation, scene, spoilt(run, FAULTS[fault]), "vector", keeps).verdict == WRONG
+
+
+@pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
+def test_size_of_an_error_where_forces_on_a_body_cancel(situation):
+    scene, run, keeps = made_up(situation)
+    more = spoilt(run, scaled(1.25 * np.eye(2)))
+    assert judge(situation, scene, more, "vector", keeps).off == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)

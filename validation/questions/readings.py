@@ -100,7 +100,8 @@ class Judged:
     verdict
         `RIGHT`, `WRONG`, `MISSING` or `STOPPED`.
     off
-        Largest error of a step over the largest impulse of a step; None where nothing was compared.
+        Largest error of a step over the largest true impulse of a step, both of the same pair, or of all pairs of the
+        same body; None where nothing was compared.
     where
         What is wrong, or what is missing.
     motion
@@ -260,8 +261,11 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
     found = list(_errors(situation, scene, run, on, part, steps))
     if not found:
         return Judged(situation.name, MISSING, motion=motion)
-    series, where = max(found, key=lambda each: float(each[0].max()))
-    off, wrong = float(series.max()), int((series > allowed).sum())
+    # What is smaller than its own round-off is no scale of an error; a number that is none is wrong.
+    series, scale, where = max(
+        found, key=lambda each: (not each[0].max() <= allowed, each[0].max() / max(each[1], allowed))
+    )
+    off, wrong = float(series.max()) / max(scale, allowed), int((~(series <= allowed)).sum())
     where += "" if wrong == len(steps) else f", in {wrong} of {len(steps)} steps"
     if not any(np.any(one.impulse) for step in run.read for each in step for one in each or ()):
         where = "reads 0"
@@ -271,10 +275,10 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
         rubs = float(np.abs(on[:, situation.body, along]).max())
         lacks = rubs > allowed and float(np.abs(beside).max(initial=0.0)) <= FAINT * rubs
         where = "friction is not in it" if lacks else where
-    verdict = RIGHT if off <= allowed else WRONG
+    verdict = WRONG if wrong else RIGHT
     if verdict == RIGHT and situation.placed and (told := _place(situation, scene, run)):
-        return Judged(situation.name, WRONG, off / largest, told, motion)
-    return Judged(situation.name, verdict, off / largest, where if verdict == WRONG else "", motion)
+        return Judged(situation.name, WRONG, off, told, motion)
+    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion)
 
 
 def _turned(scene: Scene, run: Heard, part: Part) -> float:
@@ -301,37 +305,44 @@ def _motion(situation: Situation, scene: Scene, run: Heard, on: Array) -> float 
 
 def _errors(
     situation: Situation, scene: Scene, run: Heard, on: Array, part: Part, steps: NDArray[np.int64]
-) -> Iterator[tuple[Array, str]]:
-    """Errors of the steps [N s] for each body, and for each pair in both directions, with its name."""
+) -> Iterator[tuple[Array, float, str]]:
+    """Errors of the steps [N s] for each body, and for each pair in both directions, with its true size and name.
+
+    The size [N s] is the largest of a step in the run; that of a body is no less than the sum of those of its pairs,
+    since forces on a body between two others cancel.
+    """
     pairs = situation.pairs(on)
     axis = situation.normal % scene.dimension
     names = [body.name for body in scene.bodies]
+    sizes = {pair: np.nanmax(np.abs(force), axis=1) for pair, force in pairs.items()}
     for body in (k for k, each in enumerate(scene.bodies) if each.motion == "free"):
         read = [run.read[step][body] for step in steps]
         if any(each is None for each in read):
             continue
+        own = [size for pair, size in sizes.items() if body in pair]
+        scale = max(float(sum(own).max()), float(np.abs(on[:, body]).max()))  # it may touch others than those of pairs
         if part == "size":
             acting = [np.abs(force[steps, axis]) for pair, force in pairs.items() if body in pair]
             told = np.array([sum(float(one.impulse[0]) for one in each) for each in read])
             if situation.normal != -1 and body != situation.body:
                 continue  # the pad stands on the floor as well
-            yield np.abs(told - sum(acting)), f"on {names[body]}"
+            yield np.abs(told - sum(acting)), scale, f"on {names[body]}"
             continue
         told = np.array([sum((one.impulse for one in each), np.zeros(scene.dimension)) for each in read])
         off = told - on[steps, body]
         if part == "normal" and body != situation.body and situation.normal != -1:
             continue  # its normal forces have two directions
-        yield np.abs(off[:, [axis]] if part == "normal" else off).max(axis=1), f"on {names[body]}"
+        yield np.abs(off[:, [axis]] if part == "normal" else off).max(axis=1), scale, f"on {names[body]}"
     if part == "size":
         return
     for (a, b), force in pairs.items():
         for body, other, sign in ((b, a, 1.0), (a, b, -1.0)):
-            own = [_from(run.read[step][body], other, scene.dimension) for step in steps]
-            if any(each is None for each in own):
+            parts = [_from(run.read[step][body], other, scene.dimension) for step in steps]
+            if any(each is None for each in parts):
                 continue
-            off = np.array(own) - sign * force[steps]
+            off = np.array(parts) - sign * force[steps]
             chosen = off[:, [axis]] if part == "normal" else off[:, ~np.isnan(force).any(axis=0)]
-            yield np.abs(chosen).max(axis=1), f"on {names[body]} from {names[other]}"
+            yield np.abs(chosen).max(axis=1), float(sizes[a, b].max()), f"on {names[body]} from {names[other]}"
 
 
 def _from(read: list[Read] | None, other: int, dimension: int) -> Array | None:
