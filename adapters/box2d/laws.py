@@ -6,10 +6,9 @@ from collections.abc import Mapping
 
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
-from adapters.law import Deviation, Law, Measure, Prediction, deviations
-from adapters.law.single_motions import Chosen, booked_law, corner_law, flown_law, kept_law, standstill_law
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law.single_motions import Chosen, corner_law, rounded_motions, standstill_law
 from adapters.law.single_precision import Method, Threshold, rounded_law
-from adapters.needs import needs
 from adapters.scene import Scene
 
 #: Metrics of blows in free space, by scene.
@@ -32,7 +31,7 @@ def blow_law(profile: str, metric: str) -> Law:
     """Blows in single precision, without restitution at up to one unit per second."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+        chosen = settings_of(PROFILES[profile], scene, dt)
         method = Method(Threshold(VELOCITY_THRESHOLD / chosen["units_per_metre"]), chosen["iterations"])
         return rounded_law(metric, method)(scene, dt, measure)
 
@@ -54,7 +53,7 @@ def _chosen(profile: str) -> Chosen:
     """Unit and skin of a profile."""
 
     def of(scene: Scene, dt: float) -> tuple[float, float]:
-        chosen = {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
+        chosen = settings_of(PROFILES[profile], scene, dt)
         return chosen["units_per_metre"], chosen["skin"]
 
     return of
@@ -80,41 +79,22 @@ DEVIATIONS += deviations(
     CHECKED_ON,
 )
 
-DEVIATIONS += tuple(
-    Deviation(
-        "box2d",
-        (profile,),
-        "rack",
-        metric,
-        kept_law(metric),
-        "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "b2Settings.h, float32; band in adapters/law/single_motions.py",
-        CHECKED_ON,
-    )
-    # The threshold's loss of energy as shipped is no round-off, but a finding.
-    for profile, metrics in (
-        ("default", ("momentum_defect", "asymmetry")),
-        ("tuned", ("momentum_defect", "energy_defect", "asymmetry")),
-    )
-    for metric in metrics
-)
-
-DEVIATIONS += deviations(
+DEVIATIONS += rounded_motions(
     "box2d",
     PROFILES,
-    {"off_centre": ("momentum_defect",)},
-    lambda metric, profile: booked_law(metric),
-    "single precision, 2^-24 relative",
-    "b2Settings.h, float32; band in adapters/law/single_motions.py",
+    {
+        "kept": {"rack": ("momentum_defect", "asymmetry")},
+        "booked": {"off_centre": ("momentum_defect",)},
+        "flown": {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    },
+    "b2Settings.h, float32",
     CHECKED_ON,
 )
-
-DEVIATIONS += deviations(
+# The threshold's loss of energy as shipped is no round-off, but a finding.
+DEVIATIONS += rounded_motions(
     "box2d",
-    PROFILES,
-    {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
-    lambda metric, profile: flown_law(metric),
-    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "b2Settings.h, float32; band in adapters/law/single_motions.py",
+    ("tuned",),
+    {"kept": {"rack": ("energy_defect",)}},
+    "b2Settings.h, float32",
     CHECKED_ON,
 )

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
 
 from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD, SUBSTEPS
-from adapters.law import Deviation, Law, Measure, Prediction, deviations
-from adapters.law.single_motions import booked_law, corner_law, flown_law, kept_law, standstill_law
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law.single_motions import corner_law, rounded_motions, standstill_law
 from adapters.law.single_precision import Method, Threshold, rounded_law
-from adapters.needs import needs
 from adapters.scene import Scene
 
 #: Metrics of blows in free space, by scene.
@@ -38,11 +37,7 @@ ON_A_PLANE: Mapping[str, tuple[str, ...]] = {
 
 def _chosen(profile: str) -> Chosen:
     """Settings of a profile by name."""
-
-    def of(scene: Scene, dt: float) -> dict[str, Any]:
-        return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-
-    return of
+    return partial(settings_of, PROFILES[profile])
 
 
 def _lengths(profile: str) -> Callable[[Scene, float], tuple[float, float]]:
@@ -109,32 +104,15 @@ DEVIATIONS += tuple(
     for metric in ("rise", "spin")
 )
 
-DEVIATIONS += deviations(
+DEVIATIONS += rounded_motions(
     "box2d3",
     PROFILES,
-    {"rack": ("momentum_defect",)},
-    lambda metric, profile: kept_law(metric),
-    "the impulse of every impact is rounded to single precision, 2^-24 relative",
-    "math_functions.h, b2Vec2: a pair of floats; band in adapters/law/single_motions.py",
+    {
+        "kept": {"rack": ("momentum_defect",)},
+        "booked": {"off_centre": ("momentum_defect",)},
+        "flown": {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    },
+    "math_functions.h, b2Vec2: a pair of floats",
     CHECKED_ON,
-)
-
-DEVIATIONS += deviations(
-    "box2d3",
-    PROFILES,
-    {"off_centre": ("momentum_defect",)},
-    lambda metric, profile: booked_law(metric),
-    "single precision, 2^-24 relative",
-    "math_functions.h, b2Vec2: a pair of floats; band in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
-
-DEVIATIONS += deviations(
-    "box2d3",
-    PROFILES,
-    {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
-    lambda metric, profile: flown_law(metric, TUNED_SUBSTEPS if profile == "tuned" else SUBSTEPS),
-    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "b2Vec2, built of floats; band in adapters/law/single_motions.py",
-    CHECKED_ON,
+    parts={"default": SUBSTEPS, "tuned": TUNED_SUBSTEPS},
 )

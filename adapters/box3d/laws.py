@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from adapters.box3d.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box3d.shipped import CHECKED_ON, SUBSTEPS
-from adapters.law import Deviation, Law, Measure, Prediction, deviations
-from adapters.law.single_motions import booked_law, flown_law, kept_law, standstill_law
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law.single_motions import rounded_motions, standstill_law
 from adapters.law.single_precision import Method, Threshold, plane_law, rounded_law
-from adapters.needs import needs
 from adapters.scene import Scene
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
@@ -27,16 +25,11 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def _chosen(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
-    """Settings of a profile by name."""
-    return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-
-
 def blow_law(profile: str, metric: str) -> Law:
     """Blows in single precision, with restitution above the threshold, after friction."""
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        threshold = Threshold(_chosen(profile, scene, dt)["restitution_threshold"], rebounds_at=True)
+        threshold = Threshold(settings_of(PROFILES[profile], scene, dt)["restitution_threshold"], rebounds_at=True)
         return rounded_law(metric, Method(threshold, rebound_after_friction=True))(scene, dt, measure)
 
     return law
@@ -71,28 +64,10 @@ DEVIATIONS += deviations(
     PROFILES,
     {"far_origin": ("stopping_distance",)},
     lambda metric, profile: standstill_law(
-        metric, lambda scene, dt: (_chosen(profile, scene, dt)["units_per_metre"], 0.0)
+        metric, lambda scene, dt: (settings_of(PROFILES[profile], scene, dt)["units_per_metre"], 0.0)
     ),
     "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
     "math_functions.h, b3Pos: three floats; motion in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
-DEVIATIONS += deviations(
-    "box3d",
-    PROFILES,
-    {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
-    lambda metric, profile: kept_law(metric),
-    "the impulse of every impact is rounded to single precision, 2^-24 relative",
-    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
-DEVIATIONS += deviations(
-    "box3d",
-    PROFILES,
-    {"off_centre": ("momentum_defect",)},
-    lambda metric, profile: booked_law(metric),
-    "single precision, 2^-24 relative",
-    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_motions.py",
     CHECKED_ON,
 )
 #: Blows in free space, after which the motion is planar to round-off.
@@ -105,12 +80,15 @@ DEVIATIONS += deviations(
     "math_functions.h, b3Vec3: three floats; band in adapters/law/single_precision.py",
     CHECKED_ON,
 )
-DEVIATIONS += deviations(
+DEVIATIONS += rounded_motions(
     "box3d",
     PROFILES,
-    {"flight": ("fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
-    lambda metric, profile: flown_law(metric, TUNED_SUBSTEPS if profile == "tuned" else SUBSTEPS),
-    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "math_functions.h, b3Vec3: three floats; band in adapters/law/single_motions.py",
+    {
+        "kept": {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
+        "booked": {"off_centre": ("momentum_defect",)},
+        "flown": {"flight": ("fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    },
+    "math_functions.h, b3Vec3: three floats",
     CHECKED_ON,
+    parts={"default": SUBSTEPS, "tuned": TUNED_SUBSTEPS},
 )

@@ -12,7 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Any
 
+from adapters.engine import ProfileRule
+from adapters.needs import needs
 from adapters.scene import Scene
 from adapters.trajectory import Measured, Trajectory
 
@@ -97,6 +100,11 @@ def deviations(
         for scene, metrics in rows.items()
         for metric in metrics
     )
+
+
+def settings_of(rule: ProfileRule, scene: Scene, dt: float) -> dict[str, Any]:
+    """Settings of a profile for a scene, by name."""
+    return {setting.name: setting.value for setting in rule(needs(scene), dt)}
 
 
 def exactly(metric: str) -> str:

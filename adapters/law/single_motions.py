@@ -1,14 +1,16 @@
-"""Shared laws of single precision: places too far away, a box on its corner in 2-D, a long flight."""
+"""Shared laws of single precision: places too far away, a box on its corner in 2-D, momentum, a long flight."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
 from adapters.engine import Array, Contacts
-from adapters.law import Law, Measure, Prediction
+from adapters.law import Deviation, Law, Measure, Prediction, deviations
 from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.scene import Body, Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
@@ -227,3 +229,45 @@ def flown_law(metric: str, parts: int = 1) -> Law:
         return (value, band) if math.isfinite(band) else None
 
     return law
+
+
+#: Laws that need nothing of an engine but that it is in single precision, and what they say.
+Rounded = Literal["kept", "booked", "flown"]
+_BECAUSE: Mapping[Rounded, str] = {
+    "kept": "the impulse of every impact is rounded to single precision, 2^-24 relative",
+    "booked": "single precision, 2^-24 relative",
+    "flown": "each update of a velocity, spin or place is rounded to single precision, 2^-24 relative, and ten seconds "
+    "have thousands",
+}
+
+
+def rounded_motions(
+    engine: str,
+    profiles: Iterable[str],
+    rows: Mapping[Rounded, Mapping[str, Iterable[str]]],
+    source: str,
+    versions: tuple[str, ...],
+    parts: Mapping[str, int] = MappingProxyType({}),
+) -> tuple[Deviation, ...]:
+    """`kept_law`, `booked_law` and `flown_law` of an engine.
+
+    Parameters
+    ----------
+    rows
+        Metrics by scene, of each law.
+    source
+        Where it is seen that the engine computes in single precision.
+    parts
+        Parts of a step by profile, where it has several.
+    """
+    laws: Mapping[Rounded, Callable[[str, str], Law]] = {
+        "kept": lambda metric, profile: kept_law(metric),
+        "booked": lambda metric, profile: booked_law(metric),
+        "flown": lambda metric, profile: flown_law(metric, parts.get(profile, 1)),
+    }
+    where = f"{source}; band in adapters/law/single_motions.py"
+    return tuple(
+        each
+        for name, own in rows.items()
+        for each in deviations(engine, profiles, own, laws[name], _BECAUSE[name], where, versions)
+    )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.law.single_motions import booked_law, flown_law, kept_law, standstill_law
+from adapters.law.single_motions import rounded_motions, standstill_law
 from adapters.law.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
 from adapters.law.unswept import passing_law, wall_law
 from adapters.needs import needs
@@ -84,27 +84,22 @@ DEVIATIONS += deviations(
     "PxTransform, built of floats; motion in adapters/law/single_motions.py",
     _RELEASES,
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "physx",
-        tuple(PROFILES),
-        scene,
-        "momentum_defect",
-        kept_law("momentum_defect"),
-        "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "PxVec3, built of floats; band in adapters/law/single_motions.py",
-        _RELEASES,
-    )
-    for scene in ("cradle", "rack")
-)
-
-DEVIATIONS += deviations(
+DEVIATIONS += rounded_motions(
     "physx",
     PROFILES,
-    {"off_centre": ("momentum_defect",)},
-    lambda metric, profile: booked_law(metric),
-    "single precision, 2^-24 relative",
-    "PxVec3, built of floats; band in adapters/law/single_motions.py",
+    {
+        "kept": {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
+        "booked": {"off_centre": ("momentum_defect",)},
+        "flown": {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
+    },
+    "PxVec3, built of floats",
+    _RELEASES,
+)
+DEVIATIONS += rounded_motions(
+    "physx",
+    ("tuned",),
+    {"flown": {"flight": ("ball_spin", "momentum_drift")}},
+    "PxVec3, built of floats",
     _RELEASES,
 )
 
@@ -127,24 +122,4 @@ DEVIATIONS += tuple(
     )
     for profile, scenes in PLANES.items()
     for scene in scenes
-)
-
-DEVIATIONS += deviations(
-    "physx",
-    PROFILES,
-    {"flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across")},
-    lambda metric, profile: flown_law(metric),
-    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "PxVec3, built of floats; band in adapters/law/single_motions.py",
-    _RELEASES,
-)
-
-DEVIATIONS += deviations(
-    "physx",
-    ("tuned",),
-    {"flight": ("ball_spin", "momentum_drift")},
-    lambda metric, profile: flown_law(metric),
-    "each update of a spin is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "PxVec3, built of floats; band in adapters/law/single_motions.py",
-    _RELEASES,
 )

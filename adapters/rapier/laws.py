@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, deviations, exactly
-from adapters.law.single_motions import booked_law, flown_law, kept_law, standstill_law
+from adapters.law.single_motions import rounded_motions, standstill_law
 from adapters.law.single_precision import Method, rounded_law
 from adapters.rapier.profiles import SUBSTEPS, TUNED_SUBSTEPS
 
@@ -53,41 +53,20 @@ DEVIATIONS += deviations(
     "rapier3d, built for f32; motion in adapters/law/single_motions.py",
     ("0.36.",),
 )
-DEVIATIONS += tuple(
-    Deviation(
-        "rapier",
-        ("default", "tuned"),
-        scene,
-        "momentum_defect",
-        kept_law("momentum_defect"),
-        "the impulse of every impact is rounded to single precision, 2^-24 relative",
-        "rapier3d, built for f32; band in adapters/law/single_motions.py",
-        ("0.36.",),
-    )
-    for scene in ("cradle", "rack")
-)
-
-DEVIATIONS += deviations(
-    "rapier",
-    ("default", "tuned"),
-    {"off_centre": ("momentum_defect",)},
-    lambda metric, profile: booked_law(metric),
-    "single precision, 2^-24 relative",
-    "rapier3d, built for f32; band in adapters/law/single_motions.py",
-    ("0.36.",),
-)
-
-DEVIATIONS += deviations(
+DEVIATIONS += rounded_motions(
     "rapier",
     ("default", "tuned"),
     {
-        "flight": (
-            *("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across"),
-            *("ball_spin", "momentum_drift"),
-        )
+        "kept": {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
+        "booked": {"off_centre": ("momentum_defect",)},
+        "flown": {
+            "flight": (
+                *("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across"),
+                *("ball_spin", "momentum_drift"),
+            )
+        },
     },
-    lambda metric, profile: flown_law(metric, TUNED_SUBSTEPS if profile == "tuned" else SUBSTEPS),
-    "each update of a velocity or place is rounded to single precision, 2^-24 relative, and ten seconds have thousands",
-    "rapier3d, built for f32; band in adapters/law/single_motions.py",
+    "rapier3d, built for f32",
     ("0.36.",),
+    parts={"default": SUBSTEPS, "tuned": TUNED_SUBSTEPS},
 )
