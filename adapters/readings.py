@@ -7,7 +7,7 @@ axes, on a body. Nothing is corrected on the way: what the engine says wrongly c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -62,6 +62,32 @@ class Cause:
 
 #: Asks after a step what acts on a body, by the scene's index; None: it cannot say that of this body.
 Ask = Callable[[int], list[Read] | None]
+
+
+#: Both bodies of a contact by the scene's index, the impulse on the second (d,) [N s], and its place (d,) [m].
+Told = tuple[int, int, Array, Array | None]
+
+
+def acting_on(body: int, told: Iterable[Told]) -> list[Read]:
+    """What acts on a body: the impulse on the second of a contact, and minus it on the first."""
+    found = []
+    for first, second, impulse, point in told:
+        if body in (first, second):
+            other, sign = (first, 1.0) if body == second else (second, -1.0)
+            found.append(Read(other, sign * impulse, point))
+    return found
+
+
+def cleared(simulation: Simulation, heard: list[Told]) -> Ask:
+    """Ask for what a listener has added to ``heard`` in the step just made; the list is emptied before each step."""
+    advance = simulation.advance
+
+    def fresh(steps: int) -> None:
+        heard.clear()
+        advance(steps)
+
+    simulation.advance = fresh  # type: ignore[method-assign]
+    return lambda body: acting_on(body, heard)
 
 
 @dataclass(frozen=True)

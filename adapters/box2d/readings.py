@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from adapters.box2d.simulation import Box2DSimulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on, cleared
 
 _BIAS = "without: overlaps are corrected in positions alone"
 _AXES = "along worldManifold.normal, and along that normal turned by -90 degrees"
 
 
-def _parts(contact: Any, normal: Any, tangent: Any, units: float) -> list[tuple[int, int, Any, Any]]:
+def _parts(contact: Any, normal: Any, tangent: Any, units: float) -> list[Told]:
     """Bodies of a contact, impulse of each point on the second, and place of the point."""
     a, b = contact.fixtureA.body.userData, contact.fixtureB.body.userData
     world = contact.worldManifold
@@ -24,13 +24,8 @@ def _parts(contact: Any, normal: Any, tangent: Any, units: float) -> list[tuple[
     ]
 
 
-def _of(body: int, parts: list[tuple[int, int, Any, Any]]) -> list[Read]:
-    told = [Read(a, impulse, place) for a, b, impulse, place in parts if b == body]
-    return told + [Read(b, -impulse, place) for a, b, impulse, place in parts if a == body]
-
-
 def _post_solve(simulation: Box2DSimulation) -> Ask:
-    heard: list[tuple[int, int, Any, Any]] = []
+    heard: list[Told] = []
     own = simulation.listener
 
     class Listener(type(own)):  # type: ignore[misc]
@@ -38,24 +33,17 @@ def _post_solve(simulation: Box2DSimulation) -> Ask:
             heard.extend(_parts(contact, impulse.normalImpulses, impulse.tangentImpulses, simulation.units))
 
     simulation.listener = simulation.world.contactListener = Listener(own.radii, own.materials, own.early)
-    advance = simulation.advance
-
-    def fresh(steps: int) -> None:
-        heard.clear()
-        advance(steps)
-
-    simulation.advance = fresh  # type: ignore[method-assign]
-    return lambda body: _of(body, heard)
+    return cleared(simulation, heard)
 
 
 def _manifold(simulation: Box2DSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
-        parts = []
+        parts: list[Told] = []
         for contact in simulation.world.contacts:
             points = contact.manifold.points
             normal, tangent = [p.normalImpulse for p in points], [p.tangentImpulse for p in points]
             parts += _parts(contact, normal, tangent, simulation.units)
-        return _of(body, parts)
+        return acting_on(body, parts)
 
     return ask
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from adapters.box2d3.simulation import Box2D3Simulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on
 
 
 def _begin_touch(simulation: Box2D3Simulation) -> Ask:
     own = {body.shapes[0].id: index for index, body in enumerate(simulation.bodies)}
 
     def ask(body: int) -> list[Read]:
-        found = []
+        found: list[Told] = []
         for event in simulation.world.get_contact_events().begin_events():
             first, second = own[event.shape_a.id], own[event.shape_b.id]
             manifold: Any = event.manifold
@@ -23,10 +23,8 @@ def _begin_touch(simulation: Box2D3Simulation) -> Ask:
                 impulse = (
                     point.normal_impulse * n + point.tangent_impulse * np.array([-n[1], n[0]])
                 ) / simulation.units
-                if body in (first, second):
-                    other, sign = (first, 1.0) if body == second else (second, -1.0)
-                    found.append(Read(other, sign * impulse))
-        return found
+                found.append((first, second, impulse, None))
+        return acting_on(body, found)
 
     return ask
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from adapters.chipmunk.simulation import ChipmunkSimulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, cleared
 
 _OF, _STEP = "the sum over the points of a pair", "the step just made"
 _BIAS = "without: overlaps are corrected by velocities of their own"
@@ -31,27 +31,14 @@ def _after_step(simulation: ChipmunkSimulation) -> Ask:
 
 def _post_solve(simulation: ChipmunkSimulation) -> Ask:
     own = {id(shape): index for index, shape in enumerate(simulation.shapes)}
-    heard: list[tuple[int, int, Any]] = []
+    heard: list[Told] = []
 
     def listen(arbiter: Any, space: Any, data: Any) -> None:
         first, second = (own[id(shape)] for shape in arbiter.shapes)
-        heard.append((first, second, np.array(arbiter.total_impulse)))
+        heard.append((second, first, np.array(arbiter.total_impulse), None))  # it acts on the first
 
     simulation.space.on_collision(post_solve=listen)
-    advance = simulation.advance
-
-    def fresh(steps: int) -> None:
-        heard.clear()
-        advance(steps)
-
-    simulation.advance = fresh  # type: ignore[method-assign]
-
-    def ask(body: int) -> list[Read]:
-        told = [(second, impulse) for first, second, impulse in heard if first == body]
-        told += [(first, -impulse) for first, second, impulse in heard if second == body]
-        return [Read(other, impulse) for other, impulse in told]
-
-    return ask
+    return cleared(simulation, heard)
 
 
 _AGAIN = Cause(

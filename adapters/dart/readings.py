@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from adapters.dart.simulation import DartSimulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on
 
 _STEP = "the step just made"
 _BIAS = "what is pushed out of an overlap is in it, and in the velocity"
@@ -18,13 +18,11 @@ def _contact_force(simulation: DartSimulation) -> Ask:
         return simulation.index[thing.getShapeFrame().getBodyNode().getName()]
 
     def ask(body: int) -> list[Read]:
-        found = []
+        found: list[Told] = []
         for contact in simulation.world.getLastCollisionResult().getContacts():
             first, second = body_of(contact.collisionObject1), body_of(contact.collisionObject2)
-            if body in (first, second):
-                other, sign = (second, 1.0) if body == first else (first, -1.0)
-                found.append(Read(other, sign * simulation.dt * np.array(contact.force), np.array(contact.point)))
-        return found
+            found.append((second, first, simulation.dt * np.array(contact.force), np.array(contact.point)))
+        return acting_on(body, found)
 
     return ask
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.drake.simulation import DrakeSimulation
-from adapters.engine import Array
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on
 
 _STEP = "the step just made, for a plant of discrete steps"
 _SOFT = "one force: what is pushed out of an overlap is in it, and in the velocity"
@@ -16,20 +15,18 @@ def _contact_results(simulation: DrakeSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
         plant, owner, dt = simulation.plant, simulation.owner, simulation.dt
         results = plant.get_contact_results_output_port().Eval(simulation.context)
-        told: list[tuple[int, int, Array, Array | None]] = []
+        told: list[Told] = []
         for k in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(k)
             pair = info.point_pair()
-            told.append(
-                (owner[pair.id_A], owner[pair.id_B], np.array(info.contact_force()), np.array(info.contact_point()))
-            )
+            force, place = dt * np.array(info.contact_force()), np.array(info.contact_point())
+            told.append((owner[pair.id_A], owner[pair.id_B], force, place))
         for k in range(results.num_hydroelastic_contacts()):
             surface = results.hydroelastic_contact_info(k)
-            force = -np.array(surface.F_Ac_W().translational())
+            force = -dt * np.array(surface.F_Ac_W().translational())
             both = surface.contact_surface()
             told.append((owner[both.id_M()], owner[both.id_N()], force, None))
-        found = [Read(first, dt * force, place) for first, second, force, place in told if second == body]
-        return found + [Read(second, -dt * force, place) for first, second, force, place in told if first == body]
+        return acting_on(body, told)
 
     return ask
 

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from adapters.newton.simulation import NewtonSimulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on
 
 
 def _contact_f(simulation: NewtonSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
-        held, found = simulation.touching, []
+        held, found = simulation.touching, list[Told]()
         if simulation.graph is None:
             return []
         count = int(held.rigid_contact_count.numpy()[0])
         force = simulation.told.contact_f.numpy()[:count, :3].astype(float)
         for k in range(count):
             first, second = (int(each.numpy()[k]) for each in (held.rigid_contact_shape0, held.rigid_contact_shape1))
-            if body in (first, second):
-                other, sign = (second, 1.0) if body == first else (first, -1.0)
-                found.append(Read(other, sign * simulation.dt * np.array(force[k])))
-        return found
+            found.append((second, first, simulation.dt * force[k], None))
+        return acting_on(body, found)
 
     return ask
 

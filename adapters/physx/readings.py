@@ -5,21 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.physx.simulation import PhysxSimulation
-from adapters.readings import Ask, Read, Reading
+from adapters.readings import Ask, Read, Reading, Told, acting_on
 
 
 def _points(simulation: PhysxSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
-        found = []
+        found: list[Told] = []
         for contact in simulation.system.get_contacts():
             first, second = (simulation.index[part.entity.name] for part in contact.bodies)
-            if body not in (first, second):
-                continue
-            other, sign = (second, 1.0) if body == first else (first, -1.0)
             for point in contact.points:
-                impulse = sign * np.array(point.impulse, float)
-                found.append(Read(other, impulse, np.array(point.position, float)))
-        return found
+                found.append((second, first, np.array(point.impulse, float), np.array(point.position, float)))
+        return acting_on(body, found)
 
     return ask
 

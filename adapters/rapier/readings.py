@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from adapters.rapier.simulation import RapierSimulation
-from adapters.readings import Ask, Cause, Read, Reading
+from adapters.readings import Ask, Cause, Read, Reading, Told, acting_on, cleared
 
 _STEP = "the whole step, all substeps"
 _BIAS = "with what the solver pushes out of overlaps in it"
@@ -19,18 +19,13 @@ def _pairs(simulation: RapierSimulation) -> Iterator[tuple[int, int, Any]]:
         yield simulation.index[pair.collider1], simulation.index[pair.collider2], pair
 
 
-def _of(body: int, told: list[tuple[int, int, Any, Any]]) -> list[Read]:
-    found = [Read(first, impulse, place) for first, second, impulse, place in told if second == body]
-    return found + [Read(second, -impulse, place) for first, second, impulse, place in told if first == body]
-
-
 def _vector(told: Any) -> Any:
     return np.array([told.x, told.y, told.z])
 
 
 def _points(simulation: RapierSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
-        told, bodies = [], simulation.world.rigid_bodies
+        told, bodies = list[Told](), simulation.world.rigid_bodies
         for first, second, pair in _pairs(simulation):
             for manifold in pair.manifolds:
                 data = manifold.data
@@ -40,14 +35,14 @@ def _points(simulation: RapierSimulation) -> Ask:
                 for k, point in enumerate(manifold.points):
                     middle = 0.5 * (_vector(place[k][0]) + _vector(place[k][1])) if k in place else np.zeros(3)
                     told.append((first, second, point.impulse * _vector(data.normal), middle))
-        return _of(body, told)
+        return acting_on(body, told)
 
     return ask
 
 
 def _total(simulation: RapierSimulation) -> Ask:
     def ask(body: int) -> list[Read]:
-        return _of(
+        return acting_on(
             body, [(first, second, _vector(pair.total_impulse()), None) for first, second, pair in _pairs(simulation)]
         )
 
@@ -61,17 +56,16 @@ def _event(simulation: RapierSimulation) -> Ask:
         collider.active_events = rapier3d.ActiveEvents.CONTACT_FORCE_EVENTS
         collider.contact_force_event_threshold = 0.0
     collector = world.event_handler = rapier3d.ChannelEventCollector()
-    advance, heard = simulation.advance, list[tuple[int, int, Any, Any]]()
+    heard: list[Told] = []
+    ask = cleared(simulation, heard)
 
-    def drained(steps: int) -> None:
-        advance(steps)
-        heard.clear()
+    def drained(body: int) -> list[Read] | None:
         for event in collector.drain_contact_force_events():
             first, second = simulation.index[event.collider1], simulation.index[event.collider2]
             heard.append((first, second, simulation.dt * _vector(event.total_force), None))
+        return ask(body)
 
-    simulation.advance = drained  # type: ignore[method-assign]
-    return lambda body: _of(body, heard)
+    return drained
 
 
 _SMOOTH = Cause(("rest", "slope", "sliding", "blow", "grip"), "it adds up normal parts; there is no call for friction")
