@@ -176,10 +176,7 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     ]
     if scene.dimension == 2:
         return [*found, rounded(1.0, "a spin").check("momentum_drift", "1", truth["momentum_drift"], "no torque")]
-    own = spinning.moments(1.0, SIDES)
-    return found + [
-        check for check in spinning.checks(own, _spin(3, p), time, dt, truth) if check.metric in truth
-    ]  # fmt: skip
+    return found + spinning.checks(spinning.moments(1.0, SIDES), _spin(3, p), time, dt, truth)
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:

@@ -57,6 +57,12 @@ def test_turn_over_of_another_box_as_of_tumble():
     )
 
 
+def test_slow_spin_without_a_turn_over():
+    canonical, scene = made("flight", 3, spin=0.5)
+    assert "flip_time" not in canonical.exact(scene)
+    assert failing(canonical, scene, flown(scene)) == set()
+
+
 @pytest.mark.parametrize("offset", [-1.0, 0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 @pytest.mark.parametrize("dimension", [2, 3])
