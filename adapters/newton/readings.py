@@ -24,7 +24,7 @@ def _contact_f(simulation: NewtonSimulation) -> Ask:
 _AVERAGED = Cause(
     ("rest",),
     "corrections of a body with several neighbours are averaged over its contacts (rigid_contact_con_weighting), and "
-    "the forces are not what moved it; off by 0.2 % without",
+    "the forces are not what moved it; off by less than 1 % without",
 )
 _REBOUND = Cause(("blow",), "the rebound is a velocity of its own, in no force", {"rebounds": False})
 READINGS = (

@@ -38,7 +38,8 @@ STEPS = (0.25, 4.0)
 SIZE, MOVES = 0.3, (-16, 16)
 #: The cases of its own scene in words.
 OWN_SCENE = "its own scene elsewhere"
-#: Error with a fix, over that as shipped, from which it counts: what doubles is no round-off and no phase of a step.
+#: Error with a fix, over that as shipped, from which it counts. The factor is chosen, not derived: a tolerance has room
+#: for round-off and for the phase of a step already; it keeps small steps over a tolerance from counting.
 WORSE = 2.0
 #: Factor of a number that is printed as a formula.
 FALL = "*g*dt^2"

@@ -65,11 +65,11 @@ class Situation:
         Parameters of the scene; a later one where all before are refused.
     body
         The one on which the law is stated, by index.
-    law
-        Of a scene the mean force on the body [N] over the second half of the run, or where ``is_sum`` the impulse of
-        the whole run [N s], with its tolerance, (d,) each.
     pairs
         Impulses between bodies, of those on each body (s, n, d).
+    law
+        Of a scene the mean force on the body [N] over the second half of the run, or where ``is_sum`` the impulse of
+        the whole run [N s], with its tolerance, (d,) each; None where the motion is not judged.
     normal
         Axis of the normal forces on it: 0 along the floor, -1 upwards.
     flies
@@ -83,8 +83,8 @@ class Situation:
     scene: str
     body: int
     cases: tuple[Params, ...]
-    law: Callable[[Scene, float], tuple[Array, Array]]
     pairs: Callable[[Array], Pairs]
+    law: Callable[[Scene, float], tuple[Array, Array]] | None = None
     normal: int = -1
     is_sum: bool = False
     flies: bool = False
@@ -145,10 +145,6 @@ def _struck(scene: Scene, dt: float) -> tuple[Array, Array]:
     return blow, np.full(scene.dimension, p["mass"] * p["v"] * p["fall"] * dt / p["radius"])
 
 
-def _nothing(scene: Scene, dt: float) -> tuple[Array, Array]:
-    return np.zeros(scene.dimension), np.full(scene.dimension, 0.0)
-
-
 def _gripped(scene: Scene, dt: float) -> tuple[Array, Array]:
     weight = scene.params["mass"] * scene.params["g"]
     return _steady(scene, dt, _vector(scene, 0.0, weight))
@@ -186,7 +182,7 @@ _KNOWN: Mapping[str, Mapping[str, Any]] = {
         "what": "a thrown ball, over its steps: m v (1 + e), and what friction takes", "law": _struck,
         "pairs": _on_floor, "is_sum": True,
     },
-    "airborne": {"what": "between two bounces: 0", "law": _nothing, "pairs": _on_floor, "flies": True},
+    "airborne": {"what": "between two bounces: 0", "pairs": _on_floor, "flies": True},
     "grip": {
         "what": "a box between wall and pad: N from both sides, which share its weight", "law": _gripped,
         "pairs": _between, "normal": 0,
@@ -294,7 +290,7 @@ def _turned(scene: Scene, run: Heard, part: Part) -> float:
 
 def _motion(situation: Situation, scene: Scene, run: Heard, on: Array) -> float | None:
     """How far the body's mean force or impulse is off the law, over the law's; None where it is within tolerance."""
-    if situation.flies:
+    if situation.law is None:
         return None
     truth, tolerance = situation.law(scene, run.dt)
     own = on[:, situation.body]

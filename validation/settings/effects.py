@@ -119,11 +119,12 @@ def judged(engine: str, version: str, name: str, effect: Effect, seen: Mapping[s
         Runs by ``base``, ``set``; ``ready``, ``both`` with what it needs; ``beyond``.
     """
     base, tried = seen["base"], seen["set"]
+    ready = seen["ready"] if effect.needs and seen["ready"].outcome in RAN else base
     verdict, because = NOTHING, effect.because or f"no bit of {effect.scene} changes"
     if _differ(base, tried):
         verdict, because = ACTS, effect.because
-    elif effect.needs and _differ(seen["ready"] if seen["ready"].outcome in RAN else base, seen["both"]):
-        base, tried = seen["ready"] if seen["ready"].outcome in RAN else base, seen["both"]
+    elif effect.needs and _differ(ready, seen["both"]):
+        base, tried = ready, seen["both"]
         verdict = ONLY_WITH
         others = ", ".join(f"{other}={text_of(value)}" for other, value in effect.needs.items())
         because = f"{others}: {effect.because}" if effect.because else others
