@@ -148,6 +148,6 @@ def _call(told: Sequence[Mapping[str, Any]]) -> str:
         cells = each["rows"][0]["cells"] if each["rows"] else {}
         wrong[each["call"]] = [f"{name}: {said}" for name, said in cells.items() if said not in ("right", "not run")]
     best = min(wrong, key=lambda call: len(wrong[call]), default="")
-    if not best or 2 * len(wrong[best]) > len(readings.COLUMNS):
+    if not best or 2 * len(wrong[best]) > len(readings.LAWS):
         return ""
     return f"{best} ({'; '.join(wrong[best])})" if wrong[best] else best

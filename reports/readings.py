@@ -14,10 +14,9 @@ from validation.questions.kept_readings import Known, known_of
 from validation.questions.readings import SITUATIONS, STOPPED, WRONG, Judged, causes_of
 
 Plain = dict[str, Any]
-#: Names of the situations, and what is known in them.
-COLUMNS = tuple(each.name for each in SITUATIONS)
 #: What the numbers of a table mean.
 SCALE = "largest error of a step over the largest true force of that pair or body; (1/480): in 1 of 480 steps"
+#: What is known in each situation.
 LAWS = {each.name: each.what for each in SITUATIONS}
 
 

@@ -6,6 +6,7 @@ import json
 
 import click
 from rich.console import Console
+from rich.padding import Padding
 from rich.text import Text
 
 from adapters.engine import EngineError
@@ -66,9 +67,9 @@ def _show(told: readings.Plain, console: Console) -> None:
         console.print(Text(f"correction of overlaps: {each['correction']}"))
         if each["hint"]:
             console.print(Text(each["hint"]))
-        table = grid("", *readings.COLUMNS)
+        table = grid("", *readings.LAWS)
         for row in each["rows"]:
-            table.add_row(row["profile"], *(row["cells"][name] for name in readings.COLUMNS))
+            table.add_row(row["profile"], *(row["cells"][name] for name in readings.LAWS))
         console.print(table)
         for cause in each["causes"]:
-            console.print(Text(f"  {cause}"))
+            console.print(Padding(Text(cause), (0, 0, 0, 2)))

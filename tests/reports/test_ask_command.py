@@ -55,7 +55,7 @@ def test_symptoms_in_words_of_people_lead_to_their_scenes(part, least):
     assert len(wrong) <= (1.0 - least) * len(part), wrong
 
 
-def test_public_reports_lead_to_their_scenes():
+def test_scenes_of_public_reports():
     wrong = {each["report"]: led_to(each["sentence"]) for each in REPORTS if not is_right(each)}
     assert len(REPORTS) == 37 and set(wrong) <= ELSEWHERE, wrong
 
@@ -66,7 +66,7 @@ def test_contact_force_that_reads_zero():
 
 
 @pytest.mark.parametrize("part", [TUNED, HELD_OUT], ids=["tuned", "held-out"])
-def test_wrong_scene_is_seldom_the_only_one_shown(part):
+def test_wrong_scene_as_the_only_one_shown(part):
     """Only where a match is clear is a fix printed."""
     clear = [each for each in part if answer(each["sentence"])["answer"] == SCENE]
     assert len(clear) >= 25

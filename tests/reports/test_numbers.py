@@ -10,7 +10,7 @@ ENGINES = [name for name in registry.names() if registry.adapter(name) is not No
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_properties_without_a_measurement_are_those_documented(engine):
+def test_documented_properties_without_a_measurement(engine):
     told = numbers.of_engine(engine)
     assert set(told) == {key for group in numbers.COLUMNS.values() for key in group}
     for key, what in numbers.UNSET.items():
@@ -18,7 +18,7 @@ def test_properties_without_a_measurement_are_those_documented(engine):
         assert told[key] == (rows[0] if rows else "")
 
 
-def test_measured_numbers_replace_what_is_documented():
+def test_measured_number_that_differs_from_the_documented_one():
     row = {"what": "no rebound below [m/s]", "documented": "0.2: a setting", "measured": 0.31, "value": 0.2}
     assert numbers.of_engine("bullet", [row | {"agrees": False}])["threshold"] == "0.31, differs"
     row |= {"measured": 0.2}
@@ -39,7 +39,7 @@ def test_strongest_and_weakest_group():
     assert int(passed) < int(judged)
 
 
-def test_the_force_call_is_one_of_the_readings():
+def test_force_call_among_the_readings():
     for engine in readings.engines():
         told = numbers.of_engine(engine)["force_call"]
         assert not told or any(told.startswith(each["call"]) for each in readings.told(engine)["readings"])

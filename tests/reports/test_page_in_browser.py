@@ -327,6 +327,17 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
 
 
 @pytest.mark.usefixtures("bullet")
+def test_heading_of_a_group_of_rows_in_a_saved_table(browser, page_file):
+    with opened(browser, page_file, "#forces") as page:
+        with page.expect_download() as found:
+            page.locator("#forces-bullet ~ button.save").first.click()
+        heads, *lines = csv.reader(Path(found.value.path()).read_text().splitlines())
+    assert heads[:2] == ["group", "profile"] and {len(line) for line in lines} == {len(heads)}
+    calls = {line[0] for line in lines}
+    assert len(calls) > 1 and all("getContactPoints" in call for call in calls)
+
+
+@pytest.mark.usefixtures("bullet")
 def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, page_file):
     with opened(browser, page_file, "#impact-2") as page:
         figure = page.locator("#scene-impact figure.plot").first

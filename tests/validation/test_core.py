@@ -65,26 +65,25 @@ def test_refused_and_unfinished_cases(line):
     assert refused.refused == "box: no" and not refused.wrong and math.isnan(refused.errors[0])
 
 
-def test_check_out_of_bounds_with_its_worst_case(monkeypatch):
-    def row(value, dt, outcome="ok", reason="", metric="speed"):
-        found = {
-            "value": value,
-            "truth": 1.0,
-            "tolerance": 0.1,
-            "dt": dt,
-            "slot": {"params": {"e": 0.5}},
-            "unit": "m/s",
-        }
+def test_check_out_of_bounds_with_its_worst_case():
+    seen = {}
+
+    def row(value, dt, outcome="ok", why="", metric="speed"):
+        slot = Slot("impact", (("e", 0.5),), 2, "any", "plain", dt)
+        own = "" if outcome == "ok" else why
+        seen[slot] = Observation(slot, "", 1, "1", Outcome(outcome), own, metrics={metric: (value, why)})
+        found = {"value": value, "truth": 1.0, "tolerance": 0.1, "dt": dt, "slot": slot.as_dict(), "unit": "m/s"}
+        reason = f"{why}; the engine has no list of findings"
         return SimpleNamespace(**found, outcome=outcome, reason=reason, metric=metric)
 
-    told = [row(1.05, 1 / 60), row(1.2, 1 / 60), row(0.5, 1 / 120), row(None, 1 / 60, reason="no apex", metric="apex")]
-    told += [row(None, 1 / 240, "crashed", "step: it died")]
-    assert core._beyond(told, 1e-9) == [
+    told = [row(1.05, 1 / 60), row(1.2, 1 / 60), row(0.5, 1 / 120), row(None, 1 / 60, why="no apex", metric="apex")]
+    told += [row(None, 1 / 240, "diverged", "step 3: not finite")]
+    assert core._beyond(told, seen, 1e-9) == [
         "speed: 0.5, truth 1 +- 0.1 m/s at dt = 1/120 s, e=0.5, and 1 more",
         "apex: no apex at dt = 1/60 s, e=0.5",
-        "crashed: step: it died at dt = 1/240 s, e=0.5",
+        "diverged: step 3: not finite at dt = 1/240 s, e=0.5",
     ]
-    assert core._beyond([row(1.0002, 1 / 60)], 1e-9) == []
+    assert core._beyond([row(1.0002, 1 / 60)], seen, 1e-9) == []
 
 
 @pytest.mark.few(2)

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from adapters.engine import EngineFacts
 from validation.bounds import ROUND_OFF
 from validation.canonical import Primary, halves
 from validation.catalogue import CATALOGUE
-from validation.cells import Observation, Outcome, Slot, format_dt
+from validation.cells import Observation, Outcome, Slot, format_dt, slot_from_dict
 from validation.judging.rows import Row, rows_of
 from validation.questions.convergence import Limit, declared_errors, limit_of
 
@@ -82,7 +82,7 @@ def judged(engine: EngineFacts, observations: Sequence[Observation]) -> Line:
     if refused := [each.reason for each in observations if each.outcome is Outcome.UNSUPPORTED]:
         return Line(*line, None, (), refused[0])
     floor = max(ROUND_OFF, 0.0 if engine.precision == "double" else engine.round_off)
-    wrong = _beyond(rows_of("", list(observations)), floor)
+    wrong = _beyond(rows_of("", list(observations)), {each.slot: each for each in observations}, floor)
     order = None
     if all(map(math.isfinite, errors)):
         fit, limit, because = limit_of(DTS, errors, floor)
@@ -94,7 +94,7 @@ def judged(engine: EngineFacts, observations: Sequence[Observation]) -> Line:
     return Line(*line, order, tuple(wrong))
 
 
-def _beyond(rows: Iterable[Row], floor: float) -> list[str]:
+def _beyond(rows: Iterable[Row], seen: Mapping[Slot, Observation], floor: float) -> list[str]:
     """The worst case of each check that is out of bounds or has no value, and how many others there are."""
     worst: dict[str, tuple[float, str]] = {}
     counts: Counter[str] = Counter()
@@ -105,9 +105,9 @@ def _beyond(rows: Iterable[Row], floor: float) -> list[str]:
             f", {name}={value:g}" for name, value in row.slot.get("params", {}).items()
         )
         if row.outcome != Outcome.OK.value:
-            name, far, said = row.outcome, math.inf, row.reason
+            name, far, said = row.outcome, math.inf, _why(row, seen)
         elif row.value is None or row.truth is None or row.tolerance is None:
-            name, far, said = row.metric, math.inf, row.reason
+            name, far, said = row.metric, math.inf, _why(row, seen)
         else:
             bound = max(row.tolerance, floor * max(1.0, abs(row.truth)) if floor > ROUND_OFF else 0.0)
             far = abs(row.value - row.truth) / bound if bound else math.inf
@@ -123,3 +123,11 @@ def _beyond(rows: Iterable[Row], floor: float) -> list[str]:
     return [
         f"{said}" + (f", and {counts[name] - 1} more" if counts[name] > 1 else "") for name, (_, said) in worst.items()
     ]
+
+
+def _why(row: Row, seen: Mapping[Slot, Observation]) -> str:
+    """Why there is no value, as the case says; a row's reason tells of lists of known failures as well."""
+    own = seen.get(slot_from_dict(row.slot))
+    if own is None or row.outcome != own.outcome.value:  # of a study, or judged as another outcome
+        return row.reason
+    return own.reason if own.outcome is not Outcome.OK else own.metrics.get(row.metric, (None, ""))[1] or row.reason

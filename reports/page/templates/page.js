@@ -142,8 +142,15 @@ function csvOf(table) {
   });
   const width = Math.max(0, ...grid.map((row) => row.length)), columns = [...Array(width).keys()];
   const name = (c) => [...new Set(grid.slice(0, heads).map((row) => row[c] ?? ""))].filter(Boolean).join("/");
-  const lines = grid.slice(heads).map((row) => columns.map((c) => row[c] ?? ""));
-  return [...(heads ? [columns.map(name)] : []), ...lines].map((row) => row.map(quoted).join(",")).join("\n") + "\n";
+  // What stands above a group of rows is a column before the others.
+  const lines = [], rows = $$("tr", table);
+  let group = [];
+  for (let r = heads; r < grid.length; r += 1) {
+    const line = columns.map((c) => grid[r][c] ?? "");
+    if (rows[r].cells[0].scope === "rowgroup") group = [line[0]];
+    else lines.push([...group, ...line]);
+  }
+  return [...(heads ? [[...group.map(() => "group"), ...columns.map(name)]] : []), ...lines].map((row) => row.map(quoted).join(",")).join("\n") + "\n";
 }
 for (const region of $$(".scroll")) {
   const table = region.querySelector("table"), label = region.getAttribute("aria-label");
