@@ -34,35 +34,25 @@ def check_length(name: str, values: tuple[float, ...], length: int) -> None:
 
 
 @dataclass(frozen=True)
-class Disc:
+class _Round:
+    radius: float
+
+    def validate(self, owner: str) -> None:
+        """Raise `SceneError` unless the radius is positive and finite."""
+        check_positive(f"{owner}.shape.radius", self.radius)
+
+    @property
+    def smallest_size(self) -> float:
+        """Smallest full extent [m]."""
+        return 2.0 * self.radius
+
+
+class Disc(_Round):
     """Planar disc of ``radius`` [m]."""
 
-    radius: float
 
-    def validate(self, owner: str) -> None:
-        """Raise `SceneError` unless the radius is positive and finite."""
-        check_positive(f"{owner}.shape.radius", self.radius)
-
-    @property
-    def smallest_size(self) -> float:
-        """Smallest full extent [m]."""
-        return 2.0 * self.radius
-
-
-@dataclass(frozen=True)
-class Sphere:
+class Sphere(_Round):
     """Ball of ``radius`` [m]."""
-
-    radius: float
-
-    def validate(self, owner: str) -> None:
-        """Raise `SceneError` unless the radius is positive and finite."""
-        check_positive(f"{owner}.shape.radius", self.radius)
-
-    @property
-    def smallest_size(self) -> float:
-        """Smallest full extent [m]."""
-        return 2.0 * self.radius
 
 
 @dataclass(frozen=True)
