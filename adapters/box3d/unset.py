@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from adapters import unset
-from adapters.box3d.shipped import RESTITUTION_THRESHOLD, SUBSTEPS
+from adapters.box3d.shipped import MAXIMUM_SPEED, RESTITUTION_THRESHOLD, SUBSTEPS
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, RESTITUTIONS, Asked, Told, Unset
 
 
@@ -74,6 +74,8 @@ UNSET = (
           partial(unset.least_rebound, Bare)),
     Unset("linear damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "along"), 1e-5),
     Unset("angular damping [1/s]", "0", _BODY, 0.0, partial(unset.damping, Bare, "spin"), 1e-5),
+    Unset("limit of speed [m/s]", "400: b3WorldDef.maximumLinearSpeed", _WORLD, MAXIMUM_SPEED,
+          partial(unset.limit, Bare)),
     Unset("at 1 mm/s asleep after [s]", "0.5: B3_TIME_TO_SLEEP, below sleepThreshold, 5 cm/s", f"constants.h; {_BODY}",
           0.5, partial(unset.sleep, Bare), 2.0 * Bare.dt),
     Unset("gap at rest [m]", "an overlap: springs of 60 Hz against static bodies", _WORLD, None,
