@@ -1,9 +1,20 @@
-"""Runs of an engine with the settings of a profile, some of them changed."""
+"""Runs of an engine with the settings of a profile, some of them changed, and a box at rest on the ground."""
+
+from dataclasses import replace
 
 from adapters.needs import needs
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
+
+FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
+
+
+def resting(mu=0.5, duration=0.5, **changes):
+    """A box on the ground, with other properties where ``changes`` give them."""
+    box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
+    return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
 
 
 def measured_of(engine, name, profile, dimension=2, params=None, dt=1.0 / 240.0, **changes):

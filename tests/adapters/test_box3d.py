@@ -6,14 +6,14 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from driven import driven, measured_of
+from driven import FLOOR, driven, measured_of, resting
 from test_rebounds_of_rapier import Blow
 
 from adapters.box3d import Box3DEngine
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.needs import needs
-from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Pair, Scene, Sphere
 from adapters.stepping import posed_for
 from validation.catalogue import CATALOGUE
 
@@ -21,12 +21,6 @@ pytestmark = pytest.mark.optional("box3d")
 ENGINE = Box3DEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
-
-
-def resting(mu=0.5, duration=0.5, **changes):
-    box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
-    return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from driven import driven
+from driven import FLOOR, driven
 
 from adapters.conformance import items
 from adapters.dart import DartEngine
@@ -15,14 +15,13 @@ from adapters.dart.profiles import PYRAMIDS
 from adapters.dart.pyramid import pyramid_law
 from adapters.dart.shipped import restitution
 from adapters.engine import EngineError
-from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Pair, Scene, Sphere
 from validation.catalogue import CATALOGUE
 
 pytestmark = pytest.mark.optional("dart")
 ENGINE = DartEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 
 
 def sliding(heading=0.0, mu=0.3, **changes):

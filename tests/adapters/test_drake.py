@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from driven import driven
+from driven import FLOOR, driven
 
 from adapters.conformance import items
 from adapters.drake import DrakeEngine
@@ -23,7 +23,6 @@ pytestmark = pytest.mark.optional("drake")
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
 
 

@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from driven import driven
+from driven import FLOOR, driven
 
 from adapters.engine import EngineError
 from adapters.mujoco import MujocoEngine
@@ -30,7 +30,6 @@ from adapters.trajectory import Sampling
 
 ENGINE = MujocoEngine()
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 FLAT = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
 CUBE = (1.0 / 6.0,) * 3
 BALL = (0.1,) * 3

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import driven
+from driven import FLOOR, driven
 
 from adapters.conformance import items
 from adapters.engine import EngineError
@@ -29,7 +29,6 @@ pytestmark = pytest.mark.optional("newton")
 ENGINE = NewtonEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, *UPRIGHT))
 

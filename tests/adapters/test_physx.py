@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import driven
+from driven import FLOOR, driven, resting
 
 from adapters.conformance import items
 from adapters.engine import EngineError
@@ -14,7 +14,7 @@ from adapters.physx.laws import DEVIATIONS
 from adapters.physx.shipped import FRICTION_GAP, TOLERANCE_LENGTH
 from adapters.physx.simulation import imported
 from adapters.physx.translation import turn_to
-from adapters.scene import Body, Box, HalfSpace, Harmonic, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Harmonic, Pair, Scene, Sphere
 from adapters.scene.means import means
 from adapters.scene.shapes import Capsule, Hull
 from validation.catalogue import CATALOGUE
@@ -23,13 +23,7 @@ pytestmark = pytest.mark.optional("physx")
 ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-
-
-def resting(mu=0.5, duration=0.5, **changes):
-    box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, *UPRIGHT))
-    return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
 
 
 def struck(e, speed, gap, mu=0.0, slip=0.0, steps=12):

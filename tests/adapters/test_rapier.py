@@ -5,25 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import driven
+from driven import FLOOR, driven, resting
 
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.rapier import RapierEngine
 from adapters.receipts import receipts
-from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Pair, Scene, Sphere
 
 pytestmark = pytest.mark.optional("rapier")
 ENGINE = RapierEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
-FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
-
-
-def resting(mu=0.5, duration=0.5, **changes):
-    box = Body("box", Box((0.5, 0.4, 0.25)), 3.0, (0.2, 0.3, 0.4), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
-    return Scene("rest", 1, 3, (FLOOR, replace(box, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)
