@@ -14,6 +14,7 @@ order of bodies and by signs: the mirrored world, its bodies in reverse order, i
 What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
 tells that is made to a hundredth of the accuracy.
 Of the event loop steps say only when it is looked at: it is made again to a finer and to a coarser tolerance instead.
+What it strikes together may touch a little later: by a gap that counts as none.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
 far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
 (`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
@@ -47,6 +48,7 @@ from reference_solver.certificate.audit import (
     ends_of_series,
     first_without_order,
     grazes,
+    joint_blows,
     shared_loads,
     slips_taken_out,
 )
@@ -75,6 +77,8 @@ CLOSER = 1e-2
 #: Shares of the tolerance of the event loop to which a run is made again. The finer one's steps are three quarters as
 #: long, those of the coarser one 1.3 times.
 TOLERANCES = (0.1, 10.0)
+#: Gaps of the event loop that are closed, as a share of the smallest half width.
+TOUCH = 1e-11
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
 #: Distances from the origin to which the run is moved, in smallest half widths. At the second one gaps are closed some
@@ -230,7 +234,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         reasons.append("the run at half the step is no numbers")
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
-    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips) + grazed)
+    joint = joint_blows(model, record, settings.dt, TOUCH * _size(model)) if settings.scheme == "exact" else 0.0
+    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
     made = (
@@ -281,8 +286,7 @@ def _poses(model: Model, settings: Settings, steps: int, stride: int) -> Array:
 
 def _determined(model: Model, t: Array, apart: Array, limit: float) -> float:
     """Last time at which motions are not ``apart`` at all (s,), where they are by ``limit`` of a half width later."""
-    least = min(smallest_extent(body.shape) for body in model.bodies)
-    if not (apart > limit * (least if np.isfinite(least) else 1.0)).any():
+    if not (apart > limit * _size(model)).any():
         return float("inf")
     return float(t[apart <= 0.0].max(initial=0.0))
 
@@ -322,10 +326,15 @@ def _unique(found: Answers) -> str:
     return ""
 
 
+def _size(model: Model) -> float:
+    """Smallest half width of a body [m]; 1 where none has any."""
+    least = min(smallest_extent(body.shape) for body in model.bodies)
+    return least if np.isfinite(least) else 1.0
+
+
 def away(model: Model, far: float) -> Change:
     """Return the change of a world that moves it by ``far`` smallest half widths (`AWAY`)."""
-    d, least = model.dimension, min(smallest_extent(body.shape) for body in model.bodies)
-    return Change(d, shift=tuple(far * (least if np.isfinite(least) else 1.0) * x for x in AWAY[:d]))
+    return Change(model.dimension, shift=tuple(far * _size(model) * x for x in AWAY[: model.dimension]))
 
 
 def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int, stride: int) -> list[str]:

@@ -69,6 +69,7 @@ def test_adapter_that_refuses_every_scene(called):
      (f"{FILE}:Absent", f"engine: {FILE} has no class 'Absent'"),
      (FILE, f"engine: {FILE}: name its class as well, {FILE}:CLASS"),
      (f"{FILE}:World", "engine: cannot be made: TypeError"),
+     (f"{FILE}:Myengine --crosscheck-profile absent", "profile: no chosen engine has a profile 'absent'; known: plain"),
      ("mine", "engine: there is no engine called 'mine'")],
 )  # fmt: skip
 def test_wrong_name_of_an_adapter_in_one_line(called, named, said):

@@ -198,6 +198,19 @@ def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.nda
     return moved
 
 
+def joint_blows(model: Model, record: Record, dt: float, gap: float) -> np.ndarray:
+    """Return how far (s,) it moves bodies that contacts open by ``gap`` [m] are struck with others [m].
+
+    What is struck late keeps its change of velocity for as long, and meets with what loads add until then, twice that
+    where it rebounds. Raises ValueError if the record has no pieces.
+    """
+    moved, pull = np.zeros(len(record.t)), float(np.linalg.norm(model.gravity))
+    for begin, late, speed in zip(*contact.joint_blows(_run_of(model, record, dt), gap), strict=True):
+        since = record.t - begin
+        moved += np.where(since > 0.0, late * (speed + 2.0 * pull * since), 0.0)
+    return moved
+
+
 def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple[np.ndarray, Finding]:
     """Return how far apart (s,) two motions can be that both obey the laws [m], and what is found of it.
 

@@ -146,6 +146,23 @@ def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]
     return np.array(times), np.array(speed)
 
 
+def joint_blows(run: Run, gap: float) -> tuple[Array, Array, Array]:
+    """When (k,) several contacts are struck at once [s], how late one may be (k,) [s], and what (k,) speed changes.
+
+    One that is open by up to ``gap`` [m] and closes with the speed u would be struck ``gap / u`` later.
+    """
+    pieces, owner = run.pieces, run.contact_owner
+    approach = -(run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+    meets = run.is_impact[owner] & (approach > LIES * speeds(run))
+    slowest = np.full(len(pieces), np.inf)
+    np.minimum.at(slowest, owner[meets], approach[meets])
+    several = np.flatnonzero(np.bincount(owner[meets], minlength=len(pieces)) > 1)
+    twist, reach = pieces.twist_after - pieces.twist_before, np.where(run.free, run.reach, 0.0)[pieces.body]
+    speed = np.linalg.norm(twist[:, : run.d], axis=1) + reach * np.linalg.norm(twist[:, run.d :], axis=1)
+    fastest = [speed[pieces.first_body[k] : pieces.first_body[k + 1]].max() for k in several]
+    return pieces.begin[several], gap / slowest[several], np.array(fastest)
+
+
 def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
     """Return the acceleration [m/s^2] at which the pair of contact j is held after an impact, and its friction's share.
 
