@@ -9,9 +9,9 @@ from functools import partial
 from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD, SUBSTEPS
-from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law import Deviation, deviations, settings_of
 from adapters.law.single_motions import corner_law, rounded_motions, standstill_law
-from adapters.law.single_precision import Method, Threshold, rounded_law
+from adapters.law.single_precision import late_rebound_law
 from adapters.scene import Scene
 
 #: Metrics of blows in free space, by scene.
@@ -45,22 +45,11 @@ def _lengths(profile: str) -> Callable[[Scene, float], tuple[float, float]]:
     return lambda scene, dt: (_chosen(profile)(scene, dt)["units_per_metre"], 0.0)
 
 
-def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, with restitution above the threshold, after friction."""
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        threshold = Threshold(_chosen(profile)(scene, dt)["restitution_threshold"], rebounds_at=True)
-        method = Method(threshold, rebound_after_friction=True)
-        return rounded_law(metric, method)(scene, dt, measure)
-
-    return law
-
-
 DEVIATIONS: tuple[Deviation, ...] = deviations(
     "box2d3",
     PROFILES,
     BLOWS,
-    lambda metric, profile: blow_law(profile, metric),
+    lambda metric, profile: late_rebound_law(metric, _chosen(profile)),
     "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
     "of compression only, as restitution is applied last",
     "contact_solver.c, b2ApplyRestitutionTask; types.h, restitutionThreshold; adapters/law/single_precision.py",

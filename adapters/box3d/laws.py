@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 from adapters.box3d.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box3d.shipped import CHECKED_ON, SUBSTEPS
-from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law import Deviation, deviations, settings_of
 from adapters.law.single_motions import rounded_motions, standstill_law
-from adapters.law.single_precision import Method, Threshold, plane_law, rounded_law
-from adapters.scene import Scene
+from adapters.law.single_precision import late_rebound_law, plane_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
 BLOWS: Mapping[str, tuple[str, ...]] = {
@@ -25,21 +25,11 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def blow_law(profile: str, metric: str) -> Law:
-    """Blows in single precision, with restitution above the threshold, after friction."""
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        threshold = Threshold(settings_of(PROFILES[profile], scene, dt)["restitution_threshold"], rebounds_at=True)
-        return rounded_law(metric, Method(threshold, rebound_after_friction=True))(scene, dt, measure)
-
-    return law
-
-
 DEVIATIONS: tuple[Deviation, ...] = deviations(
     "box3d",
     PROFILES,
     BLOWS,
-    lambda metric, profile: blow_law(profile, metric),
+    lambda metric, profile: late_rebound_law(metric, partial(settings_of, PROFILES[profile])),
     "single precision, 2^-24 relative; restitution is 0 below the threshold; friction is limited by the impulse "
     "of compression only, as restitution is applied last",
     "contact_solver.c, b3ApplyRestitution_Mesh; types.h, restitutionThreshold; adapters/law/single_precision.py",
@@ -54,7 +44,7 @@ for _profile, _scene, _metrics in (
         "box3d",
         (_profile,),
         {_scene: _metrics},
-        lambda metric, profile: blow_law(profile, metric),
+        lambda metric, profile: late_rebound_law(metric, partial(settings_of, PROFILES[profile])),
         "single precision, 2^-24 relative",
         "math_functions.h, b3Vec3: three floats; motion in adapters/law/single_precision.py",
         CHECKED_ON,

@@ -13,7 +13,7 @@ There is no prediction where blows follow each other within a few steps, or the 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
@@ -117,6 +117,19 @@ def rounded_law(metric: str, method: Method) -> Law:
         value = measure(scene, motion)[metric][0]
         share = ROUNDINGS * blows * method.unit
         return None if value is None else (value, _band(scene, motion, share, metric, value, measure))
+
+    return law
+
+
+def late_rebound_law(metric: str, chosen: Callable[[Scene, float], Mapping[str, Any]]) -> Law:
+    """`rounded_law` of an engine that applies restitution after friction, from its ``restitution_threshold`` [m/s] on.
+
+    ``chosen`` gives its settings for a scene and a step.
+    """
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        threshold = Threshold(chosen(scene, dt)["restitution_threshold"], rebounds_at=True)
+        return rounded_law(metric, Method(threshold, rebound_after_friction=True))(scene, dt, measure)
 
     return law
 
