@@ -84,6 +84,8 @@ def test_check_out_of_bounds_with_its_worst_case():
         "diverged: step 3: not finite at dt = 1/240 s, e=0.5",
     ]
     assert core._beyond([row(1.0002, 1 / 60)], seen, 1e-9) == []
+    no_number = core._beyond([row(math.nan, 1 / 60)], seen, 1e-9)
+    assert no_number == ["speed: nan, truth 1 +- 0.1 m/s at dt = 1/60 s, e=0.5"]
 
 
 @pytest.mark.few(2)

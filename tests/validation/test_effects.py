@@ -60,6 +60,7 @@ LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
         (NEEDS, {"base": "a", "set": "b", "ready": "c", "both": "c"}, ACTS),
         (LIMITED, {"base": "a", "set": "b", "beyond": "b"}, CLAMPED),
         (LIMITED, {"base": "a", "set": "b", "beyond": "c"}, ACTS),
+        (LIMITED, {"base": "a", "set": "b", "beyond": None}, ACTS),
         (LIMITED, {"base": "a", "set": "a", "beyond": "a"}, NOTHING),
     ],
 )

@@ -118,7 +118,7 @@ def _beyond(rows: Iterable[Row], seen: Mapping[Slot, Observation], floor: float)
             if far <= 1.0:
                 continue
         counts[name] += 1
-        if far >= worst.get(name, (0.0, ""))[0]:
+        if not far < worst.get(name, (0.0, ""))[0]:  # NaN too
             worst[name] = far, f"{name}: {said} {where}"
     return [
         f"{said}" + (f", and {counts[name] - 1} more" if counts[name] > 1 else "") for name, (_, said) in worst.items()

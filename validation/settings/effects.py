@@ -130,7 +130,8 @@ def judged(engine: str, version: str, name: str, effect: Effect, seen: Mapping[s
         because = f"{others}: {effect.because}" if effect.because else others
     elif tried.outcome not in RAN:
         verdict, because = REFUSED, tried.reason
-    if verdict in (ACTS, ONLY_WITH) and "beyond" in seen and not _differ(seen["beyond"], tried):
+    far = seen.get("beyond")
+    if verdict in (ACTS, ONLY_WITH) and far and far.outcome in RAN and not _differ(far, tried):
         limit = text_of(effect.set) + (" at a step of 1/240 s" if effect.in_steps else "")
         verdict, because = CLAMPED, f"{text_of(effect.beyond)} is as {limit}: {effect.because}"
     before, after = (_value(each, effect.metric) for each in (base, tried))
