@@ -34,7 +34,7 @@ process; with an error that engine has no laws and experiments, and ``crosscheck
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -42,7 +42,7 @@ from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from adapters import registry
 from adapters.engine import EngineError
@@ -58,6 +58,7 @@ from adapters.unset import Unset
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
 READINGS, READ, FORCE_SCRIPT = "readings", "readings.csv", "force_script.py.txt"
 CURES, PANELS, TUNING, EFFECTS = "cures.csv", "panels.csv", "tuning.toml", "effects.csv"
+Row = TypeVar("Row")
 
 
 def located(module: str) -> Path | None:
@@ -83,6 +84,15 @@ def inside(engine: str, name: str) -> Path | None:
     folder = folder_of(engine)
     path = folder / name if folder is not None else None
     return path if path is not None and path.exists() else None
+
+
+def rows_of(engine: str, name: str, read: Callable[[Path], Iterable[Row]]) -> tuple[Row, ...]:
+    """Rows of a kept table of ``engine``; none if it is not there, or cannot be read, as one of another package."""
+    path = inside(engine, name)
+    try:
+        return tuple(read(path)) if path else ()
+    except (OSError, ValueError, KeyError, TypeError):
+        return ()
 
 
 @cache

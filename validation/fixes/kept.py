@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from adapters import whole
-from adapters.engine_folder import CURES, PANELS, inside
+from adapters.engine_folder import CURES, PANELS, rows_of
 from adapters.registry import find
 from validation.canonical import Params
 from validation.fixes.panel import Changes, Cost, Panel
@@ -126,12 +126,7 @@ class Cure:
 @cache
 def cures_of(engine: str) -> Mapping[tuple[str, int], Cure]:
     """Listed fixes by scene and dimension; empty for an engine without them."""
-    path = inside(engine, CURES)
-    try:
-        found = read(path) if path else []
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are tested
-        return {}
-    return {(cure.scene, cure.dimension): cure for cure in found if cure.engine == engine}
+    return {(cure.scene, cure.dimension): cure for cure in rows_of(engine, CURES, read) if cure.engine == engine}
 
 
 #: Format of fields of the table: JSON for composite or optional ones, text for the rest.
@@ -172,15 +167,13 @@ def _digits(value: float | None, digits: int) -> float | None:
 @cache
 def panels_of(engine: str) -> Mapping[str, Panel]:
     """Listed panels of an engine's profiles, of the installed release; see `of_profile`."""
-    path = inside(engine, PANELS)
-    if path is None:
-        return {}
-    try:
-        with path.open(encoding="utf-8", newline="") as lines:
-            rows = [row for row in csv.DictReader(lines) if row["version"] == find(engine).version]
-        return {row["profile"]: _panel_of(json.loads(row["panel"])) for row in rows}
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are tested
-        return {}
+    rows = rows_of(engine, PANELS, _read_panels)
+    return {profile: panel for version, profile, panel in rows if version == find(engine).version}
+
+
+def _read_panels(path: Path) -> list[tuple[str, str, Panel]]:
+    with path.open(encoding="utf-8", newline="") as lines:
+        return [(row["version"], row["profile"], _panel_of(json.loads(row["panel"]))) for row in csv.DictReader(lines)]
 
 
 def write_panels(version: str, panels: Mapping[str, Panel], path: Path) -> None:

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from adapters.engine import Role
-from adapters.engine_folder import READ, inside, readings_of
+from adapters.engine_folder import READ, readings_of, rows_of
 from adapters.registry import load
 from validation.questions.readings import SITUATIONS, Judged, measured
 
@@ -69,11 +69,7 @@ def write(entries: Iterable[Known], path: Path) -> None:
 @cache
 def known_of(engine: str) -> tuple[Known, ...]:
     """Kept table of an engine; empty if there is none."""
-    path = inside(engine, READ)
-    try:
-        return tuple(_read(path)) if path else ()
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are read by a test
-        return ()
+    return rows_of(engine, READ, _read)
 
 
 def _read(path: Path) -> Iterator[Known]:

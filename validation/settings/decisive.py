@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from adapters.engine_folder import DECISIVE, belongs_of, cured_of, inside
+from adapters.engine_folder import DECISIVE, belongs_of, cured_of, rows_of
 from adapters.experiment import Cured
 from adapters.registry import find, load
 from validation.cells import Observation, Slot, scene_of, settings_of
@@ -188,11 +188,7 @@ def measure_all(engine: str, jobs: int = 1) -> list[Decisive]:
 @cache
 def measured_of(engine: str) -> tuple[Decisive, ...]:
     """Listed measurements of ``engine``; empty if there are none."""
-    path = inside(engine, DECISIVE)
-    try:
-        return tuple(entry for entry in (read(path) if path else ()) if entry.engine == engine)
-    except (OSError, ValueError, KeyError, TypeError):  # a file of another package; ours are read by a test
-        return ()
+    return tuple(entry for entry in rows_of(engine, DECISIVE, read) if entry.engine == engine)
 
 
 def decisive(engine: str, scene: str, dimension: int, shipped: str, better: str) -> Decisive | None:

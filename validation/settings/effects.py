@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import Engine, Setting
-from adapters.engine_folder import EFFECTS, effects_of, inside
+from adapters.engine_folder import EFFECTS, effects_of, rows_of
 from adapters.experiment import Effect
 from adapters.needs import needs
 from adapters.registry import find, load, profile_of
@@ -163,11 +163,7 @@ COLUMNS = tuple(field.name for field in fields(Told))
 @cache
 def told_of(engine: str) -> tuple[Told, ...]:
     """Kept results of ``engine``, of all releases; empty if there are none."""
-    path = inside(engine, EFFECTS)
-    try:
-        return tuple(entry for entry in (read(path) if path else ()) if entry.engine == engine)
-    except (OSError, ValueError, TypeError, KeyError):  # a file of another package; ours are read by a test
-        return ()
+    return tuple(entry for entry in rows_of(engine, EFFECTS, read) if entry.engine == engine)
 
 
 def of_release(engine: str, version: str) -> dict[str, Told]:
