@@ -19,13 +19,14 @@ from functools import lru_cache
 import numpy as np
 
 from adapters.engine import Array
-from adapters.law import Law, Measure, Prediction
+from adapters.law import Law, Measure, Prediction, settings_of
 from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR
 from adapters.mujoco.box_on_face import BoxOnFace, Triple
 from adapters.mujoco.contact_law import ContactLaw
 from adapters.mujoco.motions import along_a_heading
 from adapters.mujoco.pairs import pair_solreffriction
-from adapters.mujoco.predictions import EITHER, EPS, law_of, settings_of, solver_error
+from adapters.mujoco.predictions import EITHER, EPS, law_of, solver_error
+from adapters.mujoco.profiles import PROFILES
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 
@@ -60,7 +61,7 @@ def _ball_on_face(profile: str, scene: Scene, dt: float) -> BallOnFace | None:
     friction, shape = scene.material(face.name, body.name).friction, body.shape
     if not (isinstance(shape, Disc | Sphere) and isinstance(face.shape, HalfSpace) and friction):
         return None  # smooth: the scalar law's
-    settings, contact = settings_of(profile, scene, dt), law_of(profile, scene, dt)
+    settings, contact = settings_of(PROFILES[profile], scene, dt), law_of(profile, scene, dt)
     own = pair_solreffriction(settings, dt)
     moment = body.inertia[0] if isinstance(body.inertia, tuple) else body.inertia
     return BallOnFace(

@@ -19,12 +19,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.law import AskedLaw, Law, Measure, Prediction
+from adapters.law import AskedLaw, Law, Measure, Prediction, settings_of
 from adapters.law.moved_starts import BLURRED, GAP_ROUND_OFF, PERTURBATIONS, SPREAD_FACTOR, SUM_ROUND_OFF, scale_of
 from adapters.mujoco.blows import blow_of, metrics_of, steps_of
 from adapters.mujoco.box_on_face import BoxOnFace
@@ -32,7 +31,6 @@ from adapters.mujoco.contact_law import ContactLaw
 from adapters.mujoco.motions import CORNERS, along_a_heading, as_trajectory, column, fall, is_vertical
 from adapters.mujoco.pairs import contact_law
 from adapters.mujoco.profiles import PROFILES
-from adapters.needs import needs
 from adapters.scene import Box, Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
 from adapters.trajectory import Measured
@@ -48,15 +46,10 @@ STILL = 0.01
 ENOUGH = 10
 
 
-def settings_of(profile: str, scene: Scene, dt: float) -> dict[str, Any]:
-    """Settings of a profile for a scene, by name."""
-    return {setting.name: setting.value for setting in PROFILES[profile](needs(scene), dt)}
-
-
 def law_of(profile: str, scene: Scene, dt: float) -> ContactLaw:
     """Law of the lowest pair; the scenes here have one material."""
     material = scene.material(scene.bodies[0].name, scene.bodies[1].name)
-    return contact_law(settings_of(profile, scene, dt), material.restitution, material.friction, dt)
+    return contact_law(settings_of(PROFILES[profile], scene, dt), material.restitution, material.friction, dt)
 
 
 def solver_error(profile: str, scene: Scene, dt: float) -> float:
@@ -65,7 +58,7 @@ def solver_error(profile: str, scene: Scene, dt: float) -> float:
     The cost is in units of the mean inertia, (3 m + 3 I)/6 < m here, times 6 unknowns; that far from its minimum, an
     acceleration has an error of ``sqrt(2 * 6 * tolerance)`` m/s^2 at most.
     """
-    return math.sqrt(12.0 * float(settings_of(profile, scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
+    return math.sqrt(12.0 * float(settings_of(PROFILES[profile], scene, dt)["tolerance"])) * dt + GAP_ROUND_OFF
 
 
 # ---- a ball on a floor -------------------------------------------------------------------------------------------
@@ -163,7 +156,7 @@ def _trembles(profile: str, scene: Scene, dt: float) -> float:
     its minimum, the lightest is accelerated by ``sqrt(2 tolerance 6 n inertia/m)``. A critically damped contact turns a
     constant push into a speed of at most 2/e of its time constant, which grows with the root of load over mass.
     """
-    settings = settings_of(profile, scene, dt)
+    settings = settings_of(PROFILES[profile], scene, dt)
     if settings["solref"] == "reflect":
         return 0.0
     boxes = scene.bodies[1:]
@@ -202,7 +195,7 @@ def box_on_face(profile: str, scene: Scene, dt: float) -> BoxOnFace | None:
         return None
     if any(body.twist[scene.dimension - 1 :]) or any(body.force[1:-1]) or any(body.torque):
         return None
-    return BoxOnFace.of(settings_of(profile, scene, dt), scene, dt)
+    return BoxOnFace.of(settings_of(PROFILES[profile], scene, dt), scene, dt)
 
 
 def incline_law(profile: str, metric: str) -> Law:
