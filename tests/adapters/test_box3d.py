@@ -65,7 +65,7 @@ def test_impulses_with_one_substep_and_none_with_more(units):
     assert rough[:, 2].mean() == pytest.approx(3.0 * 9.81, rel=1e-3) and np.isnan(rough[:, :2]).all()
 
 
-def test_torque_acts_in_the_first_step():
+def test_torque_in_the_first_step():
     """The engine computes moments in world axes when a body is placed, not when its mass is set."""
     box = resting(0.0, DT, torque=(0.0, 0.0, 0.4), pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0))
     assert drive(box).twist[-1, 1, 5] == pytest.approx(DT, rel=1e-4)
@@ -109,7 +109,7 @@ def slips(name, params, profile, steps):
      ("rocking_block", {"aspect": 0.5, "tilt": 0.7}, 200),
      ("tilt_table", {"ratio": 1.1, "aspect": 0.3}, 220), ("painleve", {"ratio": 1.2}, 60)],
 )  # fmt: skip
-def test_friction_holds_the_mean_of_near_and_far_points(name, params, steps, profile):
+def test_friction_at_the_mean_of_near_and_far_points(name, params, steps, profile):
     """The edge on which a body tips slides; the mean of its corners stands still, half of which are in the air."""
     (edge, middle), gaps = slips(name, params, profile, steps)
     assert gaps.max() > 0.02 and abs(gaps.min()) < 1e-3
@@ -122,7 +122,7 @@ def test_card_held_half_way_up():
     assert gaps.max() > 1.0 and foot > 1.2 * middle > 0.1
 
 
-def test_box_on_a_tilted_table_tips_late_on_points_kept():
+def test_tipping_on_a_tilted_table_with_kept_points():
     """Not within the run as shipped, and at its time with points found in every step."""
     params = {"ratio": 1.1, "aspect": 0.3}
     assert measured_of(ENGINE, "tilt_table", "default", 2, params)["passing_time"] is None
@@ -163,7 +163,7 @@ def test_flat_box_thrown_back_corner_by_corner():
     assert min(abs(v[2] / speed - found["rebound_ratio"]) for v, _ in orders) < 0.02
 
 
-def test_a_rod_on_its_end_rebounds_without_friction():
+def test_rebound_of_a_rod_on_its_end_without_friction():
     params = {"e": 0.5, "mu": 0.1}
     ((velocity, spin),) = Blow("kane", 2, params).over((0, 1))
     found = measured_of(ENGINE, "kane", "tuned", 2, params, substeps=64, units_per_metre=64.0)
@@ -187,7 +187,7 @@ def test_friction_by_the_compression_impulse_only(profile):
     assert slowed == pytest.approx(start + (right - start) / (1.0 + e), rel=1e-4)
 
 
-def test_touching_balls_stopped_together_lose_energy():
+def test_energy_of_touching_balls_stopped_together():
     """Balls that meet one at a time keep it, in a row and in a rack."""
     touching, apart = ({"n": 3.0, "apart": gap} for gap in (0.0, 0.05))
     assert measured_of(ENGINE, "cradle", "tuned", 2, touching)["energy_defect"] > 0.1
@@ -196,7 +196,7 @@ def test_touching_balls_stopped_together_lose_energy():
     assert measured_of(ENGINE, "rack", "tuned", 2, {})["asymmetry"] > 0.1
 
 
-def test_normal_on_a_wide_face_leans():
+def test_normal_on_a_wide_face():
     """By some 1e-5 of a blow at 2 m/s without friction or spin; on the side of a ball of 0.5 m the singles are 1e-7."""
     ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.1, 0.2, 0.53, 1, 0, 0, 0), (3.0, 1.7, -2.0, 0, 0, 0))
     lean = {}
@@ -208,7 +208,7 @@ def test_normal_on_a_wide_face_leans():
     assert 1e-6 < lean["wide"] < 1e-4 and lean["narrow"] < 0.2 * lean["wide"]
 
 
-def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
+def test_limit_of_speed_as_shipped_and_none_in_tuned():
     box = replace(resting().bodies[1], twist=(500.0, 0.0, 0.0, 0.0, 0.0, 0.0), pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0))
     fast = replace(resting(), bodies=(FLOOR, box), gravity=(0.0, 0.0, 0.0), duration=5 * DT)
     assert needs(fast).top_speed == 500.0
