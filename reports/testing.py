@@ -62,7 +62,7 @@ class Plugin:
             words = [word.strip() for word in (config.getoption("--scenes") or "*").split(",")]
             profiles = config.getoption("--crosscheck-profile")
             checked = [word for word in words if word != CORE]
-            self.slots = _slots(self.engine, checked, profiles) if checked else []
+            self.slots = _slots(self.engine, checked, profiles)
             self.core = _core_slots(self.engine, profiles) if CORE in words else []
         except (EngineError, SceneError) as error:
             raise pytest.UsageError(f"crosscheck: {error}") from None
