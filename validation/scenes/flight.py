@@ -176,7 +176,9 @@ def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     ]
     if scene.dimension == 2:
         return [*found, rounded(1.0, "a spin").check("momentum_drift", "1", truth["momentum_drift"], "no torque")]
-    return found + spinning.checks(spinning.moments(1.0, SIDES), _spin(3, p), time, dt, truth)
+    turning = spinning.checks(spinning.moments(1.0, SIDES), _spin(3, p), time, dt, truth)
+    # A turn over that may be so late that it is not seen is not judged.
+    return found + [c for c in turning if c.metric != "flip_time" or (c.truth or 0.0) + (c.bound or 0.0) <= time]
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:

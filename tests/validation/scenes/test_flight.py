@@ -63,6 +63,13 @@ def test_slow_spin_without_a_turn_over():
     assert failing(canonical, scene, flown(scene)) == set()
 
 
+def test_late_turn_over_at_the_end_of_the_time():
+    """It is due 5 ms before the end, and may be 19 ms late."""
+    canonical, scene = made("flight", 3, time=1.39)
+    late = flown(scene, own=lambda box: box * (0.995, 1.0, 1.0))
+    assert canonical.measure(scene, late)["flip_time"][0] is None and failing(canonical, scene, late) == set()
+
+
 @pytest.mark.parametrize("offset", [-1.0, 0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 @pytest.mark.parametrize("dimension", [2, 3])
