@@ -203,6 +203,20 @@ def test_run_without_error_is_certified(model):
     assert found.error[-1] < 1e-9
 
 
+@pytest.mark.parametrize("pull", [0.0, G])
+def test_gap_of_a_joint_blow_is_covered(pull):
+    """A disc meets the floor and, a gap later that counts as none, the wall; what is moved along one moves no other."""
+    wall = Body(HalfSpace((1.0, 0.0)), motion="fixed")
+    disc = Body(Disc(0.5), 1.0, 0.125, (0.5987 + 4e-12, 0.5987, 0.0), (-1.0, -1.0, 0.0))
+    both, alone = (Model(2, [*those, disc], (-pull, -pull), 0.5, 0.0) for those in ([FLOOR, wall], [wall]))
+    found = certify(both, Settings.exact(DT), 48)
+    truth = Simulation(alone, Settings.exact(DT)).record(48).pose[:, -1, 0]
+    assert found.holds, found.reasons
+    off = np.abs(found.pose[:, -1, 0] - truth)
+    assert 4e-12 < off.max() < 1e-10 and found.error[-1] < 1e-9
+    assert (off <= found.error).all()
+
+
 def test_refused_run_has_no_certificate():
     roof = Body(HalfSpace((0.0, -1.0), -0.5), motion="prescribed", twist=(0.0, -1.0, 0.0))
     model = Model(2, [FLOOR, roof, Body(Disc(0.2), 1.0, 0.02, (0.0, 0.25, 0.0))], (0.0, -G), 0.0, 0.0)
