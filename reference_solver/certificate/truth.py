@@ -400,7 +400,7 @@ def _error_of_loop(model: Model, settings: Settings, record: Record, steps: int,
 def _with_ends(model: Model, record: Record, dt: float, error: Array) -> Array:
     """Return the error (s,) with round-off, and with what ends of slips and of series leave out [m]."""
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
-    least = min(smallest_extent(body.shape) for body in model.bodies)
+    least = _size(model)
     if model.dimension == 3 and len(record.pieces.body_a if record.pieces else ()):
         noise += SLIP_ENDS * least
     for end, at_once, onward in zip(*ends_of_series(model, record, dt), strict=True):

@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.cones import within_cones
+from reference_solver.exact.kernels.forces import OPEN, SLIP, STICK
 from reference_solver.exact.refusals import Undecided, Unlawful
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
 
-OPEN, STICK, SLIP = 0, 1, 2
 #: Shares of the largest number of their kind below which forces, and velocities or accelerations, are none; what a
 #: solution may break the laws by; singular values that are round-off; what equations may leave.
 NONE, BROKEN, SINGULAR, ROUND_OFF = 1e-9, 1e-6, 1e-11, 1e-15

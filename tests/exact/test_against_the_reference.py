@@ -87,7 +87,7 @@ def test_deviating_answer_detected():
 def test_world_that_takes_longer_than_its_limit():
     known = ANSWERS["fuzz3 3"]
     assert compared(known, LIMIT).word == "same"  # compiles what it needs
-    assert compared(known, 0.02).word == "late"
+    assert compared(known, 1e-6).word == "late"
 
 
 def test_refused_world_counted_apart_from_different_ones(monkeypatch):

@@ -18,10 +18,6 @@ def hashed(*arrays):
     return hashlib.sha256(b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)).hexdigest()
 
 
-def of_pieces(record):
-    return hashed(*(each for name, each in vars(record.pieces).items() if name != "step"))
-
-
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("seed", range(3))
 def test_random_splits_have_the_bits_of_the_whole(key, seed):

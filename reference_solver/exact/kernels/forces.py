@@ -4,7 +4,7 @@ import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
 
-SLIP = 2
+OPEN, STICK, SLIP = 0, 1, 2
 #: Whether rows of a group are redundant.
 UNKNOWN, SINGLE, SHARED = -1, 0, 1
 
