@@ -83,19 +83,9 @@ def test_front_imported_only_by_reports():
     assert asking == {ROOT / "reports" / "__init__.py"}
 
 
-#: Who imports what tests the solver: the command that prints it. What judges runs stands in `certificate/`.
-VERIFYING = {"reports/command/certifying.py", "reports/command/fuzzing.py"}
-
-
-def test_tests_of_the_solver_imported_only_by_their_command():
-    room = ROOT / "reference_solver" / "verification"
-    importing = {
-        path.relative_to(ROOT).as_posix()
-        for package in LINE
-        for path in (ROOT / package).rglob("*.py")
-        if room not in path.parents and any(name.startswith("reference_solver.verification") for name in named(path))
-    }
-    assert importing == VERIFYING
+@pytest.mark.parametrize("package", [*LINE, FRONT])
+def test_no_package_imports_tests(package):
+    assert not [path for path in (ROOT / package).rglob("*.py") if "tests" in set(imported(path))]
 
 
 def named(path):
@@ -263,7 +253,6 @@ OTHER_MEANINGS = {
     ("adapters/receipts/__init__.py", "slide"): "a probe",
     ("adapters/receipts/probes.py", "flight"): "a probe",
     ("validation/bench/units.py", "pyramid"): "the pile on which iteration counts are timed",
-    ("reports/command/certifying.py", "impact"): "a part of `reference_solver.verification`",
 }
 
 
@@ -502,7 +491,8 @@ def test_every_drawn_example_is_asserted_about():
 
 def test_length_of_the_name_of_a_test():
     """`FAILED file::name` of pytest fits one line of 120 columns, as our code does (but for the solver's own tests)."""
-    names = [f"FAILED {name}" for name, _ in all_tests() if not name.startswith("tests/reference_solver/")]
+    apart = ("tests/reference_solver/", "tests/verification/")
+    names = [f"FAILED {name}" for name, _ in all_tests() if not name.startswith(apart)]
     assert [name for name in names if len(name) > 120] == []
 
 

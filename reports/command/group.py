@@ -64,7 +64,6 @@ SECTIONS = {
         "doctor": ("inspecting", "Check the installation."),
     },
     "The reference solver": {
-        "certify": ("certifying", "Test the reference solver against its stated accuracy."),
         "profile": ("benching", "Show how long each stage of a solver step takes."),
     },
     "Seldom needed": {

@@ -19,8 +19,8 @@ from oracle import World
 from reference_solver import Settings
 from reference_solver.certificate.truth import distance
 from reference_solver.exact import Refused
-from reference_solver.verification.known.gates import MOTIONS, SEEDS
-from reference_solver.verification.known.motion import TRUTH, Motion, off
+from tests.verification.known.gates import MOTIONS, SEEDS
+from tests.verification.known.motion import TRUTH, Motion, off
 
 
 def held(motion: Motion) -> tuple[str, str]:

@@ -24,8 +24,8 @@ from adapters.reference.simulation import solver_model
 from adapters.scene.drives import as_moving
 from reference_solver import Model, Settings
 from reference_solver.certificate.truth import certify
-from reference_solver.verification import random_scenes
-from reference_solver.verification.fuzz.scenes import DRAWN
+from tests.verification import random_scenes
+from tests.verification.fuzz.scenes import DRAWN
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, scene_of
 from validation.running.plan import QUICK_DT, Request, slots
@@ -85,7 +85,7 @@ def random_world(seed: int) -> World:
 
 
 def drawn(kind: str, dimension: int) -> Callable[[int], World]:
-    """Return the function that makes a world of ``verification.fuzz`` from a seed."""
+    """Return the function that makes a world of ``tests.verification.fuzz`` from a seed."""
 
     def world(seed: int) -> World:
         scene = DRAWN[kind](seed, dimension)

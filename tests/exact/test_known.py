@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from known import held
 
-from reference_solver.verification.known.gates import MOTIONS, SEEDS
+from tests.verification.known.gates import MOTIONS, SEEDS
 
 #: Of all motions one whose contacts begin and end where edges cross.
 LOOKED_AT = "box over the corner of a table"

@@ -8,7 +8,7 @@ import pytest
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate.truth import certify, distance
 from reference_solver.exact import Refused, events, forces, impacts, loop, rows, stiff, world
-from reference_solver.verification import self_test
+from tests.verification import self_test
 
 DT, G = 1 / 240, 9.81
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")

@@ -17,7 +17,7 @@ from reference_solver.planar.columns import GAP, PN, PT
 from reference_solver.spatial.certificate import certify as certify_spatial
 from reference_solver.spatial.certificate import open_solve as open_spatial
 from reference_solver.tally_summary import GATES, reasons
-from reference_solver.verification.space import SPACES
+from tests.verification.space import SPACES
 
 DT, G = 1.0 / 240.0, 9.81
 FRAME = (1.0, 0.0, 0.0, 0.0)

@@ -56,7 +56,7 @@ PLANTED = """
 import json, sys
 from reference_solver import Settings, Simulation
 from reference_solver.certificate.audit import ends_of_series
-from reference_solver.verification.fuzz.scenes import STRIDE, scene
+from tests.verification.fuzz.scenes import STRIDE, scene
 from reference_solver.stepping import impacts
 
 impacts.LOWEST *= float(sys.argv[1])

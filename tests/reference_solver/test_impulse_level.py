@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_solver.verification.turning_scenes import PLANE, SPATIAL, case
+from tests.verification.turning_scenes import PLANE, SPATIAL, case
 
 #: Rates [1/s] at which errors are compared.
 COARSE, FINE = 60, 120

@@ -11,7 +11,7 @@ from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation
 from reference_solver.compilation import from_python
 from reference_solver.pieces import FORCES
 from reference_solver.stepping.islands import allocate_islands, may_meet
-from reference_solver.verification.space import SPACES
+from tests.verification.space import SPACES
 
 G, DT = 9.81, 1.0 / 60.0
 REFERENCE = Settings.reference(DT)

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from reference_solver import Settings
 from reference_solver.certificate.relations import Change, canonical_order, defect, permuted, quaternion, run, turned
-from reference_solver.verification import metamorphic
-from reference_solver.verification.metamorphic import ANY_PROFILE, EXACT, REFERENCE_ONLY, REVERSIBLE, Trial, change_of
-from reference_solver.verification.scenes import DT, GROWTH, SCENES, Numbers
-from reference_solver.verification.space import SPACES
+from tests.verification import metamorphic
+from tests.verification.metamorphic import ANY_PROFILE, EXACT, REFERENCE_ONLY, REVERSIBLE, Trial, change_of
+from tests.verification.scenes import DT, GROWTH, SCENES, Numbers
+from tests.verification.space import SPACES
 
 #: Fixed seed, so that a failure is everyone's; each example steps six scenes.
 CHOSEN = settings(derandomize=True, max_examples=15)

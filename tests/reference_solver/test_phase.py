@@ -7,7 +7,7 @@ from reference_solver import Body, Disc, Model, Settings, Simulation, Sphere
 from reference_solver.compilation import from_python
 from reference_solver.stepping import phase
 from reference_solver.stepping.lasting import CONTACTS, HOPS, allocate_lasting
-from reference_solver.verification.space import GRAVITY, SPACES
+from tests.verification.space import GRAVITY, SPACES
 
 first_return = from_python(phase.first_return)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Model, Settings, Simulation
-from reference_solver.verification.space import GRAVITY as G
-from reference_solver.verification.space import SPACES
+from tests.verification.space import GRAVITY as G
+from tests.verification.space import SPACES
 
 PLANE = SPACES[0]
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings
-from reference_solver.verification.columns import interface_impulses
-from reference_solver.verification.space import GRAVITY as G
-from reference_solver.verification.space import SPACES
+from tests.verification.columns import interface_impulses
+from tests.verification.space import GRAVITY as G
+from tests.verification.space import SPACES
 
 DT = 1.0 / 240.0
 EPS = np.finfo(float).eps

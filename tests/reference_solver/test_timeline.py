@@ -11,7 +11,7 @@ from reference_solver.planar import step as planar
 from reference_solver.settings import Settings
 from reference_solver.spatial import step as spatial
 from reference_solver.timeline import timeline
-from reference_solver.verification.space import GRAVITY, SPACES
+from tests.verification.space import GRAVITY, SPACES
 
 
 def column(dimension):

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from reference_solver import Model, Settings, Simulation
 from reference_solver.certificate.truth import certify
 from reference_solver.geometry import rotation
-from reference_solver.verification.space import GRAVITY, ROUNDNESS, SPACES
+from tests.verification.space import GRAVITY, ROUNDNESS, SPACES
 
 RADIUS, MASS, TIME = 0.2, 1.3, 0.8
 #: Angle of the plank at the start [rad], its spin [rad/s], place and rate of the ball along it [m, m/s].

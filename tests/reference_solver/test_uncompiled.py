@@ -18,9 +18,9 @@ import pytest
 
 from reference_solver import Settings
 from reference_solver.certificate.relations import Change, run
-from reference_solver.verification.metamorphic import bound
-from reference_solver.verification.scenes import DT, SCENES, Numbers, Scene, model
-from reference_solver.verification.space import SPACES
+from tests.verification.metamorphic import bound
+from tests.verification.scenes import DT, SCENES, Numbers, Scene, model
+from tests.verification.space import SPACES
 
 SCRIPT = "import sys; sys.path.insert(0, {!r}); import test_uncompiled; test_uncompiled.save(sys.argv[1])"
 

@@ -5,7 +5,7 @@ import pytest
 
 from reference_solver import Body, Disc, Settings, Sphere
 from reference_solver.exact_contact import coulomb_solutions
-from reference_solver.verification.space import SPACES
+from tests.verification.space import SPACES
 
 DT, G = 1.0 / 240.0, 9.81
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings
-from reference_solver.verification.space import GRAVITY, SPACES
+from tests.verification.space import GRAVITY, SPACES
 
 #: Takes the disc away from warm starts, uncompiled.
 WITHOUT = """

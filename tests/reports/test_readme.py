@@ -92,7 +92,7 @@ RUN = {
     # As they stand.
     **{f"crosscheck {call}": [call] for call in (
         "bench bounce --engine chipmunk --dim 2", "bench my-scene.toml --engine chipmunk", "bundle",
-        "certify --order", "certify --self-test", "certify --random 10", "compile",
+        "compile",
         "cure mujoco pinch --dim 3", "cure mujoco stack --param mu=10 --param n=2", "dashboard", "doctor",
         "export bounce --engine bullet --to python -o bug.py", "export --parquet tables", "field",
         "findings --prove stack-sweeps", "frontier thin_wall", "new-adapter myengine", "nulls impact",
@@ -141,9 +141,6 @@ SLOW = {
     "bench my-scene.toml --engine chipmunk": "my-scene.toml@",
     "bundle": ".zip",
     "compile": "",  # where all are compiled it says nothing
-    "certify --order": "order",
-    "certify --self-test": "noticed at size",
-    "certify --random 10": "10",
     "cure mujoco pinch --dim 3": "<default>",
     "cure mujoco stack --param mu=10 --param n=2": "<default>",
     "field": "mujoco#239",
@@ -166,7 +163,6 @@ NOT_RUN = {
     "crosscheck accept --engine myengine": "writes into an engine's folder; test_accept_command.py runs it",
     "crosscheck bench --piles 80": "more than ten minutes of timing, one pile after the other",
     "crosscheck bench --targets": "ten minutes of timing; tests/reports/test_targets_command.py runs it on one scene",
-    "crosscheck certify": "more than ten minutes of gates; their tests are long ones of tests/reference_solver",
     "crosscheck run --full": "half an hour on two cores",
     "crosscheck run --full --cluster tcp://HOST:PORT": "network, and half an hour on two cores",
 }

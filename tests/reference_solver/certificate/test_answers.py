@@ -19,7 +19,7 @@ from reference_solver.certificate.relations import Change
 from reference_solver.certificate.truth import certify
 from reference_solver.exact_contact import coulomb_solutions
 from reference_solver.geometry import gap
-from reference_solver.verification.fuzz.scenes import scene
+from tests.verification.fuzz.scenes import scene
 
 DT, G = 1.0 / 240.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

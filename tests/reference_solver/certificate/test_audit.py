@@ -17,8 +17,8 @@ from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.truth import certify, distance
 from reference_solver.geometry import rotation
 from reference_solver.pieces import FIFTH_ORDER, IMPACT
-from reference_solver.verification import self_test
-from reference_solver.verification.fuzz.scenes import STRIDE, scene
+from tests.verification import self_test
+from tests.verification.fuzz.scenes import STRIDE, scene
 
 DT, G = 1.0 / 240.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -67,7 +67,7 @@ def test_there_are_many_corruptions_of_all_families():
 
 @pytest.mark.parametrize("part", range(7))
 def test_corruptions_are_caught(part):
-    """A seventh of them; `crosscheck certify --self-test` plants them all, at all sizes."""
+    """A seventh of them; `make certify ARGS="--self-test"` plants them all, at all sizes."""
     for corruption in self_test.CORRUPTIONS[part :: 7 * 2]:
         scene = self_test.SCENES[corruption.scene]
         assert self_test.seen_by(*corruption.plant(scene, self_test.JUDGED)), corruption.name

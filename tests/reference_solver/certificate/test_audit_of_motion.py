@@ -9,8 +9,8 @@ from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Setting
 from reference_solver.certificate.audit import CHECKS, audit, energy, space
 from reference_solver.certificate.audit.run import Run
 from reference_solver.pieces import FIFTH_ORDER, FROZEN
-from reference_solver.verification import self_test
-from reference_solver.verification.known import gates
+from tests.verification import self_test
+from tests.verification.known import gates
 
 G = 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Polygon, Settings, Simulation
 from reference_solver.certificate.audit import audit
-from reference_solver.verification import self_test
+from tests.verification import self_test
 
 G = 9.81
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")

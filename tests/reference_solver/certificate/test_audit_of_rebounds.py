@@ -9,8 +9,8 @@ import pytest
 from reference_solver import Body, Box, Model, Settings, Simulation
 from reference_solver.certificate.audit import audit
 from reference_solver.pieces import FIFTH_ORDER
-from reference_solver.verification import self_test
-from reference_solver.verification.known import gates
+from tests.verification import self_test
+from tests.verification.known import gates
 
 
 def refused(model, record, dt):

@@ -10,8 +10,8 @@ from reference_solver.certificate.audit import audit
 from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.audit.turning import UNKNOWN_CHANGE, _largest_turn, changes_of_force, turns_beside
 from reference_solver.pieces import FIFTH_ORDER, FORCES, Pieces
-from reference_solver.verification import self_test
-from reference_solver.verification.known import gates
+from tests.verification import self_test
+from tests.verification.known import gates
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 H = 1.0 / 240.0

@@ -7,7 +7,7 @@ import pytest
 
 from reference_solver import Body, Capsule, HalfSpace, Model, Settings
 from reference_solver.certificate.truth import certify
-from reference_solver.verification.space import GRAVITY
+from tests.verification.space import GRAVITY
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate.truth import certify
 from reference_solver.pieces import FORCES, IMPULSE_LEVEL
-from reference_solver.verification.fuzz.scenes import scene
-from reference_solver.verification.fuzz.trial import conditions
+from tests.verification.fuzz.scenes import scene
+from tests.verification.fuzz.trial import conditions
 
 G, UPRIGHT = 9.81, (1.0, 0.0, 0.0, 0.0)
 

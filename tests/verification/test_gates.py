@@ -1,0 +1,114 @@
+"""Every gate that `make certify` prints holds; the functions are those that the command calls."""
+
+import pytest
+
+from reference_solver.verification import Gate
+from tests.verification import (
+    columns,
+    conservation,
+    detection,
+    falling,
+    friction,
+    impact,
+    overlaps,
+    piles,
+    random_scenes,
+    rotation,
+    turning,
+)
+from tests.verification.space import SPACES
+from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
+
+
+def long(*call):
+    """A gate of several seconds of CPU or more: `make certify` measures it, and `make test-all`."""
+    return pytest.param(call, marks=pytest.mark.long)
+
+
+#: Piles of many seconds of CPU each.
+LONG = ("50 spheres", "8 spatial boxes", "50 discs", "50 discs and boxes", "50 boxes")
+IN_BOTH = [
+    (impact.single_rebound, "classical"),
+    (impact.single_rebound, "reference"),
+    (impact.apexes,),
+    (impact.rest_time,),
+    long(impact.elastic_bounces),
+    (impact.closing_wall,),
+    (impact.thin_wall,),
+    (friction.stopping,),
+    (friction.time_to_roll,),
+    (conservation.free_collisions,),
+    (columns.heavy_on_light, 1e6, 1e-8),
+    (columns.alternating, 1e6, 1e-8),
+    (impact.flat_rebound,),
+    (impact.deep_overlap,),
+    (impact.turning_box,),
+    (friction.creep,),
+    (friction.sliding,),
+    (friction.slide_to_roll,),
+    (columns.convergence,),
+    long(columns.column, 10, 100_000),
+    (columns.column, 50, 1000),
+    (columns.column, 200, 1000),
+    (columns.heavy_on_light, 1e2, 1e-12),
+    (columns.alternating, 1e2, 1e-12),
+    (columns.heavy_on_light, 1e4, 1e-10),
+    (columns.alternating, 1e4, 1e-10),
+    (columns.pyramid,),
+    (detection.seams, "box"),
+    (detection.first_impacts,),
+]
+ALONE = [
+    (overlaps.gates,),
+    (rotation.order, "classical"),
+    (rotation.error, "reference"),
+    (rotation.angular_momentum, "classical"),
+    (rotation.angular_momentum, "reference"),
+    *[(gate, PLANE, name) for gate in (turning.errors, turning.order) for name in CASES[2]],
+    *[(turning.impulse_order, PLANE, name) for name in SMOOTH[2]],
+    (turning.long_board,),
+    long(random_scenes.gates),
+    (falling.dominoes,),
+    (falling.rocking,),
+    *[long(piles.laws, name) if name in LONG else (piles.laws, name) for name in piles.KINDS],
+    *[(gate, SPATIAL, name) for gate in (turning.errors, turning.order) for name in CASES[3]],
+    (detection.seams, SPACES[0], "polygon"),
+    (detection.slender_rod,),
+]
+
+
+def named(call):
+    return "-".join(str(getattr(part, "name", getattr(part, "__name__", part))) for part in call)
+
+
+@pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
+@pytest.mark.parametrize("call", IN_BOTH, ids=named)
+def test_gate_holds_in_both_dimensions(call, space):
+    function, *arguments = call
+    rows = list(function(space, *arguments))
+    assert rows
+    assert [row for row in rows if not row.holds] == []
+
+
+@pytest.mark.parametrize("call", ALONE, ids=named)
+def test_gate_holds(call):
+    function, *arguments = call
+    rows = list(function(*arguments))
+    assert rows
+    assert [row for row in rows if not row.holds] == []
+
+
+def test_each_part_yields_what_its_functions_yield():
+    names = {row.quantity for row in rotation.gates()}
+    assert names == {
+        "free rotation: observed order",
+        "free rotation: |L|, relative",
+        "free rotation: error [rad]",
+        "free rotation: direction of L [rad]",
+    }
+
+
+def test_a_gate_from_below_is_failed_by_what_is_too_small_and_by_what_is_no_number():
+    assert Gate.at_least("", "", 2.0, 1.9, "").holds
+    assert not Gate.at_least("", "", 1.8, 1.9, "").holds
+    assert not Gate.at_least("", "", float("nan"), 1.9, "").holds

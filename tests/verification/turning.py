@@ -1,0 +1,96 @@
+"""Gates of contacts that turn: errors and orders against the truths of `turning_scenes`, a minute of a board."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference_solver.model import Array
+from reference_solver.settings import Settings
+from reference_solver.simulation import Simulation
+from reference_solver.verification import Gate
+from tests.verification.orders import RATES, fitted
+from tests.verification.space import GRAVITY, Space
+from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, board_on_log, case
+
+#: Largest error at 60 and at 240 steps a second [m, rad].
+ALLOWED = {60: 1e-8, 240: 1e-10}
+#: Least observed order, of the fifth-order scheme and of the impulse-level scheme on cases without events.
+ORDER, IMPULSE_ORDER = 4.5, 1.9
+#: What the control of phase lengths holds errors below, of motions of a metre or a radian (`phase.ERROR`): there they
+#: fall no more with the step.
+HELD_BELOW = 1e-11
+#: Length of the long run of the board [s], and what its energy and amplitude may be off, as shares of their own.
+LONG, KEPT = 60.0, 1e-8
+
+
+def errors(space: Space, name: str) -> Iterator[Gate]:
+    """Yield the error of one case at 1/60 and 1/240 s."""
+    for rate, allowed in ALLOWED.items():
+        yield Gate.at_most(
+            "turning contact [m, rad]", f"{name}, 1/{rate}", case(space, name).error(rate), allowed, space.name
+        )
+
+
+def order(space: Space, name: str) -> Iterator[Gate]:
+    """Yield the observed order of one case; errors below `HELD_BELOW` pass it."""
+    found = fitted(tuple(case(space, name).error(rate) for rate in RATES), floor=HELD_BELOW)
+    measured = math.inf if found is None else found
+    yield Gate.at_least("turning contact: observed order", name, measured, ORDER, space.name)
+
+
+def impulse_order(space: Space, name: str) -> Iterator[Gate]:
+    """Yield the observed order of the impulse-level scheme in one case."""
+    found = fitted(tuple(case(space, name).error(rate, "midpoint") for rate in RATES))
+    measured = math.inf if found is None else found
+    yield Gate.at_least("impulse-level scheme: observed order", name, measured, IMPULSE_ORDER, space.name)
+
+
+def long_board() -> Iterator[Gate]:
+    """Yield what a minute of rocking changes of the energy of the board, and of its amplitude."""
+    board = board_on_log(PLANE, time=0.0)
+    simulation = Simulation(board.model(), Settings.reference(1.0 / 240.0))
+    record = simulation.record(round(240.0 * LONG), 1)
+    body, pose, twist = board.bodies[1], record.pose[:, 1], record.twist[:, 1]
+    mass, inertia = float(body.mass), float(np.ravel(np.asarray(body.inertia))[0])
+    kinetic = 0.5 * mass * (twist[:, :2] ** 2).sum(axis=1) + 0.5 * inertia * twist[:, 2] ** 2
+    energy = kinetic + mass * GRAVITY * (pose[:, 1] - pose[0, 1])
+    off = float(np.abs(energy - energy[0]).max() / kinetic[0])
+    yield Gate.at_most("board on a log: energy lost or gained in 60 s", "share, 1/240", off, KEPT, "planar")
+    # Turning points lie between samples: a polynomial of sixth degree through seven of them is off by 1e-12.
+    swings = _peaks(pose[:, 2])
+    lost = abs(swings[-1] / swings[0] - 1.0)
+    yield Gate.at_most("board on a log: amplitude after 60 s", "share, 1/240", lost, KEPT, "planar")
+
+
+def _peaks(angle: Array) -> Array:
+    """Heights of all maxima, each from the polynomial through seven samples around it."""
+    middle = np.flatnonzero((angle[2:-3] > angle[1:-4]) & (angle[2:-3] >= angle[3:-2])) + 2
+    middle = middle[angle[middle] > 0.0]
+    found = []
+    for k in middle:
+        t = np.arange(-3.0, 4.0)
+        if k < 3 or k + 4 > len(angle):
+            continue
+        polynomial = np.polynomial.Polynomial.fit(t, angle[k - 3 : k + 4], 6)
+        turning = polynomial.deriv().roots()
+        inside = turning[(np.abs(turning.imag) < 1e-12) & (np.abs(turning.real) <= 1.0)].real
+        found.append(max(float(polynomial(x)) for x in inside))
+    return np.array(found)
+
+
+def rows(space: Space) -> Iterator[Gate]:
+    """Yield errors and orders of all cases in one dimension."""
+    for name in SMOOTH[space.dimension]:
+        yield from impulse_order(space, name)
+    for name in CASES[space.dimension]:
+        yield from errors(space, name)
+        yield from order(space, name)
+
+
+def gates() -> Iterator[Gate]:
+    """Yield all rows of the plane; those of space are `turning_in_space`."""
+    yield from rows(PLANE)
+    yield from long_board()
