@@ -207,20 +207,6 @@ class Simulation(ABC):
         """Release the engine's resources."""
 
 
-class Worlds(Simulation):
-    """Many worlds that one call steps, from `Engine.build_many`; the state of the first is read."""
-
-    def contacts(self) -> Contacts:
-        """Contacts of many worlds are not kept.
-
-        Raises
-        ------
-        EngineError
-            Always.
-        """
-        raise EngineError("contacts: many worlds keep none")
-
-
 ProfileRule = Callable[[Needs, float], list[Setting]]
 #: ``write(scene, dt, settings, steps)``: the run of a scene as a text that needs the engine only.
 #: The settings have passed `Engine.check_settings`.
@@ -369,21 +355,6 @@ class Engine(ABC):
     @abstractmethod
     def build(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> Simulation:
         """Make a world; ``settings`` holds every setting of the profile by name, ``iterations`` included."""
-
-    def build_many(
-        self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
-    ) -> Simulation | None:
-        """Make one world for each scene. One call steps all of them on ``threads`` threads.
-
-        Scenes have the same bodies; their numbers differ. The readers return the state of the first world. None if the
-        engine has no such call.
-
-        Raises
-        ------
-        EngineError
-            For a scene or a setting that `build` refuses.
-        """
-        return None
 
     @abstractmethod
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:

@@ -9,7 +9,7 @@ approximates them. [MuJoCo documentation: computation, modeling/solver parameter
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from importlib.metadata import version
 from itertools import pairwise
 from types import MappingProxyType
@@ -27,7 +27,7 @@ from adapters.mujoco.profiles import BROUGHT, PROFILES, check_settings
 from adapters.mujoco.releases import RELEASES
 from adapters.mujoco.script import mjcf, python
 from adapters.mujoco.shipped import DOC, IMPEDANCE_RANGE, KNOWN_BAD, SMALLEST_FRICTION
-from adapters.mujoco.simulation import MujocoSimulation, MujocoWorlds
+from adapters.mujoco.simulation import MujocoSimulation
 from adapters.mujoco.spec import moments
 from adapters.mujoco.urdf import read as read_urdf
 from adapters.needs import Needs
@@ -173,17 +173,6 @@ class MujocoEngine(Engine):
         check_settings(settings)
         if moved(scene) and settings["integrator"] == "RK4":
             raise EngineError("integrator: RK4 detects contacts within a step, where moving faces have no velocity")
-
-    def build_many(
-        self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int
-    ) -> Simulation | None:
-        """See `Engine.build_many`: ``mujoco.rollout``; None with loads, or where this adapter acts between steps."""
-        for scene in scenes:
-            self._check(scene, dt, settings)
-        loaded = any(any((*body.force, *body.torque)) or body.course is not None for s in scenes for body in s.bodies)
-        if loaded or any(map(moved, scenes)) or "rounds" in settings:
-            return None
-        return MujocoWorlds(scenes, dt, settings, threads)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Rebound as shipped, over all phases of a step; friction of a box that hops; sums of forces; RK4's fall."""

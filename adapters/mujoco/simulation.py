@@ -8,13 +8,13 @@ older than the pose.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adapters.copied import Copied
-from adapters.engine import Array, Contacts, EngineError, Worlds
+from adapters.engine import Array, Contacts, EngineError
 from adapters.mujoco.matched import Matched
 from adapters.mujoco.moving import Moved, moved
 from adapters.mujoco.releases import check_state, silence
@@ -235,35 +235,3 @@ def _memory_warnings(mujoco: Any, data: Any) -> list[Any]:
     """Counters of dropped contacts; they are MuJoCo's own, so they stay up to date."""
     kinds = mujoco.mjtWarning
     return [data.warning[kind] for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL)]
-
-
-@final
-class MujocoWorlds(Worlds, MujocoSimulation):
-    """Many models by ``mujoco.rollout``, which begins each call without warm start; the state of the first is read."""
-
-    def __init__(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> None:
-        from mujoco import rollout
-
-        super().__init__(scenes[0], dt, settings)
-        mj = self._mujoco
-        self._rollout = rollout.Rollout(nthread=threads)
-        self._models = [self._model, *(Spec(scene, dt, settings).compile() for scene in scenes[1:])]
-        self._workers = [mj.MjData(self._model) for _ in range(threads)]
-        self._full = [warning for data in self._workers for warning in _memory_warnings(mj, data)]
-        self._kind = mj.mjtState.mjSTATE_FULLPHYSICS
-        state = np.empty(mj.mj_stateSize(self._model, self._kind))
-        mj.mj_getState(self._model, self._data, state, self._kind)
-        self._states = np.tile(state, (len(scenes), 1))
-
-    def advance(self, steps: int) -> None:
-        """Make ``steps`` steps of all worlds; see `MujocoSimulation.advance`."""
-        if not steps:
-            return
-        states, _ = self._rollout.rollout(self._models, self._workers, self._states, nstep=steps)
-        self._states = states[:, -1].copy()
-        self._mujoco.mj_setState(self._model, self._data, self._states[0], self._kind)
-        self._check_memory()
-
-    def close(self) -> None:
-        """End the threads."""
-        self._rollout.close()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import math
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache
@@ -32,7 +32,7 @@ from adapters.receipts import FRICTION_SHARE
 from adapters.receipts.probes import SLIDE_TIME, slide_load, slide_speed
 from adapters.reference.profiles import KINDS, PROFILES, SOURCE
 from adapters.reference.script import python
-from adapters.reference.simulation import ReferenceSimulation, ReferenceWorlds, json_ready, solver_model
+from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
 from adapters.scene import Scene
 from adapters.scene.drives import as_moving
@@ -133,10 +133,6 @@ class ReferenceEngine(Engine):
         except OverflowError as error:
             wrong = [name for name, value in settings.items() if isinstance(value, float) and not math.isfinite(value)]
             raise EngineError(f"{', '.join(wrong) or 'scene'}: {error}") from None
-
-    def build_many(self, scenes: Sequence[Scene], dt: float, settings: Mapping[str, Any], threads: int) -> Simulation:
-        """See `Engine.build_many`: `reference_solver.Simulation.many`."""
-        return ReferenceWorlds(scenes, _checked(settings, dt), threads)
 
     def certify(
         self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Recorded, Simulation, Worlds
+from adapters.engine import Array, Contacts, Recorded, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 from adapters.scene.meeting import told_pairs
 
@@ -130,36 +129,6 @@ class ReferenceSimulation(Simulation):
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
         return found if self.settings.residual is None else {**found, "certified": found["holds"]}
-
-
-class ReferenceWorlds(Worlds, ReferenceSimulation):
-    """Many worlds by `reference_solver.Simulation.many`; what is read is the state of the first."""
-
-    def __init__(self, scenes: Sequence[Scene], settings: Any, threads: int) -> None:
-        from reference_solver import Simulation as Solver
-
-        super().__init__(scenes[0], solver_model(scenes[0]), settings)  # for `readback`; it is not stepped
-        told = [{"scene": scene} for scene in scenes]
-        self.worlds = Solver.many(solver_model, told, settings, threads)
-
-    def advance(self, steps: int) -> None:
-        """Make ``steps`` steps of all worlds."""
-        self.worlds.advance(steps)
-
-    def pose(self) -> Array:
-        """Poses of the first world."""
-        return np.asarray(self.worlds.pose[0], float)
-
-    def twist(self) -> Array:
-        """Twists of the first world."""
-        return np.asarray(self.worlds.twist[0], float)
-
-    def record(self, samples: int, stride: int, contacts: bool) -> None:
-        """Samples are taken by calls of `advance`."""
-
-    def certificate(self) -> dict[str, Any]:
-        """Many worlds have none."""
-        return {}
 
 
 def _contacts(found: Any) -> Contacts:

@@ -1,4 +1,4 @@
-"""``bench`` and ``profile``: cost of an answer of a given error, and time of each stage of the solver."""
+"""``bench``: cost of an answer of a given error."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.command.piles import show_piles
-from reports.command.selection import JOBS, SECONDS, Cases, gathered, missing, option, parameter, selection
+from reports.command.selection import JOBS, SECONDS, Cases, gathered, missing, option, selection
 from reports.command.targets import show_targets
 from reports.progress import run_plan
 from reports.stages import stage
 from reports.terminal import print_roles, terminal
-from reports.wording import at, plural, profiles_called
+from reports.wording import at, plural
 from validation.bench import agreement, reading
 from validation.bench.lane import FULL, QUICK, Limits, run_lane
 from validation.bench.sweep import Sweep, accuracy_slots, answered, benched, timed_units
-from validation.bench.units import Unit, prepared
+from validation.bench.units import Unit
 from validation.bench.work import certified_of
-from validation.cells import Outcome, Slot, parse_dt
+from validation.cells import Outcome, Slot
 from validation.files.distance import primary_of
 from validation.records.store import MissingError, Run, Store
 from validation.workers import TIMEOUT
@@ -236,35 +236,3 @@ def _disagreement(row: Mapping[Any, Any]) -> str:
         f"{row[f'ratio_{k}']:.3g} [{row[f'ratio_low_{k}']:.3g}, {row[f'ratio_high_{k}']:.3g}]" for k in (1, 2)
     )
     return f"  {what} {row['params_text']} x{row['iterations']:g}: {first}, now {second}"
-
-
-@main.command("profile", epilog="Example: crosscheck profile stack")
-@click.argument("scene")
-@click.option("--param", multiple=True, metavar="NAME=VALUE", help="Set a parameter of the scene.")
-@click.option("--profile", help="Profile of the reference solver; by default the exact one.")
-@click.option("--dim", default=2, show_default=True, type=click.IntRange(2, 3), help="2-D or 3-D.")
-@click.option("--dt", default="1/240", show_default=True, metavar="S", help="Time step [s].")
-@click.option("--steps", default=2000, show_default=True, type=click.IntRange(1), help="Number of timed steps.")
-@AS_JSON
-def profile_(
-    scene: str, param: tuple[str, ...], profile: str | None, dim: int, dt: str, steps: int, as_json: bool
-) -> None:
-    """Show how long each stage of a solver step takes.
-
-    Prints the median time of each stage. SCENE is a scene of the catalogue, such as pyramid (--param rows=13).
-    """
-    from reference_solver.timeline import timeline
-
-    ours = registry.solver()
-    chosen = profiles_called([profile or "solution"], [ours])[0]
-    slot = Slot(scene, tuple(map(parameter, param)), dim, ours, chosen, parse_dt(dt))
-    engine, posed, settings, _ = prepared(slot)
-    simulation: Any = engine.build(posed, slot.dt, settings)
-    stages = timeline(simulation.solver, steps, warm_up=24)
-    total = sum(stages.values())
-    if as_json:
-        click.echo(json.dumps({"per_step_s": total, "stages_s": stages}, indent=1))
-        return
-    for name, seconds in stages.items():
-        click.echo(f"{name:<20} {speed.duration(seconds):>9}  {seconds / total:4.0%}")
-    click.echo(f"{'a step':<20} {speed.duration(total):>9}  median of {steps} steps")

@@ -63,9 +63,6 @@ SECTIONS = {
         "prune": ("keeping", "Delete old runs."),
         "doctor": ("inspecting", "Check the installation."),
     },
-    "The reference solver": {
-        "profile": ("benching", "Show how long each stage of a solver step takes."),
-    },
     "Seldom needed": {
         "compile": ("running", "Compile the solver's kernels."),
         "run-cell": ("running", "Run cases given as JSON, for a scheduler."),

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reference_solver import Settings
-from reference_solver.certificate.relations import Change, canonical_order, defect, permuted, quaternion, run, turned
+from reference_solver.certificate.relations import Change, permuted, quaternion, turned
 from tests.verification import metamorphic
 from tests.verification.metamorphic import ANY_PROFILE, EXACT, REFERENCE_ONLY, REVERSIBLE, Trial, change_of
+from tests.verification.relations import canonical_order, defect, run
 from tests.verification.scenes import DT, GROWTH, SCENES, Numbers
 from tests.verification.space import SPACES
 

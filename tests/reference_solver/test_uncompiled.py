@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings
-from reference_solver.certificate.relations import Change, run
+from reference_solver.certificate.relations import Change
 from tests.verification.metamorphic import bound
+from tests.verification.relations import run
 from tests.verification.scenes import DT, SCENES, Numbers, Scene, model
 from tests.verification.space import SPACES
 

@@ -98,15 +98,6 @@ def test_a_bad_call_exits_with_two_and_one_line(tmp_path, monkeypatch, arguments
     assert result.exit_code == 2 and said in result.stderr and "Traceback" not in result.output
 
 
-@pytest.mark.long
-def test_a_profile_names_the_stages_of_a_step():
-    result = call("profile", "stack", "--param", "n=2", "--steps", "50", "--json")
-    assert result.exit_code == 0, result.stderr
-    data = json.loads(result.stdout)
-    assert {"detect", "prepare", "solve_velocities", "move"} <= set(data["stages_s"])
-    assert data["per_step_s"] == pytest.approx(sum(data["stages_s"].values()), rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("seconds", "shown"), [(2.5, "2.5 s"), (3.14159e-3, "3.14 ms"), (412e-6, "412 us"), (8.4e-9, "8.4 ns")]
 )

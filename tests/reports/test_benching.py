@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from reports.command import benching, main
+from reports.command import benching
 from validation.cells import Slot
 from validation.files.distance import primary_of
 from validation.records.store import Run
@@ -111,30 +111,3 @@ def test_bench_output_ends_with_run_seed_and_path(monkeypatch, tmp_path, as_json
         f"run 20260101-000000, seed {seed}; written: {tmp_path / 'bench'}",
         f"figures of error against time: crosscheck report --open --out {tmp_path}",
     ]  # fmt: skip
-
-
-def test_step_time_by_stage_with_shares(monkeypatch):
-    """The median of each stage, after a warm-up, of the profile that promises a solution."""
-    import reference_solver.timeline as timed
-
-    asked = []
-    engine = SimpleNamespace(
-        build=lambda scene, dt, settings: asked.append((scene, dt, settings)) or SimpleNamespace(solver="solver")
-    )
-    monkeypatch.setattr(benching, "prepared", lambda slot: asked.append(slot) or (engine, "posed", {"a": 1}, None))
-    monkeypatch.setattr(
-        timed, "timeline", lambda *given, **more: asked.append((given, more)) or {"contacts": 3e-6, "solve": 9e-6}
-    )
-    words = ["profile", "pyramid", "--param", "rows=3", "--dt", "1/120", "--steps", "50"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, done.output
-    slot, *rest = asked
-    assert slot == Slot("pyramid", (("rows", 3.0),), 2, "reference", "reference", 1 / 120)
-    assert rest == [("posed", 1 / 120, {"a": 1}), (("solver", 50), {"warm_up": 24})]
-    assert [line.split() for line in done.stdout.splitlines()] == [
-        ["contacts", "3", "us", "25%"], ["solve", "9", "us", "75%"],
-        ["a", "step", "12", "us", "median", "of", "50", "steps"],
-    ]  # fmt: skip
-    plain = json.loads(CliRunner().invoke(main, [*words, "--json", "--dim", "3", "--profile", "classical"]).stdout)
-    assert plain == {"per_step_s": 1.2e-5, "stages_s": {"contacts": 3e-6, "solve": 9e-6}}
-    assert (asked[3].dimension, asked[3].profile) == (3, "classical")

@@ -231,7 +231,6 @@ sys.meta_path.insert(0, Hidden())
             statuses.INCOMPLETE,
             "chipmunk did not run: No module",
         ),
-        (["profile", "impact"], statuses.INCOMPLETE, "numba"),
     ],
 )
 def test_missing_package_in_one_line_with_a_status(tmp_path, arguments, status, said):

@@ -11,7 +11,7 @@ from adapters import registry
 from validation.bench.agreement import agreement, ratios
 from validation.bench.reading import bench_runs, overhead, scaling, scaling_fits, timings_summary
 from validation.bench.sweep import Sweep, accuracy_slots, benched, timed_units
-from validation.bench.timing import Timing
+from validation.bench.timing import Timing, timing_from_dict
 from validation.bench.work import COST_LEVELS, ERROR_LEVELS, error_at_equal_time, time_at_equal_error, work_points
 from validation.cells import Observation, Outcome, Slot
 from validation.files.distance import primary_of
@@ -44,6 +44,13 @@ def timing(slot, seconds, round_=0, purpose="work", steps=100, opponent="a/defau
     fields = dict(cell="", engine_version="1.0", bodies=1, order=0, process=0, sampled=False, wall_seconds=seconds)
     fields |= dict(state_hash="s", error=None) | more
     return Timing(purpose, slot, opponent=opponent, round=round_, steps=steps, seconds=seconds, **fields)
+
+
+def test_timing_stored_with_fields_that_are_gone():
+    stored = timing(impact_slot("a", STEPS[0]), 1.0)
+    assert timing_from_dict(stored.as_dict() | {"worlds": 1, "threads": 1, "kernel": ""}) == stored
+    with pytest.raises(TypeError, match="unheard"):
+        timing_from_dict(stored.as_dict() | {"unheard": 1})
 
 
 def filled(store, errors, costs, title="bench test"):

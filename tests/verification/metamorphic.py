@@ -9,18 +9,17 @@ from functools import partial
 
 import numpy as np
 
-from reference_solver.certificate.relations import (
-    Change,
+from reference_solver.certificate.relations import Change, permuted
+from reference_solver.settings import Settings
+from reference_solver.verification import Gate
+from tests.verification.relations import (
     canonical_order,
     copies_defect,
     defect,
     permutation_defect,
-    permuted,
     reversed_defect,
     run,
 )
-from reference_solver.settings import Settings
-from reference_solver.verification import Gate
 from tests.verification.scenes import DT, GROWTH, SCENES, Numbers
 from tests.verification.space import SPACES, Space, made_by
 

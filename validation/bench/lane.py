@@ -175,9 +175,6 @@ def _timing(unit: Unit, opponent: Unit, round_: int, order: int, process: int, f
         found.state_hash,
         found.error,
         found.void,
-        unit.worlds,
-        unit.threads,
-        found.kernel,
     )
 
 

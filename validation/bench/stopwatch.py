@@ -11,19 +11,17 @@ import gc
 import hashlib
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Engine, Simulation
+from adapters.engine import Array, Simulation
 from adapters.isolation.foreign import said_by
 from adapters.registry import find
-from adapters.scene import Scene
 from adapters.scene.lift import lower_pose, lower_twist
 from adapters.stepping import advances
-from validation.bench.units import COLLAPSED, Unit, many, own_error, prepared, scene_of
+from validation.bench.units import COLLAPSED, Unit, own_error, prepared, scene_of
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,6 @@ class Lap:
     whole_seconds: float
     state_hash: str
     error: float | None
-    kernel: str = ""
     void: str = ""
 
 
@@ -45,10 +42,10 @@ def lap(unit: Unit) -> Lap:
     started = time.process_time()
     version = find(unit.slot.engine).version
     try:
-        seconds, wall, state, error, kernel = _clocked(unit)
+        seconds, wall, state, error = _clocked(unit)
     except BaseException as failure:  # any error of an engine ends this lap only
         return Lap(version, 0.0, 0.0, time.process_time() - started, "", None, void=said_by(failure))
-    return Lap(version, seconds, wall, time.process_time() - started, state, error, kernel, _void(unit, error))
+    return Lap(version, seconds, wall, time.process_time() - started, state, error, _void(unit, error))
 
 
 def _void(unit: Unit, error: float | None) -> str:
@@ -74,14 +71,14 @@ class Lowered:
         return lower_twist(self.inner.twist())
 
 
-def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
+def _clocked(unit: Unit) -> tuple[float, float, str, float | None]:
     engine, scene, settings, lifted = prepared(unit.slot)
     dt = unit.slot.dt
     if not unit.warm_up:  # the timed call is the whole scene: only a twin can warm caches and predictors
         twin = engine.build(scene, dt, settings)
         twin.advance(unit.steps)
         twin.close()
-    simulation, worlds = _built(unit, engine, scene, settings)
+    simulation = engine.build(scene, dt, settings)
     try:
         view = Lowered(simulation) if lifted else simulation
         start = np.array(view.pose())
@@ -95,18 +92,9 @@ def _clocked(unit: Unit) -> tuple[float, float, str, float | None, str]:
             error = own_error(scene_of(unit.slot), (unit.warm_up + unit.steps) * dt, start, pose)
         elif not np.isfinite(pose).all():
             error = math.inf
-        return seconds / worlds, wall / worlds, state, error, str(simulation.certificate().get("kernel", ""))
+        return seconds, wall, state, error
     finally:
         simulation.close()
-
-
-def _built(unit: Unit, engine: Engine, scene: Scene, settings: Mapping[str, Any]) -> tuple[Simulation, int]:
-    """Simulation of a unit, and the number of worlds that it steps."""
-    if unit.worlds > 1:
-        found = engine.build_many(many(scene, unit.worlds), unit.slot.dt, settings, unit.threads)
-        if found is not None:
-            return found, unit.worlds
-    return engine.build(scene, unit.slot.dt, settings), 1
 
 
 def _clock(simulation: Simulation, view: Any, steps: int, sampled: bool) -> tuple[float, float]:

@@ -53,7 +53,7 @@ TIMED_ONLY = "not run for its errors, which would take minutes"
 class Opponent:
     """Profile of an engine by its role, its sweeps (None: the profile's own), and the comparison with floor and target.
 
-    ``contacts`` is whether its contacts are counted, ``worlds`` the most worlds in one call (None: no limit).
+    ``contacts`` is whether its contacts are counted.
     """
 
     engine: str
@@ -61,7 +61,6 @@ class Opponent:
     sweeps: int | None
     floor: str
     contacts: bool = True
-    worlds: int | None = None
 
     @property
     def profile(self) -> str:
@@ -85,8 +84,6 @@ class Case:
     clock: tuple[float, float] | None = None
     drift: float | None = None
     timed_only: Sequence[str] = ()
-    worlds: int = 1
-    threads: int = 1
 
     def slot(self, engine: str, profile: str, sweeps: int | None) -> Slot:
         """Slot of this scene on an engine."""
@@ -253,8 +250,8 @@ class Ours:
         return self.at(sweeps).is_within(theirs)
 
 
-#: Timings of each slot and number of worlds, by round.
-Timings = Mapping[tuple[Slot, int], Mapping[int, Timing]]
+#: Timings of each slot, by round.
+Timings = Mapping[Slot, Mapping[int, Timing]]
 
 
 def measure(
@@ -268,12 +265,12 @@ def measure(
         errors = [_Errors(case, asked, lane, tell, known) for case in asked.cases]
     finally:
         lane.stop()
-    timings: dict[tuple[Slot, int], dict[int, Timing]] = defaultdict(dict)
+    timings: dict[Slot, dict[int, Timing]] = defaultdict(dict)
     units = [unit for each in errors for unit in each.units()]
     for timing in run_lane(units, limits, seed):
         tell(f"clocking, round {timing.round + 1}: {timing.slot.scene} on {timing.slot.engine}")
         if not timing.void:
-            timings[timing.slot, timing.worlds][timing.round] = timing
+            timings[timing.slot][timing.round] = timing
     for each in errors:
         yield from each.rows(timings)
 
@@ -328,15 +325,7 @@ class _Errors:
             slot for slot, found in self.theirs.items() if found.reason in ("", TIMED_ONLY)
         ]
         steps = step_count(lasting, case.dt)
-        return [
-            Unit("work", slot, "", bodies, warm_up, steps, worlds=self._worlds(slot), threads=case.threads)
-            for slot in slots
-        ]
-
-    def _worlds(self, slot: Slot) -> int:
-        """Worlds in one call: at most as many as the engine gets."""
-        most = next((each.worlds for each, found in self.opponents if found == slot), None)
-        return min(self.case.worlds, most or self.case.worlds)
+        return [Unit("work", slot, "", bodies, warm_up, steps) for slot in slots]
 
     def rows(self, timings: Timings) -> Iterator[Row]:
         """Rows of this scene."""
@@ -366,8 +355,8 @@ class _Errors:
     ) -> Row:
         case = self.case
         ours = self.ours.at(count or max(self.ours.known))
-        own = timings.get((case.ours(count), case.worlds), {}) if count else {}
-        other = timings.get((slot, self._worlds(slot)), {})
+        own = timings.get(case.ours(count), {}) if count else {}
+        other = timings.get(slot, {})
         # Their step over ours: above 1 ours is faster.
         found = ratio(other, own)
         interval = (found.median, found.low, found.high) if found else (None, None, None)

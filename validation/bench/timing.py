@@ -13,6 +13,9 @@ from validation.cells import Slot, slot_from_dict
 #: the number of bodies; cost over the number of iterations.
 Purpose = Literal["work", "overhead", "bodies", "iterations"]
 
+#: Fields of stored timings that are not read any more; they were the same in all.
+GONE = ("worlds", "threads", "kernel")
+
 
 @dataclass(frozen=True)
 class Timing:
@@ -33,8 +36,6 @@ class Timing:
         Round, position within it, and number of the timing process; all from 0.
     sampled
         Whether poses and twists were read after each step, and converted to the plane if the scene was embedded in 3-D.
-    worlds, threads, kernel
-        Worlds per call, threads, and the variant of a kernel if an engine names one.
     steps
         Steps in the timed call.
     seconds, wall_seconds
@@ -63,9 +64,6 @@ class Timing:
     state_hash: str
     error: float | None
     void: str = ""
-    worlds: int = 1
-    threads: int = 1
-    kernel: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that `timing_from_dict` reads back."""
@@ -74,4 +72,5 @@ class Timing:
 
 def timing_from_dict(data: Mapping[str, Any]) -> Timing:
     """Inverse of `Timing.as_dict`; texts are cleaned."""
-    return Timing(**{**plain(data), "slot": slot_from_dict(data["slot"])})
+    kept = {name: value for name, value in plain(data).items() if name not in GONE}
+    return Timing(**{**kept, "slot": slot_from_dict(data["slot"])})

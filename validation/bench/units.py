@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -42,8 +42,6 @@ class Unit:
     error
         Headline error, measured before; None for scenes of the bench, whose error is measured on the timed simulation
         itself.
-    worlds, threads
-        Worlds that one call steps (`many`), and on how many threads; an engine that has no such call steps one world.
     """
 
     purpose: Purpose
@@ -54,16 +52,13 @@ class Unit:
     steps: int
     error: float | None = None
     sampled: bool = False
-    worlds: int = 1
-    threads: int = 1
 
     @property
     def group(self) -> tuple[Any, ...]:
         """Key of units that are timed next to each other: same scene, size, step and purpose."""
         slot = self.slot
         iterations = slot.iterations if self.purpose == "iterations" else None
-        several = self.worlds > 1
-        return self.purpose, slot.scene, slot.dimension, slot.params, slot.dt, iterations, self.sampled, several
+        return self.purpose, slot.scene, slot.dimension, slot.params, slot.dt, iterations, self.sampled
 
     @property
     def series(self) -> tuple[Any, ...]:
@@ -142,13 +137,6 @@ def scene_of(slot: Slot) -> Scene:
     """Scene of a slot: one of the bench's own, else the catalogue's."""
     make = OWN.get(slot.scene) or resolve(slot.scene).scene
     return make(slot.dimension, dict(slot.params))
-
-
-def many(scene: Scene, worlds: int) -> list[Scene]:
-    """The scene, and others of its kind with friction between half and one and a half times as much."""
-    factors = np.linspace(0.5, 1.5, worlds - 1).tolist()
-    pairs = (tuple(replace(pair, friction=pair.friction * factor) for pair in scene.pairs) for factor in factors)
-    return [scene, *(replace(scene, pairs=each) for each in pairs)]
 
 
 def _free(scene: Scene) -> int:
