@@ -12,7 +12,6 @@ sn from a quarter period on [L. D. Landau, E. M. Lifshitz, Mechanics, section 37
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -30,16 +29,14 @@ SIDES = (1.0, 0.6, 0.2)
 AFTERMATH = 0.5
 
 
+def _start(p: Params) -> tuple[float, float, float]:
+    """Spin in body axes at the start [rad/s]."""
+    return 0.0, p["spin"], p["delta"] * p["spin"]
+
+
 def _flip(p: Params) -> float:
     """Time until the spin about the middle axis is 0 [s]."""
-    i1, i2, i3 = spinning.moments(1.0, SIDES)
-    low, high = i2 * (i2 - i1), i3 * (i3 - i1) * p["delta"] ** 2
-    rate = p["spin"] * math.sqrt((i3 - i2) * (low + high) / (i1 * i2 * i3))
-    # K(m) = pi/2 over the arithmetic-geometric mean of 1 and sqrt(1 - m).
-    a, b = 1.0, math.sqrt(high / (low + high))
-    while abs(a - b) > 1e-15 * a:
-        a, b = 0.5 * (a + b), math.sqrt(a * b)
-    return 0.5 * math.pi / a / rate
+    return spinning.turns_over(spinning.moments(1.0, SIDES), _start(p))
 
 
 def make(dimension: int, params: Params) -> Scene:
@@ -52,7 +49,7 @@ def make(dimension: int, params: Params) -> Scene:
         p["mass"],
         (float(own[0]), float(own[1]), float(own[2])),
         pose_at(3, (0.0, 0.0, 0.0)),
-        (0.0, 0.0, 0.0, 0.0, p["spin"], p["delta"] * p["spin"]),
+        (0.0, 0.0, 0.0, *_start(p)),
     )
     duration = (1.0 + AFTERMATH) * _flip(p)
     return Scene("tumble", 1, dimension, (body,), (), (0.0, 0.0, 0.0), duration, p)
@@ -84,8 +81,7 @@ def fate(scene: Scene, found: Mapping[str, Measured]) -> str:
 
 def checks(scene: Scene, dt: float, truth: dict[str, float]) -> list[Check]:
     """A first-order scheme: the sum of its errors in spin and attitude."""
-    start = (0.0, scene.params["spin"], scene.params["delta"] * scene.params["spin"])
-    return spinning.checks(spinning.moments(1.0, SIDES), start, scene.duration, dt, truth)
+    return spinning.checks(spinning.moments(1.0, SIDES), _start(scene.params), scene.duration, dt, truth)
 
 
 def error(scene: Scene, dt: float, found: Mapping[str, Measured]) -> Measured:

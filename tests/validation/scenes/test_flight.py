@@ -48,15 +48,6 @@ def test_time_of_a_turn_over_as_integrated():
     assert canonical.exact(scene)["flip_time"] == pytest.approx(found.t_events[0][0], rel=1e-10)
 
 
-def test_turn_over_of_another_box_as_of_tumble():
-    """Without spin about the first axis it is a complete integral, which `tumble` has by another formula."""
-    canonical, scene = made("tumble", 3)
-    own = spinning.moments(1.0, (1.0, 0.6, 0.2))
-    assert spinning.turns_over(own, scene.bodies[0].twist[3:]) == pytest.approx(
-        canonical.exact(scene)["flip_time"], rel=1e-12
-    )
-
-
 def test_slow_spin_without_a_turn_over():
     canonical, scene = made("flight", 3, spin=0.5)
     assert "flip_time" not in canonical.exact(scene)
@@ -68,6 +59,20 @@ def test_late_turn_over_at_the_end_of_the_time():
     canonical, scene = made("flight", 3, time=1.39)
     late = flown(scene, own=lambda box: box * (0.995, 1.0, 1.0))
     assert canonical.measure(scene, late)["flip_time"][0] is None and failing(canonical, scene, late) == set()
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_flights_of_random_sizes(dimension, seed):
+    draw = np.random.default_rng(seed).uniform
+    params = {"speed": 10.0 ** draw(0, 3), "spin": 10.0 ** draw(-1, 1), "time": draw(1.0, 5.0), "g": draw(0.0, 20.0)}
+    canonical, scene = made("flight", dimension, mass=10.0 ** draw(-3, 3), **params)
+    record = flown(scene, offset=draw(-1.0, 1.0))
+    assert failing(canonical, scene, record) == set()
+    weak, late = flown(scene), flown(scene)
+    weak.twist[:, :, dimension - 1] += 0.01 * scene.params["g"] * weak.t[:, None]
+    late.twist[1:, FALLS] = late.twist[:-1, FALLS].copy()
+    assert {"fall_speed"} <= failing(canonical, scene, weak) and {"fall_speed"} <= failing(canonical, scene, late)
 
 
 @pytest.mark.parametrize("offset", [-1.0, 0.0, 1.0])
@@ -99,6 +104,35 @@ def headed(scene, record):
     record.twist[:, BOX - 1, : scene.dimension] *= 1.0 - 1e-9
 
 
+def twice(scene, record):
+    """Gravity acts twice in one step."""
+    record.twist[10:, :, : scene.dimension] += DT * np.array(scene.gravity)
+
+
+def short(scene, record):
+    """A step is left out of the ways, not of the speeds."""
+    d = scene.dimension
+    record.pose[1:, THROWN:BOX, :d] -= DT * record.twist[1:, THROWN:BOX, :d]
+
+
+def swapped(scene, record):
+    """What is read of the first throw is the second's."""
+    record.pose[:, THROWN] = record.pose[:, THROWN + 1]
+    record.twist[:, THROWN] = record.twist[:, THROWN + 1]
+
+
+def spun(scene, record):
+    """The ball's spin has the other sign."""
+    record.twist[:, FALLS, scene.dimension :] *= -1.0
+
+
+def leaning(scene, record):
+    """Gravity leans by a microradian."""
+    way = 0.5e-6 * scene.params["g"] * record.t[:, None] ** 2
+    record.pose[:, :, 0] += way
+    record.twist[:, :, 0] += 1e-6 * scene.params["g"] * record.t[:, None]
+
+
 @pytest.mark.parametrize(
     "fault, noticed",
     [
@@ -106,6 +140,11 @@ def headed(scene, record):
         (capped, {"throw_speed", "heading_spread"}),
         (drifting, {"drift_across"}),
         (headed, {"heading_spread"}),
+        (twice, {"fall_speed"}),
+        (short, {"throw_way"}),
+        (swapped, {"throw_speed", "throw_way"}),
+        (spun, {"ball_spin"}),
+        (leaning, {"drift_across"}),
     ],
 )
 @pytest.mark.parametrize("dimension", [2, 3])
