@@ -84,6 +84,8 @@ def test_check_out_of_bounds_with_its_worst_case():
         "diverged: step 3: not finite at dt = 1/240 s, e=0.5",
     ]
     assert core._beyond([row(1.0002, 1 / 60)], seen, 1e-9) == []
+    exact, off = (SimpleNamespace(**vars(row(value, 1 / 60)) | {"tolerance": 0.0}) for value in (1.0, 1.0 + 1e-15))
+    assert core._beyond([exact], seen, 0.0) == [] and len(core._beyond([off], seen, 0.0)) == 1
     no_number = core._beyond([row(math.nan, 1 / 60)], seen, 1e-9)
     assert no_number == ["speed: nan, truth 1 +- 0.1 m/s at dt = 1/60 s, e=0.5"]
 

@@ -110,7 +110,8 @@ def _beyond(rows: Iterable[Row], seen: Mapping[Slot, Observation], floor: float)
             name, far, said = row.metric, math.inf, _why(row, seen)
         else:
             bound = max(row.tolerance, floor * max(1.0, abs(row.truth)) if floor > ROUND_OFF else 0.0)
-            far = abs(row.value - row.truth) / bound if bound else math.inf
+            off = abs(row.value - row.truth)
+            far = off / bound if bound else math.inf if off else 0.0
             name, said = (
                 row.metric,
                 f"{row.value:.8g}, truth {row.truth:.8g} +- {bound:.2g} {row.unit}".removesuffix(" 1"),
