@@ -18,7 +18,7 @@ OURS = [
     *("mujoco", "bullet", "chipmunk"),
     *(
         pytest.param(name, marks=pytest.mark.optional(name))
-        for name in ("box2d", "box2d3", "rapier", "dart", "physx", "drake", "newton")
+        for name in ("box2d", "box2d3", "rapier", "dart", "physx", "drake", "newton", "box3d")
     ),
 ]
 WITH_SCRIPT = [each for each in OURS if each != "box2d3" and getattr(each, "values", ("",))[0] != "box2d3"]
@@ -61,6 +61,10 @@ def scaled(by):
 
 FAULTS = {
     "1 % more": scaled(1.01 * np.eye(2)),
+    "1 % less": scaled(0.99 * np.eye(2)),
+    "both bodies of a contact added up": scaled(2.0 * np.eye(2)),
+    "a force in place of an impulse": scaled(np.eye(2) / DT),
+    "friction the other way": scaled(np.diag([-1.0, 1.0])),
     "the other sign": scaled(-np.eye(2)),
     "axes of the contact": scaled(np.array([[0.0, 1.0], [-1.0, 0.0]])),
     "one of four substeps": scaled(0.25 * np.eye(2)),
@@ -102,6 +106,21 @@ def test_a_reading_that_is_one_step_late_fails(situation):
     scene, run, keeps = made_up(situation)
     late = replace(run, read=[run.read[-1], *run.read[:-1]])
     assert judge(situation, scene, late, "vector", keeps).verdict == WRONG
+
+
+@pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
+def test_a_reading_of_another_body_fails(situation):
+    scene, run, keeps = made_up(situation)
+    others = replace(run, read=[[*step[1:], step[0]] for step in run.read])
+    assert judge(situation, scene, others, "vector", keeps).verdict == WRONG
+
+
+@pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
+def test_a_reading_that_is_wrong_in_one_step_fails(situation):
+    scene, run, keeps = made_up(situation)
+    once = spoilt(run, lambda step, body, told: told[:-1] if step == 4 else told)
+    told = judge(situation, scene, once, "vector", keeps)
+    assert (told.verdict, told.wrong, told.steps) == (WRONG, 1, 30)
 
 
 def test_a_force_in_flight_fails():

@@ -76,5 +76,6 @@ def _read(path: Path) -> Iterator[Known]:
     with path.open(encoding="utf-8", newline="") as lines:
         for row in csv.DictReader(lines):
             off, motion = (float(row[name]) if row[name] else None for name in ("off", "motion"))
-            judged = Judged(row["situation"], row["verdict"], off, row["where"], motion)
+            wrong, steps = (int(row[name]) if row[name] else None for name in ("wrong", "steps"))
+            judged = Judged(row["situation"], row["verdict"], off, row["where"], motion, wrong, steps)
             yield Known(row["engine"], row["version"], row["profile"], row["call"], judged)

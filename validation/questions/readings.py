@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -55,7 +55,7 @@ RIGHT, WRONG, MISSING, STOPPED = "right", "wrong", "not available", "not run"
 
 @dataclass(frozen=True)
 class Situation:
-    """A scene in which contact forces are known; scenes and cases are in ``readings.toml``.
+    """A scene in which contact forces are known; they are stated in ``readings.toml``.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Situation:
     what: str
     scene: str
     body: int
-    cases: tuple[Params, ...]
+    cases: Sequence[Params]
     pairs: Callable[[Array], Pairs]
     law: Callable[[Scene, float], tuple[Array, Array]] | None = None
     normal: int = -1
@@ -106,6 +106,8 @@ class Judged:
         What is wrong, or what is missing.
     motion
         How far the body's mean force, or impulse, is off the law, over the law's; None where it is within tolerance.
+    wrong, steps
+        In how many steps it is wrong, of how many; None if in all, or in none.
     """
 
     situation: str
@@ -113,6 +115,8 @@ class Judged:
     off: float | None = None
     where: str = ""
     motion: float | None = None
+    wrong: int | None = None
+    steps: int | None = None
 
 
 # ---- situations ------------------------------------------------------------------------------------------------------
@@ -170,29 +174,14 @@ def _downhill(scene: Scene) -> float:
     return 0.5 * abs(scene.gravity[0] / scene.gravity[-1])
 
 
-#: What is known in each situation: its law, normal axis, and functions as of `Situation`.
-_KNOWN: Mapping[str, Mapping[str, Any]] = {
-    "rest": {"what": "two boxes on each other: 2 m g and m g", "law": _carried, "pairs": _on_each_other},
-    "slope": {
-        "what": "a box at rest: m g cos a, m g sin a, (h/2) tan a downhill of the centre",
-        "law": _carried, "pairs": _on_floor, "placed": _downhill,
-    },
-    "sliding": {"what": "a box: m g, and mu m g against the velocity", "law": _slid, "pairs": _on_floor},
-    "blow": {
-        "what": "a thrown ball, over its steps: m v (1 + e), and what friction takes", "law": _struck,
-        "pairs": _on_floor, "is_sum": True,
-    },
-    "airborne": {"what": "between two bounces: 0", "pairs": _on_floor, "flies": True},
-    "grip": {
-        "what": "a box between wall and pad: N from both sides, which share its weight", "law": _gripped,
-        "pairs": _between, "normal": 0,
-    },
+#: Functions that ``readings.toml`` names.
+_NAMED: Mapping[str, Callable[..., Any]] = {
+    "carried": _carried, "slid": _slid, "struck": _struck, "gripped": _gripped, "downhill": _downhill,
+    "on_floor": _on_floor, "on_each_other": _on_each_other, "between": _between,
 }  # fmt: skip
 SITUATIONS = tuple(
-    Situation(
-        name=case["name"], scene=case["scene"], body=case["body"], cases=tuple(case["cases"]), **_KNOWN[case["name"]]
-    )
-    for case in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["situation"]
+    Situation(**told | {part: _NAMED[told[part]] for part in ("pairs", "law", "placed") if part in told})
+    for told in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["situation"]
 )
 
 
@@ -262,7 +251,6 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
         found, key=lambda each: (not each[0].max() <= allowed, each[0].max() / max(each[1], allowed))
     )
     off, wrong = float(series.max()) / max(scale, allowed), int((~(series <= allowed)).sum())
-    where += "" if wrong == len(steps) else f", in {wrong} of {len(steps)} steps"
     if not any(np.any(one.impulse) for step in run.read for each in step for one in each or ()):
         where = "reads 0"
     elif wrong and part == "vector":
@@ -274,7 +262,8 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
     verdict = WRONG if wrong else RIGHT
     if verdict == RIGHT and situation.placed and (told := _place(situation, scene, run)):
         return Judged(situation.name, WRONG, off, told, motion)
-    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion)
+    counts = (wrong, len(steps)) if 0 < wrong < len(steps) else (None, None)
+    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion, *counts)
 
 
 def _turned(scene: Scene, run: Heard, part: Part) -> float:
