@@ -16,6 +16,7 @@
         experiments.py    the same as Python, where a package makes them: EXPERIMENTS, and CANDIDATES, BELONGS, CURED
                           where there is no tuning.toml (`adapters.experiment`)
         unset.py          UNSET: what the engine does when nothing is set (`adapters.unset`)
+        numbers.csv       what is measured of it as shipped (`validation.settings.kept_numbers`)
         readings.py       READINGS: its ways to read contact forces (`adapters.readings`)
         readings.csv      whether they are true, as measured (`validation.questions.kept_readings`)
         force_script.py.txt   a script that reads a contact force rightly with the bare engine
@@ -57,7 +58,7 @@ from adapters.unset import Unset
 
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
 READINGS, READ, FORCE_SCRIPT = "readings", "readings.csv", "force_script.py.txt"
-CURES, PANELS, TUNING, EFFECTS = "cures.csv", "panels.csv", "tuning.toml", "effects.csv"
+CURES, PANELS, TUNING, EFFECTS, NUMBERS = "cures.csv", "panels.csv", "tuning.toml", "effects.csv", "numbers.csv"
 Row = TypeVar("Row")
 
 

@@ -128,6 +128,10 @@ class Unset:
     measure: Callable[[], float] | None = None
     within: float = 0.01
 
+    def agrees(self, measured: float) -> bool | None:
+        """Whether a measured number is the documented one; None where that is no number."""
+        return None if self.value is None else measured == self.value or abs(measured - self.value) <= self.within
+
 
 def ran(make: Make, asked: Asked, time: float) -> tuple[Told, float]:
     """State of a body after ``time`` [s], to a whole step, and that time."""

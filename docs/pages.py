@@ -120,20 +120,18 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"scenes/{scene.name}", describe(scene.name) | more | {"figure": parts(scene.figure)}
     yield "scenes/index", {"groups": groups}
     engines = [name for name in registry.names() if registry.adapter(name) is not None]
-    found = {}
     for name in engines:
         told = describe(name, measure=True)
         yield f"engines/{name}", told | {"settings": settings(told["profiles"])}
-        found[name] = numbers.of_engine(name, told["unset"])
     yield "engines/index", {"engines": {name: registry.facts(name) for name in engines}}
     yield "tolerances", {"introduction": inspect.getdoc(bounds), "sections": tolerances(), "reasons": reasons()}
     yield "references", references()
     yield "worked-example", worked.example()
-    yield "numbers", {"engines": found, "groups": numbers.COLUMNS}
+    yield "numbers", {"engines": {name: numbers.of_engine(name) for name in engines}, "groups": numbers.COLUMNS}
     yield (
         "forces",
         {
-            "engines": [readings.told(name) for name in readings.engines()],
+            "engines": [readings.told(name) | {"anchor": f"forces-{name}"} for name in readings.engines()],
             "laws": readings.LAWS,
             "scale": readings.SCALE,
         },

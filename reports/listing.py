@@ -186,8 +186,7 @@ def _unset(row: Unset, why_not: str) -> dict[str, Any]:
         measured = float(row.measure())
     except Exception as error:  # a release may raise any error in the calls
         return data | {"reason": said_by(error)}
-    agrees = None if row.value is None else measured == row.value or abs(measured - row.value) <= row.within
-    return data | {"measured": measured, "agrees": agrees, "reason": ""}
+    return data | {"measured": measured, "agrees": row.agrees(measured), "reason": ""}
 
 
 def doctor() -> dict[str, Any]:

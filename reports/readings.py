@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -16,6 +15,8 @@ from validation.questions.readings import SITUATIONS, STOPPED, WRONG, Judged, ca
 Plain = dict[str, Any]
 #: What the numbers of a table mean.
 SCALE = "largest error of a step over the largest true force of that pair or body; (1/480): in 1 of 480 steps"
+#: What a call has that has no whole vector.
+PARTS = {"normal": "normal parts", "size": "sizes of normal parts"}
 #: What is known in each situation.
 LAWS = {each.name: each.what for each in SITUATIONS}
 
@@ -27,12 +28,12 @@ def said(judged: Judged) -> str:
     if judged.where == "reads 0":
         return judged.where
     assert judged.off is not None
-    some = re.search(r"in (\d+) of (\d+) steps", judged.where)
-    return f"off {number(100.0 * judged.off, 2)} %" + (f" ({some[1]}/{some[2]})" if some else "")
+    some = f" ({judged.wrong}/{judged.steps})" if judged.wrong != judged.steps else ""
+    return f"off {number(100.0 * judged.off, 2)} %{some}"
 
 
 def told(engine: str, entries: Iterable[Known] | None = None) -> Plain:
-    """Readings of an engine with their verdicts, and its bare script.
+    """Readings of an engine with their verdicts, the best as shipped and where it is off, and a bare script.
 
     Parameters
     ----------
@@ -40,15 +41,30 @@ def told(engine: str, entries: Iterable[Known] | None = None) -> Plain:
         What was measured; None: the kept table.
     """
     found, facts = list(known_of(engine) if entries is None else entries), registry.facts(engine)
+    calls = [_of_reading(reading, [e for e in found if e.call == reading.call]) for reading in readings_of(engine)]
+    best, off = _best(calls)
     return {
         "engine": engine,
         "title": facts.title if facts else engine,
         "version": found[0].version if found else "",
-        "readings": [
-            _of_reading(reading, [e for e in found if e.call == reading.call]) for reading in readings_of(engine)
-        ],
+        "best": best,
+        "off": off,
+        "readings": calls,
         "script": force_script_of(engine),
     }
+
+
+def _best(calls: Sequence[Plain]) -> tuple[str, list[str]]:
+    """The call that is wrong as shipped in the fewest situations, and in which; none if it is wrong in most."""
+    wrong = {}
+    for each in calls:
+        cells = each["rows"][0]["cells"] if each["rows"] else {}
+        wrong[each["call"]] = [f"{name}: {said}" for name, said in cells.items() if said not in ("right", "not run")]
+    best = min(wrong, key=lambda call: len(wrong[call]), default="")
+    if not best or 2 * len(wrong[best]) > len(LAWS):
+        return "", []
+    part = next(each["part"] for each in calls if each["call"] == best)
+    return best, [*([] if part == "vector" else [f"{PARTS[part]} alone"]), *wrong[best]]
 
 
 def _of_reading(reading: Reading, entries: Sequence[Known]) -> Plain:
@@ -71,6 +87,7 @@ def _of_reading(reading: Reading, entries: Sequence[Known]) -> Plain:
                 reasons.setdefault(text, []).append(judged.situation)
     return {
         "call": reading.call,
+        "part": reading.part,
         "means": f"{reading.gives} of {reading.of}; {reading.on}; {reading.frame}; over {reading.over}",
         "correction": reading.correction,
         "hint": reading.hint,

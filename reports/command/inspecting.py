@@ -13,12 +13,14 @@ import click
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.engine_folder import NUMBERS, folder_of
 from adapters.scene import SceneError
 from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
 from reports.wording import profiles_called
+from validation.settings import kept_numbers
 
 
 @main.command("list", epilog="Example: crosscheck list scenes")
@@ -80,13 +82,19 @@ def list_(
 @main.command(epilog="Example: crosscheck describe bounce")
 @click.argument("name", shell_complete=names_of_either)
 @click.option("--measure", is_flag=True, help="Of an engine, also measure what it does when nothing is set [seconds].")
+@click.option("--keep", is_flag=True, help="Of an engine, measure and write numbers.csv of its folder.")
 @AS_JSON
-def describe(name: str, measure: bool, as_json: bool) -> None:
+def describe(name: str, measure: bool, keep: bool, as_json: bool) -> None:
     """Describe a scene or an engine.
 
     For a scene: figure, law, parameters, checks with the reasons of their tolerances. For an engine: profiles, settings
     with reasons, quirks, and what it does when nothing is set: as it is documented, and as it is measured on request.
     """
+    if keep:
+        folder = folder_of(name)
+        if folder is None:
+            raise EngineError(f"describe: {name} is no engine with a folder of its own to keep {NUMBERS} in")
+        kept_numbers.write(list(kept_numbers.measure_all(name)), folder / NUMBERS)
     data = listing.describe(name, measure)
     if as_json:
         click.echo(json.dumps(data, indent=1, default=str))
