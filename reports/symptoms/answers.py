@@ -70,7 +70,7 @@ def _candidates(found: Found) -> list[Plain]:
     told: dict[str, Plain] = {}
     for name in (match.name.partition("/")[0] for match in found.matches):
         if name in kept["scenes"]:
-            verdicts = {engine: _verdict(kept["engines"][engine]["scenes"].get(name, ())) for engine in found.engines}
+            verdicts = {engine: said for engine in found.engines if (said := _verdict(kept["engines"][engine], name))}
             told.setdefault(name, {"scene": name, "title": kept["scenes"][name]["title"], "command": ""})
             told[name]["verdicts"] = verdicts
         elif name in kept["topics"] and name != OUTSIDE:
@@ -81,8 +81,12 @@ def _candidates(found: Found) -> list[Plain]:
     return list(told.values())
 
 
-def _verdict(rows: Sequence[Sequence[Any]]) -> str:
-    return "fails" if any(row[1] for row in rows) else "passes" if rows else "does not run it"
+def _verdict(engine: Mapping[str, Any], scene: str) -> str:
+    """In a word; empty where no result is on record yet."""
+    rows = engine["scenes"].get(scene, ())
+    if not rows:
+        return "does not run it" if scene in engine["refused"] else ""
+    return "fails" if any(row[1] for row in rows) else "passes"
 
 
 def _of_topic(name: str, asked: Sequence[str]) -> Plain:
