@@ -372,6 +372,10 @@ class Engine(ABC):
         """
         return None
 
+    def at_other_tolerances(self, settings: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+        """Settings of the same run to a finer and to a coarser tolerance; none if its error comes from its steps."""
+        return []
+
     def kernels(self) -> Path | None:
         """Folder of machine code that this engine compiles at its first steps; None if it compiles nothing.
 

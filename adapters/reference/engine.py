@@ -170,6 +170,13 @@ class ReferenceEngine(Engine):
             "findings": {finding.name: json_ready(finding.value) for finding in found.findings},
         }
 
+    def at_other_tolerances(self, settings: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+        """See `Engine.at_other_tolerances`: steps of the event loop only say when it is looked at."""
+        from reference_solver.certificate.truth import TOLERANCES
+
+        shares = TOLERANCES if settings["scheme"] == "exact" else ()
+        return [{**settings, "accuracy": share * settings["accuracy"]} for share in shares]
+
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Friction of a rebounding box in 3-D with fixed sweeps; all else is exact in both profiles.
 

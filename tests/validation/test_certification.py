@@ -17,10 +17,16 @@ DT = 1 / 240
 
 
 class Certifying:
-    """An engine that certifies whatever it did."""
+    """An engine that certifies whatever it did; ``tolerances`` are those that its steps do not matter to."""
+
+    def __init__(self, tolerances=()):
+        self.tolerances = tolerances
 
     def certify(self, *asked):
         return {"holds": True, "reasons": []}
+
+    def at_other_tolerances(self, settings):
+        return [{"tolerance": each} for each in self.tolerances]
 
 
 def run(off, scene, dt, sampling):
@@ -119,3 +125,19 @@ def test_metric_without_far_samples_by_its_halves(monkeypatch):
     trajectory = run(lambda dt: 0.0, prepared.scene, DT, prepared.canonical.sampling(prepared.scene))
     told = fully_certified(Certifying(), prepared, slot, {}, trajectory).certificate["metric_errors"]
     assert told["braking"] == pytest.approx(2.0 * 1e-3 * 0.4 * 9.81, rel=1e-6)
+
+
+def test_error_of_an_engine_whose_steps_do_not_matter(monkeypatch):
+    """Twice the larger difference from runs to other tolerances, with the same steps."""
+    slot, metric = CELLS[0]
+    steps = []
+
+    def to_tolerance(engine, scene, dt, settings, sampling):
+        steps.append(dt)
+        return run(lambda dt: settings["tolerance"], scene, dt, sampling)
+
+    monkeypatch.setattr(certification, "run", to_tolerance)
+    prepared = prepare(slot)
+    trajectory = run(lambda dt: 1e-4, prepared.scene, DT, prepared.canonical.sampling(prepared.scene))
+    told = fully_certified(Certifying((1e-5, 1e-3)), prepared, slot, {}, trajectory).certificate["metric_errors"]
+    assert told[metric] == pytest.approx(2.0 * (1e-3 - 1e-4), rel=1e-6) and steps == [DT, DT]
