@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.kernels.forces import SHARED, UNKNOWN, solve_groups
+from reference_solver.exact.kernels.forces import solve_groups
 from reference_solver.exact.problem import (
     OPEN,
     ROUND_OFF,
@@ -73,6 +73,11 @@ class Held:
         self.forces, acceleration = self._solved(free, self.onward(contacts) if directions is None else directions)
         return acceleration
 
+    @property
+    def pushes(self) -> Array:
+        """(m, d) forces that `follow` found, in world axes."""
+        return self.contacts.along_axes(self.forces) if len(self.contacts) else self.answer.forces
+
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
         acceleration = self.follow(state.place, state.axes, state.velocity, free)
@@ -108,16 +113,10 @@ class Held:
         contacts, answer = self.contacts, self.answer
         forces, acceleration = np.zeros(answer.forces.shape), np.empty(free.shape)
         if not hasattr(self, "_groups"):
-            # Contacts in the order of their groups, where each begins; whether loads can be shared is asked only once.
             groups = contacts.groups
-            self._groups = np.concatenate(groups), np.cumsum([0, *map(len, groups)]), np.full(len(groups), UNKNOWN)
+            self._groups = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
         held = answer.modes, directions, contacts.friction, answer.forces, loads_shared(contacts, answer.forces)
-        asked = contacts.features, held, contacts.rows, free, self._groups, forces, acceleration
-        try:
-            solve_groups(*asked)
-        except np.linalg.LinAlgError:  # loads can be shared here, and not where the piece began
-            self._groups[2][:] = SHARED
-            solve_groups(*asked)
+        solve_groups(contacts.features, held, contacts.rows, free, self._groups, forces, acceleration)
         return forces, acceleration
 
 

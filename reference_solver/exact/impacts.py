@@ -67,7 +67,7 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
             blow = _struck(state, part, stopped)
         except NoImpulses:
             # A wedge cannot rebound from both sides at once; to and fro it can, and ends at rest where that is low.
-            high = fastest[-1] ** 2 > 2.0 * world.weight * series.LOW * world.size
+            high = fastest[-1] ** 2 > 2.0 * world.weight * series.height(world, state)
             if high or stopped.issuperset(part.pairs):
                 raise
             stopped |= set(part.pairs)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.integrate import DOP853
@@ -12,6 +13,7 @@ from reference_solver.exact.forces import Held, accelerations
 from reference_solver.exact.kernels.motion import write_free_acceleration, write_moved
 from reference_solver.exact.problem import ROUND_OFF, SLIP
 from reference_solver.exact.rotation import turned
+from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
 #: Changes of rows below this share of their size are round-off, and so are accelerations below this share of what
@@ -43,6 +45,8 @@ class Piece:
         Contacts that stay closed in it, with their forces at the beginning.
     turns
         Whether rows of contacts turn, so that forces follow.
+    push
+        (m, d, k) of a piece that turns: coefficients of impulses of its contacts in world axes.
     """
 
     start: State
@@ -51,6 +55,12 @@ class Piece:
     velocity: Array
     held: Held
     turns: bool
+    push: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+
+    @cached_property
+    def own_contacts(self) -> Contacts:
+        """Contacts that the loop does not go on with: they may be brought anywhere."""
+        return self.held.contacts.chosen(np.arange(len(self.held.contacts)))
 
     def at(self, s: float) -> tuple[Array, Array, Array]:
         """Return positions, axes and twists at a share."""
@@ -59,6 +69,11 @@ class Piece:
         velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])
         write_moved(self.start.place, self.start.axes, way, velocity, moved)
         return moved[0], moved[1], velocity
+
+    def impulse(self, s: float, rate: bool = False) -> Array:
+        """Return impulses (m, d) up to a share of a piece that turns, or their rates by it."""
+        powers = np.arange(self.push.shape[2])
+        return np.asarray(self.push @ (powers * s ** np.maximum(powers - 1, 0) if rate else s**powers))
 
     def state(self, s: float) -> State:
         """Return the state at a share."""
@@ -140,13 +155,13 @@ class Turning:
         self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
 
     def _rates(self, y: Array) -> Array:
-        """Rates (2 N,) of ways and twists."""
-        shape = self._state.velocity.shape
-        way, velocity = y.reshape(2, *shape)
+        """Rates (2 N + m d,) of ways and twists, and of impulses of contacts."""
+        shape, count = self._state.velocity.shape, self._state.velocity.size
+        way, velocity = y[: 2 * count].reshape(2, *shape)
         write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
         place, axes, rate = self._moved
         acceleration = self._held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
-        return np.concatenate([rate.ravel(), acceleration.ravel()])
+        return np.concatenate([rate.ravel(), acceleration.ravel(), self._held.pushes.ravel()])
 
     def step(self, length: float) -> tuple[Piece, float]:
         """Return a piece of at most a length [s], as long as the error stays below the tolerance, and the next length.
@@ -156,22 +171,22 @@ class Turning:
         """
         size = self._world.size
         count = self._state.velocity.size
-        start = np.concatenate([np.zeros(count), self._state.velocity.ravel()])
-        least = np.concatenate([np.full(count, size), 1e-2 + np.abs(start[count:])])
-        rates = np.zeros((16, 2 * count))
+        pushes = np.zeros(self._held.answer.forces.shape)
+        start = np.concatenate([np.zeros(count), self._state.velocity.ravel(), pushes.ravel()])
+        least = np.concatenate([np.full(count, size), 1e-2 + np.abs(start[count : 2 * count])])
+        rates = np.zeros((16, len(start)))
         rates[0] = self._rates(start)
         while True:
-            try:
-                for k in range(1, 12):
-                    rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
-                change = length * (DOP853.B @ rates[:12])
-                rates[12] = self._rates(start + change)
-            except np.linalg.LinAlgError:  # so far ahead that nothing is finite
+            for k in range(1, 12):
+                rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
+            change = length * (DOP853.B @ rates[:12])
+            rates[12] = self._rates(start + change)
+            if not np.isfinite(rates).all():  # so far ahead that there are no numbers
                 length *= SHORTER
                 continue
-            scale = self._tolerance * (least + np.abs(change))
-            fifth = ((DOP853.E5 @ rates[:13] / scale) ** 2).sum()
-            third = ((DOP853.E3 @ rates[:13] / scale) ** 2).sum()
+            scale, moves = self._tolerance * (least + np.abs(change[: 2 * count])), rates[:13, : 2 * count]
+            fifth = ((DOP853.E5 @ moves / scale) ** 2).sum()
+            third = ((DOP853.E3 @ moves / scale) ** 2).sum()
             error = length * fifth / np.sqrt((fifth + 0.01 * third) * len(scale)) if fifth > 0.0 else 0.0
             factor = min(LONGER, SAFE * error**-0.125) if error > 0.0 else LONGER
             if error <= 1.0:
@@ -179,14 +194,16 @@ class Turning:
             length *= max(SHORTER, factor)
         for k, row in enumerate(DOP853.A_EXTRA, 13):
             rates[k] = self._rates(start + length * (row[:k] @ rates[:k]))
-        dense = np.zeros((7, 2 * count))
+        dense = np.zeros((7, len(start)))
         dense[0] = change
         dense[1] = length * rates[0] - change
         dense[2] = 2.0 * change - length * (rates[12] + rates[0])
         dense[3:] = length * (DOP853.D @ rates)
-        way, velocity = (dense.T @ POWERS).reshape(2, *self._state.velocity.shape, 8)
+        every = dense.T @ POWERS
+        way, velocity = every[: 2 * count].reshape(2, *self._state.velocity.shape, 8)
         velocity[..., 0] = self._state.velocity
-        return Piece(self._state, length, way, velocity, self._held, turns=True), factor * length
+        push = every[2 * count :].reshape(*pushes.shape, 8)
+        return Piece(self._state, length, way, velocity, self._held, turns=True, push=push), factor * length
 
 
 def _powers() -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.cones import within_cones
-from reference_solver.exact.kernels.forces import OPEN, SLIP, STICK
+from reference_solver.exact.kernels.forces import OPEN, SLIP, STICK, solve_near
 from reference_solver.exact.refusals import Undecided, Unlawful
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
@@ -197,12 +197,7 @@ class Problem:
         scale, start = np.ones(len(rows)), np.zeros(len(rows))
         if near is not None:
             scale, start = loads_shared(self.contacts, near).ravel()[rows], near.ravel()[rows]
-        found = start
-        for _ in range(3):  # each round leaves of the last one's remainder what round-off does
-            remainder = wanted - matrix @ found
-            if np.abs(remainder).max() <= ROUND_OFF * np.abs(wanted).max():
-                break
-            found = found + scale * np.linalg.lstsq(matrix * scale, remainder, rcond=SINGULAR)[0]
+        found = solve_near(matrix, wanted, start, scale)
         if np.abs(matrix @ found - wanted).max() > NONE * self.size:
             return None
         return Answer(modes, directions, self.spread(modes, directions, rows, found))

@@ -2,7 +2,8 @@
 
 A piece of the loop may last longer than a step. It is recorded in parts that end where the world is looked at, so that
 the audit's bounds, which grow with the length of a part, stay those of ``dt``. Impulses of a part are integrals of the
-forces that contacts have along the piece, and bodies that share no contact have records of their own.
+forces that contacts have along the piece, which is integrated with them. Bodies that share no contact have records of
+their own.
 """
 
 from __future__ import annotations
@@ -13,25 +14,20 @@ from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.special import roots_legendre
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.forces import Held
-from reference_solver.exact.motion import Piece, free_acceleration
-from reference_solver.exact.rows import Contacts
+from reference_solver.exact.motion import Piece
+from reference_solver.exact.rows import Contacts, labels, moments
 from reference_solver.model import Array
 from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
 from reference_solver.records import Contacts as Handed
 
 #: Changes of velocity below this are round-off and no blow [m/s, rad/s].
 NO_BLOW = 1e-13
-#: Shares of a piece at which forces are asked for, so many as make a polynomial of the degree of the velocities, and
-#: the Chebyshev series of its integral from values there.
-NODES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(8) + 0.5) / 8)
-SERIES = chebyshev.chebint(np.linalg.inv(chebyshev.chebvander(2.0 * NODES - 1.0, 7)), scl=0.5)
+#: Shares of a part, and their weights, at which moments of its impulses are taken: enough for polynomials of degree 7.
+GAUSS = [0.5 + 0.5 * roots_legendre(4)[0], 0.5 * roots_legendre(4)[1]]
 
 
 class Acting(NamedTuple):
@@ -52,8 +48,25 @@ class Acting(NamedTuple):
     def of(cls, contacts: Contacts, impulse: Array, moment: Array | None = None) -> Acting:
         """Return what contacts did with impulses in world axes, which act where they are unless moments are told."""
         rows = contacts.rows
-        own = about_origin(rows.place, impulse) if moment is None else moment
+        own = moments(rows.place, impulse) if moment is None else moment
         return cls(contacts.features, rows.gap.copy(), rows.place.copy(), rows.frame[:, 0].copy(), impulse, own)
+
+    @classmethod
+    def between(cls, part: Part) -> Acting:
+        """Return what contacts did in a part of a piece, without moving those that the loop goes on with."""
+        piece = part.piece
+        contacts = piece.own_contacts.at(*piece.at(part.first))
+        if not piece.turns:
+            force = contacts.along_axes(piece.held.answer.forces)
+            return cls.of(contacts, (part.last - part.first) * piece.length * force)
+        impulse, moment = piece.impulse(part.last) - piece.impulse(part.first), np.zeros(())
+        first, length = contacts.rows.place.copy(), part.last - part.first
+        for node, weight in zip(*GAUSS, strict=True):
+            share = part.first + length * node
+            place = contacts.at(*piece.at(share)).rows.place
+            # Far from the origin the way of a place is known to more digits than the place.
+            moment = moment + length * weight * moments(place - first, piece.impulse(share, rate=True))
+        return cls.of(contacts.at(*piece.at(part.first)), impulse, moment + moments(first, impulse))
 
 
 @dataclass(frozen=True)
@@ -77,7 +90,7 @@ class Blow:
     @classmethod
     def of(cls, after: State, contacts: Contacts, impulses: Array, scheme: int = FROZEN) -> Blow:
         """Return a blow of impulses (m, d) along the frames."""
-        return cls(after, Acting.of(contacts, along_axes(contacts, impulses)), scheme)
+        return cls(after, Acting.of(contacts, contacts.along_axes(impulses)), scheme)
 
 
 class Part(NamedTuple):
@@ -86,49 +99,6 @@ class Part(NamedTuple):
     piece: Piece
     first: float
     last: float
-
-
-def along_axes(contacts: Contacts, forces: Array) -> Array:
-    """Return forces (m, d) along frames in world axes."""
-    return np.asarray(np.einsum("mk,mkp->mp", forces, contacts.rows.frame))
-
-
-def about_origin(place: Array, force: Array) -> Array:
-    """Return moments (m, 1 | 3) of forces at places (m, d)."""
-    if place.shape[1] == 2:
-        return (place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0])[:, None]
-    return np.cross(place, force)
-
-
-class Course:
-    """What contacts of a piece do on the way, looked at without moving the contacts that the loop goes on with."""
-
-    def __init__(self, world: World, piece: Piece) -> None:
-        self._piece, held = piece, piece.held
-        self._contacts = held.contacts.chosen(np.arange(len(held.contacts)))
-        self._turns = piece.turns and len(held.contacts) > 0
-        if not self._turns:
-            self._force = along_axes(self._contacts.at_state(piece.start), held.answer.forces)
-            return
-        own = Held(self._contacts, held.answer, held.acceleration)
-        values, self._place = [], self._contacts.at_state(piece.start).rows.place.copy()
-        for share in NODES:
-            place, axes, velocity = piece.at(share)
-            own.follow(place, axes, velocity, free_acceleration(world, axes, velocity))
-            force = along_axes(self._contacts, own.forces)
-            # Far from the origin the way of a place is known to more digits than the place.
-            values.append(np.concatenate([force, about_origin(self._contacts.rows.place - self._place, force)], axis=1))
-        self._series = np.einsum("ij,jmk->imk", SERIES, np.array(values))
-
-    def between(self, first: float, last: float) -> Acting:
-        """Return what contacts did between two shares."""
-        contacts, length = self._contacts.at(*self._piece.at(first)), self._piece.length
-        if not self._turns:
-            return Acting.of(contacts, (last - first) * length * self._force)
-        ends = chebyshev.chebvander(2.0 * np.array([first, last]) - 1.0, len(NODES))
-        found, d = length * np.einsum("i,imk->mk", ends[1] - ends[0], self._series), self._place.shape[1]
-        impulse = found[:, :d]
-        return Acting.of(contacts, impulse, found[:, d:] + about_origin(self._place, impulse))
 
 
 class Row(NamedTuple):
@@ -147,7 +117,6 @@ class Recorder:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._course: tuple[Piece, Course] | None = None
 
     def begin(self, pose: Array, twist: Array) -> None:
         """Begin a record where bodies are."""
@@ -157,22 +126,17 @@ class Recorder:
 
     def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
         """Return contacts as a simulation hands them out: each once, as it was first, with the sum of its impulses."""
-        found = [part.acting if isinstance(part, Blow) else self._along(part) for part in parts]
-        if not found:
+        found = [part.acting if isinstance(part, Blow) else Acting.between(part) for part in parts]
+        if not any(len(each.gap) for each in found):
             return Handed.empty(0, self._world.dimension)
         every = Acting(*(np.concatenate(each) for each in zip(*found, strict=True)))
         key = np.column_stack([every.features[:, :2], self._numbered(every.features)])
-        _, at, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        impulse = np.zeros((len(at), self._world.dimension))
-        np.add.at(impulse, which.ravel(), every.impulse)
-        a, b, feature = key[at].T
-        return Handed(a, b, feature, every.point[at], every.normal[at], impulse, every.gap[at])
-
-    def _along(self, part: Part) -> Acting:
-        """Return what contacts did in a part of a piece."""
-        if self._course is None or self._course[0] is not part.piece:
-            self._course = part.piece, Course(self._world, part.piece)
-        return self._course[1].between(part.first, part.last)
+        order = np.lexsort(key.T[::-1])
+        begins = np.append(True, (np.diff(key[order], axis=0) != 0).any(axis=1))
+        first = order[begins]
+        impulse = np.add.reduceat(every.impulse[order], np.flatnonzero(begins))
+        a, b, feature = key[first].T
+        return Handed(a, b, feature, every.point[first], every.normal[first], impulse, every.gap[first])
 
     def _numbered(self, features: Indices) -> Indices:
         """Return one number (m,) for the features of each contact (m, 6)."""
@@ -209,7 +173,7 @@ class Recorder:
         piece, start, end = part.piece, part.piece.state(part.first), part.piece.state(part.last)
         self._bring(start)
         length = (part.last - part.first) * piece.length  # to more digits than times have
-        acting = self._along(part)
+        acting = Acting.between(part)
         for bodies, own in self._groups(acting.features):
             turns = piece.turns and bool(own.any())
             label = (step, FORCES, FIFTH_ORDER if turns else FROZEN)
@@ -224,10 +188,7 @@ class Recorder:
         """Yield bodies that share contacts, with what is moved and touches them, and which contacts (m,) are theirs."""
         bodies, pairs = self._world.bodies, features[:, :2]
         free = bodies.free == 1
-        both = pairs[free[pairs].all(axis=1)]
-        n = len(free)
-        joined = coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
-        label = connected_components(joined, directed=False)[1]
+        n, label = len(free), np.array(labels(free.tolist(), pairs.tolist()))
         of = np.where(free[pairs[:, 0]], label[pairs[:, 0]], label[pairs[:, 1]])
         moved = ~free & (self._state[:, -self._world.shape[1] :] != 0.0).any(axis=1)
         for group in dict.fromkeys(label[free].tolist()):

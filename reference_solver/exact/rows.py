@@ -12,6 +12,7 @@ where G a collects the accelerations a of the bodies. A kind of contact tells n,
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -124,19 +125,10 @@ class Contacts:
     def groups(self) -> list[Indices]:
         """Contacts that share free bodies, at first hand or not, by their numbers."""
         free = self.world.bodies.free.tolist()
-        group = list(range(len(free)))  # of each body a number that all of its group have
-
-        def first(i: int) -> int:
-            while group[i] != i:
-                i = group[i]
-            return i
-
-        for a, b in self.pairs:
-            if free[a] and free[b]:
-                group[first(b)] = first(a)
+        label = labels(free, self.pairs)
         of: dict[int, list[int]] = {}
         for k, (a, b) in enumerate(self.pairs):
-            of.setdefault(first(a if free[a] else b), []).append(k)
+            of.setdefault(label[a if free[a] else b], []).append(k)
         return [np.array(each) for each in of.values()]
 
     def _spread(self, blocks: Array) -> Array:
@@ -153,6 +145,10 @@ class Contacts:
         """Return accelerations (n, q) by forces (m, d) along the frames, or changes of velocities by impulses."""
         return np.asarray((self.matrices[1] @ forces.ravel()).reshape(self.world.shape))
 
+    def along_axes(self, forces: Array) -> Array:
+        """Return forces (m, d) along the frames in world axes."""
+        return np.asarray(np.einsum("mk,mkp->mp", forces, self.rows.frame))
+
     @property
     def matrices(self) -> tuple[Array, Array]:
         """G (m d, n q) and H = M^-1 G' (n q, m d)."""
@@ -160,6 +156,23 @@ class Contacts:
             rows, yields = self._spread(self.rows.row), self._spread(self.rows.yields)
             self._matrices = rows, np.ascontiguousarray(yields.T)
         return self._matrices
+
+
+def labels(free: Sequence[int], pairs: Iterable[Sequence[int]]) -> list[int]:
+    """Return a number for each body, the same for free ones that pairs join, at first hand or not."""
+    label = list(range(len(free)))
+    for a, b in pairs:
+        if free[a] and free[b] and label[a] != label[b]:
+            old, new = label[b], label[a]
+            label = [new if each == old else each for each in label]
+    return label
+
+
+def moments(place: Array, force: Array) -> Array:
+    """Return moments (m, 1 | 3) of forces at places (m, d) about the origin."""
+    if place.shape[1] == 2:
+        return (place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0])[:, None]
+    return np.cross(place, force)
 
 
 def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:

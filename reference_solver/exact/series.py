@@ -21,12 +21,17 @@ from reference_solver.exact.refusals import Refused
 from reference_solver.exact.rows import Contacts
 from reference_solver.pieces import ROCKING
 
-#: Rebounds no higher than this share of the smallest half width are summed.
+#: Rebounds no higher than this share of the smallest half width are summed, and than what coordinates resolve.
 LOW = 1e-13
 
 
+def height(world: World, state: State) -> float:
+    """Return how high a rebound may be that is summed [m]."""
+    return LOW * world.size + 2.0 * float(np.spacing(np.abs(state.place).max()))
+
+
 def _low(world: World, state: State, contacts: Contacts) -> tuple[NDArray[np.bool_], set[tuple[int, ...]]]:
-    """Which contacts (m,) part so slowly that they rise by less than `LOW`, and the names of those that stay closed."""
+    """Which contacts (m,) part so slowly that they do not rise by `height`, and the names of those that stay closed."""
     contacts.at_state(state)
     none: set[tuple[int, ...]] = set()
     parts = contacts.rows.speed[:, 0]
@@ -38,7 +43,7 @@ def _low(world: World, state: State, contacts: Contacts) -> tuple[NDArray[np.boo
     except Refused:
         return np.zeros(len(contacts), bool), none
     falls = -accelerations(contacts.at_state(state), held.acceleration)[:: world.dimension]
-    low = (parts > STILL) & (falls > 0.0) & (parts**2 < 2.0 * falls * LOW * world.size)
+    low = (parts > STILL) & (falls > 0.0) & (parts**2 < 2.0 * falls * height(world, state))
     return low, set(held.contacts.names)
 
 

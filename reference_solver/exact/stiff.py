@@ -60,17 +60,19 @@ class Stiff:
         self._directions = held.onward(held.contacts)
         rubs = (held.answer.modes == SLIP) & (held.contacts.friction > 0.0)
         self._slips = np.flatnonzero(rubs & self._directions.any(axis=1))
-        _, self._start, turn, slip, across = self._at(np.zeros(state.velocity.shape), state.velocity, self._directions)
+        _, self._start, _, turn, slip, across = self._at(
+            np.zeros(state.velocity.shape), state.velocity, self._directions
+        )
         sizes = np.maximum(np.linalg.norm(slip, axis=1), SLIPPING)
         self.rate = float(np.abs((across * turn).sum(axis=1) / sizes).max(initial=0.0))
 
-    def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Rates of ways and accelerations (N,); of slips, how they turn accelerations, along and across, and rows."""
+    def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, ...]:
+        """Rates of ways, accelerations (N,), pushes; of slips, how they turn accelerations, along and across, rows."""
         write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
         place, axes, rate = self._moved
         free = free_acceleration(self._world, axes, velocity)
         held = self._held
-        acceleration = held.follow(place, axes, velocity, free, directions)
+        acceleration, pushes = held.follow(place, axes, velocity, free, directions), held.pushes
         turn, across = np.zeros((2, len(self._slips), velocity.size))
         rows = held.contacts.matrices[0].reshape(len(held.contacts), 3, -1)
         slip = np.zeros((len(self._slips), 2))
@@ -80,7 +82,7 @@ class Stiff:
             across[out] = first * rows[k, 2] - second * rows[k, 1]
             speed = held.contacts.rows.speed[k, 1:]
             slip[out] = first * speed[0] + second * speed[1], first * speed[1] - second * speed[0]
-        return rate.ravel().copy(), acceleration.ravel(), turn, slip, across
+        return rate.ravel().copy(), acceleration.ravel(), pushes, turn, slip, across
 
     def step(self, length: float) -> tuple[Piece, float] | None:
         """Return a piece of at most a length [s] and the next length; None where the iteration does not converge."""
@@ -90,11 +92,12 @@ class Stiff:
         rates = np.tile(start.ravel(), (COUNT, 1))
         accelerations = np.tile(self._start, (COUNT, 1))
         directions = np.tile(self._directions, (COUNT, 1, 1))
+        shift = np.inf
         for _ in range(MOST):
             velocity = start.ravel() + length * UP_TO @ accelerations
             way = length * UP_TO @ rates
             found = [self._at(way[i].reshape(shape), velocity[i].reshape(shape), directions[i]) for i in range(COUNT)]
-            moved, now, turn, slip, across = (np.array(each) for each in zip(*found, strict=True))
+            moved, now, pushes, turn, slip, across = (np.array(each) for each in zip(*found, strict=True))
             rest = now - accelerations
             # Slips are to lie along their directions: across (v + change of v) = |s| z, where z is how far they turn.
             wanted = (slip[:, :, 1] / length + np.einsum("ikn,in->ik", across, UP_TO @ rest)).ravel()
@@ -106,14 +109,16 @@ class Stiff:
             except np.linalg.LinAlgError:  # a slip that does not yield has no direction
                 return None
             change = rest + np.einsum("ik,ikn->in", z, turn)
+            before, changes = shift, np.array([UP_TO @ change, UP_TO @ (moved - rates)])
+            shift = length * float(np.abs(changes / scale).max())
+            if shift < CLOSE or 0.5 * before < shift < 1.0:  # round-off is all that still changes
+                accelerations = now
+                break
             accelerations = accelerations + change
             old = directions[:, self._slips]
             new = old + np.clip(z, -1.0, 1.0)[:, :, None] * np.stack([-old[:, :, 1], old[:, :, 0]], axis=2)
             directions[:, self._slips] = new / np.linalg.norm(new, axis=2, keepdims=True)
-            shift = length * max(np.abs(UP_TO @ change / scale).max(), np.abs(UP_TO @ (moved - rates) / scale).max())
             rates = moved
-            if shift < CLOSE:
-                break
         else:
             return None
         if slip[:, :, 0].min() < 0.0:  # it would have turned round before
@@ -124,8 +129,10 @@ class Stiff:
         factor = min(LONGER, SAFE * error ** (-1.0 / (COUNT + 1))) if error > 0.0 else LONGER
         if error > 1.0:
             return self.step(length * max(SHORTER, factor))
-        out = np.zeros((2, count, COUNT + 1))
-        out[:, :, 1:] = length * (THROUGH @ np.array([rates, accelerations])).swapaxes(1, 2) / (POWERS + 1)
-        out[1, :, 0] = start.ravel()
-        way, twist = out.reshape(2, *shape, COUNT + 1)
-        return Piece(self._state, length, way, twist, self._held, turns=True), factor * length
+        every = np.concatenate([rates, accelerations, pushes.reshape(COUNT, -1)], axis=1)
+        out = np.zeros((every.shape[1], COUNT + 1))
+        out[:, 1:] = length * (THROUGH @ every).T / (POWERS + 1)
+        out[count : 2 * count, 0] = start.ravel()
+        way, twist = out[: 2 * count].reshape(2, *shape, COUNT + 1)
+        push = out[2 * count :].reshape(*pushes.shape[1:], COUNT + 1)
+        return Piece(self._state, length, way, twist, self._held, turns=True, push=push), factor * length

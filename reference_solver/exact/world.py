@@ -65,7 +65,7 @@ class World:
         if kept:
             self.journal = self._recorder.journal(self._steps, steps)
         self._steps += steps
-        return joined(frames)
+        return joined(frames) if len(frames) > 1 else frames[0]
 
     def _move_to(self, step: int) -> Part:
         """Move the world to the end of a step; return the part of a piece that ends there."""

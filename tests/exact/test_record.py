@@ -8,7 +8,8 @@ import pytest
 from oracle import world_of
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation
-from reference_solver.certificate.truth import certify
+from reference_solver.certificate.audit import audit
+from reference_solver.certificate.truth import away, certify
 
 DT, G = 1 / 240, 9.81
 KEYS = ["fuzz2 0", "fuzz2 3", "fuzz3 1", "chains2 2", "random 5"]
@@ -90,3 +91,26 @@ def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
     world = world_of(key)
     found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
     assert found.holds and np.isinf(found.horizon)
+
+
+def test_momentum_of_a_slip_that_turns_at_once():
+    """Impulses are those that moved the bodies: an integral of forces looked at anew is off by a step's error."""
+    world = world_of("fuzz3 8")
+    record = Simulation(world.model, Settings.exact(world.dt)).record(
+        world.samples * world.stride, world.stride, pieces=True
+    )
+    found = {finding.name: finding for finding in audit(world.model, record, world.dt)}
+    assert found["momentum"].holds and found["moment"].holds
+
+
+def test_tolerance_that_slips_reach_but_for_round_off():
+    """The iteration of an implicit step ends where round-off is all that still changes."""
+    world = world_of("fuzz3 35")
+    Simulation(world.model, Settings.exact(world.dt, 1e-12)).advance(round(0.24 / world.dt))
+
+
+def test_rebounds_that_coordinates_do_not_resolve():
+    """Far from the origin a capsule rebounds by a unit in the last place of where it is, and comes to rest."""
+    world = world_of("fuzz3 45")
+    model = away(world.model, 3000.0).model(world.model)
+    Simulation(model, Settings.exact(world.dt)).advance(round(0.04 / world.dt))

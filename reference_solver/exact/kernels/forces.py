@@ -3,10 +3,50 @@
 import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.rotation import dot
 
 OPEN, STICK, SLIP = 0, 1, 2
-#: Whether rows of a group are redundant.
-UNKNOWN, SINGLE, SHARED = -1, 0, 1
+#: What is left of a row, as a share of it, that others say all of.
+REDUNDANT = 1e-10
+
+
+@kernel
+def solve_near(matrix, wanted, start, scale):
+    """Return x with ``matrix @ x = wanted`` whose change from ``start``, over ``scale``, is the least.
+
+    Rows are made orthogonal, the one that those before say least of first (Gram and Schmidt); what they say all of is
+    left out. Each round leaves of the last one's remainder what round-off does.
+    """
+    m, n = matrix.shape
+    rows, size, left, ones = matrix * scale, np.empty(m), np.ones(m), np.ones(n)
+    for i in range(m):
+        size[i] = max(np.sqrt(dot(rows[i], rows[i])), 1e-300)
+        rows[i] /= size[i]
+    basis, lower, chosen = np.empty((m, n)), np.empty((m, m)), np.empty(m, np.int64)
+    rank = 0
+    while rank < m:
+        best = np.argmax(left)
+        if left[best] < REDUNDANT**2:
+            break
+        basis[rank] = rows[best] / np.sqrt(left[best])
+        chosen[rank] = best
+        lower[:, rank] = np.dot(rows, basis[rank])
+        for i in range(m):
+            rows[i] -= lower[i, rank] * basis[rank]
+        rows[best] = 0.0
+        left = np.dot(rows * rows, ones)
+        rank += 1
+    x, along = start.copy(), np.empty(m)
+    for _ in range(3):
+        remainder = wanted - np.dot(matrix, x)
+        if np.abs(remainder).max() <= 1e-15 * np.abs(wanted).max():
+            break
+        for k in range(rank):
+            i = chosen[k]
+            along[k] = (remainder[i] / size[i] - dot(lower[i, :k], along[:k])) / lower[i, k]
+            for j in range(n):
+                x[j] += scale[j] * along[k] * basis[k, j]
+    return x
 
 
 @kernel
@@ -29,11 +69,10 @@ def solve_groups(features, held, rows, free, groups, forces, acceleration):
         Modes, directions of slips, friction; forces (m, d) that those of redundant rows are nearest to, and how changes
         of them are weighed.
     groups
-        Contacts in the order of their groups, where each group begins, and whether its rows are redundant, which is
-        found out once.
+        Contacts in the order of their groups, and where each group begins.
     """
     modes, directions, friction, near, weight = held
-    order, begin, shared = groups
+    order, begin = groups
     d = rows.row.shape[1]
     push = np.empty(rows.yields.shape)
     write_push(modes, directions, friction, rows.yields, push)
@@ -48,7 +87,7 @@ def solve_groups(features, held, rows, free, groups, forces, acceleration):
             for r in range(d):
                 does = rows.rate[c, r]
                 for x in range(2):
-                    does += np.dot(rows.row[c, r, x], free[features[c, x]])
+                    does += dot(rows.row[c, r, x], free[features[c, x]])
                 size = max(size, abs(does))
                 if r == 0 or modes[c] != SLIP:
                     names[i, 0], names[i, 1], wanted[i] = c, r, -does
@@ -61,24 +100,13 @@ def solve_groups(features, held, rows, free, groups, forces, acceleration):
                 for x in range(2):
                     for y in range(2):
                         if features[c, x] == features[e, y]:
-                            matrix[i, j] += np.dot(rows.row[c, r, x], push[e, t, y])
-        if shared[g] == UNKNOWN:
-            values = np.linalg.svd(matrix)[1]
-            shared[g] = SHARED if values[-1] < 1e-9 * values[0] else SINGLE
-        if shared[g] == SHARED:
-            start, scale = np.empty(count), np.empty(count)
-            for i in range(count):
-                start[i], scale[i] = near[names[i, 0], names[i, 1]], weight[names[i, 0], names[i, 1]]
-            found = start.copy()
-            for _ in range(3):  # each round leaves of the last one's remainder what round-off does
-                rest = wanted - np.dot(matrix, found)
-                if np.abs(rest).max() <= 1e-15 * np.abs(wanted).max():
-                    break
-                found += scale * np.linalg.lstsq(matrix * scale, rest, 1e-11)[0]
-            if np.abs(np.dot(matrix, found) - wanted).max() > 1e-9 * size:
-                found = start
-        else:
-            found = np.linalg.solve(matrix, wanted)
+                            matrix[i, j] += dot(rows.row[c, r, x], push[e, t, y])
+        start, scale = np.empty(count), np.empty(count)
+        for i in range(count):
+            start[i], scale[i] = near[names[i, 0], names[i, 1]], weight[names[i, 0], names[i, 1]]
+        found = solve_near(matrix, wanted, start, scale)
+        if np.abs(np.dot(matrix, found) - wanted).max() > 1e-9 * size:
+            found = start
         for i in range(count):
             forces[names[i, 0], names[i, 1]] = found[i]
     acceleration[:] = free
