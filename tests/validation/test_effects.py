@@ -198,4 +198,5 @@ def test_wrong_case_of_a_setting_in_one_line(tmp_path, table, said):
 
 
 def test_engine_without_a_table():
-    assert told_of("newton") == () and inside("newton", EFFECTS) is None
+    assert told_of("newton") and inside("newton", EFFECTS) is not None
+    assert told_of("toy") == () and inside("toy", EFFECTS) is None
