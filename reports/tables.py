@@ -200,7 +200,9 @@ def shown_by(told: Plain) -> str:
     """The case of a setting: its value, scene and metric, and that without and with it."""
     if not told["scene"]:
         return ""
-    return f"{told['metric']} of {told['scene']} {told['before'] or '-'} -> {told['after'] or '-'} at {told['value']}"
+    before, after = told["before"] or "-", told["after"] or "-"
+    changed = "no change" if before == after != "-" else f"{before} -> {after}"
+    return f"{told['metric']} of {told['scene']} {changed} at {told['value']}"
 
 
 def _unset(data: Plain, console: Console) -> None:

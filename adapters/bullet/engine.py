@@ -32,8 +32,9 @@ from adapters.receipts.probes import (
     slide_load,
     slide_speed,
 )
-from adapters.scene import Scene
+from adapters.scene import HalfSpace, Scene
 from adapters.scene.meeting import meeting_pairs
+from adapters.scene.shapes import ROUND
 from adapters.settings import checked
 
 _QUIRKS = (
@@ -165,7 +166,10 @@ class BulletEngine(CheckedEngine):
         if soft:
             which = "rebound" if needs(scene).restitution > 0.0 else "need it"
             lines.append(f"p.changeDynamics(body, -1, {', '.join(soft)})  # only bodies that {which}")
-        return "\n".join(["# p: pybullet", *lines]) if lines else ""
+        flat = any(isinstance(body.shape, HalfSpace) for body in scene.bodies)
+        boxes = any(not isinstance(body.shape, (HalfSpace, *ROUND)) for body in scene.bodies)
+        floor = "; the floor a box, as plane.urdf: on GEOM_PLANE boxes spin" if flat and boxes else ""
+        return "\n".join([f"# p: pybullet{floor}", *lines]) if lines else ""
 
     def words(self, settings: Mapping[str, Any], scene: Scene, dt: float) -> dict[str, tuple[str, Any]]:
         """Parameters of pybullet."""

@@ -75,6 +75,8 @@ def tune(
     engine, is written to effects.csv, which `describe`, `run --set` and models read. Exits with 1 if a verdict is not
     the listed one.
     """
+    if acts and which:
+        raise click.UsageError("--effects and --decisive are two measurements: give one")
     console = terminal(stderr=True)
     if acts:
         sys.exit(0 if _effects(engine, jobs, as_json) else 1)

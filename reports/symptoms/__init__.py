@@ -22,13 +22,17 @@ TABLE = Path(__file__).parent / "table.json"
 COLUMNS = {"title": 2.0, "symptoms": 1.0, "reports": 0.7, "physics": 0.3}
 #: Share of the nearest line in a rank; the rest is that of all that is known of a scene.
 LINE = 0.5
+#: Power, in the rank of a line, of the share of it that the question has: a jittering capsule is about capsules.
+OWN = 0.5
 #: Name of what is out of scope, and its weight in a rank: a rope or a camera says more than the verbs beside it.
 OUTSIDE, APART = "outside", 1.5
+#: Weight of the other topics, which no scene shows.
+TOPIC = 0.8
 #: Weight of a word that nothing has; one that a single scene has weighs 4.5.
 UNKNOWN = 1.5
 #: A match is clear if its nearest line has this share of the question, by weight, if it is nearly the first both as a
 #: whole and by its nearest line, and if the next has at most this share of its rank.
-SAID, NEARLY, NEXT = 0.55, 0.9, 0.75
+SAID, NEARLY, NEXT = 0.55, 0.9, 0.8
 #: Share of the question below which nothing shows it.
 LEAST = 0.25
 #: What may stand beside a word.
@@ -130,7 +134,7 @@ def search(question: str) -> Found:
     try:
         pairs = [(stem, word) for word, own in zip(words, stems(words, database), strict=True) for stem in own]
         asked = list(dict.fromkeys(terms([stem for stem, _ in pairs], kept["same"], kept["idle"])))
-        matches, missed = _ranked(asked, kept["rows"], database) if asked else ([], [])
+        matches, missed = _ranked(asked, kept["rows"], kept["topics"], database) if asked else ([], [])
     finally:
         database.close()
     word_of = {stem: word.strip(MARKS) for stem, word in pairs}
@@ -196,15 +200,18 @@ def _without_names(question: str, names: Mapping[str, str]) -> tuple[list[str], 
 
 
 def _ranked(
-    asked: Sequence[str], rows: Sequence[Sequence[str]], database: sqlite3.Connection
+    asked: Sequence[str], rows: Sequence[Sequence[str]], topics: Collection[str], database: sqlite3.Connection
 ) -> tuple[list[Match], list[str]]:
     """Matches for some terms, the best first, and the terms that nothing has."""
-    known = {term: {name for name, _, _, text in rows if f" {term} " in f" {text} "} for term in asked}
+    known: dict[str, set[str]] = {term: set() for term in asked}
+    for name, _, _, text in rows:
+        for term in text.split():
+            known.setdefault(term, set()).add(name)
     count = len({name for name, *_ in rows})
     weight = {term: math.log(1.0 + count / len(has)) if has else UNKNOWN for term, has in known.items()}
     total = sum(weight[term] for term in asked)
     exact = {name for name, _, line, text in rows if line and set(text.split()) == set(asked)}
-    whole, lines = _ranks(asked, rows, database)
+    whole, lines = _ranks(asked, rows, weight, database)
     most, longest = max(whole.values(), default=1.0), max((rank for rank, *_ in lines.values()), default=1.0)
     found = []
     for name, rank in whole.items():
@@ -212,7 +219,7 @@ def _ranked(
         share = sum(weight[term] for term in asked if name in known[term]) / total
         said = sum(weight[term] for term in asked if f" {term} " in f" {text} ") / total
         joint = (1.0 - LINE) * rank / most + LINE * near / longest
-        joint *= APART if name.startswith(f"{OUTSIDE}/") else 1.0
+        joint *= APART if name.startswith(f"{OUTSIDE}/") else TOPIC if name in topics else 1.0
         is_first = rank >= NEARLY * most and near >= NEARLY * longest
         found.append(Match(name, joint * share, share, said, is_first, exact == {name}, line))
     found.sort(key=lambda match: (not match.is_exact, -match.rank))
@@ -220,7 +227,7 @@ def _ranked(
 
 
 def _ranks(
-    asked: Sequence[str], rows: Sequence[Sequence[str]], database: sqlite3.Connection
+    asked: Sequence[str], rows: Sequence[Sequence[str]], weight: Mapping[str, float], database: sqlite3.Connection
 ) -> tuple[dict[str, float], dict[str, tuple[float, str, str]]]:
     """BM25 of all that is known of each scene and topic, and of its nearest line, with that line and its terms."""
     database.execute(f"CREATE VIRTUAL TABLE whole USING fts5(name UNINDEXED, {', '.join(COLUMNS)})")
@@ -239,6 +246,8 @@ def _ranks(
     whole = dict(database.execute(f"SELECT name, {bm25} FROM whole WHERE whole MATCH ?", anything))
     lines: dict[str, tuple[float, str, str]] = {}
     ordered = "SELECT name, -bm25(lines), shown, text FROM lines WHERE lines MATCH ? ORDER BY rank"
-    for name, *line in database.execute(ordered, anything):
-        lines.setdefault(name, tuple(line))
+    for name, rank, line, text in database.execute(ordered, anything):
+        own = {term: weight[term] for term in text.split()}
+        share = sum(own[term] for term in asked if term in own) / sum(own.values())
+        lines[name] = max(lines.get(name, (0.0, "", "")), (rank * share**OWN, line, text), key=lambda each: each[0])
     return whole, lines

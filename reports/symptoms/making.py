@@ -107,6 +107,7 @@ def _of_scenes() -> Iterator[tuple[str, str, str]]:
         scene = CATALOGUE[name]
         yield name, "title", name.replace("_", " ")
         yield name, "title", scene.title
+        yield name, "title", " ".join(scene.figure.split("\n\n")[0].split())
         yield from ((name, "symptoms", line) for line in scene.symptoms)
         yield from ((name, "reports", note.symptom) for note in notes() if note.scene == name)
         made = [scene.scene(dimension) for dimension in scene.dimensions]

@@ -90,6 +90,14 @@ def test_python_of_bullet_runs_and_sets_what_the_profile_has():
         assert name in text or name == "iterations"
 
 
+@pytest.mark.parametrize(("scene", "said"), [("incline", True), ("impact", False), ("card_tent", True)])
+def test_floor_of_a_bullet_cure_for_boxes(scene, said):
+    """On an infinite plane of Bullet a box has one contact point a step: the fix of `incline` is 15 % off there."""
+    pytest.importorskip("pybullet")
+    text = registry.load("bullet").snippet({"iterations": 99}, ["iterations"], resolve(scene).scene(2, {}), DT)
+    assert ("the floor a box" in text.splitlines()[0]) == said
+
+
 def test_adapter_without_snippets_prints_nothing():
     from adapters.engine import Engine
 

@@ -14,7 +14,7 @@ from adapters.registry import names
 from reports.fixes import cure_paste
 from validation.cells import plane_of
 from validation.fixes.kept import cures_of
-from validation.fixes.panel import WORSE, other_cases
+from validation.fixes.panel import is_broken, other_cases
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
@@ -83,7 +83,7 @@ def test_bounce_fix_pasted_into_another_scene(engine, case):
     cure, slot = CURES[engine, "bounce", 3], dict(other_cases(engine, "default"))[case]
     where = (engine, slot.scene, slot.dimension, slot.params)
     before, after = (judged(*where, paste, (1.0, 1.0, slot.dt)) for paste in ("", cure_paste(cure)))
-    broken = {kind_of(metric) for metric, error in after.items() if error > max(1.0, WORSE * before[metric])}
+    broken = {kind_of(metric) for metric, error in after.items() if is_broken(before[metric], error)}
     assert broken == {kind_of(cost.metric) for cost in cure.panel.breaks if cost.case == case}
 
 

@@ -123,3 +123,8 @@ def test_engine_without_cures_and_outdated_list_refused(measured, monkeypatch):
     assert done.exit_code == 2 and "tune: the profile changes no setting of stack" in done.stderr
     done = CliRunner().invoke(main, ["tune", "reference", "--decisive"])
     assert done.exit_code == 2 and "no fixes of reference to measure are listed" in done.stderr
+
+
+def test_two_measurements_at_once_refused(measured, tmp_path):
+    done = measured([], [], "--effects")
+    assert done.exit_code == 2 and "--effects and --decisive" in done.stderr and not list(tmp_path.iterdir())

@@ -1,6 +1,6 @@
 """Settings that do nothing and settings that act, each with its verdict; kept tables follow cases and engines."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -9,6 +9,7 @@ from adapters.engine_folder import EFFECTS, effects_of, fault_of_tuning, inside
 from adapters.experiment import Effect
 from adapters.experiment.files import read_tuning
 from adapters.registry import find, load, names
+from reports.tables import shown_by
 from validation.cells import Observation, Outcome, Slot
 from validation.running.plan import QUICK_DT
 from validation.settings import effects
@@ -74,6 +75,20 @@ def test_setting_that_changes_a_metric_alone():
     runs["set"] = replace(runs["set"], metrics={"load": (1.0, "")}, readback={"knob": 1})
     told = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs)
     assert (told.verdict, told.after, told.read) == (ACTS, "1", "yes")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [(0.0034061, 0.0034062, ("0.0034061", "0.0034062")), (0.0034061, 0.0034061, ("0.003406", "0.003406")),
+     (1.0, 1.0 + 2e-16, ("1", "1.0000000000000002")), (0.0034061, None, ("0.003406", ""))],
+)  # fmt: skip
+def test_digits_that_tell_two_numbers_apart(before, after, told):
+    runs = {part: replace(each, metrics={"load": (value, "")})
+            for (part, each), value in zip(seen(base="a", set="b").items(), (before, after), strict=True)}  # fmt: skip
+    found = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs)
+    assert (found.before, found.after) == told
+    same = "no change" if before == after else f"{told[0]} -> {told[1] or '-'}"
+    assert shown_by(asdict(found)) == f"load of stack {same} at 1"
 
 
 def test_planted_setting_without_effect_and_one_that_acts(monkeypatch):

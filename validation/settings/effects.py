@@ -134,7 +134,7 @@ def judged(engine: str, version: str, name: str, effect: Effect, seen: Mapping[s
     if verdict in (ACTS, ONLY_WITH) and far and far.outcome in RAN and not _differ(far, tried):
         limit = text_of(effect.set) + (" at a step of 1/240 s" if effect.in_steps else "")
         verdict, because = CLAMPED, f"{text_of(effect.beyond)} is as {limit}: {effect.because}"
-    before, after = (_value(each, effect.metric) for each in (base, tried))
+    before, after = _texts(*(each.metrics.get(effect.metric, (None, ""))[0] for each in (base, tried)))
     read = "" if tried.outcome not in RAN else "yes" if base.readback != tried.readback else "no"
     case = text_of(effect.set), effect.scene, effect.metric
     return Told(engine, version, name, verdict, *case, before, after, read, because)
@@ -150,9 +150,14 @@ def _differ(one: Observation, other: Observation) -> bool:
 RAN = (Outcome.OK, Outcome.DIVERGED, Outcome.INVALID, Outcome.REFUSED)
 
 
-def _value(observation: Observation, metric: str) -> str:
-    value = observation.metrics.get(metric, (None, ""))[0]
-    return "" if value is None or not math.isfinite(value) else f"{value:.4g}"
+def _texts(*values: float | None) -> list[str]:
+    """Numbers with four digits, or as many more as tell them apart; empty for one that is none."""
+    known = [value is not None and math.isfinite(value) for value in values]
+    for digits in range(4, 18):
+        texts = [f"{value:.{digits}g}" if told else "" for value, told in zip(values, known, strict=True)]
+        if len(set(texts)) == len(set(values)):
+            break
+    return texts
 
 
 # ---- what is kept ----------------------------------------------------------------------------------------------------
