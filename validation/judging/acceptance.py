@@ -33,7 +33,7 @@ from dataclasses import dataclass, field, replace
 from validation.canonical import Check
 from validation.cells import Observation, Outcome, Slot, slot_from_dict
 from validation.findings import Family, Finding, Findings, Key, Unsupported, row_key, solutions_of
-from validation.judging.rows import Row, predictions_of
+from validation.judging.rows import ALARMING_OUTCOMES, Row, predictions_of
 from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
 from validation.metrics import REALISED
@@ -188,7 +188,7 @@ def propose(
         key = row_key(slot, row.metric)
         if row.outcome not in ("ok", "diverged"):
             # A cell without a result does not change a finding: its entries stay.
-            if row.outcome in ("invalid", "refused"):
+            if row.outcome in ("refused", *ALARMING_OUTCOMES):
                 refused.append((row, f"{row.outcome}: {row.reason}"))
             if row.outcome == "unsupported" and not findings.unsupported_by(slot):
                 refused.append((row, "the engine refuses the case: write that as [[unsupported]], with its reason"))
