@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.drake.landing import landing_law
-from adapters.drake.profiles import PROFILES
+from adapters.drake.profiles import APPROXIMATIONS, PROFILES
 from adapters.law import Deviation, deviations
 
 #: Scenes of a ball that falls straight onto a floor without restitution, or of two overlapping balls, and the metrics
@@ -18,7 +18,7 @@ FALLING: Mapping[str, tuple[str, ...]] = {
 
 DEVIATIONS: tuple[Deviation, ...] = deviations(
     "drake",
-    PROFILES,
+    [profile for profile in PROFILES if profile == "default" or profile in APPROXIMATIONS],
     FALLING,
     landing_law,
     "contacts are springs with dissipation: an overlap is corrected, with Hunt and Crossley's dissipation at up "

@@ -1,9 +1,10 @@
-"""Profiles of Drake: they differ only in the approximation of contact in a step.
+"""Profiles of Drake: they differ in the approximation of contact in a step, or have no step but an accuracy.
 
 default   Lagged, as shipped: a convex problem whose friction is regularised by the last step's load
 sap       SAP: linear dissipation, and friction with gliding (separation proportional to slip)
 tamsi     TAMSI: an implicit step by Newton's method, sub-stepped until it converges
 similar   SAP's friction with the dissipation of the others
+cenic     CENIC: the continuous plant, by an integrator that chooses its steps so that each is accurate
 """
 
 from __future__ import annotations
@@ -14,17 +15,20 @@ from types import MappingProxyType
 from typing import Any
 
 from adapters import settings
-from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
-from adapters.engine import ProfileRule, Setting
+from adapters.drake.shipped import ACCURACY, DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
+from adapters.engine import EngineError, ProfileRule, Setting
 from adapters.needs import Needs
 
-#: Names of the engine's own approximations.
+#: Word of `approximation` for the continuous plant.
+CONTINUOUS = "cenic"
+#: Names of the engine's own approximations of a step.
 APPROXIMATIONS: Mapping[str, str] = MappingProxyType(
     {"lagged": "kLagged", "sap": "kSap", "tamsi": "kTamsi", "similar": "kSimilar"}
 )
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
-        "approximation": settings.word(*APPROXIMATIONS),
+        "approximation": settings.word(*APPROXIMATIONS, CONTINUOUS),
+        "accuracy": settings.number(1e-10, 0.1),
         "boxes": settings.word("hydroelastic", "point"),
         "point_stiffness": settings.number(1.0, 1e15),
         "modulus": settings.number(1.0, 1e15),
@@ -58,6 +62,13 @@ def rule(approximation: str, why: str) -> list[Setting]:
     ]
 
 
+def _continuous(needs: Needs, dt: float) -> list[Setting]:
+    """As `rule`, with an accuracy; relaxation times are of SAP alone."""
+    first, *others = rule(CONTINUOUS, "steps follow from the accuracy; the bench's step is the longest of them")
+    because = f"estimated error of a step [m]; with {ACCURACY:g}, as shipped, friction of a blow is off by a sixth"
+    return [first, Setting("accuracy", 1e-6, because, "SimulatorConfig.accuracy; measured with 1.51.1"), *others]
+
+
 def _rule(approximation: str, why: str, needs: Needs, dt: float) -> list[Setting]:
     return rule(approximation, why)
 
@@ -67,11 +78,23 @@ _RULES: dict[str, Callable[[Needs, float], list[Setting]]] = {
     "sap": partial(_rule, "sap", "the convex approximation, solved to convergence"),
     "tamsi": partial(_rule, "tamsi", "the implicit step of earlier releases"),
     "similar": partial(_rule, "similar", "SAP's friction with Hunt's and Crossley's dissipation"),
+    CONTINUOUS: _continuous,
 }
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType(_RULES)
 
 
 def checked(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with valid names and values for the engine; see `adapters.settings.checked`. `OWN` may be missing."""
+    """Settings with valid names and values for the engine; see `adapters.settings.checked`. `OWN` may be missing.
+
+    Raises
+    ------
+    EngineError
+        Also for an accuracy of a profile that has a step.
+    """
     kinds = {**KINDS, OWN: settings.rows(*_KINDS_OF_A_ROW)} if OWN in asked else KINDS
-    return settings.checked("drake", kinds, asked)
+    found = settings.checked("drake", kinds, asked, ("accuracy",))
+    if found["approximation"] == CONTINUOUS:
+        return {"accuracy": ACCURACY, **found}
+    if "accuracy" in found:
+        raise EngineError(f"accuracy: of approximation={CONTINUOUS} only; {found['approximation']} has a step")
+    return found

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.copied import Copied
-from adapters.drake.profiles import APPROXIMATIONS, OWN
+from adapters.drake.profiles import APPROXIMATIONS, CONTINUOUS, OWN
 from adapters.drake.translation import frictions, pair_of
 from adapters.engine import EngineError
 from adapters.readback import free_parts
@@ -26,10 +26,12 @@ class DrakeSimulation(Copied):
         drake = self.drake = module or import_module("pydrake.all")
         self.scene, self.dt, self.settings = scene, dt, settings
         builder = drake.DiagramBuilder()
-        self.plant, self.graph = drake.AddMultibodyPlantSceneGraph(builder, dt)
+        stepped = settings["approximation"] != CONTINUOUS
+        self.plant, self.graph = drake.AddMultibodyPlantSceneGraph(builder, dt if stepped else 0.0)
         plant = self.plant
-        approximation = getattr(drake.DiscreteContactApproximation, APPROXIMATIONS[settings["approximation"]])
-        plant.set_discrete_contact_approximation(approximation)
+        if stepped:
+            approximation = getattr(drake.DiscreteContactApproximation, APPROXIMATIONS[settings["approximation"]])
+            plant.set_discrete_contact_approximation(approximation)
         plant.set_contact_model(drake.ContactModel.kHydroelasticWithFallback)
         plant.set_stiction_tolerance(settings["stiction_tolerance"])
         plant.mutable_gravity_field().set_gravity_vector(list(scene.gravity))
@@ -39,6 +41,11 @@ class DrakeSimulation(Copied):
         plant.Finalize()
         diagram = builder.Build()
         self.simulator: Any = drake.Simulator(diagram)
+        if not stepped:
+            scheme = {"integration_scheme": CONTINUOUS, "max_step_size": dt, "accuracy": settings["accuracy"]}
+            drake.ApplySimulatorConfig(drake.SimulatorConfig(**scheme), self.simulator)
+        #: What a force of the plant is multiplied by: of a continuous plant it is that of an instant, of no step [s].
+        self.acting = dt if stepped else np.nan
         self.context: Any = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
         for body, asked in zip(self.bodies, scene.bodies, strict=True):
             if asked.motion == "free":
@@ -153,7 +160,7 @@ class DrakeSimulation(Copied):
             pair = info.point_pair()
             first, second = self.owner[pair.id_A], self.owner[pair.id_B]
             # The normal points from B to A, and the force is on B.
-            impulse = np.multiply(self.dt, info.contact_force())
+            impulse = np.multiply(self.acting, info.contact_force())
             rows.append((first, second, *info.contact_point(), *-pair.nhat_BA_W, *impulse, -pair.depth))
         for k in range(found.num_hydroelastic_contacts()):
             info = found.hydroelastic_contact_info(k)
@@ -163,7 +170,7 @@ class DrakeSimulation(Copied):
             # The force is on M; faces look out of N, into M.
             normal = np.sum([surface.area(f) * surface.face_normal(f) for f in range(surface.num_faces())], axis=0)
             normal = normal / np.linalg.norm(normal)
-            impulse = np.multiply(self.dt, force.translational())
+            impulse = np.multiply(self.acting, force.translational())
             rows.append((second, first, *surface.centroid(), *normal, *impulse, np.nan))
         return rows
 
@@ -178,10 +185,17 @@ class DrakeSimulation(Copied):
         inertias = {
             name: body.CalcSpatialInertiaInBodyFrame(self.context) for name, body in free_parts(self.scene, self.bodies)
         }
-        return {
-            "dt": float(plant.time_step()),
+        if plant.time_step() > 0.0:
+            how = {"dt": float(plant.time_step()), "approximation": plant.get_discrete_contact_approximation().name}
+        else:
+            integrator = self.simulator.get_integrator()
+            how = {
+                "dt": float(integrator.get_maximum_step_size()),
+                "approximation": type(integrator).__name__,
+                "accuracy": float(integrator.get_target_accuracy()),
+            }
+        return how | {
             "gravity": [float(g) for g in plant.gravity_field().gravity_vector()],
-            "approximation": plant.get_discrete_contact_approximation().name,
             "contact_model": plant.get_contact_model().name,
             "bodies": {
                 name: {

@@ -8,6 +8,7 @@ import pytest
 from adapters import registry
 from adapters.conformance import CHECKS, check_adapter, items, worlds
 from adapters.conformance.faults import FaultyToy
+from adapters.conformance.finding import judged
 from adapters.engine import Expected
 from adapters.receipts import QUANTITIES
 from adapters.scene import Box, Capsule, Hull
@@ -87,6 +88,13 @@ def test_expected_failures_told_and_unexpected_pass_as_failure(toy_class):
     told = {finding.check: finding for finding in check_adapter(Mistaken())}
     assert told["stats"].status == "FAIL" and not told["stats"].holds and "no such check" in told["stats"].message
     assert told["receipt mass"].status == "unexpected pass"
+
+
+def test_check_expected_to_fail_in_one_profile_fails_in_another():
+    one = Expected("states", "it starts late", "its manual", "late")
+    assert judged("states", "late: off by 1", "", one).status == "expected"
+    assert judged("states", "plain: off by 1", "", one).status == "FAIL"
+    assert judged("states", "", "", one).status == "unexpected pass"
 
 
 @pytest.mark.usefixtures("worlds_in_time")

@@ -10,7 +10,7 @@ from adapters.conformance import items
 from adapters.drake import DrakeEngine
 from adapters.drake.landing import landing_law
 from adapters.drake.laws import DEVIATIONS, FALLING
-from adapters.drake.shipped import DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
+from adapters.drake.shipped import ACCURACY, DISSIPATION, MODULUS, POINT_STIFFNESS, RELAXATION, STICTION
 from adapters.drake.translation import frictions, pair_of
 from adapters.engine import EngineError
 from adapters.needs import needs
@@ -23,6 +23,8 @@ pytestmark = pytest.mark.optional("drake")
 ENGINE = DrakeEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
+#: Profiles with a step.
+STEPPED = [profile for profile in ENGINE.profiles if profile != "cenic"]
 BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0))
 
 
@@ -38,15 +40,17 @@ def test_conformance(item):
 def test_shipped_numbers_equal_to_the_engine_s_own():
     from pydrake.geometry import SceneGraphConfig
     from pydrake.multibody.plant import MultibodyPlantConfig
+    from pydrake.systems.analysis import SimulatorConfig
 
     given, plant = SceneGraphConfig().default_proximity_properties, MultibodyPlantConfig()
     assert (given.point_stiffness, given.hydroelastic_modulus) == (POINT_STIFFNESS, MODULUS)
     assert (given.hunt_crossley_dissipation, given.relaxation_time) == (DISSIPATION, RELAXATION)
+    assert SimulatorConfig().accuracy == ACCURACY
     assert plant.stiction_tolerance == STICTION and plant.contact_model == "hydroelastic_with_fallback"
     assert plant.discrete_contact_approximation == settings(resting())["approximation"] == "lagged"
 
 
-@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("profile", STEPPED)
 @pytest.mark.parametrize(
     ("name", "params"), [("impact", {"e": 0.0}), ("impact", {"e": 0.0, "v": 50.0}), ("bounce", {"e": 0.0})], ids=str
 )
@@ -72,7 +76,7 @@ def test_spring_rebound_by_the_law(name, params, dimension, profile):
     assert seen >= 3
 
 
-@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("profile", STEPPED)
 @pytest.mark.parametrize("params", [{}, {"depth": 0.01, "ratio": 100.0}], ids=str)
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_separation_speed_of_overlapping_balls_by_the_law(params, dimension, profile):
@@ -214,3 +218,37 @@ def test_facets_of_a_surface_not_mirror_symmetric():
 
     assert sum(facet[3] > 0.2 for facet in facets) == 4
     assert mirrored(1e-3, 0.2) and not mirrored(1e-6, 0.2) and not mirrored(1e-3, 0.0)
+
+
+@pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-7])
+def test_a_fall_with_error_control_is_off_by_the_root_of_the_accuracy(accuracy):
+    # A step of h and two of h/2 differ by g h^2/4, which is the accuracy; two of h/2 fall g t h/4 too far in t.
+    scene = replace(resting(pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0)), duration=0.5)
+    found = run(ENGINE, scene, DT, {**settings(scene, "cenic"), "accuracy": accuracy})
+    late = 9.0 - 9.81 * found.t[-1] ** 2 / 2.0 - found.pose[-1, 1, 2]
+    most = found.t[-1] * math.sqrt(9.81 * accuracy) / 2.0
+    assert 0.7 * min(most, 9.81 * found.t[-1] * DT / 4.0) <= late <= most
+
+
+def test_a_blow_is_not_in_the_error_that_is_controlled():
+    # Closed form of Hunt and Crossley: d w + ln(1 - d w) is the same before and after the blow.
+    scene = CATALOGUE["impact"].scene(3, {"e": 0.0, "v": 0.1})
+
+    def rebound(accuracy, dt):
+        found = run(ENGINE, scene, dt, {**settings(scene, "cenic"), "accuracy": accuracy})
+        return DISSIPATION * found.twist[-1, 1, 2]
+
+    def kept(w):
+        return w + math.log1p(-w)
+
+    right = 0.9849
+    assert kept(right) == pytest.approx(kept(-DISSIPATION * 0.1), rel=1e-3)
+    assert abs(rebound(1e-4, DT) - right) > 0.014 and abs(rebound(1e-8, DT) - right) > 0.014
+    assert abs(rebound(1e-8, 1.0 / 16000.0) - right) < 0.005
+
+
+def test_an_accuracy_of_a_profile_with_a_step_is_refused():
+    scene = resting()
+    assert ENGINE.checked({**settings(scene), "approximation": "cenic"})["accuracy"] == ACCURACY
+    with pytest.raises(EngineError, match=r"^accuracy: of approximation=cenic only; lagged has a step$"):
+        ENGINE.build(scene, DT, {**settings(scene), "accuracy": 1e-3})

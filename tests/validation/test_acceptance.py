@@ -14,6 +14,7 @@ from validation.findings import Family, Finding, Findings, Unsupported, row_key
 from validation.judging import acceptance
 from validation.judging.acceptance import MOVES, accepted, band, propose, slots_to_move
 from validation.judging.rows import rows_of
+from validation.metrics import UNAVAILABLE
 
 SLOT = Slot("incline", (("ratio", 0.99),), 2, "nameless", "default", 1 / 240)
 SLIDES = replace(SLOT, params=())
@@ -145,6 +146,12 @@ def test_unsupported_case_refused_until_listed():
     (row,) = propose(refused, "nameless", replace(listed(FAMILY), unsupported=(other,))).refused
     assert "[[unsupported]]" in row[1]
     assert not propose(refused, "nameless", replace(listed(FAMILY), unsupported=(here,))).refused
+
+
+def test_value_that_the_engine_does_not_tell_is_no_refused_case():
+    untold = observed(SLOT, creep=None)
+    untold.metrics["creep"] = (None, UNAVAILABLE)
+    assert not propose(rows_of("run", [untold]), "nameless", listed(FAMILY)).refused
 
 
 def test_refused_scenes_of_a_first_list():

@@ -36,7 +36,7 @@ from validation.findings import Family, Finding, Findings, Key, Unsupported, row
 from validation.judging.rows import ALARMING_OUTCOMES, Row, predictions_of
 from validation.judging.studies import study_of
 from validation.judging.verdicts import is_marginal
-from validation.metrics import REALISED
+from validation.metrics import REALISED, UNTOLD
 from validation.running.plan import is_standard
 
 #: Moves of the start, in units in the last place, that sample the scatter of a value.
@@ -190,7 +190,8 @@ def propose(
             # A cell without a result does not change a finding: its entries stay.
             if row.outcome in ("refused", *ALARMING_OUTCOMES):
                 refused.append((row, f"{row.outcome}: {row.reason}"))
-            if row.outcome == "unsupported" and not findings.unsupported_by(slot):
+            told = row.outcome != "unsupported" or row.reason in UNTOLD
+            if not told and not findings.unsupported_by(slot):
                 refused.append((row, "the engine refuses the case: write that as [[unsupported]], with its reason"))
             continue
         if slot in otherwise and row.physics == "fail":
