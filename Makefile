@@ -67,6 +67,8 @@ nightly: test-all soak
 	$(MAKE) test VENV=.venv-newest CONSTRAINTS=
 	$(MAKE) extras
 	CROSSCHECK_REQUIRE_ENGINES=$(EXTRAS) $(BIN)/python -m pytest -n auto -m optional
+	$(BIN)/python -m pip install --quiet "solve-nivp>=0.1.2,<0.2"
+	CROSSCHECK_ALL=1 $(BIN)/python -m pytest -n auto tests/oracles
 
 # Lines of Python by room.
 size:
