@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.motion import Piece
+from reference_solver.exact.forces import Held
+from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.rows import Contacts, labels, moments
 from reference_solver.model import Array
 from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
@@ -59,13 +60,21 @@ class Acting(NamedTuple):
         if not piece.turns:
             force = contacts.along_axes(piece.held.answer.forces)
             return cls.of(contacts, (part.last - part.first) * piece.length * force)
-        impulse, moment = piece.impulse(part.last) - piece.impulse(part.first), np.zeros(())
+        whole, own = part.first == 0.0 and part.last == 1.0, Held(contacts, piece.held.answer, piece.held.acceleration)
         first, length = contacts.rows.place.copy(), part.last - part.first
+        impulse, moment = np.zeros(first.shape), np.zeros(())
         for node, weight in zip(*GAUSS, strict=True):
             share = part.first + length * node
-            place = contacts.at(*piece.at(share)).rows.place
+            place, axes, velocity = piece.at(share)
+            if whole:  # what moved the bodies, to the last place
+                contacts.at(place, axes, velocity)
+                rate = piece.impulse(share, rate=True)
+            else:  # between its ends a piece is known less well than its forces
+                own.follow(place, axes, velocity, free_acceleration(contacts.world, axes, velocity))
+                rate = piece.length * own.pushes
+            impulse = impulse + length * weight * rate
             # Far from the origin the way of a place is known to more digits than the place.
-            moment = moment + length * weight * moments(place - first, piece.impulse(share, rate=True))
+            moment = moment + length * weight * moments(contacts.rows.place - first, rate)
         return cls.of(contacts.at(*piece.at(part.first)), impulse, moment + moments(first, impulse))
 
 

@@ -93,14 +93,15 @@ def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
     assert found.holds and np.isinf(found.horizon)
 
 
-def test_momentum_of_a_slip_that_turns_at_once():
-    """Impulses are those that moved the bodies: an integral of forces looked at anew is off by a step's error."""
-    world = world_of("fuzz3 8")
+@pytest.mark.parametrize("key", ["fuzz3 8", "standard domino 2-D", "standard seam 3-D"])
+def test_impulses_that_moved_the_bodies(key):
+    """Forces looked at anew are off by a step's error where a slip turns at once, and steps between their ends."""
+    world = world_of(key)
     record = Simulation(world.model, Settings.exact(world.dt)).record(
         world.samples * world.stride, world.stride, pieces=True
     )
     found = {finding.name: finding for finding in audit(world.model, record, world.dt)}
-    assert found["momentum"].holds and found["moment"].holds
+    assert all(found[name].holds for name in ("momentum", "moment", "spin"))
 
 
 def test_tolerance_that_slips_reach_but_for_round_off():
