@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,9 @@ from reference_solver.geometry import rotation
 from reference_solver.model import Array, Model
 from reference_solver.pieces import Indices
 from reference_solver.shapes import smallest_extent
+
+#: Shares of the speed of `World` below which speeds are none, and slips have no direction.
+STILL, SLIPPING = 1e-12, 1e-11
 
 
 class Bodies(NamedTuple):
@@ -114,18 +119,49 @@ class World:
         Of the bodies.
     restitution, friction
         (n, n).
-    size
-        Smallest half width of a body [m].
+    extent, size
+        Half widths of the bodies (n,), and the smallest of them [m].
     weight
-        Largest acceleration by loads [m/s^2, rad/s^2], and 1e-3 at least.
+        Largest acceleration by loads [m/s^2], of points that far from centres; without loads, what the first speeds
+        could come from within the smallest half width.
+    load
+        What the lightest body weighs [N].
     """
 
     bodies: Bodies
     shapes: tuple[object, ...]
     restitution: Array
     friction: Array
+    extent: Array
     size: float
     weight: float
+    load: float
+
+    @cached_property
+    def time(self) -> float:
+        """What it takes to fall through the smallest half width, but for a factor [s]."""
+        return math.sqrt(self.size / self.weight)
+
+    @cached_property
+    def speed(self) -> float:
+        """Speed that is reached by then [m/s]."""
+        return math.sqrt(self.size * self.weight)
+
+    @cached_property
+    def per_length(self) -> Array:
+        """(q,): of a twist or a turn for a unit of length."""
+        q, d = self.shape[1], self.dimension
+        return np.array([1.0] * d + [1.0 / self.size] * (q - d))
+
+    @cached_property
+    def still(self) -> float:
+        """Speeds below this are none [m/s]."""
+        return STILL * self.speed
+
+    @cached_property
+    def slipping(self) -> float:
+        """Slips below this have no direction [m/s]."""
+        return SLIPPING * self.speed
 
     @property
     def dimension(self) -> int:
@@ -155,8 +191,9 @@ def world_of(model: Model) -> World:
             torque[i] = body.torque if body.torque is not None else 0.0
     if s == 1:
         load[:, d:] = torque / moment
-    extents = [smallest_extent(body.shape) for body in model.bodies]
-    size = min((each for each in extents if np.isfinite(each)), default=1.0)
+    extent = np.array([smallest_extent(body.shape) for body in model.bodies])
+    size = float(extent[np.isfinite(extent)].min(initial=np.inf))
+    size = size if np.isfinite(size) else 1.0
     side, limit, sides = _sides(cores, d)
     bodies = Bodies(
         _table([c.points for c in cores], d),
@@ -178,9 +215,15 @@ def world_of(model: Model) -> World:
         torque,
         generator,
     )
-    weight = max(1e-3, float(np.abs(load).max()), float(np.abs(torque / moment).max()))
+    twist = np.abs(start_of(model).velocity)
+    fastest = max(float(twist[:, :d].max()), size * float(twist[:, d:].max()))
+    weight = max(float(np.abs(load[:, :d]).max()), size * float(np.abs(torque / moment).max()))
+    weight = weight or fastest**2 / size or 1.0
+    lightest = min((body.mass for body in model.bodies if body.motion == "free"), default=0.0)
     shapes = tuple(body.shape for body in model.bodies)
-    return World(bodies, shapes, np.array(model.restitution), np.array(model.friction), size, weight)
+    return World(
+        bodies, shapes, np.array(model.restitution), np.array(model.friction), extent, size, weight, lightest * weight
+    )
 
 
 def start_of(model: Model) -> State:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from reference_solver.exact.bodies import World
 from reference_solver.exact.features import margins, width_of_margins
-from reference_solver.exact.forces import NONE, SLIPPING
+from reference_solver.exact.forces import LEAST, NONE
 from reference_solver.exact.meeting import next_meeting
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
@@ -20,7 +20,7 @@ from reference_solver.model import Array
 
 #: Shares at which monitors are looked at: of a step, and of a piece of any length, whose beginning counts.
 OF_STEP, OF_CONSTANT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1e-6, *np.linspace(0.125, 1.0, 8))
-#: Margins and speeds that are round-off, as a share of the smallest half width, and in m/s.
+#: Shares of the smallest half width and of the world's speed below which margins and slips are round-off.
 MARGIN, SPEED = 1e-12, 1e-12
 
 
@@ -75,11 +75,13 @@ class Monitors:
         self._slips = (modes == SLIP) & (np.abs(directions).max(axis=1, initial=0.0) > 0.0)
         # A slip that may turn ends where hardly anything is left of it; one that begins may have less.
         begun = np.linalg.norm(self._contacts.at_state(piece.start).rows.speed[:, 1:], axis=1)
-        self._ended = np.minimum(SLIPPING, 0.5 * begun)
+        self._ended = np.minimum(world.slipping, 0.5 * begun)
         count = len(modes)
         self.noise = np.full((count, self.width + 3), MARGIN * world.size)
-        self.noise[:, self.width] = SPEED
-        self.noise[:, self.width + 1 :] = NONE * (1e-3 + np.abs(self._answer.forces[:, :1]).max(initial=0.0))
+        self.noise[:, self.width] = SPEED * world.speed
+        self.noise[:, self.width + 1 :] = NONE * (
+            LEAST * world.load + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
+        )
 
     def __call__(self, share: float) -> Array:
         """Return the monitors (m, width + 3) at a share of the piece."""
@@ -108,18 +110,19 @@ class Monitors:
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
 
 
-def first_event(world: World, piece: Piece) -> Event:
-    """Return the first event of a piece; where something ends as the piece begins, that alone."""
+def first_event(world: World, piece: Piece, stuck: bool) -> Event:
+    """Return the first event of a piece; where something ends as the piece begins, that alone.
+
+    ``stuck``: whether the event before was now, so that what is as near as round-off is not met again.
+    """
     event = Event(Kind.LOOK, 1.0)
     if len(piece.held.contacts):
         event = _first_end(piece, Monitors(world, piece))
         piece.held.contacts.at_state(piece.start)
     if event.at_start:
         return event
-    meeting = next_meeting(world, piece, piece.held.contacts)
-    if meeting.share < event.share:
-        return Event(Kind.LOOK if meeting.stopped else Kind.MEET, meeting.share)
-    return event
+    share, stopped = next_meeting(world, piece, piece.held.contacts, stuck)
+    return Event(Kind.LOOK if stopped else Kind.MEET, share) if share < event.share else event
 
 
 def _first_end(piece: Piece, monitors: Monitors) -> Event:
@@ -139,7 +142,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
                     left.add(tuple(piece.held.contacts.features[k].tolist()))
                 elif kind is not Kind.SLIDE:
                     modes[k] = OPEN if kind is Kind.LIFT else SLIP
-                elif values[k, column] < -1e-9:
+                else:
                     modes.setdefault(k, STICK)
                 continue
             if share < event.share:

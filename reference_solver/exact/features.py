@@ -15,13 +15,21 @@ from reference_solver.exact.kernels.features import place_features, touching, wr
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
 
-#: Gaps below this share of the smallest half width are closed, and places as near to an end are at it (E8). A contact
-#: that is projected has 1e-15.
+#: Features nearer than this share of the smallest half width may touch, and places as near to an end are at it (E8).
+#: A contact that is projected has 1e-15.
 TOUCH = 1e-11
+#: Gaps below this share of the smaller half width of a pair are none, and these units in the last place of coordinates.
+NO_GAP, UNITS = 1e-13, 8.0
 #: Cores may be this deep in each other along a face that touches; along other faces they are far deeper.
 DEEP = 1e-3
 #: Room for the contacts of a world.
 MOST_CONTACTS = 2048
+
+
+def no_gap(world: World, place: Array) -> Array:
+    """Return the gaps that count as none (n, n) where bodies are (n, d) [m]."""
+    least = np.minimum.outer(world.extent, world.extent)
+    return np.where(np.isfinite(least), NO_GAP * least, 0.0) + UNITS * np.spacing(np.abs(place).max())
 
 
 def width_of_margins(world: World) -> int:
@@ -62,8 +70,9 @@ def find(world: World, state: State, left: frozenset[tuple[int, ...]] = frozense
     margin = margins(world, state.place, state.axes, found)
     at_end = margin < tol
     if at_end.any():
-        # A place at an end that moves out: seen after a moment in which it moves by 1e-7 of a half width at most.
-        moment = 1e-7 * world.size / (1e-9 + np.abs(state.velocity).max())
+        # A place at an end that moves out: seen after a moment in which all move by 1e-7 of a half width at most. What
+        # that bends, to second order, is less than the noise; what moves at 1e-5 of the fastest speed is more.
+        moment = 1e-7 * world.size / (1e-9 * world.speed + np.abs(state.velocity / world.per_length).max())
         later = state.moved(moment * state.velocity)
         falls = margins(world, later.place, later.axes, found) < margin - 1e-12 * world.size
         out |= (at_end & falls).any(axis=1)

@@ -22,10 +22,8 @@ from reference_solver.exact.problem import (
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
-#: Speeds below this are none [m/s], and slips below this have no direction.
-STILL, SLIPPING = 1e-12, 1e-11
-#: Share of the largest load or acceleration that is round-off where a mode ends, and one that is a breach of a law.
-NONE = 1e-9
+#: Share of the largest load or acceleration that is round-off where a mode ends, and of a body's weight at least.
+NONE, LEAST = 1e-9, 1e-3
 #: Turn of a slip that shows how forces change with it [rad].
 TURN = 1e-6
 
@@ -42,11 +40,14 @@ class Held:
         Modes, directions of slips and forces.
     acceleration
         (n, q) of all bodies.
+    lasts
+        How long they hold, where that is known [s]; else 0.
     """
 
     contacts: Contacts
     answer: Answer
     acceleration: Array
+    lasts: float = 0.0
 
     @property
     def pressure(self) -> Array:
@@ -81,7 +82,7 @@ class Held:
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
         acceleration = self.follow(state.place, state.axes, state.velocity, free)
-        answer = replace(self.answer, forces=self.forces, directions=self.onward(self.contacts))
+        answer = Answer(self.answer.modes, self.onward(self.contacts), self.forces)
         return Held(self.contacts, answer, acceleration)
 
     def onward(self, contacts: Contacts) -> Array:
@@ -89,7 +90,7 @@ class Held:
         if contacts.world.dimension == 2:
             return self.answer.directions
         before = self.answer.directions
-        now = directed(contacts.rows.speed[:, 1:], SLIPPING, before)
+        now = directed(contacts.rows.speed[:, 1:], contacts.world.slipping, before)
         return np.where((self.answer.modes == SLIP)[:, None], now, before)
 
     @property
@@ -99,7 +100,7 @@ class Held:
         if not len(contacts) or contacts.world.dimension == 2:
             return False
         change = accelerations(contacts, self.acceleration).reshape(answer.forces.shape)[:, 1:]
-        over = np.linalg.norm(contacts.rows.speed[:, 1:], axis=1) < 2.0 * SLIPPING
+        over = np.linalg.norm(contacts.rows.speed[:, 1:], axis=1) < 2.0 * contacts.world.slipping
         return bool((over & ((change * answer.directions).sum(axis=1) < 0.0))[answer.modes == SLIP].any())
 
     def turned(self, slip: int, free: Array, directions: Array) -> Array:
@@ -128,16 +129,19 @@ def accelerations(contacts: Contacts, free: Array) -> Array:
 def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
     """Return the contacts that stay closed, and accelerations under their forces."""
     stays = answer.modes != OPEN
-    if not stays.any():
-        return Held(contacts.chosen(stays), answer.chosen(stays), free)
     acceleration = free + contacts.changes(answer.forces)
     if stays.all():
         return Held(contacts, answer, acceleration)
     return Held(contacts.chosen(stays), answer.chosen(stays), acceleration)
 
 
-def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
-    """Return which of the contacts that do not part stay closed, and how.
+def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: float = 0.0) -> Held:
+    """Return which of contacts without a speed of parting stay closed, and how.
+
+    Parameters
+    ----------
+    lasts
+        Time in which speeds of contacts are taken off [s], slips as far as friction can; 0 where they have none.
 
     Raises
     ------
@@ -146,10 +150,9 @@ def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
     Refused
         See `Problem.solved`.
     """
-    contacts = contacts.chosen(contacts.rows.speed[:, 0] < STILL)
     if not len(contacts):
         return Held(contacts, nothing(0, world.dimension), free)
-    directions = directed(contacts.rows.speed[:, 1:], SLIPPING)
+    directions = directed(contacts.rows.speed[:, 1:], np.inf if lasts > 0.0 else world.slipping)
     slips = np.asarray(directions.any(axis=1))
     if world.dimension == 3 and slips.any():
         # Frames take up the slip, so that its rows are along and across it.
@@ -157,10 +160,10 @@ def decide(world: World, state: State, contacts: Contacts, free: Array) -> Held:
         contacts.along = np.where(slips[:, None], tangents, contacts.along)
         contacts.at_state(state)
         directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
-    wanted = accelerations(contacts, free)
+    wanted = accelerations(contacts, free) + (contacts.rows.speed.ravel() / lasts if lasts > 0.0 else 0.0)
     if np.abs(wanted).max() < ROUND_OFF * world.weight:
         wanted[:] = 0.0
-    return held_by(contacts, Problem.of(contacts, wanted, directions).solved(state.t), free)
+    return replace(held_by(contacts, Problem.of(contacts, wanted, directions).solved(state.t), free), lasts=lasts)
 
 
 def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:
@@ -191,7 +194,7 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
         return held_by(contacts, found, free)
     after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
     force, load = np.abs(found.forces).max(), found.forces[:, 0]
-    least = -NONE * (1e-3 + force)
+    least = -NONE * (LEAST * contacts.world.load + force)
     small = -NONE * (contacts.world.weight + np.abs(after).max())
     friction = np.linalg.norm(found.forces[:, 1:], axis=1)
     holds = load.min() >= least and after[:, 0].min() >= small

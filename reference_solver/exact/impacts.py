@@ -6,27 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference_solver.exact import series
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.cones import NoSolution
-from reference_solver.exact.forces import STILL, accelerations
+from reference_solver.exact.forces import accelerations
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import Problem
 from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import NoImpulses, TooManyImpacts
 from reference_solver.exact.rows import Contacts
+from reference_solver.exact.series import height
 from reference_solver.model import Array
 from reference_solver.pieces import CHAIN, FROZEN
 
 #: Impacts of one instant, and of how many of them the speeds are compared to tell a cycle.
 MOST, LOOK_BACK = 4096, 64
-#: A pair without restitution that parts more slowly than this share of the fastest approach takes part (E21).
+#: A contact without restitution that parts more slowly than this share of the fastest approach takes part (E21).
 SLOW = 1e-6
 #: A point that parts so many times as fast as the fastest approaches has no part in an impact: no lever stops it, and
 #: its speed is no measure of the others.
 FAST = 1e6
-
-Pair = tuple[int, int]
 
 
 def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
@@ -40,63 +38,42 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
     blows: list[Blow] = []
     if not len(contacts):
         return blows
-    pairs = contacts.pairs
-    stopped: set[Pair] = set()  # pairs whose rebounds are over
-    cycle: set[Pair] = set()
+    known, pair = np.unique(contacts.features[:, :2], axis=0, return_inverse=True)
+    stopped, cycle = np.zeros((2, len(known)), bool)  # pairs whose rebounds are over, and those that a cycle strikes
     fastest: list[float] = []
     for count in range(MOST):
-        contacts.at_state(state)
-        approach = _least_of_pairs(pairs, contacts.rows.speed[:, 0])
-        closing = {pair for pair, speed in approach.items() if speed < -STILL}
-        if not closing:
-            last = series.settled(world, state, contacts) if blows else None
-            return blows if last is None else [*blows, last]
-        fastest.append(-min(approach.values()))
-        takes_part = {pair for pair, speed in approach.items() if speed < _parting(world, pair, fastest[-1])}
-        scheme = FROZEN
+        speeds = contacts.at_state(state).rows.speed[:, 0].copy()
+        closing = np.bincount(pair, speeds < -world.still) > 0.0
+        if not closing.any():
+            return blows
+        fastest.append(-float(speeds.min()))
+        answer, scheme = closing, FROZEN  # all points of a pair that meets answer together
         if count % (2 * LOOK_BACK) >= LOOK_BACK:
             cycle |= closing
         if count % (2 * LOOK_BACK) == 2 * LOOK_BACK - 1:
             # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22).
             if max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK]):
-                takes_part, stopped, scheme = cycle, stopped | cycle, CHAIN
-            cycle = set()
-        near = contacts.rows.speed[:, 0] < FAST * fastest[-1]
-        part = contacts.chosen(np.array([pair in takes_part for pair in pairs]) & near)
+                answer, stopped, scheme = cycle, stopped | cycle, CHAIN
+            cycle = np.zeros(len(known), bool)
+        lies = speeds < np.where(contacts.restitution == 0.0, max(world.still, SLOW * fastest[-1]), world.still)
+        which = np.flatnonzero((answer[pair] | lies & (scheme == FROZEN)) & (speeds < FAST * fastest[-1]))
+        part, rebounds = contacts.chosen(which), np.where(stopped[pair], 0.0, contacts.restitution)[which]
         try:
-            blow = _struck(state, part, stopped)
+            blow = _struck(state, part, rebounds)
         except NoImpulses:
             # A wedge cannot rebound from both sides at once; to and fro it can, and ends at rest where that is low.
-            high = fastest[-1] ** 2 > 2.0 * world.weight * series.height(world, state)
-            if high or stopped.issuperset(part.pairs):
+            high = fastest[-1] ** 2 > 2.0 * world.weight * height(world, state)
+            if high or not rebounds.any():
                 raise
-            stopped |= set(part.pairs)
-            blow = _struck(state, part, stopped)
-        low = series.too_low(world, blow.after, part) - stopped
-        if low:  # the impact again, without the rebounds that are too low
-            stopped |= low
-            blow = _struck(state, part, stopped)
+            stopped[pair[which]] = True
+            blow = _struck(state, part, 0.0 * rebounds)
         blows.append(replace(blow, scheme=scheme))
         state = blow.after
     raise TooManyImpacts(count=MOST, t=state.t)
 
 
-def _parting(world: World, pair: Pair, fastest: float) -> float:
-    """Return the speed of parting below which a pair takes part [m/s]."""
-    return max(STILL, SLOW * fastest) if world.restitution[pair] == 0.0 else STILL
-
-
-def _least_of_pairs(pairs: list[Pair], speeds: Array) -> dict[Pair, float]:
-    least: dict[Pair, float] = {}
-    for pair, speed in zip(pairs, speeds.tolist(), strict=True):
-        least[pair] = min(speed, least.get(pair, np.inf))
-    return least
-
-
-def _struck(state: State, part: Contacts, stopped: set[Pair]) -> Blow:
-    """Return one impact of contacts, solved without forces: u+ >= -e u- of each that approaches."""
-    part.at_state(state)
-    rebounds = np.array([pair not in stopped for pair in part.pairs]) * part.restitution
+def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
+    """Return one impact of contacts with restitutions (m,): u+ >= -e u- of each that approaches, without forces."""
     wanted = part.rows.speed.copy()
     wanted[:, 0] += rebounds * np.minimum(wanted[:, 0], 0.0)
     try:

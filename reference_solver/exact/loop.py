@@ -10,30 +10,34 @@ from reference_solver.exact.bodies import State, World
 from reference_solver.exact.checks import check
 from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.events import Event, Kind, first_event
+from reference_solver.exact.features import no_gap
 from reference_solver.exact.forces import Held, changed, decide
 from reference_solver.exact.impacts import jam, strike
-from reference_solver.exact.motion import Piece, constant, free_acceleration
+from reference_solver.exact.motion import Piece, constant, free_acceleration, steady
 from reference_solver.exact.problem import OPEN, SLIP, STICK
 from reference_solver.exact.projection import projected
 from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
 from reference_solver.exact.rows import Contacts, touching_contacts
+from reference_solver.exact.series import settling
 from reference_solver.exact.stiff import step
 
-#: Pieces of a run, events that may follow each other without progress, and progress [s].
-MOST_PIECES, MOST_AT_ONCE, PROGRESS = 20_000, 50, 1e-12
-#: Pieces that may follow each other within this share of the longest one.
+#: Pieces of a run: some 40 s of CPU. Shorter ones than this share of the world's time are an instant.
+MOST_PIECES, PROGRESS = 20_000, 1e-11
+#: Events that may follow each other within this share of the longest piece. A series of rebounds with e = .95 takes
+#: three hundred to become too low.
 MOST_IN_A_ROW, ROW = 1000, 1e-3
-#: An instant in which impulses do what no forces can (E54) [s].
-INSTANT = 4e-11
-#: First step of a motion that turns, in the time that the smallest half width falls through.
+#: An instant in which impulses do what no forces can (E54), as a share of the world's time: loads make some hundred
+#: times the speed in it that counts as none.
+INSTANT = 4e-10
+#: First step of a motion that turns, as a share of the world's time.
 FIRST_STEP = 0.1
 #: Modes that end while others go on: forces do not jump there.
 GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
 #: Share of the tolerance that is asked for where a body that turns touches nothing: free rotation is known to nearly
 #: round-off.
 FREE = 1e-2
-#: Speeds that are round-off [m/s].
+#: Share of the world's speed below which speeds are round-off.
 NO_SPEED = 1e-14
 
 
@@ -61,7 +65,8 @@ class Loop:
     longest: float
     step: float = 0.0
     pieces: int = 0
-    at_once: int = 0
+    events: int = 0
+    stuck: bool = False  # whether the piece before was an instant
     blows: list[Blow] = field(default_factory=list)
     row: float = 0.0  # where a count of pieces in a row began [s]
     held: Held | None = None  # what goes on from the piece before
@@ -80,7 +85,7 @@ class Loop:
             if held is None:
                 continue
             piece = self._piece(held)
-            event = first_event(self.world, piece)
+            event = first_event(self.world, piece, self.stuck)
             if event.at_start:
                 self._count(event.kind.value)
                 self.left, self.held = self.left | event.left, self._revised(held, event)
@@ -94,13 +99,21 @@ class Loop:
     def _found(self) -> Held | None:
         """Find what touches, strike it, and decide forces; None where a jam changed velocities instead."""
         contacts = touching_contacts(self.world, self.state, self.left)
-        blows = strike(self.world, self.state, contacts)
+        none = no_gap(self.world, self.state.place)
+        blows = strike(self.world, self.state, contacts.chosen(contacts.touch(none)))
         if blows:
             struck = blows[-1].after
-            velocity = np.where(np.abs(struck.velocity) < NO_SPEED, 0.0, struck.velocity)
+            stops = (np.abs(struck.velocity) < NO_SPEED * self.world.speed * self.world.per_length) & (
+                struck.velocity != self.state.velocity
+            )
+            velocity = np.where(stops, 0.0, struck.velocity)
             self.state = replace(struck, velocity=velocity)
             self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
             contacts = touching_contacts(self.world, self.state, self.left)
+        if blows and (held := settling(self.world, self.state, contacts.chosen(contacts.touch(none)))):
+            return held
+        speed = contacts.rows.speed[:, 0]  # what approaches and has a gap meets later
+        contacts = contacts.chosen((speed < self.world.still) & (contacts.touch(none) | (speed > -self.world.still)))
         free = free_acceleration(self.world, self.state.axes, self.state.velocity)
         try:
             held = decide(self.world, self.state, contacts, free)
@@ -117,7 +130,7 @@ class Loop:
 
     def _jam(self, contacts: Contacts) -> None:
         try:
-            blow = jam(self.world, self.state, contacts, INSTANT)
+            blow = jam(self.world, self.state, contacts, INSTANT * self.world.time)
         except NoSolution:
             raise NoForces(t=self.state.t) from None
         self.blows.append(blow)
@@ -126,11 +139,13 @@ class Loop:
 
     def _piece(self, held: Held) -> Piece:
         """Return the piece from here on: exact where accelerations are constant, else a step."""
+        if held.lasts > 0.0:
+            return steady(self.state, held, held.acceleration, held.lasts)
         if self.step == 0.0:
             piece = constant(self.world, self.state, held, self.longest)
             if piece is not None:
                 return piece
-            self.step = FIRST_STEP * float(np.sqrt(self.world.size / self.world.weight))
+            self.step = FIRST_STEP * self.world.time
         tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
         piece, self.step = step(self.world, self.state, held, tolerance, min(self.step, self.longest))
         return piece
@@ -157,14 +172,10 @@ class Loop:
         self.pieces += 1
         if self.pieces > MOST_PIECES:
             raise TooManyPieces(count=MOST_PIECES, t=self.state.t)
-        if self.pieces % MOST_IN_A_ROW == 0:
-            if self.state.t - self.row < ROW * self.longest:
-                raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=event.kind.value)
-            self.row = self.state.t
-        if piece.length > PROGRESS:
-            self.at_once, self.left = 0, frozenset()
-        else:
-            self._count(event.kind.value)
+        self._count(event.kind.value)
+        self.stuck = piece.length <= PROGRESS * self.world.time
+        if not self.stuck:
+            self.left = frozenset()
         self.state = piece.state(1.0)
         if not piece.turns:
             self.step = 0.0
@@ -197,6 +208,8 @@ class Loop:
         return found or changed(held, modes, free, strictly=False)
 
     def _count(self, what: str) -> None:
-        self.at_once += 1
-        if self.at_once > MOST_AT_ONCE:
-            raise NoProgress(count=MOST_AT_ONCE, t=self.state.t, last=what)
+        self.events += 1
+        if self.events % MOST_IN_A_ROW == 0:
+            if self.state.t - self.row < ROW * self.longest:
+                raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=what)
+            self.row = self.state.t

@@ -24,13 +24,15 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_solver.exact.bodies import World
+from reference_solver.exact.features import no_gap
 from reference_solver.exact.kernels.features import POINT
 from reference_solver.exact.kernels.meeting import first_meeting, first_meeting_of_pairs
 from reference_solver.exact.motion import Piece
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
-#: Gaps below this share of the smallest half width touch; with a speed below this a point leaves without one [m/s].
+#: Gaps below this share of the smallest half width touch; with less than this share of the world's speed a point
+#: leaves without one.
 NOISE, SLOW = 1e-12, 1e-10
 
 
@@ -53,15 +55,11 @@ def course_of(piece: Piece) -> Course:
     return Course(piece.start.place, piece.start.axes, piece.way, np.ascontiguousarray(spin))
 
 
-class Meeting(NamedTuple):
-    """What a search found: the share of the piece, and whether it was given up there and goes on."""
+def next_meeting(world: World, piece: Piece, contacts: Contacts, stuck: bool) -> tuple[float, bool]:
+    """Return the share of the first meeting in a piece in which contacts stay closed, `NEVER` if there is none.
 
-    share: float
-    stopped: bool
-
-
-def next_meeting(world: World, piece: Piece, contacts: Contacts) -> Meeting:
-    """Return the first meeting in a piece in which contacts stay closed; its share is `NEVER` if there is none."""
+    And whether the search was given up there, and goes on.
+    """
     bodies, n = world.bodies, len(world.bodies.free)
     held = np.zeros((n, n, bodies.point.shape[1]), np.bool_)
     touch = np.zeros((n, n), np.bool_)
@@ -75,8 +73,12 @@ def next_meeting(world: World, piece: Piece, contacts: Contacts) -> Meeting:
     # In the plane, and where a body is round, points are all that meets.
     round_ = (bodies.points == 1) | (bodies.points == 0)
     edges = ~(round_[:, None] | round_[None, :]) & ~touch if world.dimension == 3 else np.zeros((n, n), np.bool_)
-    scales = np.array([NOISE * world.size, SLOW * piece.length])
-    found = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales)
+    none = no_gap(world, piece.start.place)
+    if stuck:
+        none = np.maximum(none, NOISE * world.size)
+    scales = np.array([NOISE * world.size, SLOW * world.speed * piece.length])
+    found = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales, none)
     if edges.any():
-        found = min(found, first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales), key=itemgetter(0))
-    return Meeting(float(found[0]), bool(found[1]))
+        crossed = first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales, none)
+        found = min(found, crossed, key=itemgetter(0))
+    return float(found[0]), bool(found[1])

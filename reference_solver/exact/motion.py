@@ -19,6 +19,8 @@ from reference_solver.model import Array
 #: Changes of rows below this share of their size are round-off, and so are accelerations below this share of what
 #: forces of contacts make one by one.
 STEADY, REST = 1e-13, 1e-12
+#: Share of the world's speed from which on errors of speeds are relative to them.
+LEAST = 1e-2
 #: How much shorter or longer than the last a step may be, and what is left to safety.
 SHORTER, LONGER, SAFE = 0.2, 5.0, 0.9
 
@@ -90,6 +92,13 @@ class Piece:
         return replace(self, length=share * self.length, way=way, velocity=velocity)
 
 
+def steady(state: State, held: Held, acceleration: Array, length: float) -> Piece:
+    """Return the piece under accelerations (n, q) that stay."""
+    way = np.stack([np.zeros(acceleration.shape), length * state.velocity, 0.5 * length**2 * acceleration], axis=2)
+    velocity = np.stack([state.velocity, length * acceleration], axis=2)
+    return Piece(state, length, way, velocity, held, turns=False)
+
+
 def constant(world: World, state: State, held: Held, length: float) -> Piece | None:
     """Return the piece under constant accelerations, exact whatever its length; None where they are not constant.
 
@@ -97,16 +106,14 @@ def constant(world: World, state: State, held: Held, length: float) -> Piece | N
     half-way, nor at the end.
     """
     d = world.dimension
-    # A heavy body goes along with what round-off makes of a light one that it presses on.
-    noise = np.maximum(REST * held.pressure, ROUND_OFF * held.pressure.max(axis=0))
+    # A heavy body goes along with what round-off makes of a light one that it presses on; errors of all contacts of a
+    # pile add up towards its top.
+    most = max(map(len, held.contacts.groups), default=0)
+    noise = np.maximum(REST * held.pressure, most * ROUND_OFF * held.pressure.max(axis=0))
     acceleration = np.where(np.abs(held.acceleration) < noise, 0.0, held.acceleration)
-    n, q = acceleration.shape
-    way, velocity = np.zeros((n, q, 3)), np.zeros((n, q, 2))
-    way[..., 1], way[..., 2] = length * state.velocity, 0.5 * length**2 * acceleration
-    velocity[..., 0], velocity[..., 1] = state.velocity, length * acceleration
     if d == 3 and not _turns_steadily(world, state, acceleration):
         return None
-    piece = Piece(state, length, way, velocity, held, turns=False)
+    piece = steady(state, held, acceleration, length)
     if not len(held.contacts):
         return piece
     rows = held.contacts.rows
@@ -134,7 +141,7 @@ def _turns_steadily(world: World, state: State, acceleration: Array) -> bool:
     """Whether spins keep their directions, and those of bodies with different moments are none."""
     spin, change, moment = state.velocity[:, 3:], acceleration[:, 3:], world.bodies.moment
     free = world.bodies.free == 1
-    bent = np.abs(np.cross(spin, change)).max() > 1e-14 * (1.0 + np.abs(spin).max())
+    bent = np.abs(np.cross(spin, change)).max() > 1e-14 * np.abs(spin).max() * np.abs(change).max()
     torque = (world.bodies.torque[free] != 0.0).any()
     unequal = free & (np.ptp(np.where(free[:, None], moment, 1.0), axis=1) > 0.0)
     return not bent and not torque and not (spin[unequal] != 0.0).any() and not (change[unequal] != 0.0).any()
@@ -169,11 +176,12 @@ class Turning:
         E. Hairer, S. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 1993, II.10: order 8, with an
         interpolant of order 7.
         """
-        size = self._world.size
         count = self._state.velocity.size
+        each = np.tile(self._world.per_length, len(self._state.velocity))
         pushes = np.zeros(self._held.answer.forces.shape)
         start = np.concatenate([np.zeros(count), self._state.velocity.ravel(), pushes.ravel()])
-        least = np.concatenate([np.full(count, size), 1e-2 + np.abs(start[count : 2 * count])])
+        floor = LEAST * self._world.speed * each
+        least = np.concatenate([self._world.size * each, floor + np.abs(start[count : 2 * count])])
         rates = np.zeros((16, len(start)))
         rates[0] = self._rates(start)
         while True:

@@ -14,7 +14,7 @@ stick and slip (`cones`), and the equations of these modes are solved once more,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ from reference_solver.pieces import Indices
 NONE, BROKEN, SINGULAR, ROUND_OFF = 1e-9, 1e-6, 1e-11, 1e-15
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """Modes (m,), directions of slips (m, d - 1), forces or impulses (m, d) along the frames."""
 
     modes: Indices
@@ -108,7 +107,7 @@ class Problem:
             return self._joined([part.solved(t) for _, part in parts])
         guess = self.with_modes(*self._held())
         if guess is not None and self.broken(guess) < NONE:
-            return guess
+            return _pressing(guess)
         found = within_cones(self.contacts, self.free, self.slips)
         answer = self._polished(found.reshape(-1, self.dimension), t)
         broken = self.broken(answer)
@@ -130,11 +129,8 @@ class Problem:
         """Return answers of all parts as one."""
         whole = nothing(len(self.contacts), self.dimension)
         for (group, _), answer in zip(self._parts(), answers, strict=True):
-            whole.modes[group], whole.directions[group], whole.forces[group] = (
-                answer.modes,
-                answer.directions,
-                answer.forces,
-            )
+            for each, own in zip(whole, answer, strict=True):
+                each[group] = own
         return whole
 
     def _held(self) -> tuple[Indices, Array]:
@@ -250,7 +246,6 @@ def loads_shared(contacts: Contacts, near: Array) -> Array:
 
 
 def _pressing(answer: Answer) -> Answer:
-    """Return the answer with loads that round-off made negative as zeros."""
-    forces = answer.forces.copy()
-    forces[:, 0] = np.maximum(forces[:, 0], 0.0)
-    return Answer(answer.modes, answer.directions, forces)
+    """Return the answer without forces where loads are round-off, or negative by it."""
+    loads = answer.forces[:, :1]
+    return Answer(answer.modes, answer.directions, np.where(loads > ROUND_OFF * loads.max(), answer.forces, 0.0))

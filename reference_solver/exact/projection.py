@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.forces import SLIPPING, Held
+from reference_solver.exact.forces import Held
 from reference_solver.exact.problem import SINGULAR, STICK
 from reference_solver.exact.record import Blow
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 
-#: Gaps that are left alone, as a share of the smallest half width, and speeds [m/s].
+#: Shares of the smallest half width and of the world's speed below which gaps and speeds are left alone.
 GAP, SPEED = 1e-14, 1e-13
 
 
@@ -40,7 +40,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     sticks = np.flatnonzero((held.answer.modes == STICK) | ended)
     keeps = np.concatenate([normal, (sticks[:, None] * d + np.arange(1, d)).ravel()])
     speed = contacts.rows.speed.ravel()[keeps]
-    if np.abs(speed).max() <= SPEED:
+    if np.abs(speed).max() <= SPEED * world.speed:
         return state, None
     impulses = _least(contacts, keeps, -speed).reshape(-1, d)
     after = replace(state, velocity=state.velocity + contacts.changes(impulses))
@@ -55,7 +55,7 @@ def _at_end(held: Held) -> NDArray[np.bool_]:
     if contacts.world.dimension == 2:
         return np.zeros(len(contacts), bool)
     slip = np.linalg.norm(contacts.rows.speed[:, 1:], axis=1)
-    return np.asarray((slip <= 2.0 * SLIPPING) & (contacts.friction > 0.0))
+    return np.asarray((slip <= 2.0 * contacts.world.slipping) & (contacts.friction > 0.0))
 
 
 def _least(contacts: Contacts, rows: NDArray[Any], wanted: Array) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,9 @@ from reference_solver.model import Array
 from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
 from reference_solver.records import Contacts as Handed
 
-#: Changes of velocity below this are round-off and no blow [m/s, rad/s].
+#: Share of the smallest half width by which ways of a part may differ from cubic polynomials.
+CLOSE = 1e-9
+#: Share of the world's speed below which changes of velocity are round-off and no blow.
 NO_BLOW = 1e-13
 #: Shares of a part, and their weights, at which moments of its impulses are taken: enough for polynomials of degree 7.
 GAUSS = [0.5 + 0.5 * roots_legendre(4)[0], 0.5 * roots_legendre(4)[1]]
@@ -161,7 +163,8 @@ class Recorder:
                 continue
             for part in group:
                 if isinstance(part, Part):
-                    self._write_part(step, dt, part)
+                    for share in self._shares(part):
+                        self._write_part(step, dt, share)
 
     def _write_blows(self, step: int, dt: float, blows: list[Blow]) -> None:
         """Write blows of one instant: those of bodies that share contacts follow each other."""
@@ -173,10 +176,22 @@ class Recorder:
                 free = bodies[self._world.bodies.free[bodies] == 1]
                 own = np.asarray(np.isin(blow.acting.features[:, :2], free).any(axis=1))
                 gained = blow.after.velocity[bodies] - self._state[bodies, -self._world.shape[1] :]
-                if np.abs(gained).max() > NO_BLOW:
+                if np.abs(gained / self._world.per_length).max() > NO_BLOW * self._world.speed:
                     rocks = blow.scheme == ROCKING
                     label = (step, FORCES if rocks else IMPACT, blow.scheme)
                     self._enter((begin, 0.0), label, bodies, blow.after, blow.acting.chosen(own))
+
+    def _shares(self, part: Part) -> list[Part]:
+        """Return a part in so many that cubic polynomials through their ends, which the audit follows, are close."""
+        piece, first, last = part
+        if not piece.turns:
+            return [part]
+        s = np.array([first, 0.5 * (first + last), last])[:, None]
+        way, rate = (each @ (s ** np.arange(each.shape[2])).T for each in (piece.way, piece.velocity))
+        bend = 0.125 * (last - first) * piece.length * (rate[..., 0] - rate[..., 2])
+        off = np.abs(way[..., 1] - 0.5 * (way[..., 0] + way[..., 2]) - bend).max() / (CLOSE * self._world.size)
+        ends = np.linspace(first, last, 1 + max(1, int(np.ceil(off**0.25))))  # errors fall with the fourth power
+        return [Part(piece, *both) for both in pairwise(ends.tolist())]
 
     def _write_part(self, step: int, dt: float, part: Part) -> None:
         piece, start, end = part.piece, part.piece.state(part.first), part.piece.state(part.last)
@@ -184,8 +199,10 @@ class Recorder:
         length = (part.last - part.first) * piece.length  # to more digits than times have
         acting = Acting.between(part)
         for bodies, own in self._groups(acting.features):
-            turns = piece.turns and bool(own.any())
-            label = (step, FORCES, FIFTH_ORDER if turns else FROZEN)
+            scheme = FIFTH_ORDER if piece.turns and own.any() else FROZEN
+            if piece.held.lasts > 0.0 and own.any():
+                scheme = ROCKING
+            label = (step, FORCES, scheme)
             self._enter((start.t - step * dt, length), label, bodies, end, acting.chosen(own))
 
     def _bring(self, state: State) -> None:
@@ -197,13 +214,13 @@ class Recorder:
         """Yield bodies that share contacts, with what is moved and touches them, and which contacts (m,) are theirs."""
         bodies, pairs = self._world.bodies, features[:, :2]
         free = bodies.free == 1
-        n, label = len(free), np.array(labels(free.tolist(), pairs.tolist()))
+        label = np.array(labels(free.tolist(), pairs.tolist()))
         of = np.where(free[pairs[:, 0]], label[pairs[:, 0]], label[pairs[:, 1]])
         moved = ~free & (self._state[:, -self._world.shape[1] :] != 0.0).any(axis=1)
         for group in dict.fromkeys(label[free].tolist()):
             own = of == group
-            touched = np.zeros(n, bool)
-            touched[pairs[own].ravel()] = True
+            touched = np.zeros(len(free), bool)
+            touched[features[own, :2].ravel()] = True
             yield np.flatnonzero(free & (label == group) | touched & moved), own
 
     def _enter(

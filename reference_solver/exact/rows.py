@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.features import find
+from reference_solver.exact.features import TOUCH, find, no_gap
 from reference_solver.exact.kernels.features import LINE
 from reference_solver.exact.kernels.rows import write_rows
 from reference_solver.model import Array
@@ -111,6 +111,10 @@ class Contacts:
         part.rows = Rows(*(each[which] for each in self.rows))
         return part
 
+    def touch(self, none: Array) -> NDArray[np.bool_]:
+        """Whether gaps (m,) count as none, of those of all pairs (n, n)."""
+        return np.asarray(self.rows.gap <= none[self.features[:, 0], self.features[:, 1]])
+
     @property
     def names(self) -> list[tuple[int, ...]]:
         """Features as tuples, to look contacts up by."""
@@ -178,19 +182,24 @@ def moments(place: Array, force: Array) -> Array:
 def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
     """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it.
 
-    Edges that cross count at one place each: where a corner leaves a face two begin, which part.
+    There bodies meet along the normal along which they close last. Edges that cross count at one place each: where a
+    corner leaves a face two begin, which part.
     """
     features = find(world, state, left)
     contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
     crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
     place = contacts.rows.place
-    # Places differ by as much as two gaps and two distances from ends may be off.
-    tol = 2e-10 * world.size
+    # At corners of three degrees or more places are off by less than twenty gaps.
+    tol = 20.0 * TOUCH * world.size
     of: dict[tuple[int, int], list[int]] = {}
     keep: list[int] = []
-    for k, pair in enumerate(contacts.pairs):
+    gap = np.where(contacts.touch(no_gap(world, state.place)), 0.0, contacts.rows.gap)
+    closes = np.maximum(-contacts.rows.speed[:, 0], world.still)
+    pairs = contacts.pairs
+    for k in np.lexsort((closes, -gap)).tolist():
+        pair = pairs[k]
         others = of.setdefault(pair, [])
         if all((crosses[j] and crosses[k]) or np.abs(place[j] - place[k]).max() >= tol for j in others):
             others.append(k)
             keep.append(k)
-    return contacts if len(keep) == len(features) else contacts.chosen(np.array(keep))
+    return contacts if len(keep) == len(features) else contacts.chosen(np.array(sorted(keep)))

@@ -14,9 +14,9 @@ from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.forces import SLIPPING, Held
+from reference_solver.exact.forces import Held
 from reference_solver.exact.kernels.motion import write_moved
-from reference_solver.exact.motion import LONGER, SAFE, SHORTER, Piece, Turning, free_acceleration
+from reference_solver.exact.motion import LEAST, LONGER, SAFE, SHORTER, Piece, Turning, free_acceleration
 from reference_solver.exact.problem import SLIP
 from reference_solver.model import Array
 
@@ -39,7 +39,7 @@ def step(world: World, state: State, held: Held, tolerance: float, length: float
     if world.dimension == 3 and len(held.contacts):
         stiff = Stiff(world, state, held, tolerance)
         # What order 8 could do with the smallest half width's time to fall through.
-        smooth = tolerance**0.125 * float(np.sqrt(world.size / world.weight))
+        smooth = tolerance**0.125 * world.time
         if stiff.rate * smooth > STABLE:
             while stiff.rate * length > SHORTER * STABLE:
                 found = stiff.step(length)
@@ -63,7 +63,7 @@ class Stiff:
         _, self._start, _, turn, slip, across = self._at(
             np.zeros(state.velocity.shape), state.velocity, self._directions
         )
-        sizes = np.maximum(np.linalg.norm(slip, axis=1), SLIPPING)
+        sizes = np.maximum(np.linalg.norm(slip, axis=1), world.slipping)
         self.rate = float(np.abs((across * turn).sum(axis=1) / sizes).max(initial=0.0))
 
     def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, ...]:
@@ -88,7 +88,9 @@ class Stiff:
         """Return a piece of at most a length [s] and the next length; None where the iteration does not converge."""
         start = self._state.velocity
         shape, count, k = start.shape, start.size, len(self._slips)
-        scale = self._tolerance * (1e-2 + np.abs(start.ravel()))
+        scale = self._tolerance * (
+            LEAST * self._world.speed * np.tile(self._world.per_length, len(start)) + np.abs(start.ravel())
+        )
         rates = np.tile(start.ravel(), (COUNT, 1))
         accelerations = np.tile(self._start, (COUNT, 1))
         directions = np.tile(self._directions, (COUNT, 1, 1))

@@ -18,7 +18,7 @@ from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.tally import new_tally
 
-#: Longest piece, in the time that the smallest half width falls through.
+#: Longest piece, in units of the world's time.
 LONGEST = 10.0
 
 
@@ -31,7 +31,7 @@ class World:
     def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool = True) -> None:
         self._dt, self._steps = settings.dt, 0
         world, state = world_of(model), start_of(model)
-        self._loop = Loop(world, state, settings.accuracy, LONGEST * float(np.sqrt(world.size / world.weight)))
+        self._loop = Loop(world, state, settings.accuracy, LONGEST * world.time)
         self._recorder = Recorder(world)
         self._part: Part | None = None  # up to where the world was looked at
         self._parts: list[Part | Blow] = []  # what happened in the last step

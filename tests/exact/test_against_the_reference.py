@@ -7,6 +7,7 @@ from oracle import KEPT, SEEDED, Answer, stored, world_of
 
 from reference_solver import Settings, Simulation
 from reference_solver.certificate.relations import Change
+from reference_solver.certificate.truth import certify, distance
 from reference_solver.exact import loop
 from reference_solver.exact.refusals import NoForces
 
@@ -14,7 +15,7 @@ from reference_solver.exact.refusals import NoForces
 #: some 60 s on the slowest machine.
 COUNT, LIMIT = 6, 300.0
 ANSWERS = {known.key: known for known in stored()}
-CHOSEN = [f"{kind} {seed}" for kind in SEEDED for seed in range(COUNT)]
+CHOSEN = [f"{kind} {seed}" for kind in SEEDED for seed in range(COUNT)] + ["fuzz2 1021"]
 
 
 def test_store_has_every_kind_of_world():
@@ -27,6 +28,18 @@ def test_store_has_every_kind_of_world():
 @pytest.mark.parametrize("key", CHOSEN)
 def test_random_world_is_the_same_within_both_bounds(key):
     assert compared(ANSWERS[key], LIMIT).word in ("same", "unknown", "refused by both")
+
+
+@pytest.mark.parametrize("seed", [1004, 1036, 1042, 1043, 1049, 1073, 1074, 1096])
+def test_world_of_small_gaps_and_low_rebounds_is_certified(seed):
+    """What is nearly closed, or rises hardly at all, would be struck with others, or for ever, or off by its time."""
+    known, world = ANSWERS[f"fuzz2 {seed}"], world_of(f"fuzz2 {seed}")
+    found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
+    assert found.holds, found.reasons
+    assert (distance(world.model, found.pose, np.array(known.pose)) <= found.error + known.error)[
+        found.t < found.horizon
+    ].all()
+    assert found.error.max() < 1e-6
 
 
 @pytest.mark.long

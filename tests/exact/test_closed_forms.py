@@ -2,12 +2,14 @@
 
 import math
 from fractions import Fraction
+from itertools import permutations
 
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
 from reference_solver.exact.refusals import NoImpulses
+from reference_solver.pieces import ROCKING
 
 G, DT = 9.81, 1.0 / 240.0
 SMALL = 1e-10
@@ -64,6 +66,30 @@ def test_bounce_down_to_rest(d, e):
     found = record(Model(d, [ground(d), ball(d, up(d, 1.5))], up(d, -G), e, 0.0), 3.0)
     truth = [0.5 + height_of_bounce(t, 1.0, e) for t in found.t]
     assert np.abs(found.pose[:, 1, d - 1] - truth).max() < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("e", [0.2, 0.8])
+def test_time_of_all_rebounds(d, e):
+    """They are over at (1 + e) / (1 - e) sqrt(2 h / g)."""
+    model = Model(d, [ground(d), ball(d, up(d, 1.5))], up(d, -G), e, 0.0)
+    last = (1.0 + e) / (1.0 - e) * math.sqrt(2.0 / G)
+    pieces = Simulation(model, Settings.exact(DT)).record(math.ceil(last / DT), pieces=True).pieces
+    (end,) = np.flatnonzero(pieces.scheme == ROCKING)
+    assert abs(pieces.begin[end] + pieces.length[end] - last) < 1e-12
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_slide_over_a_seam_of_polygons(order):
+    """Corners of both meet at the seam, and are not held up by each other's sides."""
+    block = Polygon(((0.5, -0.5), (0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5)))
+    bodies = [
+        Body(block, motion="fixed", pose=(0.0, -0.5, 0.0)),
+        Body(block, motion="fixed", pose=(1.0, -0.5, 0.0)),
+        Body(block, 1.0, 1.0 / 6.0, (-0.25, 0.5, 0.0), (1.0, 0.0, 0.0)),
+    ]
+    found = record(Model(2, [bodies[i] for i in order], (0.0, -G), 0.0, 0.0), 0.5)
+    assert np.abs(found.twist[:, order.index(2)] - (1.0, 0.0, 0.0)).max() < 1e-12
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.4])

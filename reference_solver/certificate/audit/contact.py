@@ -114,8 +114,9 @@ def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]
 
     Bodies that go apart with the acceleration a after they came near each other with the speed u were nearer by
     ``u^2/(2 a)`` then. Where gaps below ``noise`` [m] count as none, they meet with any u up to ``sqrt(2 a noise)``, or
-    pass each other. The acceleration is that of the gap until the first sample (``t``, ``pose``) after the impact, if
-    the pair has no impulse before it; it may have been `APART` times as large when they met.
+    pass each other. The acceleration is that of the gap until the first sample (``t``, ``pose``) after the impact that
+    resolves it, if the pair has no impulse before it; it may have been `APART` times as large when they met. At gaps
+    below ``4 APART noise`` a speed of parting looks like an acceleration.
     """
     pieces, owner = run.pieces, run.contact_owner
     approach = (run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
@@ -130,10 +131,15 @@ def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]
     alone = run.is_impact[owner] & pushed & (approach < 0.0) & (until >= t[sample]) & (t[sample] > pieces.begin[owner])
     times, speed, mass = [], [], reduced_mass(run)
     for j in np.flatnonzero(alone):
-        both, at = (int(pieces.body_a[j]), int(pieces.body_b[j])), pose[sample[j]]
+        both = (int(pieces.body_a[j]), int(pieces.body_b[j]))
         first, second = (run.model.bodies[i].shape for i in both)
-        gap = max(float(nearest(first, at[both[0]], second, at[both[1]]).gap), 0.0)
-        met = math.sqrt(2.0 * APART * noise * 2.0 * gap) / (t[sample[j]] - pieces.begin[owner[j]])
+        for k in range(sample[j], len(t)):
+            if t[k] > until[j]:
+                break
+            gap = max(float(nearest(first, pose[k, both[0]], second, pose[k, both[1]]).gap), 0.0)
+            met = math.sqrt(2.0 * APART * noise * 2.0 * gap) / (t[k] - pieces.begin[owner[j]])
+            if gap > 4.0 * APART * noise:
+                break
         if -approach[j] <= met:
             impulse = (1.0 + run.model.restitution[both]) * met * mass[j]
             far = [

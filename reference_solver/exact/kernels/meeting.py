@@ -360,10 +360,10 @@ def clear_at(bodies, course, who, s, bounds, rates, room):
 def meeting(bodies, course, who, limits, rates, room):
     """Return the first share below ``limits[0]`` at which a point or a body meets body ``who[0]``, or `NEVER`.
 
-    ``limits``: the share to look up to, noise [m], speed of what leaves [m], round-off of gaps [m]. The second number
-    tells whether the search stopped there before anything met. See `clear_at` for the rest.
+    ``limits``: the share to look up to, noise [m], speed of what leaves [m], gaps that are none [m], round-off of gaps
+    [m]. The second number tells whether the search stopped there before anything met. See `clear_at` for the rest.
     """
-    until, noise, slow, least = limits
+    until, noise, slow, none, least = limits
     s, lift, leaves, before, runs = 0.0, 0.0, True, 0.0, noise
     for step in range(MOST_STEPS):
         ahead = until - s
@@ -371,8 +371,12 @@ def meeting(bodies, course, who, limits, rates, room):
         if step == 0 and gap <= noise:  # it touches, and leaves with a speed
             lift, runs = max(0.0, -gap), -1e300
             far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), rates, room)[1]
-            if far == 0.0:  # or without one: no contact until it is deeper than now by the noise
-                lift, leaves = noise + lift, False
+            if far == 0.0:
+                drifts = clear_at(bodies, course, who, s, (lift, -slow, ahead, runs, noise), rates, room)[1]
+                if gap > none and drifts == 0.0:  # it approaches, and meets
+                    lift, runs = 0.0, noise
+                else:  # it leaves without one: no contact until it is deeper than now by the noise
+                    lift, leaves = noise + lift, False
                 far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)[1]
         elif not leaves and gap > noise:
             lift, leaves = 0.0, True
@@ -398,7 +402,7 @@ def meeting(bodies, course, who, limits, rates, room):
 
 
 @kernel
-def first_meeting(bodies, course, held, pairs, scales):
+def first_meeting(bodies, course, held, pairs, scales, none):
     """Return the first share of a piece at which points that are not held meet another body, or `NEVER`; see `meeting`.
 
     Parameters
@@ -409,6 +413,8 @@ def first_meeting(bodies, course, held, pairs, scales):
         (n, n): whether the pair is followed here.
     scales
         Noise of gaps [m], speed of what leaves, as a way in the piece [m].
+    none
+        (n, n): gaps that count as none [m].
     """
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
@@ -445,7 +451,7 @@ def first_meeting(bodies, course, held, pairs, scales):
                 bounds[o, 1] = own
                 if rates[0, 0] == 0.0:
                     continue
-                limits = (min(first, 1.0), scales[0], scales[1], 1e-16 * size)
+                limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-16 * size)
                 s, ended = meeting(bodies, course, (o, w, fixed, k), limits, rates, room)
                 if s < first:
                     first, stopped = s, ended
@@ -453,7 +459,7 @@ def first_meeting(bodies, course, held, pairs, scales):
 
 
 @kernel
-def first_meeting_of_pairs(bodies, course, pairs, scales):
+def first_meeting_of_pairs(bodies, course, pairs, scales, none):
     """Return the first share of a piece at which pairs that no contact holds meet, or `NEVER`; see `first_meeting`."""
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
@@ -476,7 +482,7 @@ def first_meeting_of_pairs(bodies, course, pairs, scales):
             reach_o, reach_w = min(bodies.reach[o], 1e300), min(bodies.reach[w], 1e300)
             write_rates(bounds, o, w, reach_w, apart, rates[0])
             write_rates(bounds, w, o, reach_o, apart, rates[1])
-            limits = (min(first, 1.0), scales[0], scales[1], 1e-15 * (apart + r))
+            limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-15 * (apart + r))
             s, ended = meeting(bodies, course, (o, w, 0, -1), limits, rates, room)
             if s < first:
                 first, stopped = s, ended
