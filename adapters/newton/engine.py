@@ -8,21 +8,18 @@ Overlaps at a step's end are corrected, all contacts at once; a body gets the me
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import MappingProxyType
 from typing import final
 
-from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Quirk, Scheme
 from adapters.needs import Needs
+from adapters.newton.family import NewtonFamily
 from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS
 from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
-from adapters.newton.simulation import NewtonSimulation, imported
+from adapters.newton.simulation import NewtonSimulation
 from adapters.receipts import FRICTION_SHARE
 from adapters.receipts.probes import GRAVITY, SLIDE_TIME
-from adapters.scene import Scene
-from adapters.scene.means import no_means
 
 #: Largest ratio of a box's mass to the effective mass at a corner, for any face: 1 + 3 a^2/(a^2 + c^2) + 3 b^2/(b^2 +
 #: c^2).
@@ -30,7 +27,7 @@ LEAST_SHARE = 7.0
 
 
 @final
-class NewtonEngine(CheckedEngine):
+class NewtonEngine(NewtonFamily):
     """Spatial engine; see the module's docstring for its step."""
 
     facts = EngineFacts(
@@ -92,29 +89,10 @@ class NewtonEngine(CheckedEngine):
             ),
         ),
     )
-    module = "newton"
     simulation = NewtonSimulation
     profiles = PROFILES
     kinds = KINDS
     exports = MappingProxyType({"python": python})
-
-    def version(self) -> str:
-        """Version of the installed distribution."""
-        imported()  # without the output of its first import
-        return super().version()
-
-    def kernels(self) -> Path | None:
-        """Folder of this release in Warp's own cache, which holds what is compiled; None if it cannot be written."""
-        folder = Path(imported()[0].config.kernel_cache_dir) / f"newton-{self.version()}"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            return None
-        return folder
-
-    def refuses(self, scene: Scene, profile: str) -> str | None:
-        """Refuse values beyond single precision, and pairs that no body values give."""
-        return no_means(scene) or super().refuses(scene, profile)
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Residual approach speeds after two iterations, momentum lost by stopping, and rebounds without friction."""

@@ -1,4 +1,4 @@
-"""Defaults of Newton's XPBD solver."""
+"""Defaults of Newton: of shapes, and of the XPBD solver."""
 
 from __future__ import annotations
 
@@ -17,3 +17,5 @@ GAP = 0.1
 STOPPED = 1e-4
 #: Threshold speed of restitution, in units of g dt. [xpbd/restitution_kernels.py, impact_threshold]
 LEAST_APPROACH = 2.0
+#: Stiffness [N/m] and damping [N s/m] of a contact where it is a spring. [`ModelBuilder.ShapeConfig`, ke, kd]
+STIFFNESS, DAMPING = 2500.0, 100.0

@@ -1,7 +1,7 @@
-"""One Newton model with XPBD and its readings; a step is recorded once and replayed.
+"""One Newton model with a solver and its readings; a step is recorded once and replayed.
 
-A step of the solver has about thirty launches of kernels, which cost 1.2 ms of Python on a CPU. Warp records them into
-a graph, as on GPUs, and replays the same launches on the same arrays in 0.03 ms, bit for bit.
+A step of XPBD has about thirty launches of kernels, which cost 1.2 ms of Python on a CPU. Warp records them into a
+graph, as on GPUs, and replays the same launches on the same arrays in 0.03 ms, bit for bit.
 """
 
 from __future__ import annotations
@@ -70,7 +70,13 @@ def turned(quaternion: tuple[float, ...], spin: tuple[float, ...], time: float) 
 
 
 class NewtonSimulation(Simulation):
-    """One model on the CPU; free and driven bodies are Newton's, shapes of fixed ones belong to its world."""
+    """One model on the CPU; free and driven bodies are Newton's, shapes of fixed ones belong to its world.
+
+    Subclasses have another solver, with its own numbers and materials.
+    """
+
+    #: Whether the solver reports contact forces.
+    tells_forces = True
 
     def __init__(self, scene: Scene, dt: float, settings: Mapping[str, Any]) -> None:
         warp, newton = imported()
@@ -80,18 +86,12 @@ class NewtonSimulation(Simulation):
         builder.rigid_gap = settings["gap"]
         #: Newton's index of each of the scene's bodies; -1 for fixed ones.
         self.numbers = [self._made(newton, builder, index, body) for index, body in enumerate(scene.bodies)]
-        self.model: Any = builder.finalize(device="cpu")
-        self.solver: Any = newton.solvers.SolverXPBD(
-            self.model,
-            iterations=settings["iterations"],
-            rigid_contact_relaxation=settings["relaxation"],
-            rigid_contact_con_weighting=settings["weighted"],
-            enable_restitution=settings["rebounds"],
-            rigid_contact_restitution_iterations=settings["rebound_iterations"],
-        )
-        self.pipeline: Any = newton.CollisionPipeline(self.model)
+        self.model: Any = self._finished(builder)
+        self.room = self._room()
+        self.pipeline: Any = newton.CollisionPipeline(self.model, rigid_contact_max=self.room)
         self.touching: Any = self.pipeline.contacts()
-        self.told: Any = self.solver.observables({"contact_f"}, contacts=self.touching)
+        self.solver: Any = self._solver(newton)
+        self.told: Any = self.solver.observables({"contact_f"}, contacts=self.touching) if self.tells_forces else None
         self.now, self.next = self.model.state(), self.model.state()
         self.control: Any = self.model.control()
         # Views of the engine's own arrays: there are no copies on a CPU.
@@ -100,6 +100,52 @@ class NewtonSimulation(Simulation):
         self.driven = [k for k, body in enumerate(scene.bodies) if is_driven(body)]
         self.steps = 0
         self.graph: Any = None
+
+    # ---- the solver --------------------------------------------------------------------------------------------------
+
+    def _room(self) -> int | None:
+        """Most contacts; None: as the engine estimates."""
+        return None
+
+    def _materials(self, index: int) -> dict[str, float]:
+        """Further numbers of a body's shape."""
+        rubs = self.frictions[index] > 0.0
+        names = {"mu_torsional": "torsional", "mu_rolling": "rolling"}
+        return {theirs: self.settings[ours] if rubs else 0.0 for theirs, ours in names.items()}
+
+    def _finished(self, builder: Any) -> Any:
+        """The model of what was made."""
+        return builder.finalize(device="cpu")
+
+    def _solver(self, newton: Any) -> Any:
+        """The solver of the model."""
+        return newton.solvers.SolverXPBD(
+            self.model,
+            iterations=self.settings["iterations"],
+            rigid_contact_relaxation=self.settings["relaxation"],
+            rigid_contact_con_weighting=self.settings["weighted"],
+            enable_restitution=self.settings["rebounds"],
+            rigid_contact_restitution_iterations=self.settings["rebound_iterations"],
+        )
+
+    def _impulses(self, count: int) -> Array:
+        """Impulses of the contacts of the last step on the first bodies [N s]; NaN where the solver tells none."""
+        if self.told is None or self.settings.get("rebounds"):
+            return np.full((count, 3), np.nan)
+        return np.asarray(self.dt * self.told.contact_f.numpy()[:count, :3].astype(float))
+
+    def _numbers(self) -> dict[str, Any]:
+        """The solver's own numbers, as it holds them."""
+        model, solver = self.model, self.solver
+        return {
+            "iterations": int(solver.iterations),
+            "relaxation": float(solver.rigid_contact_relaxation),
+            "weighted": bool(solver.rigid_contact_con_weighting),
+            "rebounds": bool(solver.enable_restitution),
+            "rebound_iterations": int(solver.rigid_contact_restitution_iterations),
+            "torsional": [float(x) for x in model.shape_material_mu_torsional.numpy()],
+            "rolling": [float(x) for x in model.shape_material_mu_rolling.numpy()],
+        }
 
     # ---- making ------------------------------------------------------------------------------------------------------
 
@@ -115,8 +161,7 @@ class NewtonSimulation(Simulation):
             density=0.0,
             mu=self.frictions[index],
             restitution=self.restitutions[index],
-            mu_torsional=self.settings["torsional"] if self.frictions[index] > 0.0 else 0.0,
-            mu_rolling=self.settings["rolling"] if self.frictions[index] > 0.0 else 0.0,
+            **self._materials(index),
         )
         self._shape(newton, builder, number, asked, None if number >= 0 else place, config)
         return int(number)
@@ -164,32 +209,27 @@ class NewtonSimulation(Simulation):
     def _solve(self) -> None:
         """One step of the solver: contacts at its start, then positions; the state is ready for the next."""
         self.pipeline.collide(self.now, self.touching)
-        self.solver.step(self.now, self.next, self.control, self.touching, self.dt, observables=self.told)
+        told = {} if self.told is None else {"observables": self.told}
+        self.solver.step(self.now, self.next, self.control, self.touching, self.dt, **told)
         self.warp.copy(self.now.body_q, self.next.body_q)
         self.warp.copy(self.now.body_qd, self.next.body_qd)
-
-    def _record(self) -> None:
-        """Load the kernels by a step, record one, which also executes it, and restore the state."""
-        place, speed = self.place.copy(), self.speed.copy()
-        self._solve()
-        with self.warp.ScopedCapture(device="cpu") as capture:
-            self._solve()
-        self.graph = capture.graph
-        self.place[:], self.speed[:] = place, speed
 
     def advance(self, steps: int) -> None:
         """See `Simulation.advance`; a driven body gets its final pose first, because the others are projected."""
         if not len(self.place):
             self.steps += steps
             return
-        if self.graph is None:
-            self._record()
-        launch = self.warp.capture_launch
         for _ in range(steps):
             self.steps += 1
             for k in self.driven:
                 self._lead(k)
-            launch(self.graph)
+            if self.graph is None:
+                with self.warp.ScopedCapture(device="cpu") as capture:  # records the launches and makes none
+                    self._solve()
+                self.graph = capture.graph
+            self.warp.capture_launch(self.graph)
+        if self.room is not None and (found := int(self.touching.rigid_contact_count.numpy()[0])) > self.room:
+            raise EngineError(f"contacts: {found} of them, and the model has room for {self.room}")
 
     def _lead(self, k: int) -> None:
         """Set a driven body's pose at the end of the next step, and its velocity."""
@@ -222,14 +262,14 @@ class NewtonSimulation(Simulation):
         return rows
 
     def contacts(self) -> Contacts:
-        """Contacts of the last step; impulses are those of positions, and unknown with restitution.
+        """Contacts of the last step; impulses of XPBD are those of positions, and unknown with restitution.
 
         Shapes are made in the order of bodies, one each, so a shape's index is its body's in the scene.
         """
         if self.graph is None:
             return Contacts.from_rows([], 3)
         held, count = self.touching, int(self.touching.rigid_contact_count.numpy()[0])
-        force = self.told.contact_f.numpy()[:count, :3].astype(float)
+        impulses = self._impulses(count)
         shapes, local, offsets = (
             [part.numpy()[:count] for part in parts]
             for parts in (
@@ -250,8 +290,7 @@ class NewtonSimulation(Simulation):
             gap = float(normals[k] @ (inner[1] - inner[0])) - float(margins[k])
             place = 0.5 * (outer[0] + outer[1])
             # The force acts on the first body; contacts out of range have none.
-            impulse = np.full(3, np.nan) if self.settings["rebounds"] else -self.dt * force[k]
-            rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], impulse, gap))
+            rows.append((int(shapes[0][k]), int(shapes[1][k]), place, normals[k], -impulses[k], gap))
         return Contacts.from_rows(sorted(rows, key=lambda row: sorted(row[:2])), 3)
 
     def _world(self, number: int, point: Array) -> Array:
@@ -264,20 +303,14 @@ class NewtonSimulation(Simulation):
 
     def readback(self) -> dict[str, Any]:
         """Values of the model and its solver."""
-        model, solver = self.model, self.solver
+        model = self.model
         mass, inertia = model.body_mass.numpy(), model.body_inertia.numpy()
         friction, restitution = model.shape_material_mu.numpy(), model.shape_material_restitution.numpy()
         return {
             "dt": self.dt,
             "gravity": [float(g) for g in model.gravity.numpy()[0]],
-            "iterations": int(solver.iterations),
-            "relaxation": float(solver.rigid_contact_relaxation),
-            "weighted": bool(solver.rigid_contact_con_weighting),
-            "rebounds": bool(solver.enable_restitution),
-            "rebound_iterations": int(solver.rigid_contact_restitution_iterations),
             "gap": [float(x) for x in model.shape_gap.numpy()],
-            "torsional": [float(x) for x in model.shape_material_mu_torsional.numpy()],
-            "rolling": [float(x) for x in model.shape_material_mu_rolling.numpy()],
+            **self._numbers(),
             "bodies": {
                 name: {
                     "mass": float(mass[number]),

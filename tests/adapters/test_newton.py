@@ -5,22 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import FLOOR, driven
+from driven import FLOOR, driven, measured_of
 
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.newton import NewtonEngine
-from adapters.newton.laws import DEVIATIONS, MOTIONS
-from adapters.newton.motion import DRAWS, LONGER, followed, held_plane, motion_law, moved, settings_of
-from adapters.newton.roundings import LIMITS, ROUNDINGS, roundings_of
+from adapters.newton.laws import DEVIATIONS
 from adapters.newton.shipped import GAP, ITERATIONS, REBOUND_ITERATIONS, RELAXATION, ROLLING, STOPPED, TORSIONAL
 from adapters.newton.simulation import imported
-from adapters.scene import Body, Box, HalfSpace, Harmonic, Pair, Scene, Sphere
+from adapters.scene import Body, Box, Harmonic, Pair, Scene, Sphere
 from adapters.scene.shapes import Capsule, Hull
 from adapters.stepping import posed_for, run
 from validation import metrics
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
+from validation.findings import row_key
+from validation.findings.files import findings_of
 from validation.running.warming import missing
 from validation.scenes import card_tent
 from validation.truths import leaning
@@ -148,211 +148,7 @@ def test_tables_that_are_no_means_refused():
     assert ENGINE.refuses(scene, "default").startswith("pairs: friction")
 
 
-# ---- the recurrence --------------------------------------------------------------------------------------------------
-
-CASES = [
-    ("impact", 2, {"e": 0.0}, "rebound_ratio"), ("impact", 3, {"e": 0.0}, "impulse"), ("bounce", 2, {}, "apex[3]"),
-    ("head_on", 2, {}, "first_speed"), ("stacked_balls", 2, {}, "large_speed"), ("rack", 2, {}, "energy_defect"),
-    ("kane", 2, {}, "rise"), ("oblique", 3, {}, "forward_speed"), ("incline", 2, {"ratio": 0.5}, "creep"),
-    ("roll_incline", 2, {}, "acceleration"), ("rolling_spin", 3, {"spin": 50.0, "v": 0.0}, "spin"),
-    ("edge_drop", 3, {}, "spin"), ("off_centre", 2, {}, "ball_speed"), ("off_centre", 3, {"whirl": -2.0}, "spin"),
-    ("galperin", 2, {"gap": 2.0, "ratio": 100.0}, "small_speed"), ("rod_gas", 2, {}, "astray"),
-    ("rocker", 3, {}, "amplitude"), ("ladder", 2, {}, "wall_load"), ("v_groove", 2, {}, "load[left]"),
-    ("slide", 3, {}, "hop"), ("tilt_table", 2, {}, "moved"),
-    ("painleve", 2, {}, "passing_time"), ("incline", 3, {}, "creep"),
-    ("stack", 2, {"n": 2}, "interface_impulse[1]"), ("stack", 3, {"n": 10}, "penetration"),
-    ("stack", 2, {"n": 20}, "impulse_scatter"), ("stack", 2, {"n": 20}, "settle_time"),
-    ("heavy_on_light", 3, {}, "kinetic_energy"), ("heavy_on_light", 2, {}, "interface_impulse[1]"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "dimension", "params", "metric"), CASES, ids=str)
-def test_engine_motion_by_the_recurrence(name, dimension, params, metric):
-    canonical = CATALOGUE[name]
-    scene = canonical.scene(dimension, params)
-    found = canonical.measure(scene, run(ENGINE, scene, DT, settings(scene), canonical.sampling(scene)))[metric][0]
-    assert metric in MOTIONS[name][1]
-    (law,) = [d.law for d in DEVIATIONS if d.covers("newton", "1.8.0", "default", name, metric)]
-    said, band = law(scene, DT, canonical.measure)
-    assert abs(found - said) <= band < 0.021 * abs(found)
-
-
-def test_recurrence_with_another_relaxation_differs(monkeypatch):
-    """A planted fault: what is said hangs on the engine's own numbers, by more than its band."""
-    from adapters.newton import motion
-
-    impact = CATALOGUE["impact"]
-    scene = impact.scene(2, {"e": 0.0})
-    said, band = motion_law("rebound_ratio", "default")(scene, DT, impact.measure)
-    rule = motion.PROFILES["default"]
-    off = {"default": lambda n, dt: [replace(s, value=0.81) if s.name == "relaxation" else s for s in rule(n, dt)]}
-    monkeypatch.setattr(motion, "PROFILES", off)
-    motion._readings.cache_clear()
-    other, _ = motion_law("rebound_ratio", "default")(scene, DT, impact.measure)
-    motion._readings.cache_clear()
-    assert abs(other - said) > 10.0 * band
-
-
-def test_one_sided_round_off_of_a_trembling_column():
-    """Every draw of singles tells less than doubles: their mean belongs to what is predicted, and no scatter to it."""
-    stack = CATALOGUE["stack"]
-    scene, metric = stack.scene(2, {"n": 10.0}), "interface_impulse[7]"
-    exact, rounded = (
-        [
-            stack.measure(scene, moved(scene, DT, "tuned", single, draw * LONGER, iterations=100))[metric][0]
-            for draw in range(DRAWS)
-        ]
-        for single in (False, True)
-    )
-    missed = np.array(rounded) - np.array(exact)
-    (law,) = [d for d in DEVIATIONS if d.covers("newton", "1.8.0", "tuned", "stack", metric)]
-    said, band = law.says(scene, DT, stack.measure, 100)
-    # Last digits that are told by chance are 2^-24 of an impulse.
-    assert missed.max() < 0.0 and said == pytest.approx(exact[0] + missed.mean(), abs=1e-5)
-    assert band == pytest.approx(-missed.mean(), abs=1e-5) and band > 7.88 * missed.std(ddof=1) * math.sqrt(1.125)
-
-
-def test_rounding_errors_counted_by_hand():
-    """A ball that comes down at 2 m/s on a smooth floor without gravity, and is stopped in three steps.
-
-    Two sweeps of three roundings each in every one of them, of 2 m/s, and 26 more for each of two sweeps over rebounds;
-    the farthest point is .5 m from the middle of the ball, which never turns.
-    """
-    gap = 1.3 * 2.0 * DT
-    scene = struck(0.0, 2.0, gap)
-    motion = moved(scene, DT, "default")
-    pressed = np.count_nonzero(motion.contacts.impulse_between(0, 1)[:, 2])
-    counted = roundings_of(scene, motion, DT, settings_of(scene, DT, "default", None))
-    assert pressed == 3
-    assert counted.speed == pytest.approx(2.0**-24 * 3 * 2 * 3 * 2.0, rel=1e-12)
-    assert counted.levered == counted.speed and counted.start == 2.0
-    assert counted.placed - counted.speed == pytest.approx(2.0**-24 * 3 * 12 * (0.5 + gap + 0.5) / DT, rel=1e-6)
-    assert LIMITS["momentum_defect"](counted) == pytest.approx(18 * 2.0**-24, rel=1e-12)
-    bouncing = struck(0.5, 2.0, gap)
-    motion = moved(bouncing, DT, "default")
-    pressed = len(np.unique(motion.contacts.step[np.diff(motion.contacts.offset) > 0]))
-    counted = roundings_of(bouncing, motion, DT, settings_of(bouncing, DT, "default", None))
-    assert counted.speed == pytest.approx(2.0**-24 * pressed * (6 + 2 * 26) * 2.0, rel=1e-12)
-
-
-def test_momentum_from_rounded_positions_at_the_end_of_sweeps(monkeypatch):
-    """Fifty sweeps stop a ball that two leave moving: what was stopped is told by overlaps, 12 roundings a step.
-
-    Without the stop no more than roundings of velocities is missing.
-    """
-    from adapters.newton import motion
-
-    gap = 1.3 * 0.1 * DT
-    scene, chosen = struck(0.0, 0.1, gap), settings_of(struck(0.0, 0.1, gap), DT, "tuned", None)
-    counted = roundings_of(scene, moved(scene, DT, "tuned"), DT, chosen)
-    assert counted.told - counted.speed == pytest.approx(2.0**-24 * 2 * 12 * (0.5 + gap + 0.5) / DT, rel=1e-6)
-    impact = CATALOGUE["impact"]
-    asked = impact.scene(2, {"e": 0.0, "v": 0.1})
-    of_speeds = counted.speed / counted.start
-
-    def missing():
-        return [impact.measure(asked, moved(asked, DT, "tuned", True, k * LONGER))["momentum_defect"][0]
-                for k in range(DRAWS)]  # fmt: skip
-
-    assert of_speeds < np.mean(missing()) and max(missing()) < counted.told / counted.start
-    monkeypatch.setattr(motion, "STOPPED", 0.0)
-    assert max(missing()) < of_speeds
-
-
-@pytest.mark.parametrize(("dimension", "v"), [(2, 0.1), (3, 0.1), (2, 1.0), (3, 1.0)])
-def test_momentum_of_a_stop_by_rounded_positions(dimension, v):
-    """The engine's own: it is what the recurrence draws, and a small part of it 500 times nearer to the origin."""
-    impact = CATALOGUE["impact"]
-
-    def missing(radius):
-        scene = impact.scene(dimension, {"e": 0.0, "v": v, "radius": radius})
-        found = run(ENGINE, scene, DT, settings(scene, "tuned"), impact.sampling(scene))
-        (law,) = [d.law for d in DEVIATIONS if d.covers("newton", "1.8.0", "tuned", "impact", "momentum_defect")]
-        return impact.measure(scene, found)["momentum_defect"][0], law(scene, DT, impact.measure)
-
-    found, (said, band) = missing(0.5)
-    assert abs(found - said) <= band < 2e-4 and found > 1e-12
-    # Beside roundings of velocities, shares of 2^-24, which smaller places leave as they are.
-    assert missing(2.0**-10)[0] < max(0.05 * found, 8.0 * 2.0**-24) < found
-
-
-def test_scene_at_rest_without_a_balance_of_shares():
-    rest = resting()
-    counted = roundings_of(rest, moved(rest, DT, "default"), DT, settings_of(rest, DT, "default", None))
-    assert counted.start == 0.0 and LIMITS["momentum_defect"](counted) == LIMITS["energy_lost"](counted) == 0.0
-
-
-def test_no_law_for_a_scattered_balance(monkeypatch):
-    """A planted fault: with a limit of a tenth of what is drawn nothing is said."""
-    from adapters.newton import motion
-
-    head_on = CATALOGUE["head_on"]
-    scene = head_on.scene(2, {})
-    motion._readings.cache_clear()
-    said, band = motion_law("momentum_defect", "default", True)(scene, DT, head_on.measure)
-    assert abs(said) <= band < 1e-6 and motion_law("momentum_defect", "default")(scene, DT, head_on.measure) is None
-    monkeypatch.setattr(motion, "LIMITS", {"momentum_defect": lambda of: 0.1 * band})
-    assert motion_law("momentum_defect", "default", True)(scene, DT, head_on.measure) is None
-
-
-TWO = Scene("two", 1, 3, (FLOOR, BOX, replace(BOX, name="upper", pose=(0, 0, 0.75, *UPRIGHT))), (Pair(),),
-            (0.0, 0.0, -9.81), 0.1)  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "upper",
-    [{"pose": (0.1, 0, 0.75, *UPRIGHT)}, {"pose": (0, 0, 0.75, math.cos(0.1), 0, 0, math.sin(0.1))},
-     {"twist": (0.1, 0, 0, 0, 0, 0)}, {"force": (0, 1.0, 0)}, {"shape": Capsule(0.2, 0.25)}],
-    ids=lambda each: "-".join(each),
-)  # fmt: skip
-def test_scenes_outside_the_recurrence_without_a_law(upper):
-    other = replace(TWO, bodies=(*TWO.bodies[:2], replace(TWO.bodies[2], **upper)))
-    assert followed(resting()) and not followed(other) and moved(other, DT, "default") is None
-
-
-def test_column_of_rebounding_boxes_without_a_law():
-    assert moved(TWO, DT, "default") is not None
-    assert moved(replace(TWO, pairs=(Pair(restitution=0.5),)), DT, "default") is None
-
-
-def test_column_sinking_through_its_boxes_without_a_law():
-    """A heavy box goes down to the floor through a light one: faces of neighbours are not all that touches then."""
-    heavy = CATALOGUE["heavy_on_light"].scene(3, {"ratio": 1e4})
-    assert moved(heavy, DT, "tuned") is not None and moved(heavy, DT, "default") is None
-
-
-@pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_column_positions_by_the_recurrence(profile):
-    """Other sizes, masses and names than a scene's: a wide box on a slim one, in another order, thrown upwards.
-
-    The bound is what roundings of a place add up to in as many steps, 2^-24 of 1 m each, by 1/dt for a speed.
-    """
-    lower = Body("z", Box((0.2, 0.4, 0.3)), 2.0, (0.2, 0.1, 0.15), (0.3, -0.1, 0.3, *UPRIGHT), (0, 0, 0.5, 0, 0, 0))
-    upper = Body("a", Box((0.5, 0.3, 0.1)), 5.0, (0.2, 0.4, 0.5), (0.3, -0.1, 0.75, *UPRIGHT), force=(0, 0, -7.0))
-    scene = Scene("thrown", 1, 3, (upper, FLOOR, lower), (Pair(friction=0.5),), (0.0, 0.0, -9.81), 0.25)
-    found, said = drive(scene, profile), moved(scene, DT, profile)
-    bound = 60 * 2.0**-24
-    assert np.abs(found.pose - said.pose).max() < bound and np.abs(found.twist - said.twist).max() < bound / DT
-    for pair in ((1, 2), (0, 2)):
-        mass = 5.0 + 2.0 * (1 in pair)
-        held = [motion.contacts.impulse_between(*pair)[:, 2] for motion in (found, said)]
-        assert np.abs(held[0]).max() > 0.02 * mass and np.abs(held[0] - held[1]).max() < 8.0 * mass * bound / DT
-
-
-def test_corner_loads_change_the_column(monkeypatch):
-    """A planted fault: a column's law hangs on what its corners feel, by more than its band."""
-    from adapters.newton import column, motion
-
-    stack = CATALOGUE["stack"]
-    scene, law = stack.scene(2, {"n": 2}), motion_law("penetration", "default")
-    motion._readings.cache_clear()
-    said, band = law(scene, DT, stack.measure)
-    felt = column._corner_feels
-    monkeypatch.setattr(column, "_corner_feels", lambda below, above: 1.1 * felt(below, above))
-    motion._readings.cache_clear()
-    other, _ = law(scene, DT, stack.measure)
-    motion._readings.cache_clear()
-    assert abs(other - said) > 10.0 * band
+# ---- causes of known failures ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("profile", "dimension"), [("default", 2), ("tuned", 3)])
@@ -375,104 +171,30 @@ def test_column_contacts_told_as_the_mean_of_two_bodies(dimension, profile):
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
 def test_distant_box_at_rest_with_growing_speed(profile):
+    """A motion of a step below half the spacing of places is lost, and no overlap is found; at 1 km it brakes."""
     far = CATALOGUE["far_origin"]
-    scene = far.scene(3, {})
-    found = far.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), far.sampling(scene)))
-    for metric in ("stopping_distance", "braking", "end_speed"):
-        (law,) = [d.law for d in DEVIATIONS if d.covers("newton", "1.8.0", profile, "far_origin", metric)]
-        said, band = law(scene, DT, far.measure)
-        assert abs(found[metric][0] - said) <= band < 1e-3
-        assert law(far.scene(3, {"far": 1e3}), DT, far.measure) is None
 
+    def found(distance):
+        scene = far.scene(3, {"far": distance})
+        return far.measure(scene, run(ENGINE, scene, DT, settings(scene, profile), far.sampling(scene)))
 
-def test_spinning_ball_among_fixed_boxes_by_the_recurrence():
-    """It lands on the top of a free box, off its middle, beside a fixed ball and a fixed wall; all rub.
-
-    The bound is that of the column above, by the roundings of a point that is turned to a body's axes and back.
-    """
-    ball = Body("ball", Sphere(0.2), 1.0, (0.02,) * 3, (0.2, 0.1, 0.705, *UPRIGHT), (0.5, 0, 0, 0, 3.0, 0))
-    log = Body("log", Sphere(0.3), pose=(0.7, 0.1, 0.6, *UPRIGHT), motion="fixed")
-    wall = Body("wall", HalfSpace((0.0, -1.0, 0.0), -2.0), motion="fixed")
-    scene = Scene("met", 1, 3, (ball, FLOOR, wall, log, BOX), (Pair(friction=0.5),), (0.0, 0.0, -9.81), 0.25)
-    found, said = drive(scene), moved(scene, DT, "default")
-    bound = ROUNDINGS * 60 * 2.0**-24
-    assert np.abs(found.pose - said.pose).max() < bound and np.abs(found.twist - said.twist).max() < bound / DT
-    for pair, mass in (((0, 3), 1.0), ((0, 4), 1.0), ((1, 4), 4.0)):
-        held = [motion.contacts.impulse_between(*pair) for motion in (found, said)]
-        assert np.abs(held[0] - held[1]).max() < mass * bound / DT < 0.2 * np.abs(held[0]).max()
-
-
-NORMALS = [(0, 0, 1), (1, 0, 0), (-1, 0, 0), (math.sin(0.3), 0, math.cos(0.3)), (0.6, 0.8, 0), (-0.36, 0.48, 0.8)]
-
-
-@pytest.mark.parametrize("normal", NORMALS, ids=str)
-def test_tilted_plane_bit_by_bit_as_in_the_engine(normal):
-    plane = Body("plane", HalfSpace(tuple(map(float, normal)), 0.7), motion="fixed")
-    world = ENGINE.build(Scene("plane", 1, 3, (plane, BOX), (Pair(),), (0.0,) * 3, DT), DT, settings(resting()))
-    x, y, z, w = world.model.shape_transform.numpy()[0, 3:]
-    held, offset = held_plane(plane.shape)
-    assert np.array_equal(np.float32(held), [2 * w * y + z * x, z * y - 2 * w * x, 2 * w * w - 1 + z * z])
-    assert offset == pytest.approx(0.7, abs=4.0 * 2.0**-24)
-    level = abs(normal[2]) == 1.0
-    assert (abs(held[2] - normal[2]) > 2.0**-25) is not level
-
-
-def test_deviation_of_a_line_of_blows_by_a_leaning_wall(monkeypatch):
-    """A planted fault: with a wall that does not lean, by 2^-24 rad, 31 blows end as the textbook has them."""
-    from adapters.newton import motion
-
-    galperin = CATALOGUE["galperin"]
-    scene = galperin.scene(2, {"gap": 2.0, "ratio": 100.0})
-    truth = galperin.exact(scene)["small_speed"]
-    leaning = galperin.measure(scene, moved(scene, DT, "default"))["small_speed"][0]
-    monkeypatch.setattr(motion, "held_plane", lambda plane: (plane.normal, plane.offset))
-    upright = galperin.measure(scene, moved(scene, DT, "default"))["small_speed"][0]
-    assert abs(upright - truth) < 1e-9 and abs(leaning - truth) > 1.0
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_a_tall_column_comes_to_rest_in_doubles_and_trembles_in_singles(dimension):
-    stack = CATALOGUE["stack"]
-    scene = stack.scene(dimension, {"n": 10.0})
-    (check,) = [check for check in stack.checks(scene, DT) if check.metric == "kinetic_energy"]
-    exact, rounded = (
-        stack.measure(scene, moved(scene, DT, "tuned", single))["kinetic_energy"][0] for single in (False, True)
-    )
-    assert exact == 0.0 and rounded > check.bound
-
-
-def test_starved_balls_come_to_rest_in_doubles_and_tremble_in_singles():
-    starved = CATALOGUE["starved"]
-    scene = starved.scene(2, {})
-    (check,) = [check for check in starved.checks(scene, DT) if check.metric == "kinetic_energy"]
-    found = [starved.measure(scene, moved(scene, DT, "tuned", single)) for single in (False, True)]
-    assert found[0]["kinetic_energy"][0] < 0.01 * check.bound
-    assert found[1]["kinetic_energy"][0] > 10.0 * found[0]["kinetic_energy"][0]
-    assert found[0]["load_error"][0] == pytest.approx(0.5, abs=1e-3)
-
-
-def test_a_heavy_box_sinks_into_a_light_one_for_a_second():
-    heavy = CATALOGUE["heavy_on_light"]
-    scene = heavy.scene(3, {})
-    assert heavy.measure(scene, moved(scene, DT, "tuned"))["settle_time"][0] == pytest.approx(1.04, abs=0.01)
-
-
-# ---- families that have no switch ------------------------------------------------------------------------------------
+    lost, near = found(1e6), found(1e3)
+    assert lost["stopping_distance"][0] == lost["braking"][0] == 0.0 < 0.9 * far.exact(far.scene(3, {}))["braking"]
+    assert near["braking"][0] > 0.0 and near["stopping_distance"][0] > 0.0
 
 
 def rougher(scene, factor):
     return replace(scene, pairs=tuple(replace(pair, friction=factor * pair.friction) for pair in scene.pairs))
 
 
-def both_ways(name, dimension, params, profile, metric, factor=1.0, **changes):
-    """What the engine and its recurrence in doubles make of a scene, as rough as it is or rougher, and its check."""
+def reading(name, dimension, params, profile, metric, factor=1.0, **changes):
+    """What the engine makes of a scene, as rough as it is or rougher, and its check."""
     canonical = CATALOGUE[name]
     scene = canonical.scene(dimension, params)
     (check,) = [check for check in canonical.checks(scene, DT) if check.metric == metric]
     posed = rougher(scene, factor)
     found = run(ENGINE, posed, DT, settings(posed, profile, **changes), canonical.sampling(scene))
-    said = moved(posed, DT, profile, iterations=changes.get("iterations"))
-    return *(canonical.measure(scene, motion)[metric][0] for motion in (found, said)), check
+    return canonical.measure(scene, found)[metric][0], check
 
 
 @pytest.mark.parametrize(("dimension", "params"), [(2, {}), (3, {"ratio": 0.5})], ids=str)
@@ -481,21 +203,21 @@ def test_box_creep_by_friction_limited_to_its_own_sweep(dimension, params):
 
     Fewer sweeps are worse, more change nothing: what presses nothing any more holds nothing.
     """
-    found, said, check = both_ways("incline", dimension, params, "tuned", "creep")
-    assert min(found, said) > 20.0 * check.bound and found == pytest.approx(said, rel=0.005)
-    more, _, _ = both_ways("incline", dimension, params, "tuned", "creep", iterations=500)
+    found, check = reading("incline", dimension, params, "tuned", "creep")
+    assert found > 20.0 * check.bound
+    more, _ = reading("incline", dimension, params, "tuned", "creep", iterations=500)
     assert more == pytest.approx(found, rel=1e-3)
-    assert max(both_ways("incline", dimension, params, "tuned", "creep", 2.0)[:2]) < check.bound
+    assert reading("incline", dimension, params, "tuned", "creep", 2.0)[0] < check.bound
 
 
 def test_ladder_creep_by_few_sweeps_and_limited_friction():
     """Either alone leaves it creeping by 20 tolerances; half as much friction again in fifty sweeps does not."""
-    found, said, check = both_ways("ladder", 2, {}, "default", "moved")
-    assert found == pytest.approx(said, rel=0.01) and found > 500.0 * check.bound
-    rough, _, _ = both_ways("ladder", 2, {}, "default", "moved", 1.5)
-    swept, said, _ = both_ways("ladder", 2, {}, "tuned", "moved")
-    assert swept == pytest.approx(said, rel=0.01) and min(rough, swept) > 20.0 * check.bound
-    assert both_ways("ladder", 2, {}, "tuned", "moved", 1.5)[0] < check.bound
+    found, check = reading("ladder", 2, {}, "default", "moved")
+    assert found > 500.0 * check.bound
+    rough, _ = reading("ladder", 2, {}, "default", "moved", 1.5)
+    swept, _ = reading("ladder", 2, {}, "tuned", "moved")
+    assert min(rough, swept) > 20.0 * check.bound
+    assert reading("ladder", 2, {}, "tuned", "moved", 1.5)[0] < check.bound
 
 
 def tent(params, profile, factor, **changes):
@@ -559,17 +281,42 @@ def test_drift_of_a_rolling_and_spinning_ball(dt):
     """In a step it turns by the exponential of (w n + v/r a) dt: its lowest point goes w v dt^2/2 along its axis a.
 
     Friction takes that for a slip until the point has the speed w v dt/2 the other way, 2/7 of which is the ball's.
-    Doubles leave out (w dt)^2 of it; singles take roundings of the place, up to v t, for slips as well.
+    It is less by (w dt)^2; single precision takes roundings of the place, up to v t, for slips as well.
     """
     scene = CATALOGUE["rolling_spin"].scene(3, {})
     p = scene.params
     law = p["spin"] * p["v"] * dt * p["duration"] / 7.0
     found = run(ENGINE, scene, dt, settings(scene, "tuned"), CATALOGUE["rolling_spin"].sampling(scene))
     astray = CATALOGUE["rolling_spin"].measure(scene, found)["astray"][0]
-    exact = CATALOGUE["rolling_spin"].measure(scene, moved(scene, dt, "tuned"))["astray"][0]
-    assert exact == pytest.approx(law, rel=(p["spin"] * dt) ** 2)
-    rounded = 2.0 / 7.0 * ROUNDINGS * 2.0**-24 * p["v"] * p["duration"] / dt * p["duration"]
-    assert abs(astray - law) < rounded < 0.07 * law
+    rounded = 2.0 / 7.0 * 12.0 * 2.0**-24 * p["v"] * p["duration"] / dt * p["duration"]
+    assert abs(astray - law) < rounded + (p["spin"] * dt) ** 2 * law < 0.2 * law
+
+
+ERRORS = [("masse", 3, {"back": 4.0, "side": 1.0}, "final_vx", 0.6),
+          ("roll_incline", 3, {"ratio": 0.99}, "turning", 0.6),
+          ("pivot", 2, {"from": 1.0, "to": 30.0}, "passing_time", 0.6),
+          ("rolling_spin", 3, {"spin": 50.0, "v": 0.0}, "spin", 2.5)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "dimension", "params", "metric", "most"), ERRORS, ids=lambda each: str(each))
+def test_errors_by_the_step(name, dimension, params, metric, most):
+    """An error of the method halves with the step; that of a length which each step rounds grows with their number."""
+    canonical = CATALOGUE[name]
+    truth = canonical.exact(canonical.scene(dimension, params))[metric]
+    coarse, fine = (measured_of(ENGINE, name, "tuned", dimension, params, dt)[metric] - truth for dt in (DT, 0.5 * DT))
+    assert most - 0.6 < fine / coarse < most
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_momentum_of_a_stop_by_rounded_positions(dimension):
+    """A small part of what is missing is left 500 times nearer to the origin, beside roundings of velocities."""
+
+    def missing(radius):
+        params = {"e": 0.0, "v": 0.1, "radius": radius}
+        return measured_of(ENGINE, "impact", "tuned", dimension, params)["momentum_defect"]
+
+    found = missing(0.5)
+    assert missing(2.0**-10) < max(0.05 * found, 8.0 * 2.0**-24) < found
 
 
 @pytest.mark.parametrize("height", [1.03, 1.04])
@@ -608,12 +355,47 @@ def test_half_load_of_starved_balls_by_the_mean_of_two_bodies(profile):
 
     Each of four sweeps may stop each ball between a contact and the one that is pressed.
     """
-    found, said, check = both_ways("starved", 2, {}, profile, "load_error", iterations=4)
+    found, check = reading("starved", 2, {}, profile, "load_error", iterations=4)
     p = CATALOGUE["starved"].scene(2, {}).params
     stopped = 4 * p["n"] * STOPPED * p["mass"] / (p["press"] * DT)
-    assert abs(said - 0.5) < stopped and abs(found - 0.5) < stopped
-    whole, _, _ = both_ways("starved", 2, {}, profile, "load_error", iterations=4, weighted=False)
+    assert abs(found - 0.5) < stopped
+    whole, _ = reading("starved", 2, {}, profile, "load_error", iterations=4, weighted=False)
     assert check.bound < whole < stopped < 0.1
+
+
+def heavier(scene):
+    return replace(scene, bodies=tuple(replace(body, mass=1.01 * body.mass) for body in scene.bodies))
+
+
+FAULTS = {
+    "mass": ("v_groove", {}, heavier),
+    "friction": ("slide", {}, lambda scene: rougher(scene, 1.05)),
+    "restitution": ("head_on", {"e": 0.5, "ratio": 1e6}, lambda scene: replace(scene, pairs=(Pair(restitution=0.49),))),
+}
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_of_the_adapter_outside_what_is_known(fault, profile):
+    """Every row of the engine passes, or is explained or known; with the fault planted some row is none of these."""
+    name, params, spoilt = FAULTS[fault]
+    canonical, members = CATALOGUE[name], findings_of("newton").members
+
+    def unknown(posed):
+        found = canonical.measure(scene, run(ENGINE, posed, DT, settings(scene, profile), canonical.sampling(scene)))
+        slot = Slot(name, canonical.minimal(params), 2, "newton", profile, DT)
+        for check in canonical.checks(scene, DT):
+            value, known = found[check.metric][0], members.get(row_key(slot, check.metric))
+            laws = [d for d in DEVIATIONS if d.covers("newton", "1.8.0", profile, name, check.metric)]
+            said = [told for law in laws if (told := law.law(scene, DT, canonical.measure)) is not None]
+            passes = value is not None and check.bound is not None and abs(value - check.truth) <= check.bound
+            explained = value is not None and any(abs(value - number) <= band for number, band in said)
+            held = known is not None and (known.value is None if value is None else known.holds(value))
+            if check.bound is not None and not (passes or explained or held):
+                yield check.metric
+
+    scene = canonical.scene(2, params)
+    assert not list(unknown(scene)) and list(unknown(spoilt(scene)))
 
 
 def test_run_without_kernels(tmp_path, monkeypatch):

@@ -14,6 +14,7 @@ from adapters.scene import SceneError
 from validation import identity
 from validation.catalogue import CATALOGUE
 from validation.cells import MOST_ITERATIONS, MOST_ULPS, Slot, slot_from_dict
+from validation.findings import Findings, known_of
 from validation.running import plan
 from validation.running.plan import FULL_DT, Request, slots
 
@@ -180,3 +181,22 @@ def test_scene_larger_than_an_engine_is_meant_for():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert slots(replace(request, params={"n": 99.0}))
+
+
+def test_scene_that_an_engine_s_suites_leave_out(monkeypatch, tmp_path):
+    """Among others it has no case, and a row of it has no regression status; alone it runs."""
+    (tmp_path / plan.LEFT_OUT).write_text('slide = "it shakes"')
+    monkeypatch.setattr(plan, "inside", lambda engine, name: tmp_path / name if engine == "chipmunk" else None)
+    plan.left_out.cache_clear()
+    try:
+        asked = {
+            name: {slot.scene for slot in slots(Request(["slide", "impact"], [name]))}
+            for name in ("chipmunk", "reference")
+        }
+        assert asked == {"chipmunk": {"impact"}, "reference": {"slide", "impact"}}
+        alone = slots(Request(["slide"], ["chipmunk"]))
+        assert alone and not any(map(plan.is_standard, alone))
+        known = known_of(alone[0], "braking", "7.3", Findings("chipmunk", {}, (), {}))
+        assert not known.expected and known.remark == "no suite runs this scene on chipmunk: it shakes"
+    finally:
+        plan.left_out.cache_clear()

@@ -96,3 +96,34 @@ def test_wrong_proof_refused_by_family_and_field(proofs, tmp_path, entry, said):
     with pytest.raises(FindingsError) as caught:
         proofs(entry)
     assert str(caught.value) == f"{tmp_path / FAMILIES}: family creeps: {said}"
+
+
+MANY = FAMILY.replace('scene = "incline"', 'scenes = ["incline", "stack"]')
+
+
+def test_one_entry_for_several_scenes(tmp_path):
+    """It is a family for each scene, with the proofs whose cells name it."""
+    (tmp_path / FAMILIES).write_text(MANY + PROOF.replace("{ profile", '{ scene = "stack", profile'))
+    found = read("nameless", tmp_path).families
+    assert {name: (family.scene, family.reason) for name, family in found.items()} == {
+        "incline-creeps": ("incline", "it is soft"), "stack-creeps": ("stack", "it is soft")
+    }  # fmt: skip
+    assert found["incline-creeps"].proofs == ()
+    (proof,) = found["stack-creeps"].proofs
+    assert (proof.family, proof.scene, proof.metric) == ("stack-creeps", "stack", "creep[1]")
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        (MANY + PROOF, "creeps: proof: cell: scene must be one of incline, stack"),
+        (MANY.replace('["incline", "stack"]', "[]"), "creeps: scenes must be a list of names"),
+        (MANY + 'scene = "stack"\n', "creeps: scenes must be a list of names, in place of scene"),
+        (MANY + "proof = 1\n", "creeps: proof must be a list of tables"),
+    ],
+)
+def test_wrong_entry_for_several_scenes(tmp_path, entry, said):
+    (tmp_path / FAMILIES).write_text(entry)
+    with pytest.raises(FindingsError) as caught:
+        read("nameless", tmp_path)
+    assert said in str(caught.value) and "\n" not in str(caught.value)

@@ -23,7 +23,7 @@ from functools import cache
 from adapters import registry
 from adapters.experiment import Experiment
 from validation.cells import Slot, format_dt
-from validation.running.plan import is_standard
+from validation.running.plan import is_standard, left_out
 
 #: Identity of a row within its engine: profile, scene, dimension, params, dt, iterations, metric.
 Key = tuple[str, ...]
@@ -205,6 +205,8 @@ def known_of(slot: Slot, metric: str, version: str, findings: Findings | None) -
         if family.holds_for(version):
             return Known(finding, True)
         return Known(None, True, f"listed for releases {family.releases} only: {family.reason}")
+    if why := left_out(slot.engine).get(slot.scene):
+        return Known(None, False, f"no suite runs this scene on {slot.engine}: {why}")
     like = None if is_standard(slot) else findings.family_of(key)
     if like is not None and like.holds_for(version):
         return Known(None, False, f"outside the standard suite, not listed; rows like it: {like.reason}")

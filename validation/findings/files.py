@@ -83,12 +83,13 @@ def read(engine: str, folder: Path) -> Findings:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise FindingsError(f"{path}: {error}") from None
     families: dict[str, Family] = {}
-    for entry in data.get("family", []):
-        family = _family(engine, path, entry)
+    for family in (_family(engine, path, each) for entry in data.get("family", []) for each in _by_scene(path, entry)):
         if family.id in families:
             raise FindingsError(f"{path}: family {family.id} is listed twice")
         families[family.id] = family
-    unsupported = tuple(_unsupported(path, entry) for entry in data.get("unsupported", []))
+    unsupported = tuple(
+        _unsupported(path, each) for entry in data.get("unsupported", []) for each in _by_scene(path, entry)
+    )
     return Findings(engine, families, unsupported, _members(engine, folder / MEMBERS, families))
 
 
@@ -103,6 +104,29 @@ def _fields(path: Path, kind: str, entry: Mapping[str, Any], names: tuple[str, .
         raise FindingsError(str(error)) from None
     out = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     return {"dimension": 0, **out} if "dimension" in names else out
+
+
+def _by_scene(path: Path, entry: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """One entry for each of its ``scenes``, called by both, with the proofs whose cells name it."""
+    if "scenes" not in entry:
+        return [entry]
+    label, scenes, proofs = f"{path}: {entry.get('id', '?')}", entry["scenes"], entry.get("proof", [])
+    if "scene" in entry or not _NAMES[0](scenes):
+        raise FindingsError(f"{label}: scenes must be {_NAMES[1]}, in place of scene")
+    if not is_list_of(lambda proof: isinstance(proof, dict) and isinstance(proof.get("cell"), dict))(proofs):
+        raise FindingsError(f"{label}: proof must be a list of tables, [[family.proof]], each with a cell")
+    for proof in proofs:
+        if proof["cell"].get("scene") not in scenes:
+            raise FindingsError(f"{label}: proof: cell: scene must be one of {', '.join(scenes)}")
+    parts: list[Mapping[str, Any]] = []
+    for scene in scenes:
+        own = [proof for proof in proofs if proof["cell"]["scene"] == scene]
+        cells = [{name: value for name, value in proof["cell"].items() if name != "scene"} for proof in own]
+        told = [{**proof, "cell": cell} for proof, cell in zip(own, cells, strict=True)]
+        rest = {name: value for name, value in entry.items() if name not in ("scenes", "proof")}
+        name = f"{scene.replace('_', '-')}-{entry.get('id', '')}"
+        parts.append({**rest, "id": name, "scene": scene, **({"proof": told} if told else {})})
+    return parts
 
 
 def _family(engine: str, path: Path, entry: Mapping[str, Any]) -> Family:

@@ -13,12 +13,15 @@ full
 from __future__ import annotations
 
 import math
+import tomllib
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from adapters.engine import NOT_KNOWN, Engine, EngineError
+from adapters.engine_folder import inside
 from adapters.needs import needs
 from adapters.plain import NAME, Notice, one_line
 from adapters.registry import facts, find, is_ranked
@@ -32,6 +35,8 @@ from validation.files.expressions import FormulaError, value_of
 from validation.posed import pinned, resolve
 
 QUICK_DT = 1.0 / 240.0
+#: File of an engine's folder with what its suites leave out (`left_out`).
+LEFT_OUT = "left_out.toml"
 FULL_DT = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))
 
 
@@ -198,6 +203,8 @@ def knowing(request: Request) -> list[str]:
 
 def _is_asked(request: Request, canonical: CanonicalScene, variation: Variation, engine: str, profile: str) -> bool:
     """Whether a suite runs this cell; the quick one runs unranked profiles in representative cells only."""
+    if len(request.scenes) > 1 and canonical.name in left_out(engine):
+        return False
     if request.suite != "quick" or request.params or profile in request.profiles or is_ranked(engine, profile):
         return True
     return canonical.stands_for_it(variation.params) and None in variation.iterations
@@ -209,9 +216,22 @@ def _one_profile(name: str) -> str:
     return (told.profile("shipped") or next(iter(told.roles), NOT_KNOWN)) if told else NOT_KNOWN
 
 
+@cache
+def left_out(engine: str) -> Mapping[str, str]:
+    """Scenes that no suite runs on an engine, with the reason: ``left_out.toml`` of its folder.
+
+    There no law explains its failures, and no setting switches their cause off. A run of one such scene alone still has
+    its cases, without regression status.
+    """
+    path = inside(engine, LEFT_OUT)
+    return {} if path is None else {str(scene): str(why) for scene, why in tomllib.loads(path.read_text()).items()}
+
+
 def is_standard(slot: Slot) -> bool:
     """Whether the standard suite runs this slot, or uses it in a study: its FAILs are listed one by one."""
     if slot.dt != QUICK_DT or slot.ulp or slot.switched or slot.scene not in CATALOGUE:
+        return False
+    if slot.scene in left_out(slot.engine):
         return False
     canonical, own = CATALOGUE[slot.scene], dict(slot.params).items()
     return any(
