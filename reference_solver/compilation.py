@@ -27,10 +27,8 @@ config: Any = numba_config
 njit: Any = numba.njit
 
 
-#: What stands beside the solver and holds no kernel: an edit there compiles nothing anew.
-WITHOUT_KERNELS = ("certificate", "exact", "verification", "geometry.py", "piles.py")
-#: The one folder in there whose functions are compiled.
-WITH_KERNELS = ("verification", "event_driven")
+#: What stands beside the solver and holds none of its kernels: an edit there compiles nothing anew.
+WITHOUT_KERNELS = ("certificate", "exact", "geometry.py", "piles.py")
 
 
 def source_hash() -> str:
@@ -38,8 +36,7 @@ def source_hash() -> str:
     root = Path(__file__).parent
     digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__} {KNOWN}".encode())
     for path in sorted(root.rglob("*.py")):
-        parts = path.relative_to(root).parts
-        if parts[0] in WITHOUT_KERNELS and parts[:2] != WITH_KERNELS:
+        if path.relative_to(root).parts[0] in WITHOUT_KERNELS:
             continue
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
@@ -80,8 +77,8 @@ else:
         return function
 
 
-#: No hidden branches for divisions by zero: zero denominators are excluded by validation. Threads may run side by side.
-OPTIONS: Any = {"error_model": "numpy", "nogil": True}
+#: No hidden branches for divisions by zero: zero denominators are excluded by validation.
+OPTIONS: Any = {"error_model": "numpy"}
 #: How kernels are compiled that only kernels call.
 INNER_OPTIONS: Any = OPTIONS | INNER
 

@@ -1,8 +1,7 @@
-"""A number of kernels that is several: one for each of `LANES` worlds, or manifolds, that are computed side by side.
+"""A number of kernels that is several: one for each of `LANES` manifolds that are solved side by side.
 
 It is a vector of the processor. Kernels calculate with it as with a float, so that one source serves both. Each lane
-holds, to the bit, what the same operations give for its float. What a float decides by a branch, lanes decide by
-`where`. `any_of` and `all_of` leave out what no lane, or not each, needs.
+holds, to the bit, what the same operations give for its float.
 
 numba's low-level extension interface (types, data models, lowering) makes it known to kernels.
 """
@@ -43,21 +42,6 @@ def room(*shape: int) -> NDArray[np.float64]:
     return memory[first : first + size].reshape(shape)
 
 
-def where(condition: Any, one: Any, other: Any) -> Any:
-    """``one`` where the condition holds, else ``other``; for each lane by itself."""
-    return one if condition else other
-
-
-def any_of(condition: Any) -> bool:
-    """Whether a condition holds in any lane."""
-    return bool(condition)
-
-
-def all_of(condition: Any) -> bool:
-    """Whether a condition holds in each lane."""
-    return bool(condition)
-
-
 class LanesType(types.Type):
     """One float for each lane."""
 
@@ -73,17 +57,8 @@ class LanesType(types.Type):
         return self if isinstance(other, types.Float) else None
 
 
-class MaskType(types.Type):
-    """One truth for each lane."""
-
-    def __init__(self) -> None:
-        super().__init__(f"mask{LANES}")
-
-
-LANE, MASK = LanesType(), MaskType()
-FLOAT = types.float64
-DOUBLES, BITS = ir.VectorType(ir.DoubleType(), LANES), ir.VectorType(ir.IntType(1), LANES)
-NONE, ALL = ir.IntType(LANES)(0), ir.IntType(LANES)(2**LANES - 1)
+LANE, FLOAT = LanesType(), types.float64
+DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
 
 
 @register_model(LanesType)
@@ -92,14 +67,6 @@ class LanesModel(models.PrimitiveModel):
 
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, DOUBLES)
-
-
-@register_model(MaskType)
-class MaskModel(models.PrimitiveModel):
-    """A vector of bits."""
-
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, BITS)
 
 
 def splat(builder: Any, value: Any) -> Any:
@@ -115,118 +82,45 @@ def from_float(context: Any, builder: Any, source: Any, target: Any, value: Any)
     return splat(builder, context.cast(builder, value, source, FLOAT))
 
 
-def of_lanes(function: Any, takes: tuple[Any, ...], gives: Any, write: Callable[..., Any]) -> None:
-    """Let kernels call ``function`` with lanes, some of which may be floats; ``write`` writes its instructions."""
+def of_lanes(function: Any, count: int, write: Callable[..., Any]) -> None:
+    """Let kernels call ``function`` with ``count`` lanes, some of which may be floats; ``write``: its instructions."""
 
     @type_callable(function)
     def typed(context: Any) -> Any:
         def typer(*given: Any) -> Any:
-            if len(given) != len(takes) or (LANE in takes and not any(each in (LANE, MASK) for each in given)):
-                return None
-            pairs = zip(given, takes, strict=True)
-            fits = (each == wanted or (wanted == LANE and isinstance(each, types.Float)) for each, wanted in pairs)
-            return gives if all(fits) else None
+            fits = all(each == LANE or isinstance(each, types.Float) for each in given)
+            return LANE if len(given) == count and LANE in given and fits else None
 
-        named = [Parameter(f"value{k}", Parameter.POSITIONAL_ONLY) for k in range(len(takes))]
+        named = [Parameter(f"value{k}", Parameter.POSITIONAL_ONLY) for k in range(count)]
         typer.pysig = Signature(named)  # type: ignore[attr-defined]
         return typer
 
     def lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        told = zip(values, sig.args, takes, strict=True)
-        return write(context, builder, *(context.cast(builder, *each) for each in told))
+        told = zip(values, sig.args, strict=True)
+        return write(builder, *(context.cast(builder, value, kind, LANE) for value, kind in told))
 
-    for chosen in product(*((LANE, FLOAT) if wanted == LANE else (wanted,) for wanted in takes)):
-        if LANE not in takes or LANE in chosen or MASK in chosen:
+    for chosen in product((LANE, FLOAT), repeat=count):
+        if LANE in chosen:
             lower_builtin(function, *chosen)(lowered)
-
-
-def instruction(name: str, *told: Any) -> Callable[..., Any]:
-    """Write one instruction."""
-    return lambda context, builder, *values: getattr(builder, name)(*told, *values)
-
-
-def call(name: str) -> Callable[..., Any]:
-    """Write a call of what LLVM has for vectors."""
-
-    def write(context: Any, builder: Any, *values: Any) -> Any:
-        kind = ir.FunctionType(DOUBLES, [DOUBLES] * len(values))
-        found = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64")
-        return builder.call(found, values)
-
-    return write
-
-
-def each_lane(function: Any) -> Callable[..., Any]:
-    """Call a function of a float for one lane after the other: the same bits as of a float."""
-
-    def write(context: Any, builder: Any, value: Any) -> Any:
-        found = context.get_function(function, FLOAT(FLOAT))
-        result = ir.Constant(DOUBLES, ir.Undefined)
-        for k in map(ir.IntType(32), range(LANES)):
-            one = found(builder, [builder.extract_element(value, k)])
-            result = builder.insert_element(result, one, k)
-        return result
-
-    return write
 
 
 def better(comparison: str) -> Callable[..., Any]:
     """Write `max` (``>``) or `min` (``<``) as of floats: the second number only where it is better."""
 
-    def write(context: Any, builder: Any, one: Any, other: Any) -> Any:
+    def write(builder: Any, one: Any, other: Any) -> Any:
         return builder.select(builder.fcmp_ordered(comparison, other, one), other, one)
 
     return write
 
 
-def bits(builder: Any, mask: Any) -> Any:
-    """Return a mask as an integer of one bit for each lane."""
-    return builder.bitcast(mask, ir.IntType(LANES))
-
-
-def compared(comparison: str) -> Callable[..., Any]:
-    """Write a comparison: like that of floats it is false of what is no number, and ``!=`` is true."""
-    method = "fcmp_unordered" if comparison == "!=" else "fcmp_ordered"
-    return lambda context, builder, one, other: getattr(builder, method)(comparison, one, other)
-
-
-for name, operations in {
-    "fadd": (operator.add, operator.iadd),
-    "fsub": (operator.sub, operator.isub),
-    "fmul": (operator.mul, operator.imul),
-    "fdiv": (operator.truediv,),
-}.items():
-    for operation in operations:
-        of_lanes(operation, (LANE, LANE), LANE, instruction(name))
-for sign, operation in {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}.items():
-    of_lanes(operation, (LANE, LANE), MASK, compared(sign))
-for operation, name in ((operator.and_, "and_"), (operator.or_, "or_")):
-    of_lanes(operation, (MASK, MASK), MASK, instruction(name))
-of_lanes(operator.invert, (MASK,), MASK, instruction("not_"))
-of_lanes(operator.neg, (LANE,), LANE, instruction("fneg"))
-of_lanes(max, (LANE, LANE), LANE, better(">"))
-of_lanes(min, (LANE, LANE), LANE, better("<"))
-of_lanes(abs, (LANE,), LANE, call("fabs"))
-of_lanes(math.sqrt, (LANE,), LANE, call("sqrt"))
-of_lanes(math.copysign, (LANE, LANE), LANE, call("copysign"))
-of_lanes(math.cos, (LANE,), LANE, each_lane(math.cos))
-of_lanes(math.sin, (LANE,), LANE, each_lane(math.sin))
-of_lanes(where, (MASK, LANE, LANE), LANE, instruction("select"))
-of_lanes(where, (types.boolean, FLOAT, FLOAT), FLOAT, instruction("select"))
-of_lanes(where, (types.boolean, LANE, LANE), LANE, instruction("select"))
-of_lanes(
-    any_of, (MASK,), types.boolean, lambda c, builder, mask: builder.icmp_unsigned("!=", bits(builder, mask), NONE)
-)
-of_lanes(all_of, (MASK,), types.boolean, lambda c, builder, mask: builder.icmp_unsigned("==", bits(builder, mask), ALL))
-of_lanes(any_of, (types.boolean,), types.boolean, lambda context, builder, truth: truth)
-of_lanes(all_of, (types.boolean,), types.boolean, lambda context, builder, truth: truth)
+for operation in (operator.add, operator.iadd):
+    of_lanes(operation, 2, lambda builder, one, other: builder.fadd(one, other))
+for operation in (operator.sub, operator.isub):
+    of_lanes(operation, 2, lambda builder, one, other: builder.fsub(one, other))
+of_lanes(operator.mul, 2, lambda builder, one, other: builder.fmul(one, other))
+of_lanes(operator.neg, 1, lambda builder, one: builder.fneg(one))
+of_lanes(max, 2, better(">"))
+of_lanes(min, 2, better("<"))
 
 
 def _seen_in_lanes(typingctx: Any, array: Any) -> Any:

@@ -17,9 +17,8 @@ The two dimensions are two packages behind one interface, chosen from one table.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -32,9 +31,6 @@ from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
 from reference_solver.tally import OPENED, merge, new_tally
 from reference_solver.tally_summary import columns, summary
-
-if TYPE_CHECKING:
-    from reference_solver.many.worlds import Worlds
 
 
 class World(Protocol):
@@ -107,33 +103,6 @@ class Simulation:
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """See `__copy__`: model and settings cannot change."""
         return self.__copy__()
-
-    @staticmethod
-    def many(
-        model: Callable[..., Model],
-        parameters: Iterable[Mapping[str, Any]],
-        settings: Settings,
-        threads: int | None = None,
-    ) -> Worlds:
-        """Return a world ``model(**each)`` for each set of ``parameters``, all of them stepped side by side.
-
-        Each has the same states, to the bit, as a simulation of it alone. In the plane, with a fixed number of
-        row-by-row sweeps (`Settings.classical`), eight worlds whose bodies are alike take about twice the time of one.
-        Many worlds have no `certificate`; a simulation has.
-
-        Parameters
-        ----------
-        threads
-            How many threads step them; by default one for each processor that this process may use.
-
-        Raises
-        ------
-        ValueError
-            If there is no set of parameters, models differ in dimension or number of bodies, or ``threads`` is below 1.
-        """
-        from reference_solver.many.worlds import worlds  # it steps what does not fit together by simulations
-
-        return worlds(model, parameters, settings, threads)
 
     def advance(self, steps: int) -> None:
         """Make ``steps`` steps; afterwards positions and velocities belong to the same instant.

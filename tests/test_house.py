@@ -363,7 +363,7 @@ OTHER_CLAMPS = {
 def test_friction_is_clamped_in_one_place():
     """`coulomb.py` has what the law allows; elsewhere nothing is clamped but lengths and steps."""
     found = {str(path) for path, node in solver_functions() for part in ast.walk(node) if clamps(part)}
-    ours = {path for path in found if path.partition("/")[0] not in ("certificate", "verification", "geometry.py")}
+    ours = {path for path in found if path.partition("/")[0] not in ("certificate", "geometry.py")}
     assert ours - {"coulomb.py"} == set(OTHER_CLAMPS)
     assert "coulomb.py" in ours
 
@@ -418,7 +418,7 @@ def test_solver_size_limit_by_room():
     for room, most in rooms.items():
         print(f"{room:22} {lines[room]:6} of at most {most:6}")
     print(f"{'all':22} {sum(lines.values()):6}")
-    assert set(lines) >= {"planar", "spatial", "stepping", "certificate", "verification"}
+    assert set(lines) >= {"planar", "spatial", "stepping", "certificate"}
     grown = {room: lines[room] for room, most in rooms.items() if lines[room] > most}
     assert not grown, "see 'Change the reference solver' in CONTRIBUTING.md"
     loose = {room: lines[room] for room, most in rooms.items() if lines[room] < most * (1.0 - SLACK) - 10}

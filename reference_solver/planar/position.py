@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.lanes import any_of, where
 from reference_solver.model import Array
 from reference_solver.planar.block import sweep_block_pushes
 from reference_solver.planar.columns import EXTENT, GAP, PUSH, PUSH_TARGET, TARGET, A, B
@@ -38,9 +37,9 @@ def set_push_targets(bodies: Bodies, rows: Rows, options: Options) -> float:
             parting = rows.real[c, TARGET] if along else normal_velocity(bodies.twist, rows, c)
             after += options.dt * max(parting, 0.0)
         excess = -after - options.slop
-        excess = where(abs(excess) <= ROUND_OFF * extent, 0.0, excess)
+        excess = 0.0 if abs(excess) <= ROUND_OFF * extent else excess
         # Within what is allowed a contact may close, but not farther (negative target).
-        rows.real[c, PUSH_TARGET] = where(excess > 0.0, options.beta, 1.0) * excess / options.dt
+        rows.real[c, PUSH_TARGET] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
         largest = max(largest, rows.real[c, PUSH_TARGET])
     return largest
 
@@ -60,7 +59,7 @@ def begin_pushes(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> 
     if options.correction != SPLIT:
         return 0.0
     largest = set_push_targets(bodies, rows, options)
-    if any_of(largest > 0.0):
+    if largest > 0.0:
         bodies.pseudo[:] = 0.0
         tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
     return largest

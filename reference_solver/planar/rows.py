@@ -6,7 +6,6 @@ import math
 
 from reference_solver.compilation import inner_kernel
 from reference_solver.coulomb import into_interval
-from reference_solver.lanes import where
 from reference_solver.planar.columns import (
     AN,
     APPROACH,
@@ -95,12 +94,13 @@ def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Option
     u, gap = rows.real[c, APPROACH], rows.real[c, GAP]
     place = max(abs(rows.real[c, POINT]), abs(rows.real[c, POINT + 1]))
     noise = ROUND_OFF * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) + COORDINATE_NOISE * place
-    target = where(gap > options.slop + noise, -(gap - options.slop) / options.dt, 0.0)
+    target = -(gap - options.slop) / options.dt if gap > options.slop + noise else 0.0
     if options.correction == BAUMGARTE:
         target = max(target, options.beta * (-gap - options.slop) / options.dt)
     if options.restitution:
         rebound = -pairs.restitution[a, b] * u
-        target = where((u < 0.0) & (rebound > 0.0), max(rebound, target), target)
+        if u < 0.0 and rebound > 0.0:
+            target = max(rebound, target)
     rows.real[c, TARGET] = target
 
 

@@ -9,7 +9,6 @@ import math
 
 from reference_solver.compilation import inner_kernel, kernel
 from reference_solver.direct.problem import Problem
-from reference_solver.lanes import any_of, where
 from reference_solver.model import Array
 from reference_solver.planar.block import prepare_blocks
 from reference_solver.planar.certificate import certify, open_solve
@@ -37,7 +36,7 @@ def accelerate(bodies: Bodies, options: Options) -> None:
 def way(bodies: Bodies, i: int, k: int, dt: float, pushed: bool) -> float:
     """How far coordinate k of body i goes (E17)."""
     own = dt * bodies.twist[i, k]
-    return where(pushed, own + dt * bodies.pseudo[i, k], own)
+    return own + dt * bodies.pseudo[i, k] if pushed else own
 
 
 @inner_kernel
@@ -48,10 +47,8 @@ def move(bodies: Bodies, dt: float, pushed: bool) -> None:
             continue
         for k in range(3):
             bodies.pose[i, k] += way(bodies, i, k, dt, pushed)
-        turns = way(bodies, i, 2, dt, pushed) != 0.0
-        if any_of(turns) and bodies.kind[i, SHAPE] != DISC:
-            bodies.real[i, COS] = where(turns, math.cos(bodies.pose[i, 2]), bodies.real[i, COS])
-            bodies.real[i, SIN] = where(turns, math.sin(bodies.pose[i, 2]), bodies.real[i, SIN])
+        if way(bodies, i, 2, dt, pushed) != 0.0 and bodies.kind[i, SHAPE] != DISC:
+            bodies.real[i, COS], bodies.real[i, SIN] = math.cos(bodies.pose[i, 2]), math.sin(bodies.pose[i, 2])
 
 
 @inner_kernel

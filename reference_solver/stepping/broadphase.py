@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.lanes import where
 from reference_solver.model import Array
 from reference_solver.needs import ALL_PAIRS_LIMIT
 from reference_solver.pieces import Indices
@@ -94,8 +93,10 @@ def bodies_of(pair: int) -> tuple[int, int]:
 def bound_along(boxes: Boxes, i: int, axis: int, component: float, place: float) -> None:
     """Bound half-space i along an axis that is its normal, to the last bit, by the place of its face there."""
     noise = 1e-15 * abs(place)
-    boxes.high[i, axis] = where(component == 1.0, place + noise, boxes.high[i, axis])
-    boxes.low[i, axis] = where(component == -1.0, place - noise, boxes.low[i, axis])
+    if component == 1.0:
+        boxes.high[i, axis] = place + noise
+    if component == -1.0:
+        boxes.low[i, axis] = place - noise
 
 
 @inner_kernel

@@ -38,12 +38,12 @@ sys.exit(status)
     [
         # 8 s of CPU where nothing is compiled before
         pytest.param(
-            ["test_structures.py", "verification/event_driven/test_roots.py", "direct/test_matrix.py"],
+            ["test_structures.py", "direct/test_matrix.py"],
             marks=pytest.mark.long,
         ),
         pytest.param(["direct"], marks=pytest.mark.long),  # 31 s
     ],
-    ids=["structures, roots, a matrix", "the direct solver"],
+    ids=["structures, a matrix", "the direct solver"],
 )
 def test_tests_of_the_solver_pass_on_a_release_that_nobody_tried(tests):
     paths = [f"tests/reference_solver/{name}" for name in tests]

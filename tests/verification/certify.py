@@ -20,12 +20,12 @@ from rich.console import Console
 from rich.table import Table
 
 from adapters.isolation import end_with
-from reference_solver.verification import Gate
 from reports.command.group import AS_JSON
 from reports.terminal import terminal
 from reports.wording import number
 from tests.verification import piles
 from tests.verification.fuzzing import show_random
+from tests.verification.gate import Gate
 from tests.verification.orders import PHASES, RATES, orders
 from tests.verification.self_test import JUDGED, PROMISED, SIZES, trials
 

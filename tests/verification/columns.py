@@ -11,7 +11,7 @@ import numpy as np
 from reference_solver.model import Array, Body
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY, SPACES, Space, made_by
 
 DT = 1 / 240

@@ -10,7 +10,7 @@ import numpy as np
 
 from reference_solver.model import Array, Body, Box, Disc, Sphere
 from reference_solver.settings import Settings
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.rotation import rotation_matrix
 from tests.verification.space import ROUNDNESS, SPACES, Space, made_by
 

@@ -10,8 +10,8 @@ import numpy as np
 from reference_solver.model import Array, Body, Box, Capsule, HalfSpace, Model, Polygon, Shape
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
 from tests.verification import runge_kutta
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY, SPACES, Space, made_by
 
 #: Random slides over a seam, and random impacts of turning boxes.

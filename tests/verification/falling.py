@@ -13,8 +13,8 @@ from reference_solver.model import Array, Body, Model
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, HalfSpace
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
 from tests.verification import runge_kutta
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY
 from tests.verification.turning_scenes import PLANE, rocking_block
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from reference_solver.model import Array, Body
 from reference_solver.settings import Settings
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY, SPACES, Space, made_by
 
 STEPS = (1 / 60, 1 / 240, 1 / 960)

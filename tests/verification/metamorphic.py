@@ -11,7 +11,7 @@ import numpy as np
 
 from reference_solver.certificate.relations import Change, permuted
 from reference_solver.settings import Settings
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.relations import (
     canonical_order,
     copies_defect,

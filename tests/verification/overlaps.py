@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 
 from reference_solver.settings import PositionCorrection, Settings
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY, SPACES, Space
 
 #: Step [s], overlap of a ball of half a metre and a floor [m], and the share of it beyond the slop [m] that goes.

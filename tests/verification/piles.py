@@ -13,7 +13,7 @@ from reference_solver.model import Model
 from reference_solver.piles import GRAVITY, RATE, planar_pile, spatial_pile
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.rotation import rotation_matrix
 
 #: Seconds that a pile falls: in the last half of them bodies lie still or nearly so.

@@ -11,8 +11,9 @@ from reference_solver.model import Array, Body, Model
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, Disc, HalfSpace
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
-from reference_solver.verification.event_driven import EventDriven, OracleError
+from tests.verification.event_driven.errors import OracleError
+from tests.verification.event_driven.oracle import EventDriven
+from tests.verification.gate import Gate
 from tests.verification.space import GRAVITY
 
 #: Number of scenes, seed of the first, steps a second, seconds and comparisons of each run.

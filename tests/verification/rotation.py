@@ -11,8 +11,8 @@ import numpy as np
 from reference_solver.model import Array, Body, Box, Model
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
 from tests.verification import runge_kutta
+from tests.verification.gate import Gate
 
 #: Moments and spin of a body that turns over about its intermediate axis.
 MOMENTS = (1.0, 2.0, 3.0)

@@ -21,7 +21,7 @@ from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, Disc, HalfSpace, Sphere
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 
 SIZES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 #: Size at which the share of what is caught is promised, and that share.

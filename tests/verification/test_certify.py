@@ -7,9 +7,9 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from reference_solver.verification import Gate
 from tests.verification import certify as command
 from tests.verification import piles, rotation
+from tests.verification.gate import Gate
 from tests.verification.orders import RATES, Order
 from tests.verification.self_test import JUDGED, SIZES, Corruption, Trial
 

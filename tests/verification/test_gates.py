@@ -2,7 +2,6 @@
 
 import pytest
 
-from reference_solver.verification import Gate
 from tests.verification import (
     columns,
     conservation,
@@ -16,6 +15,7 @@ from tests.verification import (
     rotation,
     turning,
 )
+from tests.verification.gate import Gate
 from tests.verification.space import SPACES
 from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
 

@@ -10,7 +10,7 @@ import numpy as np
 from reference_solver.model import Array
 from reference_solver.settings import Settings
 from reference_solver.simulation import Simulation
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.orders import RATES, fitted
 from tests.verification.space import GRAVITY, Space
 from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, board_on_log, case

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.turning import rows
 from tests.verification.turning_scenes import SPATIAL
 

@@ -1,13 +1,16 @@
 """Sweeps of many manifolds at once have the bits of sweeps of one after the other."""
 
+import math
+import struct
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation
 from reference_solver.compilation import config
-from reference_solver.lanes import LANES
+from reference_solver.lanes import LANES, lanes
 from reference_solver.planar.state import MANIFOLDS, Narrow, Wide, allocate_rows
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: there are no lanes")
@@ -107,3 +110,37 @@ def test_small_scenes_and_solves_to_a_residual_have_no_room_for_it():
     small = Simulation(wall(4), Settings.classical(DT))
     exact = Simulation(wall(13), Settings.fixed_step(DT))
     assert all(isinstance(each._world._rows.wide, Narrow) for each in (small, exact))
+
+
+#: Numbers on which operations differ that are nearly the same.
+ODD = (0.0, -0.0, 1.0, -2.5, math.inf, -math.inf, math.nan, 5e-324)
+
+
+@numba.njit(error_model="numpy")
+def operations(x, y, out):
+    out[0], out[1], out[2], out[3] = x + y, x - y, x * y, -x
+    out[4], out[5], out[6], out[7] = max(x, y), min(x, y), max(x, 0.5), min(0.5, x)
+    total = x
+    total += y
+    total -= 0.25
+    out[8] = total
+
+
+@numba.njit(error_model="numpy")
+def of_lanes(one, other, out):
+    operations(lanes(one)[0], lanes(other)[0], lanes(out))
+
+
+def bits(number):
+    """Bytes of a float; all that is no number alike: which of them an operation gives is left to the processor."""
+    return b"nan" if math.isnan(number) else struct.pack("d", number)
+
+
+@pytest.mark.parametrize("shift", range(len(ODD)))
+def test_each_lane_holds_what_floats_give(shift):
+    one, other = np.array([ODD]), np.roll([ODD], shift)
+    found, wanted = np.zeros((2, 9, LANES))
+    of_lanes(one, other, found)
+    for lane in range(LANES):
+        operations(one[0, lane], other[0, lane], wanted[:, lane])
+    assert [list(map(bits, row)) for row in found] == [list(map(bits, row)) for row in wanted]

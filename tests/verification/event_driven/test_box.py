@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model
-from reference_solver.verification.event_driven import EventDriven, LeavesClosedForm
+from tests.verification.event_driven.errors import LeavesClosedForm
+from tests.verification.event_driven.oracle import EventDriven
 
 G = 9.81
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Sphere
-from reference_solver.verification.event_driven import EventDriven, LeavesClosedForm
+from tests.verification.event_driven.errors import LeavesClosedForm
+from tests.verification.event_driven.oracle import EventDriven
 
 G = 9.81
 #: A few units in the last place of numbers of order one, over a handful of operations.

@@ -2,8 +2,8 @@
 
 import pytest
 
-from reference_solver.verification import Gate
-from reference_solver.verification.event_driven import gates
+from tests.verification.event_driven import gates
+from tests.verification.gate import Gate
 
 PARTS = (
     "bounce",

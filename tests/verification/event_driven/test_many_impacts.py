@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Disc, HalfSpace, Model, Sphere
-from reference_solver.verification.event_driven import EventDriven, LeavesClosedForm, TooManyEvents
+from tests.verification.event_driven.errors import LeavesClosedForm, TooManyEvents
+from tests.verification.event_driven.oracle import EventDriven
 
 
 def disc(x, y=0.0, vx=0.0, vy=0.0, mass=1.0, radius=0.5):

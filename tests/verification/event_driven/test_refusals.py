@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Sphere
-from reference_solver.verification.event_driven import EventDriven
+from tests.verification.event_driven.oracle import EventDriven
 
 STILL = (0.0, 0.0, 0.0)
 

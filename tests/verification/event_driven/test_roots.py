@@ -8,19 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference_solver.compilation import kernel
-from reference_solver.verification.event_driven.roots import first_fall, first_quartic_fall, first_touch
-
-
-@kernel
-def quartic(work):
-    return first_quartic_fall(work)
+from tests.verification.event_driven.prediction import first_fall, first_quartic_fall, first_touch
 
 
 def first_root(coefficients):
     work = np.zeros((5, 7))
     work[0, :5] = coefficients
-    return quartic(work)
+    return first_quartic_fall(work)
 
 
 @given(st.floats(1e-12, 1e3), st.floats(-1e3, 1e3), st.floats(-100.0, -1e-3))

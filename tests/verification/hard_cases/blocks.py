@@ -8,7 +8,7 @@ import numpy as np
 
 from reference_solver.model import Model
 from reference_solver.settings import Settings
-from reference_solver.verification.event_driven import EventDriven
+from tests.verification.event_driven.oracle import EventDriven
 from tests.verification.hard_cases.case import HardCase, Run, Verdict, diverged, energy, within
 from tests.verification.hard_cases.parts import DOWN, FLOOR, box
 

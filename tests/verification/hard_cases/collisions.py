@@ -8,7 +8,7 @@ import numpy as np
 
 from reference_solver.model import Body, HalfSpace, Model
 from reference_solver.settings import Settings
-from reference_solver.verification.event_driven import EventDriven, Law
+from tests.verification.event_driven.oracle import EventDriven, Law
 from tests.verification.hard_cases.case import HardCase, Run, Verdict, energy, within
 from tests.verification.hard_cases.parts import DOWN, DT, FLOOR, disc
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.hard_cases.cases import HARD_CASES, HardCase
 
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from reference_solver.verification import Gate
+from tests.verification.gate import Gate
 from tests.verification.known import blows, corners, crossing, edges, planar, rubbing, spatial
 from tests.verification.known.motion import TRUTH, Miss, Motion, miss
 from tests.verification.space import SPACES

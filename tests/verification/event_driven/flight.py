@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference_solver.model import Array, Model
-from reference_solver.verification.event_driven.bodies import Bodies
+from tests.verification.event_driven.bodies import Bodies
 
 
 class Flight:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from reference_solver.model import Array
-from reference_solver.verification.event_driven.bodies import BOX, PLANE, Bodies
-from reference_solver.verification.event_driven.box import BoxGaps
-from reference_solver.verification.event_driven.flight import Flight
-from reference_solver.verification.event_driven.prediction import Flown, touch_length, touching
+from tests.verification.event_driven.bodies import BOX, PLANE, Bodies
+from tests.verification.event_driven.box import BoxGaps
+from tests.verification.event_driven.flight import Flight
+from tests.verification.event_driven.prediction import Flown, touch_length, touching
 
 #: (body_a, body_b, feature): the same contact at another instant has the same key.
 Key = tuple[int, int, int]

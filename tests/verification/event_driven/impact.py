@@ -15,10 +15,10 @@ from reference_solver.exact_contact import (
     frictionless_solutions,
 )
 from reference_solver.model import Array
-from reference_solver.verification.event_driven.bodies import Bodies
-from reference_solver.verification.event_driven.contacts import Contact, Rows
-from reference_solver.verification.event_driven.errors import ContactParadox, LeavesClosedForm
-from reference_solver.verification.event_driven.flight import Flight
+from tests.verification.event_driven.bodies import Bodies
+from tests.verification.event_driven.contacts import Contact, Rows
+from tests.verification.event_driven.errors import ContactParadox, LeavesClosedForm
+from tests.verification.event_driven.flight import Flight
 
 #: A rebound slower than this share of the fastest impact that its bodies ever had ends an accumulation of impacts:
 #: what is left of it is below round-off in position (its square) and in time.

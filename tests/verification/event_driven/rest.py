@@ -9,10 +9,10 @@ import numpy as np
 
 from reference_solver.exact_contact import MOST_WITH_FRICTION, MOST_WITHOUT, coulomb_solutions, frictionless_solutions
 from reference_solver.model import Array
-from reference_solver.verification.event_driven.bodies import PLANE, Bodies
-from reference_solver.verification.event_driven.contacts import Contact, Geometry, Key, Rows
-from reference_solver.verification.event_driven.errors import ContactParadox, LeavesClosedForm
-from reference_solver.verification.event_driven.flight import Flight
+from tests.verification.event_driven.bodies import PLANE, Bodies
+from tests.verification.event_driven.contacts import Contact, Geometry, Key, Rows
+from tests.verification.event_driven.errors import ContactParadox, LeavesClosedForm
+from tests.verification.event_driven.flight import Flight
 
 #: Relative speeds below this share of the bodies' speeds are round-off: 64 units in the last place.
 STILL = 64.0 * 2.220446049250313e-16

@@ -10,8 +10,8 @@ import numpy as np
 
 from reference_solver.exact_contact import coulomb_solutions
 from reference_solver.model import Array, Body, Box, Disc, HalfSpace, Model
-from reference_solver.verification import Gate
-from reference_solver.verification.event_driven import Event, EventDriven, Law
+from tests.verification.event_driven.oracle import Event, EventDriven, Law
+from tests.verification.gate import Gate
 
 #: Standard test value [m/s^2]; the gates are ratios, so that any other would do.
 GRAVITY = 9.81

@@ -1,4 +1,4 @@
-"""When balls and planes meet next: one compiled scan over the partners of a body (O3 to O5).
+"""First instants at which a gap closes (O3 to O6): balls and planes by one compiled scan over the partners of a body.
 
 Each pair is looked at from the later of its two anchors, so that the answer does not depend on when it is asked.
 """
@@ -6,14 +6,17 @@ Each pair is looked at from the later of its two anchors, so that the answer doe
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
-from reference_solver.compilation import inner_kernel, kernel
+import numba
+
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
-from reference_solver.structures import structure
-from reference_solver.verification.event_driven.bodies import BALL, PLANE
-from reference_solver.verification.event_driven.roots import GRAZE, first_fall, first_quartic_fall
+from tests.verification.event_driven.bodies import BALL, PLANE
+
+#: numba keeps machine code by the file a kernel stands in: all of them stand here.
+kernel = numba.njit(error_model="numpy", cache=True)
 
 #: Gaps below this share of the coordinates that make them are contacts: 16 units in the last place, the rounding of
 #: two positions, two radii and an event time.
@@ -22,8 +25,15 @@ TOUCH = 16.0 * 2.220446049250313e-16
 #: A bound that is only just beyond the limit may be round-off; such a pair is looked at in full.
 SURELY = 1.0 + 1e-9
 
+#: A discriminant below this share of its two terms, or a closing speed below this share of the speeds that it is the
+#: difference of, is round-off: nobody can tell a graze from a miss there. 16 units in the last place.
+GRAZE = 16.0 * 2.220446049250313e-16
 
-@structure
+#: Doublings of a safe step in which a contact within round-off is looked for: a closing speed of a thousandth of its
+#: bound still gets there.
+AHEAD = 11
+
+
 class Flown(NamedTuple):
     """What kernels read of the flight (`flight.Flight`) and the shapes (`bodies.Bodies`) of n bodies in d axes."""
 
@@ -47,13 +57,13 @@ def touch_length(i, j, t, x0, v0, reach, offset):
     return TOUCH * size
 
 
-@inner_kernel
+@kernel
 def since(i, t, extra, f):
     """Time from body i's anchor to t + extra; 0 where t is the rounded time of the anchor."""
     return 0.0 if t == f.t0[i] else (t - f.t0[i]) + (extra - f.late[i])
 
 
-@inner_kernel
+@kernel
 def plane_gap(ball, plane, t, extra, f):
     """Gap, its rate and its acceleration between a ball and a plane that moves uniformly."""
     gap = -f.offset[plane] - f.radius[ball]
@@ -69,7 +79,7 @@ def plane_gap(ball, plane, t, extra, f):
     return gap, rate, acceleration
 
 
-@inner_kernel
+@kernel
 def meet_plane(ball, plane, f):
     """Time [s] from the later anchor to the next contact of a ball with a plane; inf if never."""
     last = ball if f.t0[ball] >= f.t0[plane] else plane
@@ -84,7 +94,7 @@ def meet_plane(ball, plane, f):
     return first_fall(gap, rate, acceleration)
 
 
-@inner_kernel
+@kernel
 def relative_flight(i, j, t, extra, f, work):
     """Position, velocity, acceleration of ball j seen from ball i at t + extra, into rows 1 to 3 of ``work``."""
     since_i, since_j = since(i, t, extra, f), since(j, t, extra, f)
@@ -95,7 +105,7 @@ def relative_flight(i, j, t, extra, f, work):
         work[3, k] = f.a0[j, k] - f.a0[i, k]
 
 
-@inner_kernel
+@kernel
 def dot(a, b, size):
     """Sum of products."""
     total = 0.0
@@ -104,7 +114,7 @@ def dot(a, b, size):
     return total
 
 
-@inner_kernel
+@kernel
 def crossed(x, v, size):
     """Square of |x cross v|, from the differences themselves: x.x v.v - (x.v)^2 would cancel."""
     total = 0.0
@@ -114,7 +124,7 @@ def crossed(x, v, size):
     return total
 
 
-@inner_kernel
+@kernel
 def meet_ball(i, j, f, work):
     """Time [s] from the later anchor to the next contact of two balls; inf if never (O4, O5)."""
     last, d = i if f.t0[i] >= f.t0[j] else j, f.x0.shape[1]
@@ -140,7 +150,7 @@ def meet_ball(i, j, f, work):
     return first_quartic_fall(work)
 
 
-@inner_kernel
+@kernel
 def meet(i, j, f, work):
     """Time [s] from the later anchor to the next contact of two bodies; inf if never."""
     if f.kind[i] == BALL and f.kind[j] == BALL:
@@ -187,7 +197,7 @@ def next_meeting(i, skipped, f, work, best):
     return partner
 
 
-@inner_kernel
+@kernel
 def gap_between(i, j, t, f):
     """Gap [m] of two balls, or of a ball and a plane, at time t."""
     if f.kind[j] == PLANE or f.kind[i] == PLANE:
@@ -224,3 +234,126 @@ def touching(i, t, depth, f, found):
             found[count] = j
             count += 1
     return count
+
+
+@kernel
+def first_fall(gap, rate, acceleration):
+    """First t >= 0 at which gap + rate t + acceleration t^2 / 2 falls through zero; inf if never (O3).
+
+    ``gap`` must not be negative; the root that would subtract nearly equal numbers is never formed. A gap of
+    exactly zero is a contact just left: the next one is at -2 rate / acceleration.
+    """
+    if gap <= 0.0 and rate < 0.0:
+        return 0.0
+    square = rate * rate
+    product = 2.0 * acceleration * gap
+    if rate >= 0.0:
+        return (rate + math.sqrt(square - product)) / -acceleration if acceleration < 0.0 else math.inf
+    if square - product <= GRAZE * square and acceleration > 0.0:
+        return math.inf
+    return 2.0 * gap / (-rate + math.sqrt(square - product))
+
+
+@kernel
+def polynomial(c, degree, t):
+    """Value of c[0] + c[1] t + ... (Horner)."""
+    value = c[degree]
+    for k in range(degree - 1, -1, -1):
+        value = value * t + c[k]
+    return value
+
+
+@kernel
+def between(c, degree, low, high):
+    """Root of a polynomial with a sign change on [low, high]: halved down to neighbouring doubles."""
+    rising = polynomial(c, degree, low) < 0.0
+    while True:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            return high
+        if (polynomial(c, degree, middle) < 0.0) == rising:
+            low = middle
+        else:
+            high = middle
+
+
+@kernel
+def first_quartic_fall(work):
+    """First t > 0 at which the quartic work[0, :5] falls through zero; inf if never (O5).
+
+    Between two neighbouring roots of its derivative a polynomial is monotone, so that signs tell its roots: from
+    the linear third derivative up to the quartic itself. ``work`` (5, 7) is overwritten: row k holds derivative k,
+    row 4 the roots found last.
+    """
+    bound = 0.0
+    for k in range(4):
+        for m in range(4 - k):
+            work[k + 1, m] = (m + 1) * work[k, m + 1]
+        bound = max(bound, abs(work[0, k]))
+    bound = 1.0 + bound / abs(work[0, 4])  # Cauchy's bound of all roots
+    roots = work[4]
+    found = 0
+    for k in range(3, -1, -1):
+        degree = 4 - k
+        c = work[k]
+        low = 0.0
+        at_low = polynomial(c, degree, 0.0)
+        kept = 0
+        for m in range(found + 1):
+            high = roots[m] if m < found else bound
+            at_high = polynomial(c, degree, high)
+            if at_low * at_high < 0.0 or (at_high == 0.0 and at_low != 0.0):
+                root = between(c, degree, low, high)
+                if k == 0 and at_low > 0.0:
+                    return root
+                roots[kept] = root  # never beyond the entry being read: one root per interval
+                kept += 1
+            low = high
+            at_low = at_high
+        found = kept
+    return math.inf
+
+
+def first_touch(
+    gap: Callable[[float], float],
+    step: Callable[[float], float],
+    touch: float,
+    start: float,
+    horizon: float,
+) -> float:
+    """First t in [start, horizon] at which a gap closes; inf if there is none (O6).
+
+    Steps that cannot overrun the contact come within ``touch`` of it; from there the sign change is bracketed and
+    halved down to neighbouring doubles. A gap that comes so close and opens again counts as contact.
+
+    Parameters
+    ----------
+    gap
+        Gap [m] at a time [s].
+    step
+        Time [s] from t on in which the gap cannot close.
+    touch
+        What counts as contact [m]: some units in the last place of the coordinates.
+    """
+    t = before = start
+    while t <= horizon:
+        value = gap(t)
+        if value <= 0.0:
+            return _sign_change(gap, before, t)
+        if value <= touch:
+            ahead = (t + 2.0**k * max(step(t), math.ulp(t)) for k in range(AHEAD))
+            return next((_sign_change(gap, t, high) for high in ahead if gap(high) <= 0.0), t)
+        before = t
+        t += max(step(t), math.ulp(t))
+    return math.inf
+
+
+def _sign_change(gap: Callable[[float], float], low: float, high: float) -> float:
+    while True:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            return high
+        if gap(middle) > 0.0:
+            low = middle
+        else:
+            high = middle

@@ -11,13 +11,13 @@ import numpy as np
 
 from reference_solver.model import Array, Model
 from reference_solver.records import Contacts, Record
-from reference_solver.verification.event_driven.bodies import PLANE, Bodies
-from reference_solver.verification.event_driven.contacts import Contact, Geometry, Rows
-from reference_solver.verification.event_driven.errors import OracleError, TooManyEvents
-from reference_solver.verification.event_driven.flight import Flight
-from reference_solver.verification.event_driven.impact import Impacts, Struck
-from reference_solver.verification.event_driven.prediction import next_meeting, touch_length
-from reference_solver.verification.event_driven.rest import Rest
+from tests.verification.event_driven.bodies import PLANE, Bodies
+from tests.verification.event_driven.contacts import Contact, Geometry, Rows
+from tests.verification.event_driven.errors import OracleError, TooManyEvents
+from tests.verification.event_driven.flight import Flight
+from tests.verification.event_driven.impact import Impacts, Struck
+from tests.verification.event_driven.prediction import next_meeting, touch_length
+from tests.verification.event_driven.rest import Rest
 
 Law = Literal["N-SIM", "N-SEQ"]
 

@@ -1,4 +1,4 @@
-"""Measured gates: what the solver and the oracle promise, as rows that ``crosscheck certify`` prints and tests assert.
+"""Measured gates: what the solver and the oracle promise, as rows that ``make certify`` prints and tests assert.
 
 One module per part that answers for its rows, each with ``gates() -> Iterator[Gate]``.
 """

@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from reference_solver.model import Array
-from reference_solver.verification.event_driven.bodies import BALL, PLANE, Bodies
-from reference_solver.verification.event_driven.flight import Flight
-from reference_solver.verification.event_driven.prediction import TOUCH
-from reference_solver.verification.event_driven.roots import GRAZE, first_fall, first_touch
+from tests.verification.event_driven.bodies import BALL, PLANE, Bodies
+from tests.verification.event_driven.flight import Flight
+from tests.verification.event_driven.prediction import GRAZE, TOUCH, first_fall, first_touch
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
