@@ -79,7 +79,7 @@ def test_a_ratio_below_its_floor_is_no_failure(measured, tmp_path):
 def test_scene_outside_the_table_refused(measured):
     assert call("stack").exit_code == 0
     ((table, _),) = measured
-    assert {case.scene for case in table.cases} == {"stack"} and len(table.cases) == 5
+    assert {case.scene for case in table.cases} == {"stack"} and len(table.cases) == 4
     refused = call("hilltop")
     assert refused.exit_code == 2 and "the table has no scene 'hilltop', only bounce, stack" in refused.output
 

@@ -199,7 +199,7 @@ def test_timing_rounds_in_own_processes_and_void_only_once(monkeypatch):
             did.append(unit.slot.profile)
             if len(did) > 9:
                 raise RuntimeError("the machine fell asleep")
-            return Lap("1.0", 0.5, 0.75, 1.0, "ab", None, "", "it hung" if unit.slot == other else "")
+            return Lap("1.0", 0.5, 0.75, 1.0, "ab", None, "it hung" if unit.slot == other else "")
 
     monkeypatch.setattr(timing, "Lane", Lane)
     monkeypatch.setattr(timing, "yardstick", lambda: float(next(sticks)))
