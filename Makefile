@@ -13,7 +13,7 @@ EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,newton
 # Engines of an extra with another name.
 BESIDE := newton_kamino,newton_vbd,newton_semi_implicit
 
-.PHONY: run test test-all recipe extras soak certify lint setup publish apart releases tune cures mutants detection tables size nightly docs clean
+.PHONY: run test test-all recipe extras soak certify lint setup publish apart releases ports tune cures mutants detection tables size nightly docs clean
 
 setup: $(STAMP)
 
@@ -138,6 +138,12 @@ releases: $(STAMP)
 	$(BIN)/crosscheck dashboard --out $(RELEASES_OUT) --output $(RELEASES_OUT)/releases.html
 	$(BIN)/python -m reports.releases $(RELEASES_OUT) $(RELEASES_OUT)/releases.md
 	cp $(RELEASES_OUT)/releases.html $(RELEASES_OUT)/releases.md reports/published/
+
+# Ports of MuJoCo, tested beside MuJoCo C of their release, then compared with it for the page Ports; an hour of CPU.
+ports: $(STAMP)
+	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco_warp,mujoco_mjx,dev
+	CROSSCHECK_REQUIRE_ENGINES=mujoco_warp,mujoco_mjx .venv-ports/bin/python -m pytest -m optional tests/adapters/test_ports_of_mujoco.py
+	$(BIN)/crosscheck ports mujoco --keep
 
 # Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
 tune: $(STAMP)

@@ -258,6 +258,8 @@ class EngineFacts:
     #: What the adapter supports beyond discs, balls, boxes and fixed half-spaces. A scene that needs more is
     #: UNSUPPORTED before it reaches the adapter.
     abilities: frozenset[Ability] = frozenset()
+    #: Name of the engine of which this one is a port: the same models and settings, steps of its own.
+    port_of: str = ""
 
     @property
     def epsilon(self) -> float:
@@ -294,6 +296,8 @@ class Engine(ABC):
     #: Writers of a run for the engine alone, by format (``crosscheck export --to``). The scene has a dimension of the
     #: engine; what a format cannot express raises `EngineError`.
     exports: Mapping[str, Writer] = MappingProxyType({})
+    #: Of a port: settings, each tried in both engines where its motion differs from the original's.
+    switches: tuple[Mapping[str, Any], ...] = ()
     #: Files other than Python modules that its results depend on, such as a program that it starts.
     sources: tuple[Path, ...] = ()
     #: Readers of model files of this engine, by file ending (`adapters.model`).

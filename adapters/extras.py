@@ -27,6 +27,7 @@ def packages(extra: str) -> list[str]:
 
     None either where nothing can read the metadata: environments of releases have neither it nor `packaging`.
     """
+    extra = extra.replace("_", "-")  # as metadata spell it
     try:
         from packaging.requirements import Requirement
 

@@ -16,7 +16,7 @@ import pandas as pd
 import worked
 
 from adapters import registry
-from reports import numbers, readings
+from reports import numbers, ports, readings
 from reports.fixes import recorded_fixes, recorded_paste, recorded_text
 from reports.listing import describe
 from reports.symptoms.published import passed
@@ -24,6 +24,7 @@ from reports.tables import shown_by, unset_text, verdict_of
 from reports.wording import first_of, markdown, number, setting_text, word_of
 from validation import bounds
 from validation.catalogue import CATALOGUE
+from validation.releases.kept import kept
 
 
 def write(folder: Path) -> None:
@@ -136,6 +137,9 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
             "scale": readings.SCALE,
         },
     )
+    for name in engines:
+        if rows := kept(name):
+            yield "ports", {"engine": name, "title": registry.facts(name).title} | ports.told(rows)
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from adapters import registry
-from adapters.engine_folder import folder_of
+from adapters.engine_folder import located
 from validation.catalogue import CATALOGUE
 from validation.scenes import OURS
 
@@ -23,8 +23,8 @@ ROOT = Path(__file__).parent.parent
 LINE = ["reference_solver", "adapters", "validation", "reports"]
 #: What people import; its examples name engines and scenes, its code does not.
 FRONT = "contact_crosscheck"
-#: Folders of our engines, by name.
-FOLDERS = {name: folder_of(name) for name in registry.names() if registry.is_ours(registry.entry(name))}
+#: Folders of our engines, by name; a port is a module in the folder of its original.
+FOLDERS = {e.name: located(e.module).parent for e in map(registry.entry, registry.names()) if registry.is_ours(e)}
 SOLVER = registry.solver()
 #: What their folders import beside the standard library, numpy, scipy and us: the engines themselves.
 COMMON = {*sys.stdlib_module_names, "numpy", "packaging", "scipy", *LINE}
@@ -150,7 +150,7 @@ def test_engine_folder_imports_the_vocabulary_alone(engine):
     A folder in an engine's folder is another engine of the same package, which may use what they share.
     """
     others = {folder.name for name, folder in FOLDERS.items() if name != engine} - {
-        folder.name for folder in FOLDERS[engine].parents
+        folder.name for folder in (FOLDERS[engine], *FOLDERS[engine].parents)
     }
     for path in FOLDERS[engine].rglob("*.py"):
         named = set(re.findall(r"^\s*(?:from|import) adapters\.(\w+)", path.read_text(), re.MULTILINE))

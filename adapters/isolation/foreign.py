@@ -282,6 +282,7 @@ def facts_from(data: Mapping[str, Any]) -> EngineFacts:
         _precision(data["precision"]),
         bool(data["apart"]),
         frozenset(map(_ability, data["abilities"])),
+        one_line(data["port_of"], NAME),
     )
 
 

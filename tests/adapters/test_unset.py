@@ -13,7 +13,8 @@ from adapters.unset import FRICTIONS, RADIUS, RESTITUTIONS, Asked, Told, Unset
 from reports import listing, tables
 from reports.command import main
 
-OURS = [name for name in registry.names() if registry.is_ours(registry.entry(name))]
+#: Ports do what their originals do.
+OURS = [name for name in registry.names() if (told := registry.adapter(name)) and not told.facts.port_of]
 HERE = [name for name in OURS if registry.find(name).engine is not None]
 
 

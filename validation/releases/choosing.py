@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 
 from packaging.requirements import Requirement
@@ -142,6 +143,38 @@ def release(engine: str, known: Releases, version: str) -> Release:
     if not unknown and not SpecifierSet(known.known).contains(version, prereleases=True):
         unknown = f"its adapter supports {known.known}; --try runs it all the same"
     return Release(engine, version, carriers[0].name, tuple(needs), unknown)
+
+
+def ported(engine: str, ports: Sequence[str], version: str = "") -> Release:
+    """Return a release of ``engine`` with the same release of each port, in one environment.
+
+    The newest one that all of them have, unless ``version`` is given; none that is known to be bad.
+
+    Raises
+    ------
+    EngineError
+        If one is no port of ``engine``, or there is no such release.
+    RegistryError
+        If the registry does not answer.
+    """
+    known = ports_of(engine)
+    for name in ports or [""]:
+        if name not in known:
+            raise EngineError(f"ports: {name or 'nothing'} is no port of {engine}; ports: {', '.join(known) or 'none'}")
+    facts = registry.facts(engine)
+    bad = facts.known_bad_versions if facts else {}
+    every = [{each.version for each in offered(name)} for name in (engine, *ports)]
+    found = sorted((each for each in set.intersection(*every) - set(bad) if version in ("", each)), key=Version)
+    if not found:
+        raise EngineError(f"ports: {', '.join((engine, *ports))} have no release {version or 'in common'}")
+    own = release(engine, known_releases(engine), found[-1])
+    return replace(own, needs=(*own.needs, *(f"{known[name]}=={found[-1]}" for name in ports)))
+
+
+def ports_of(engine: str) -> dict[str, str]:
+    """Ports of an engine, each with its package."""
+    told = {name: registry.facts(name) for name in registry.names()}
+    return {name: facts.package for name, facts in told.items() if facts and facts.port_of == engine}
 
 
 @cache

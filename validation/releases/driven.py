@@ -1,8 +1,9 @@
 """Runs in the environment of a release; needs only numpy and the engine.
 
-    stdin    one JSON object: {"engine", "request" or null, "slots", "timed", "stated", "jobs", "timeout"}
+    stdin    one JSON object: {"engine", "request" or null, "slots", "timed", "compared", "ports", "stated", "jobs",
+             "timeout"}
     stdout   one JSON object per line: first what this is ({"told": ...}), then an observation or {"left": ...} each,
-             then {"timed": ...} for each lap of what is to be timed
+             then {"timed": ...} for each lap of what is to be timed, {"compared": ...} for each case on each port
 
 Cells run as usual: `validation.workers` isolates them, and property checks run before each. The parent keeps stdin
 open; when it closes, this process and its workers end.
@@ -22,6 +23,7 @@ from typing import Any, TextIO
 from adapters import registry
 from validation import posed
 from validation.cells import Slot, slot_from_dict
+from validation.releases.ports import compared
 from validation.releases.timing import laps
 from validation.running.plan import Request, slots
 from validation.workers import run_cells
@@ -67,6 +69,8 @@ def _run(answers: TextIO, asked: Mapping[str, Any]) -> None:
         _say(answers, observation.as_dict())
     for lap in laps([slot_from_dict(data) for data in asked["timed"]]):
         _say(answers, lap)
+    for told in compared([slot_from_dict(data) for data in asked["compared"]], asked["ports"]):
+        _say(answers, {"compared": told.as_dict()})
 
 
 def _say(answers: TextIO, data: Mapping[str, Any]) -> None:

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from adapters import registry
+from adapters.engine import EngineError
 from adapters.isolation import LOG_LINES
 from adapters.plain import lines, one_line
 from validation import posed
@@ -22,6 +23,7 @@ from validation.records.store import RELEASE_TITLE, Run, Store
 from validation.releases.carried import code
 from validation.releases.choosing import Release
 from validation.releases.environments import BuildError, Environment, build
+from validation.releases.ports import PATIENCE, Compared, compared_from
 from validation.releases.timing import kept, timed_cells
 from validation.running.plan import Request, slots
 from validation.workers import TIMEOUT
@@ -140,6 +142,8 @@ def _answers(
     todo: Sequence[Slot],
     say: Say,
     timed: Sequence[Slot] = (),
+    ported: Sequence[Slot] = (),
+    ports: Sequence[str] = (),
 ) -> Iterator[dict[str, Any]]:
     """Output of a release's environment, line by line: its identity, a result per cell, then laps.
 
@@ -154,13 +158,17 @@ def _answers(
         environment = build(release, say)
     except BuildError as error:
         raise Unasked(str(error)) from None
-    scenes = list(dict.fromkeys([*(slot.scene for slot in (*todo, *timed)), *(request.scenes if request else ())]))
+    scenes = list(
+        dict.fromkeys([*(slot.scene for slot in (*todo, *timed, *ported)), *(request.scenes if request else ())])
+    )
     question = {
         "engine": release.engine,
         "distribution": release.distribution,
         "request": asdict(request) if request else None,
         "slots": [slot.as_dict() for slot in todo],
         "timed": [slot.as_dict() for slot in timed],
+        "compared": [slot.as_dict() for slot in ported],
+        "ports": list(ports),
         "stated": posed.stated_of(scenes),
         "jobs": effort.jobs,
         "timeout": effort.timeout,
@@ -276,6 +284,25 @@ def time(
     for reason in void.values():
         say(f"{release.name}: not timed: {reason}")
     store.finish(run)
+
+
+def compare(
+    release: Release, ports: Sequence[str], wanted: Sequence[Slot], say: Say = lambda line: None
+) -> Iterator[Compared]:
+    """Compare cases of an engine with its ports, all in the environment of ``release``.
+
+    Raises
+    ------
+    EngineError
+        If the release cannot be installed or imported.
+    """
+    try:
+        answers = _answers(release, Effort(timeout=PATIENCE), None, [], say, ported=wanted, ports=ports)
+        next(answers)
+        for answer in answers:
+            yield compared_from(answer["compared"])
+    except Unasked as why:
+        raise EngineError(f"ports: {release.name}: {why}") from None
 
 
 def _timed(store: Store, release: Release) -> set[Slot]:

@@ -1,0 +1,60 @@
+"""Ports of an engine beside it: a line for each case, from the rows that the table keeps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from adapters.law.single_precision import ROUNDINGS
+from validation.releases.ports import LOST, MOVES, SHARE
+
+Row = Mapping[str, str]
+#: Verdicts without a comparison of motions, in words.
+UNMOVED = {"unsupported": "unsupported there", "neither": "run by neither", "failed": "failed"}
+
+
+def sentence(row: Row) -> str:
+    """What was found in one case."""
+    if row["verdict"] in UNMOVED:
+        return f"{UNMOVED[row['verdict']]}: {row['because']}"
+    until = f"{row['until']} s" + ("" if row["until"] == row["end"] else f" of {row['end']} s")
+    if row["verdict"] == "same":
+        proof = f"; to the end with {row['proof']}" if row["proof"] else ""
+        return f"same to single precision until {until} ({row['apart']} m){proof}"
+    proof = f"; the same with {row['proof']}" if row["proof"] else ""
+    if row["because"]:
+        return f"{row['because']}{proof}"
+    return f"differs by {row['apart']} m in {row['body']} from {row['since']} s on, until {until}{proof}"
+
+
+def case_of(row: Row) -> str:
+    """``stack 3-D n=5 default``."""
+    return " ".join(text for text in (row["scene"], f"{row['dimension']}-D", row["params"], row["profile"]) if text)
+
+
+def counts(rows: Sequence[Row], port: str) -> str:
+    """Number of cases by verdict; of those that differ also how many are the same with a setting."""
+    own = [row for row in rows if row["port"] == port]
+    count = Counter(row["verdict"] for row in own)
+    proven = sum(bool(row["proof"]) for row in own if row["verdict"] == "differs")
+    words = {"same": "same", "differs": f"differ ({proven} with a setting that proves why)", **UNMOVED}
+    return f"{port}: {', '.join(f'{count[verdict]} {said}' for verdict, said in words.items() if count[verdict])}"
+
+
+def told(rows: Sequence[Row]) -> dict[str, Any]:
+    """What the page shows of a kept table: a row for each case, a column for each port."""
+    ports = list(dict.fromkeys(row["port"] for row in rows))
+    cases: dict[str, dict[str, str]] = {}
+    for row in rows:
+        cases.setdefault(case_of(row), {})[row["port"]] = sentence(row)
+    return {
+        "releases": " and ".join(sorted({row["release"] for row in rows})),
+        "ports": ports,
+        "counts": [counts(rows, port) for port in ports],
+        "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in cases.items()],
+        "moves": MOVES,
+        "roundings": ROUNDINGS,
+        "share": SHARE,
+        "lost": 100.0 * LOST,
+    }

@@ -1,0 +1,167 @@
+"""Comparison of an engine with its ports; a port here is MuJoCo C with a planted change."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from adapters import registry
+from adapters.engine import EngineError
+from adapters.mujoco import MujocoEngine, port
+from adapters.stepping import posed_for, run
+from reports.ports import counts, sentence, told
+from validation.catalogue import CATALOGUE
+from validation.cells import Slot, prepare
+from validation.releases import choosing, kept
+from validation.releases.choosing import Release, ported
+from validation.releases.ports import LOST, Compared, _asked, ask, compared_from, moved, size_of
+
+ENGINE, DT = MujocoEngine(), 1.0 / 240.0
+
+
+class Port(port.PortEngine):
+    """MuJoCo C that reads one setting otherwise."""
+
+    facts = port.port_facts("port", "Port", "port", "single")
+    switches = ({"impratio": 2.0},)
+
+    def __init__(self, **changes):
+        self.changes = changes
+
+    def build(self, scene, dt, settings):
+        return ENGINE.build(scene, dt, {**settings, **self.changes})
+
+
+def slot(scene, profile="default", **params):
+    return Slot(scene, tuple(sorted(params.items())), 3, "mujoco", profile, DT)
+
+
+def compared(case, **changes):
+    posed = posed_for(ENGINE, prepare(case).scene)
+    return _asked(Compared(case, "port", "unsupported"), ENGINE, Port(**changes), posed, {})
+
+
+@pytest.mark.parametrize("profile", ["default", "tuned"])
+def test_engine_against_itself(profile):
+    found = compared(slot("slide_to_roll", profile))
+    assert found.verdict == "same" and found.apart == 0.0 and found.until == found.end
+
+
+@pytest.mark.parametrize("tolerance", [1e-12, 1e-6])
+def test_rounding_of_the_solver_alone(tolerance):
+    assert compared(slot("slide_to_roll"), tolerance=tolerance).verdict == "same"
+
+
+@pytest.mark.parametrize("changes", [{"impratio": 1.5}, {"solref": (0.0201, 1.0)}, {"cone": "elliptic"}])
+def test_port_with_another_contact_model(changes):
+    found = compared(slot("oblique"), **changes)
+    assert found.verdict == "differs" and 0.0 < found.since < found.until and found.body == "ball"
+
+
+def test_port_that_ends_early(monkeypatch):
+    def ending(engine, scene, dt, settings):
+        found = run(engine, scene, dt, settings)
+        if isinstance(engine, Port):
+            parts = {name: getattr(found, name)[:9] for name in ("t", "pose", "twist")}
+            parts["pose"] = parts["pose"].copy()
+            parts["pose"][-1] = math.nan
+            return replace(found, **parts, finish="diverged", reason="the state is not finite at t = 1 s")
+        return found
+
+    monkeypatch.setattr("validation.releases.ports.run", ending)
+    found = compared(slot("oblique"))
+    assert found.verdict == "differs" and found.because == "the port ends: the state is not finite at t = 1 s"
+    assert found.end == pytest.approx(7 * DT) and found.apart == 0.0
+
+
+def test_proof_of_a_difference(monkeypatch):
+    """With the changed setting in both, both are the same."""
+    monkeypatch.setattr(registry, "load", lambda name: Port(impratio=2.0) if name == "port" else ENGINE)
+    found = ask(slot("oblique"), "port")
+    assert found.verdict == "differs" and found.proof == "impratio=2"
+    monkeypatch.setattr(registry, "load", lambda name: Port(impratio=3.0) if name == "port" else ENGINE)
+    assert ask(slot("oblique"), "port").proof == ""
+
+
+def test_scene_that_a_port_lacks(monkeypatch):
+    monkeypatch.setattr(registry, "load", lambda name: Port() if name == "port" else ENGINE)
+    found = ask(slot("conveyor"), "port")
+    assert found.verdict == "unsupported" and found.because.endswith("the adapter of port has no surface velocity")
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_moved_start(number):
+    scene = posed_for(ENGINE, CATALOGUE["stack"].scene(3, {"n": 3}))
+    other = moved(scene, number)
+    shifts = [math.dist(a.pose[:3], b.pose[:3]) for a, b in zip(scene.bodies, other.bodies, strict=True)]
+    assert shifts[0] == 0.0 and all(0.0 < each < 1e-5 * size_of(scene) for each in shifts[1:])
+    assert LOST * size_of(scene) > 1e3 * max(shifts)
+    assert all(math.isclose(math.hypot(*body.pose[3:]), 1.0) for body in other.bodies)
+    assert moved(scene, number) == other and moved(scene, number + 1) != other
+
+
+def test_result_as_plain_data():
+    found = compared(slot("oblique"), impratio=1.5)
+    assert compared_from(found.as_dict()) == found
+
+
+# ---- releases --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def offers(monkeypatch):
+    """Releases of each engine."""
+    of = {"mujoco": ["3.16.0", "3.17.0", "4.0.0"], "mujoco_warp": ["3.16.0", "3.17.0", "4.0.0"],
+          "mujoco_mjx": ["3.16.0", "3.18.0"]}  # fmt: skip
+    monkeypatch.setattr(choosing, "offered", lambda name: [Release(name, version, name, ()) for version in of[name]])
+    return of
+
+
+def test_newest_common_release_that_is_not_known_to_be_bad(offers):
+    assert "4.0.0" in ENGINE.facts.known_bad_versions
+    assert ported("mujoco", ["mujoco_warp"]).requirements == ("mujoco==3.17.0", "numpy", "mujoco-warp==3.17.0")
+    both = ported("mujoco", ["mujoco_warp", "mujoco_mjx"])
+    assert both.version == "3.16.0" and "mujoco-mjx==3.16.0" in both.needs
+
+
+@pytest.mark.parametrize(
+    ("ports", "version", "line"),
+    [
+        (["mujoco_mjx"], "3.17.0", "ports: mujoco, mujoco_mjx have no release 3.17.0"),
+        (["bullet"], "", "ports: bullet is no port of mujoco; ports: mujoco_mjx, mujoco_warp"),
+    ],
+)
+def test_releases_that_are_not_compared(offers, ports, version, line):
+    with pytest.raises(EngineError) as caught:
+        ported("mujoco", ports, version)
+    assert str(caught.value) == line
+
+
+def test_port_beside_another_release(monkeypatch):
+    monkeypatch.setattr(port, "version", lambda package: "3.17.0")
+    here = ENGINE.version()
+    with pytest.raises(ImportError, match=f"port 3.17.0 is no port of MuJoCo {here}, which is installed"):
+        Port().version()
+
+
+# ---- the kept table --------------------------------------------------------------------------------------------------
+
+
+def test_kept_table(monkeypatch, tmp_path):
+    monkeypatch.setattr(kept, "folder_of", lambda engine: tmp_path)
+    monkeypatch.setattr(kept, "inside", lambda engine, name: tmp_path / name if (tmp_path / name).exists() else None)
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
+    assert kept.kept("mujoco") == []
+    first = compared(slot("oblique"), impratio=1.5)
+    for each in (
+        first,
+        replace(first, proof="impratio=2"),
+        Compared(slot("conveyor"), "port", "unsupported", because="no"),
+    ):
+        kept.keep("mujoco", each, "3.17.0")
+    rows = kept.kept("mujoco")
+    assert [(row["scene"], row["proof"]) for row in rows] == [("conveyor", ""), ("oblique", "impratio=2")]
+    page = told(rows)
+    assert page["cases"][0] == ("conveyor 3-D default", ["unsupported there: no"])
+    assert page["counts"] == ["port: 1 differ (1 with a setting that proves why), 1 unsupported there"]
+    assert sentence(rows[1]).endswith("; the same with impratio=2") and counts(rows, "other") == "other: "

@@ -1,0 +1,212 @@
+"""Whether a port of an engine moves bodies as the engine does: the same scenes, steps and settings in both.
+
+    engine                 ----o----o----o----
+    engine, start moved    ----o---o-----o---o    what round-off of single precision may do in this scene
+    port                   ----o----o--------x    differs: by more than that
+
+A step of the port rounds a state some `ROUNDINGS` times. The engine runs again from starts moved by as many roundings,
+in `MOVES` directions; what they change is multiplied by `SHARE`, for roundings of later steps. The moves are that large
+because growth of a smaller one cannot be scaled up: where bodies touch at a distance of exactly 0, one of 1e-12 already
+removes a contact for a step, and changes the motion by g dt^2 as one of 1e-6 does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from adapters import registry
+from adapters.engine import Array, Engine, EngineError
+from adapters.isolation.foreign import checked_refusal
+from adapters.law.single_precision import ROUNDINGS, UNIT
+from adapters.needs import needs
+from adapters.plain import one_line
+from adapters.scene import Scene
+from adapters.scene.drives import top_speed
+from adapters.scene.shapes import reach
+from adapters.settings import text_of
+from adapters.stepping import posed_for, run
+from adapters.trajectory import Trajectory
+from validation.cells import Slot, prepare, slot_from_dict
+from validation.running.apart import Apart
+
+#: Moved starts, and the share of what they change that round-off may change.
+MOVES, SHARE = 3, 4.0
+#: Share of the scene's size beyond which two runs are no longer the same motion.
+LOST = 0.05
+#: Longest wait for one comparison [s]: a port may compile each scene.
+PATIENCE = 600.0
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One scene on an engine and on its port.
+
+    Parameters
+    ----------
+    port
+        Name of the port.
+    verdict
+        ``same``, ``differs``, ``unsupported`` (by the port), ``neither`` (runs it) or ``failed``.
+    until
+        Time until which the motion can be compared [s]: round-off may then have changed it by `LOST`.
+    end
+        Duration [s].
+    apart
+        Largest distance of the farthest point of a body in one run from the same point in the other, until then [m].
+    body, since
+        That body, and the time at which the distance first exceeds round-off [s].
+    because
+        Why there is no comparison, or how the port ended.
+    proof
+        Settings of both with which the motions are the same: to the end, or beyond the time at which they differ.
+    """
+
+    slot: Slot
+    port: str
+    verdict: str
+    until: float = math.nan
+    end: float = math.nan
+    apart: float = math.nan
+    body: str = ""
+    since: float = math.nan
+    because: str = ""
+    proof: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether the motions are the same to the end."""
+        return self.verdict == "same" and self.until == self.end
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data that `compared_from` reads back; what is not known is null."""
+        told = {**asdict(self), "slot": self.slot.as_dict()}
+        return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in told.items()}
+
+
+def compared_from(data: Mapping[str, Any]) -> Compared:
+    """Inverse of `Compared.as_dict`."""
+    told: dict[str, Any] = {k: math.nan if v is None else v for k, v in data.items()}
+    texts = {name: one_line(told[name]) for name in ("port", "verdict", "body", "because", "proof")}
+    return Compared(**{**told, **texts, "slot": slot_from_dict(data["slot"])})
+
+
+def compared(slots: Sequence[Slot], ports: Sequence[str]) -> Iterator[Compared]:
+    """Compare each case of an engine with each of its ports, one after the other, in a process of its own."""
+    for port in ports:
+        with Apart(PATIENCE) as apart:
+            for slot in slots:
+                told = apart.ask(ask, slot, port)
+                yield told if isinstance(told, Compared) else Compared(slot, port, "failed", because=told)
+
+
+def ask(slot: Slot, port: str) -> Compared:
+    """Compare one case; where it differs, find settings with which it does not."""
+    blank = Compared(slot, port, "unsupported")
+    own, ported = registry.load(slot.engine), registry.load(port)
+    scene = prepare(slot).scene
+    try:
+        posed = posed_for(own, scene)
+        if refused := own.refusal(posed, slot.profile, slot.dt):
+            return replace(blank, verdict="neither", because=refused)
+        refused = checked_refusal(ported.refusal(posed_for(ported, scene), slot.profile, slot.dt))
+    except EngineError as error:
+        refused = str(error)
+    if refused:
+        return replace(blank, because=refused)
+    found = _asked(blank, own, ported, posed, {})
+    if found.verdict == "failed" or found.whole:
+        return found
+    for switched in ported.switches:
+        again = _asked(blank, own, ported, posed, switched)
+        if again.whole or (found.verdict == "differs" and again.verdict == "same" and again.until > found.since):
+            return replace(found, proof=", ".join(f"{name}={text_of(value)}" for name, value in switched.items()))
+    return found
+
+
+def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: Mapping[str, Any]) -> Compared:
+    slot = blank.slot
+    asked = needs(prepare(slot).scene)
+
+    def settings(engine: Engine) -> dict[str, Any]:
+        return {s.name: s.value for s in engine.settings(slot.profile, asked, slot.dt, slot.iterations)} | dict(
+            switched
+        )
+
+    try:
+        base = run(own, posed, slot.dt, settings(own))
+        others = [run(own, moved(posed, k), slot.dt, settings(own)) for k in range(MOVES)]
+    except EngineError as error:
+        return replace(blank, verdict="failed", because=str(error))
+    try:
+        other = run(ported, posed, slot.dt, settings(ported))
+    except EngineError as error:
+        return replace(blank, verdict="failed", because=str(error))
+    return judged(blank, posed, base, others, other)
+
+
+def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Trajectory], port: Trajectory) -> Compared:
+    """Verdict from the motions of the engine, of the engine from moved starts (``others``), and of the port."""
+    count = min(len(each.t) - (each.finish == "diverged") for each in (base, port, *others))
+    size = float(np.abs(base.pose[:count, _free(posed), :3]).max(initial=size_of(posed)))
+    changed = np.max([_distances(posed, base, each)[:count].max(axis=1) for each in others], axis=0)
+    rounded = ROUNDINGS * UNIT * size * np.sqrt(np.arange(count) + 1.0)
+    allowed = rounded + SHARE * np.maximum.accumulate(changed)
+    apart = _distances(posed, base, port)[:count]
+    kept = allowed <= LOST * size
+    last = count if kept.all() else int(np.argmin(kept)) or 1
+    beyond = apart[:last].max(axis=1) > allowed[:last]
+    at, body = np.unravel_index(np.argmax(apart[:last]), apart[:last].shape)
+    found = replace(
+        blank,
+        verdict="differs" if beyond.any() else "same",
+        until=float(base.t[last - 1]),
+        end=float(base.t[count - 1]),
+        apart=float(apart[at, body]),
+        body=posed.bodies[int(body)].name,
+    )
+    if len(port.t) < len(base.t):
+        return replace(found, verdict="differs", since=found.end, because=f"the port ends: {port.reason}")
+    return replace(found, since=float(base.t[int(np.argmax(beyond))])) if beyond.any() else found
+
+
+def size_of(scene: Scene) -> float:
+    """Size of a scene at its start [m]: the largest distance of a point of a free body from the origin."""
+    free = [body for body in scene.bodies if body.motion == "free"]
+    return max((math.hypot(*body.pose[:3]) + reach(body.shape) for body in free), default=1.0)
+
+
+def moved(scene: Scene, number: int) -> Scene:
+    """The scene with places, turns and velocities of its free bodies moved by `ROUNDINGS`; ``number`` draws where."""
+    drawn, by = np.random.default_rng(number), ROUNDINGS * UNIT
+    size, bodies = size_of(scene), []
+    for body in scene.bodies:
+        if body.motion == "free":
+            step = by * drawn.uniform(-1.0, 1.0, 13)
+            pose = np.add(body.pose, step[:7] * [size, size, size, 1.0, 1.0, 1.0, 1.0])
+            pose[3:] /= math.hypot(*pose[3:])
+            speed = max(top_speed(body), math.sqrt(2.0 * math.hypot(*scene.gravity) * size))  # of a fall through it
+            twist = np.add(body.twist, step[7:] * speed * np.array([1.0, 1.0, 1.0, *[1.0 / size] * 3]))
+            body = replace(body, pose=tuple(pose.tolist()), twist=tuple(twist.tolist()))
+        bodies.append(body)
+    return replace(scene, bodies=tuple(bodies))
+
+
+def _distances(posed: Scene, one: Trajectory, other: Trajectory) -> Array:
+    """Largest distance of a point of a body in one run from the same point in the other, (samples, bodies) [m]."""
+    count = min(len(one.t), len(other.t))
+    a, b = one.pose[:count], other.pose[:count]
+    turned = np.minimum(
+        np.linalg.norm(a[..., 3:] - b[..., 3:], axis=2), np.linalg.norm(a[..., 3:] + b[..., 3:], axis=2)
+    )
+    reaches = np.array([reach(body.shape) for body in posed.bodies])
+    # Quaternions at a distance d are a turn with d = 2 sin(angle/4) apart, which moves a point by at most 2 reach d.
+    return np.where(_free(posed), np.linalg.norm(a[..., :3] - b[..., :3], axis=2) + 2.0 * reaches * turned, 0.0)
+
+
+def _free(posed: Scene) -> Any:
+    return np.array([body.motion == "free" for body in posed.bodies])
