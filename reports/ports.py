@@ -44,7 +44,7 @@ def counts(rows: Sequence[Row], port: str) -> str:
 
 def told(rows: Sequence[Row]) -> dict[str, Any]:
     """What the page shows of a kept table: a row for each case, a column for each port."""
-    ports = list(dict.fromkeys(row["port"] for row in rows))
+    ports = sorted({row["port"] for row in rows})
     cases: dict[str, dict[str, str]] = {}
     for row in rows:
         cases.setdefault(case_of(row), {})[row["port"]] = sentence(row)
@@ -52,7 +52,7 @@ def told(rows: Sequence[Row]) -> dict[str, Any]:
         "releases": " and ".join(sorted({row["release"] for row in rows})),
         "ports": ports,
         "counts": [counts(rows, port) for port in ports],
-        "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in cases.items()],
+        "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in sorted(cases.items())],
         "moves": MOVES,
         "roundings": ROUNDINGS,
         "share": SHARE,

@@ -116,6 +116,11 @@ class MujocoMjxEngine(PortEngine):
             "JAX documentation: jax_enable_x64",
         ),
         Quirk(
+            "a pair without friction, which keeps rows of friction, has 0 in them where C has 1e-5",
+            "unchanged; with smooth_condim=1 it has no such rows, and moves as in C",
+            "measured with 3.17.0: after a blow a ball is 2 mm elsewhere, with friction 1e-5 it is not",
+        ),
+        Quirk(
             "a step is compiled for each layout of a model, anew in each process",
             "unchanged",
             "measured: 5 s of CPU for a ball, 19 s for five boxes",

@@ -8,7 +8,9 @@ from adapters.engine import EngineError, Expected, Quirk
 from adapters.mujoco.port import PortEngine, PortSimulation, port_facts
 from adapters.mujoco.releases import no_autoreset
 
-MEASURED = "measured with 3.17.0, which warns of it; mujoco_warp/_src/io.py, put_model"
+MEASURED = (
+    "measured with 3.17.0: a ball falling on a floor of friction 0 to 1e-3; none with 0.01, condim=1 or elliptic cones"
+)
 #: Contacts that fit per body: four neighbours with eight each.
 CONTACTS = 32
 
@@ -65,8 +67,13 @@ class WarpSimulation(PortSimulation):
         return float(self._ported.opt.tolerance.numpy()[0])
 
 
-#: Why a body that meets another without friction has no state afterwards.
-NO_NUMBER = "a pair without friction keeps rows of friction 0, where C has 1e-5: its first contact is not a number"
+#: Why a body that strikes another without friction may have no state afterwards.
+NO_NUMBER = (
+    "in single precision the edges of a friction pyramid of 1e-3 or less are alike, so a blow along the normal may "
+    "not be a number; a pair without friction keeps one of 1e-5"
+)
+#: Checks in which a body strikes another without friction, with the profile as shipped.
+STRUCK = ("capabilities", "fresh", "sizes", "receipt size", "receipt restitution", "receipt impulse", "receipt turn")
 
 
 @final
@@ -82,6 +89,12 @@ class MujocoWarpEngine(PortEngine):
             "the tolerance of the solver is at least 1e-6",
             "unchanged; the readback has the value that is used",
             "mujoco_warp/_src/io.py, put_model",
+        ),
+        Quirk(NO_NUMBER, "unchanged; smooth_condim=1 or cone=elliptic avoid it", MEASURED),
+        Quirk(
+            "places are rounded by more than the margin with which `tuned` keeps touching bodies in contact",
+            "unchanged; with margin=0.001 piles move as in C",
+            "measured: stack, shove",
         ),
         Quirk(
             "it takes no flag to disable autoreset, and resets nothing",
@@ -107,8 +120,6 @@ class MujocoWarpEngine(PortEngine):
     module = "mujoco_warp"
     simulation = WarpSimulation
     expected = (
-        Expected("capabilities", NO_NUMBER, MEASURED),
-        Expected("fresh", f"{NO_NUMBER}, which equals nothing", MEASURED),
         Expected("readback", "the tolerance of the solver is at least 1e-6", "mujoco_warp/_src/io.py, put_model"),
-        Expected("sizes", NO_NUMBER, MEASURED),
+        *(Expected(check, NO_NUMBER, MEASURED) for check in STRUCK),
     )

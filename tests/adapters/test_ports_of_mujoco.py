@@ -21,9 +21,10 @@ PORTS = [
 ]
 
 
-def ball(mu, duration=0.25):
-    body = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.6, *UPRIGHT), (1.0, 0.0, -2.0, 0.0, 0.0, 0.0))
-    return Scene("fall", 1, 3, (FLOOR, body), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
+def ball(mu, speed=1.0):
+    """A ball that strikes a floor at 2 m/s, with a ``speed`` along it [m/s]."""
+    body = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.6, *UPRIGHT), (speed, 0.0, -2.0, 0.0, 0.0, 0.0))
+    return Scene("fall", 1, 3, (FLOOR, body), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.25)
 
 
 def ran(engine, scene, profile="default", **changes):
@@ -49,26 +50,29 @@ def test_rough_ball_as_in_c(engine):
     within = 1e-5 if engine.facts.precision == "single" else 1e-9
     assert np.abs(here.pose - there.pose).max() < within
     assert len(there.contacts.rows.a) == len(here.contacts.rows.a) > 20
-    assert np.allclose(there.contacts.rows.impulse, here.contacts.rows.impulse, atol=1e3 * within)
+    assert np.allclose(there.contacts.rows.impulse, here.contacts.rows.impulse, atol=10.0 * within)
 
 
 @pytest.mark.optional("mujoco_warp")
-def test_smooth_ball_as_shipped_in_warp():
-    """C has friction 1e-5 in the rows of a pair without friction; the port has 0, and divides by it."""
+def test_flat_pyramid_in_warp():
+    """In single precision its edges are alike; C moves the ball by its law."""
     engine = MujocoWarpEngine()
-    assert ran(engine, ball(0.0)).finish == "diverged"
-    for scene, changes in ((ball(1e-5), {}), (ball(0.0), {"smooth_condim": 1})):
-        found = ran(engine, scene, **changes)
-        assert found.finish == "completed"
-        assert np.abs(found.pose - ran(ORIGINAL, scene, **changes).pose).max() < 1e-4
+    for mu in (0.0, 1e-5, 1e-3):
+        assert ran(engine, ball(mu, 0.0)).finish == "diverged"
+        assert ran(ORIGINAL, ball(mu, 0.0)).finish == "completed"
+    for mu, changes in ((0.01, {}), (0.0, {"smooth_condim": 1}), (0.0, {"cone": "elliptic"})):
+        here, there = (ran(each, ball(mu, 0.0), **changes) for each in (ORIGINAL, engine))
+        assert np.abs(here.pose - there.pose).max() < 1e-6
 
 
 @pytest.mark.optional("mujoco_mjx")
-def test_smooth_ball_as_shipped_in_mjx():
-    engine = MujocoMjxEngine()
-    assert np.abs(ran(engine, ball(0.0)).pose - ran(ORIGINAL, ball(0.0)).pose).max() > 1e-3
-    here, there = (ran(each, ball(0.0), smooth_condim=1) for each in (ORIGINAL, engine))
-    assert np.abs(there.pose - here.pose).max() < 1e-9
+def test_pair_without_friction_in_mjx():
+    """C has friction 1e-5 in its rows, the port has 0."""
+    engine, within = MujocoMjxEngine(), {}
+    for name, mu, changes in (("none", 0.0, {}), ("that of C", 1e-5, {}), ("no rows", 0.0, {"smooth_condim": 1})):
+        here, there = (ran(each, ball(mu), **changes) for each in (ORIGINAL, engine))
+        within[name] = np.abs(here.pose - there.pose).max()
+    assert within["none"] > 1e-3 and within["that of C"] < 1e-6 and within["no rows"] < 1e-9
 
 
 @pytest.mark.optional("mujoco_mjx")

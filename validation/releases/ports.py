@@ -111,8 +111,12 @@ def ask(slot: Slot, port: str) -> Compared:
     scene = prepare(slot).scene
     try:
         posed = posed_for(own, scene)
-        if refused := own.refusal(posed, slot.profile, slot.dt):
-            return replace(blank, verdict="neither", because=refused)
+        refused = own.refusal(posed, slot.profile, slot.dt)
+    except EngineError as error:
+        refused = str(error)
+    if refused:
+        return replace(blank, verdict="neither", because=refused)
+    try:
         refused = checked_refusal(ported.refusal(posed_for(ported, scene), slot.profile, slot.dt))
     except EngineError as error:
         refused = str(error)

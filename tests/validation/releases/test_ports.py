@@ -89,6 +89,12 @@ def test_scene_that_a_port_lacks(monkeypatch):
     assert found.verdict == "unsupported" and found.because.endswith("the adapter of port has no surface velocity")
 
 
+def test_scene_that_neither_runs(monkeypatch):
+    monkeypatch.setattr(registry, "load", lambda name: Port() if name == "port" else ENGINE)
+    found = ask(replace(slot("restitution_above_one"), dimension=2), "port")
+    assert found.verdict == "neither" and found.because == "pairs: the adapter of mujoco has no restitution above 1"
+
+
 @pytest.mark.parametrize("number", range(3))
 def test_moved_start(number):
     scene = posed_for(ENGINE, CATALOGUE["stack"].scene(3, {"n": 3}))
