@@ -14,6 +14,7 @@ from reports.command import main
 from reports.listing import doctor
 from validation import identity
 from validation.findings import files, solutions_of
+from validation.releases.choosing import ports_of
 from validation.settings import decisive
 from validation.settings.proofs import experiments_on
 
@@ -290,14 +291,14 @@ def hashes():
 
 
 @pytest.mark.parametrize("engine", ["reference", "chipmunk", "bullet", "mujoco"])
-def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engine, monkeypatch):
+def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_and_its_ports(site, engine, monkeypatch):
     """`toy` is made of Chipmunk's adapter and does not change with it: others' imports are their own matter."""
     before = hashes()
     read = Path.read_bytes
     edited = ROOT / "adapters" / engine / "simulation.py"
     monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n# edited\n" * (self == edited))
     after = hashes()
-    assert {name for name in before if before[name] != after[name]} == {engine}
+    assert {name for name in before if before[name] != after[name]} == {engine, *ports_of(engine)}
 
 
 @pytest.mark.parametrize("name", ["laws.py", "experiments.py", TUNING, "findings/families.toml"])
