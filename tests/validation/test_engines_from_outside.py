@@ -291,7 +291,7 @@ def hashes():
 
 
 @pytest.mark.parametrize("engine", ["reference", "chipmunk", "bullet", "mujoco"])
-def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_and_its_ports(site, engine, monkeypatch):
+def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engine, monkeypatch):
     """`toy` is made of Chipmunk's adapter and does not change with it: others' imports are their own matter."""
     before = hashes()
     read = Path.read_bytes
