@@ -22,10 +22,12 @@ def sentence(row: Row) -> str:
     if row["verdict"] == "same":
         proof = f"; to the end with {row['proof']}" if row["proof"] else ""
         return f"same to single precision until {until} ({row['apart']} m){proof}"
-    proof = f"; the same with {row['proof']}" if row["proof"] else ""
-    if row["because"]:
-        return f"{row['because']}{proof}"
-    return f"differs by {row['apart']} m in {row['body']} from {row['since']} s on, until {until}{proof}"
+    how = (
+        f": {row['because']}"
+        if row["because"]
+        else f": by {row['apart']} m in {row['body']} from {row['since']} s on, until {until}"
+    )
+    return f"differs{how}; the same with {row['proof']}" if row["proof"] else f"differs, no cause found{how}"
 
 
 def case_of(row: Row) -> str:
@@ -38,7 +40,12 @@ def counts(rows: Sequence[Row], port: str) -> str:
     own = [row for row in rows if row["port"] == port]
     count = Counter(row["verdict"] for row in own)
     proven = sum(bool(row["proof"]) for row in own if row["verdict"] == "differs")
-    words = {"same": "same", "differs": f"differ ({proven} with a setting that proves why)", **UNMOVED}
+    unknown = count["differs"] - proven
+    words = {
+        "same": "same",
+        "differs": f"differ ({proven} with a setting that proves why, {unknown} with no cause found)",
+        **UNMOVED,
+    }
     return f"{port}: {', '.join(f'{count[verdict]} {said}' for verdict, said in words.items() if count[verdict])}"
 
 

@@ -1,6 +1,7 @@
 """Ports of MuJoCo, each in an environment beside MuJoCo C of its release (``make ports``)."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,18 @@ def test_pair_without_friction_in_mjx():
         here, there = (ran(each, ball(mu), **changes) for each in (ORIGINAL, engine))
         within[name] = np.abs(here.pose - there.pose).max()
     assert within["none"] > 1e-3 and within["that of C"] < 1e-6 and within["no rows"] < 1e-9
+
+
+@pytest.mark.optional("mujoco_mjx")
+@pytest.mark.parametrize("rough", [False, True])
+def test_elliptic_cones_of_pairs_without_friction_in_mjx(rough):
+    """Scenes with and without a cone; tuned: elliptic cones, no friction rows of pairs without friction."""
+    scene = ball(0.0)
+    if rough:
+        far = replace(scene.bodies[1], name="far", pose=(3.0, 0.0, 0.6, *UPRIGHT))
+        scene = replace(scene, bodies=(*scene.bodies, far), pairs=(*scene.pairs, Pair("floor", "far", friction=0.3)))
+    here, there = (ran(each, scene, "tuned") for each in (ORIGINAL, MujocoMjxEngine()))
+    assert np.abs(here.pose - there.pose).max() < 1e-9
 
 
 @pytest.mark.optional("mujoco_mjx")
