@@ -53,7 +53,7 @@ SECTIONS = {
     "Since which release": {
         "releases": ("releasing", "Run scenes on releases of an engine."),
         "bisect": ("releasing", "Find the release that changed a check."),
-        "ports": ("porting", "Compare an engine with its ports: same scenes, steps and settings."),
+        "ports": ("porting", "Compare an engine with its ports, scene by scene."),
         "dashboard": ("reporting", "Write one HTML page about all runs and releases."),
     },
     "Maintain results, lists and settings": {

@@ -39,7 +39,7 @@ def ports(
     kept: bool,
     as_json: bool,
 ) -> None:
-    """Compare an engine with its ports: same scenes, steps and settings.
+    """Compare an engine with its ports, scene by scene.
 
     Runs one case of each scene. All run in one environment, in the same release. A difference beyond round-off is run
     again with other settings in both, until one makes it go. Exits with 1 if none does, with 4 if a case failed.
