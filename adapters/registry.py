@@ -237,9 +237,13 @@ def loaded(entry: EntryPoint, distribution: str = "", imported: bool = True) -> 
 
 
 def _remedy(entry: EntryPoint, facts: EngineFacts | None, distribution: str) -> str:
-    """What to install where an import fails: the packages of the extra of one of ours, else the engine's own."""
-    if is_ours(entry) and packages(entry.name):
-        return install(entry.name)
+    """What to install where an import fails: the packages of the extra of one of ours, else the engine's own.
+
+    An engine in the folder of another one is installed by that one's extra.
+    """
+    extras = (entry.name, entry.module.split(".")[1]) if is_ours(entry) else ()
+    if extra := next(filter(packages, extras), None):
+        return install(extra)
     if facts is not None:
         return f"pip install {one_line(facts.package, NAME)}"
     return f"it is an engine of {distribution or 'another distribution'}, which must be installed with all it needs"

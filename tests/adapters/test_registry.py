@@ -273,3 +273,7 @@ def test_broken_engines_listed_under_their_names(plugins) -> None:
         there = registry.find(name).engine is not None
         assert entry["status"] == ("installed" if there else "not installed") and bool(entry["reason"]) is not there
     assert {entry["status"] for entry in listed.values()} == {"installed", "not installed"}
+
+
+def test_engine_in_the_folder_of_another_is_installed_by_its_extra():
+    assert registry.find("newton_kamino").reason == registry.find("newton").reason
