@@ -89,7 +89,8 @@ class Piece:
         """Return the piece up to a share."""
         way = self.way * share ** np.arange(self.way.shape[2])
         velocity = self.velocity * share ** np.arange(self.velocity.shape[2])
-        return replace(self, length=share * self.length, way=way, velocity=velocity)
+        push = self.push * share ** np.arange(self.push.shape[2])
+        return replace(self, length=share * self.length, way=way, velocity=velocity, push=push)
 
 
 def steady(state: State, held: Held, acceleration: Array, length: float) -> Piece:

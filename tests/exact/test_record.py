@@ -93,9 +93,12 @@ def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
     assert found.holds and np.isinf(found.horizon)
 
 
-@pytest.mark.parametrize("key", ["fuzz3 8", "standard domino 2-D", "standard seam 3-D"])
+@pytest.mark.parametrize("key", ["fuzz3 8", "standard domino 2-D", "standard seam 3-D", "fuzz2 31"])
 def test_impulses_that_moved_the_bodies(key):
-    """Forces looked at anew are off by a step's error where a slip turns at once, and steps between their ends."""
+    """Forces looked at anew are off by a step's error where a slip turns at once, and steps between their ends.
+
+    A step that an event cuts short has the impulses of its part.
+    """
     world = world_of(key)
     record = Simulation(world.model, Settings.exact(world.dt)).record(
         world.samples * world.stride, world.stride, pieces=True
