@@ -24,6 +24,7 @@
         effects.csv       what each setting does in its case of tuning.toml (`validation.settings.effects`)
         cures.csv         fixes by scene, and their cost, as measured (`validation.fixes`)
         panels.csv        what its profiles break in other cases (`validation.fixes.panel`)
+        ports.csv         whether its ports move bodies as it does (`validation.releases.kept`)
 
 All except the first are optional; an entry point that names a plain module provides an adapter only. Ours are in
 ``adapters/<engine>/`` and found in the same way.
@@ -59,6 +60,7 @@ from adapters.unset import Unset
 LAWS, EXPERIMENTS, FINDINGS, DECISIVE, UNSET = "laws", "experiments", "findings", "decisive.csv", "unset"
 READINGS, READ, FORCE_SCRIPT = "readings", "readings.csv", "force_script.py.txt"
 CURES, PANELS, TUNING, EFFECTS, NUMBERS = "cures.csv", "panels.csv", "tuning.toml", "effects.csv", "numbers.csv"
+PORTS = "ports.csv"
 Row = TypeVar("Row")
 
 

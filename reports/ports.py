@@ -11,13 +11,18 @@ from validation.releases.ports import LOST, MOVES, SHARE
 
 Row = Mapping[str, str]
 #: Verdicts without a comparison of motions, in words.
-UNMOVED = {"unsupported": "unsupported there", "neither": "run by neither", "failed": "failed"}
+UNMOVED = {
+    "unsupported": "unsupported there",
+    "neither": "run by neither",
+    "lost": "lost in round-off",
+    "failed": "failed",
+}
 
 
 def sentence(row: Row) -> str:
     """What was found in one case."""
     if row["verdict"] in UNMOVED:
-        return f"{UNMOVED[row['verdict']]}: {row['because']}"
+        return ": ".join(filter(None, (UNMOVED[row["verdict"]], row["because"])))
     until = f"{row['until']} s" + ("" if row["until"] == row["end"] else f" of {row['end']} s")
     if row["verdict"] == "same":
         proof = f"; to the end with {row['proof']}" if row["proof"] else ""

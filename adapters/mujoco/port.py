@@ -20,6 +20,7 @@ from adapters.mujoco.engine import MujocoEngine
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.needs import Needs, needs
+from adapters.plain import one_line
 from adapters.scene import Scene
 from adapters.settings import Check, checked_step
 
@@ -54,8 +55,8 @@ class PortSimulation(MujocoSimulation):
         super().__init__(scene, dt, settings)
         try:
             self._put()
-        except (NotImplementedError, ValueError, AssertionError) as error:  # the ways of ports to refuse a model
-            raise EngineError(f"scene: {' '.join(str(error).split()) or type(error).__name__}") from None
+        except (NotImplementedError, ValueError) as error:  # the ways of ports to refuse a model
+            raise EngineError(f"scene: {one_line(error)}") from None
 
     @abstractmethod
     def _put(self) -> None:

@@ -158,9 +158,11 @@ def ported(engine: str, ports: Sequence[str], version: str = "") -> Release:
         If the registry does not answer.
     """
     known = ports_of(engine)
-    for name in ports or [""]:
+    if not known:
+        raise EngineError(f"ports: no port of {engine} is known")
+    for name in ports:
         if name not in known:
-            raise EngineError(f"ports: {name or 'nothing'} is no port of {engine}; ports: {', '.join(known) or 'none'}")
+            raise EngineError(f"ports: {name} is no port of {engine}; ports: {', '.join(known)}")
     facts = registry.facts(engine)
     bad = facts.known_bad_versions if facts else {}
     every = [{each.version for each in offered(name)} for name in (engine, *ports)]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
+from pathlib import Path
 
 from adapters.engine import EngineError
-from adapters.engine_folder import folder_of, inside
+from adapters.engine_folder import PORTS, folder_of, rows_of
 from validation.cells import format_dt
 from validation.releases.environments import cache_folder, locked
 from validation.releases.ports import Compared
 
-#: Name of the file.
-KEPT = "ports.csv"
 #: Columns of the kept table: what says which case it is, then what was found.
 CASE = ("release", "port", "scene", "dimension", "params", "profile", "dt")
 COLUMNS = (*CASE, "verdict", "until", "end", "apart", "body", "since", "because", "proof")
@@ -26,13 +26,14 @@ def row_of(told: Compared, release: str) -> dict[str, str]:
     return case | {k: f"{v:.3g}" if isinstance(v, float) else v for k, v in found.items()}
 
 
-def kept(engine: str) -> list[dict[str, str]]:
+def kept(engine: str) -> tuple[dict[str, str], ...]:
     """Rows of the kept table of an engine; none where there is none."""
-    path = inside(engine, KEPT)
-    if path is None:
-        return []
+    return rows_of(engine, PORTS, _read)
+
+
+def _read(path: Path) -> Iterator[dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as stream:
-        return [*csv.DictReader(stream)]
+        yield from csv.DictReader(stream)
 
 
 def keep(engine: str, told: Compared, release: str) -> None:
@@ -42,7 +43,7 @@ def keep(engine: str, told: Compared, release: str) -> None:
         raise EngineError(f"engine: {engine} has no folder to keep a table in")
     with locked(cache_folder() / ".ports.lock"):  # two commands may keep theirs at once
         rows = {tuple(row[name] for name in CASE[1:]): row for row in (*kept(engine), row_of(told, release))}
-        with (folder / KEPT).open("w", encoding="utf-8", newline="") as stream:
+        with (folder / PORTS).open("w", encoding="utf-8", newline="") as stream:
             writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows[key] for key in sorted(rows))

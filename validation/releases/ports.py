@@ -23,7 +23,6 @@ from adapters import registry
 from adapters.engine import Array, Engine, EngineError
 from adapters.isolation.foreign import checked_refusal
 from adapters.law.single_precision import ROUNDINGS, UNIT
-from adapters.needs import needs
 from adapters.plain import one_line
 from adapters.scene import Scene
 from adapters.scene.drives import top_speed
@@ -31,12 +30,13 @@ from adapters.scene.shapes import reach
 from adapters.settings import text_of
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Trajectory
-from validation.cells import Slot, prepare, slot_from_dict
+from validation.cells import Slot, prepare, settings_of, slot_from_dict
 from validation.running.apart import Apart
 
 #: Moved starts, and the share of what they change that round-off may change.
 MOVES, SHARE = 3, 4.0
-#: Share of the scene's size beyond which two runs are no longer the same motion.
+#: Two runs are no longer the same motion beyond this share of the room that bodies take, and of their largest distance
+#: from the origin.
 LOST = 0.05
 #: Longest wait for one comparison [s]: a port may compile each scene.
 PATIENCE = 600.0
@@ -51,7 +51,8 @@ class Compared:
     port
         Name of the port.
     verdict
-        ``same``, ``differs``, ``unsupported`` (by the port), ``neither`` (runs it) or ``failed``.
+        ``same``, ``differs``, ``lost`` (in round-off, at the first step), ``unsupported`` (by the port), ``neither``
+        (runs it) or ``failed``.
     until
         Time until which the motion can be compared [s]: round-off may then have changed it by `LOST`.
     end
@@ -106,22 +107,16 @@ def compared(slots: Sequence[Slot], ports: Sequence[str]) -> Iterator[Compared]:
 
 def ask(slot: Slot, port: str) -> Compared:
     """Compare one case; where it differs, find settings with which it does not."""
-    blank = Compared(slot, port, "unsupported")
     own, ported = registry.load(slot.engine), registry.load(port)
     scene = prepare(slot).scene
-    try:
-        posed = posed_for(own, scene)
-        refused = own.refusal(posed, slot.profile, slot.dt)
-    except EngineError as error:
-        refused = str(error)
-    if refused:
-        return replace(blank, verdict="neither", because=refused)
-    try:
-        refused = checked_refusal(ported.refusal(posed_for(ported, scene), slot.profile, slot.dt))
-    except EngineError as error:
-        refused = str(error)
-    if refused:
-        return replace(blank, because=refused)
+    for engine, verdict in ((own, "neither"), (ported, "unsupported")):
+        try:
+            refused = checked_refusal(engine.refusal(posed_for(engine, scene), slot.profile, slot.dt))
+        except EngineError as error:
+            refused = str(error)
+        if refused:
+            return Compared(slot, port, verdict, because=refused)
+    posed, blank = posed_for(own, scene), Compared(slot, port, "failed")
     found = _asked(blank, own, ported, posed, {})
     if found.verdict == "failed" or found.whole:
         return found
@@ -132,36 +127,32 @@ def ask(slot: Slot, port: str) -> Compared:
     return found
 
 
-def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: Mapping[str, Any]) -> Compared:
+def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: dict[str, Any]) -> Compared:
+    def ran(engine: Engine, start: Scene) -> Trajectory:
+        settings = {each.name: each.value for each in settings_of(engine, slot, scene)}
+        return run(engine, start, slot.dt, settings | switched)
+
     slot = blank.slot
-    asked = needs(prepare(slot).scene)
-
-    def settings(engine: Engine) -> dict[str, Any]:
-        return {s.name: s.value for s in engine.settings(slot.profile, asked, slot.dt, slot.iterations)} | dict(
-            switched
-        )
-
+    scene = prepare(slot).scene
     try:
-        base = run(own, posed, slot.dt, settings(own))
-        others = [run(own, moved(posed, k), slot.dt, settings(own)) for k in range(MOVES)]
+        base, others = ran(own, posed), [ran(own, moved(posed, k)) for k in range(MOVES)]
+        return judged(blank, posed, base, others, ran(ported, posed))
     except EngineError as error:
-        return replace(blank, verdict="failed", because=str(error))
-    try:
-        other = run(ported, posed, slot.dt, settings(ported))
-    except EngineError as error:
-        return replace(blank, verdict="failed", because=str(error))
-    return judged(blank, posed, base, others, other)
+        return replace(blank, because=str(error))
 
 
 def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Trajectory], port: Trajectory) -> Compared:
     """Verdict from the motions of the engine, of the engine from moved starts (``others``), and of the port."""
     count = min(len(each.t) - (each.finish == "diverged") for each in (base, port, *others))
-    size = float(np.abs(base.pose[:count, _free(posed), :3]).max(initial=size_of(posed)))
+    places = base.pose[:count, _free(posed), :3]
+    size = float(np.abs(places).max(initial=farthest(posed)))
+    reaches = [reach(body.shape) for body in posed.bodies if body.motion == "free"]
+    room = float(np.ptp(places, axis=(0, 1)).max() + 2.0 * max(reaches)) if reaches else size
     changed = np.max([_distances(posed, base, each)[:count].max(axis=1) for each in others], axis=0)
     rounded = ROUNDINGS * UNIT * size * np.sqrt(np.arange(count) + 1.0)
     allowed = rounded + SHARE * np.maximum.accumulate(changed)
     apart = _distances(posed, base, port)[:count]
-    kept = allowed <= LOST * size
+    kept = allowed <= LOST * min(size, room)
     last = count if kept.all() else int(np.argmin(kept)) or 1
     beyond = apart[:last].max(axis=1) > allowed[:last]
     at, body = np.unravel_index(np.argmax(apart[:last]), apart[:last].shape)
@@ -175,11 +166,13 @@ def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Tra
     )
     if len(port.t) < len(base.t):
         return replace(found, verdict="differs", since=found.end, because=f"the port ends: {port.reason}")
-    return replace(found, since=float(base.t[int(np.argmax(beyond))])) if beyond.any() else found
+    if beyond.any():
+        return replace(found, since=float(base.t[int(np.argmax(beyond))]))
+    return replace(found, verdict="lost") if last == 1 < count else found
 
 
-def size_of(scene: Scene) -> float:
-    """Size of a scene at its start [m]: the largest distance of a point of a free body from the origin."""
+def farthest(scene: Scene) -> float:
+    """Largest distance of a point of a free body from the origin, at the start [m]."""
     free = [body for body in scene.bodies if body.motion == "free"]
     return max((math.hypot(*body.pose[:3]) + reach(body.shape) for body in free), default=1.0)
 
@@ -187,7 +180,7 @@ def size_of(scene: Scene) -> float:
 def moved(scene: Scene, number: int) -> Scene:
     """The scene with places, turns and velocities of its free bodies moved by `ROUNDINGS`; ``number`` draws where."""
     drawn, by = np.random.default_rng(number), ROUNDINGS * UNIT
-    size, bodies = size_of(scene), []
+    size, bodies = farthest(scene), []
     for body in scene.bodies:
         if body.motion == "free":
             step = by * drawn.uniform(-1.0, 1.0, 13)

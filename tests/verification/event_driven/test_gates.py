@@ -19,7 +19,7 @@ PARTS = (
     "painleve",
     "kane",
     "slide_to_roll",
-    pytest.param("rod_gas", marks=pytest.mark.long),  # half a minute of CPU; `crosscheck certify` measures it
+    pytest.param("rod_gas", marks=pytest.mark.long),  # half a minute of CPU; `make certify` measures it
 )
 
 
