@@ -147,7 +147,7 @@ def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Tra
     places = base.pose[:count, _free(posed), :3]
     size = float(np.abs(places).max(initial=farthest(posed)))
     reaches = [reach(body.shape) for body in posed.bodies if body.motion == "free"]
-    room = float(np.ptp(places, axis=(0, 1)).max() + 2.0 * max(reaches)) if reaches else size
+    room = float(np.ptp(places, axis=(0, 1)).max() + 2.0 * np.max(reaches)) if reaches else size
     changed = np.max([_distances(posed, base, each)[:count].max(axis=1) for each in others], axis=0)
     rounded = ROUNDINGS * UNIT * size * np.sqrt(np.arange(count) + 1.0)
     allowed = rounded + SHARE * np.maximum.accumulate(changed)
