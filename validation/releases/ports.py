@@ -127,10 +127,10 @@ def ask(slot: Slot, port: str) -> Compared:
     return found
 
 
-def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: dict[str, Any]) -> Compared:
+def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: Mapping[str, Any]) -> Compared:
     def ran(engine: Engine, start: Scene) -> Trajectory:
         settings = {each.name: each.value for each in settings_of(engine, slot, scene)}
-        return run(engine, start, slot.dt, settings | switched)
+        return run(engine, start, slot.dt, {**settings, **switched})
 
     slot = blank.slot
     scene = prepare(slot).scene
