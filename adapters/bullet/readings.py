@@ -10,7 +10,7 @@ import numpy as np
 from adapters.bullet.simulation import BulletSimulation
 from adapters.readings import Ask, Cause, Read, Reading
 
-_STEP = "a step; with numSubSteps the last substep, as if it were the step"
+_STEP = "a step; with numSubSteps = n > 1 it is 1/n of the force of the last substep"
 _BIAS = "without the split impulse; what contactERP pushes out of an overlap is in it, and in the velocity"
 
 

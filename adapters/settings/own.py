@@ -23,10 +23,15 @@ MISFIT = object()
 
 
 def read(text: str) -> Any:
-    """Value of a setting from text: a number, ``true``, ``none``, a word, or several with commas between."""
+    """Value of a setting from text: a number, ``true``, ``none``, a word, or several with commas between.
+
+    Numbers may have spaces between them instead, as MJCF and fixes of MuJoCo have them.
+    """
     if "," in text:
         values = tuple(map(read, text.split(",")))
         return tuple(float(v) if isinstance(v, int) and not isinstance(v, bool) else v for v in values)
+    if len(parts := text.split()) > 1 and not any(isinstance(read(part), str) for part in parts):
+        return read(",".join(parts))
     said = text.strip()
     if said.lower() in NAMED:
         return NAMED[said.lower()]

@@ -211,6 +211,15 @@ def test_weight_on_a_resting_box_counted_once(profile):
     assert np.allclose(late, 2.0 * 9.81 * DT, rtol=1e-6)
 
 
+@pytest.mark.parametrize("substeps", [2, 5])
+def test_share_of_the_weight_with_substeps(substeps):
+    """The engine divides the impulse of its last substep by the whole step, as `readings` says."""
+    box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))
+    scene = scene_of(FLOOR, box, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=1.0)
+    late = drive(scene, "default", numSubSteps=substeps).contacts.impulse_between(0, 1)[-60:, 2]
+    assert np.allclose(late, 2.0 * 9.81 * DT / substeps, rtol=1e-6)
+
+
 @pytest.mark.parametrize("profile", PROFILES)
 def test_friction_impulse_is_m_dv_and_opposes_the_slide(profile):
     box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (2.0, -1.0, 0.0, 0.0, 0.0, 0.0))

@@ -24,7 +24,8 @@ def stock(engine, profile, scene="bounce"):
     ("text", "value", "again"),
     [("10", 10, "10"), ("-3", -3, "-3"), ("10.0", 10.0, "10"), ("1e-7", 1e-7, "1e-07"), (" .5", 0.5, "0.5"),
      ("elliptic", "elliptic", "elliptic"), ("true", True, "true"), ("False", False, "false"), ("none", None, "none"),
-     ("0.01,1", (0.01, 1.0), "0.01,1"), ("warmstart,island", ("warmstart", "island"), "warmstart,island")],
+     ("0.01,1", (0.01, 1.0), "0.01,1"), ("warmstart,island", ("warmstart", "island"), "warmstart,island"),
+     ("0.01 1", (0.01, 1.0), "0.01,1"), ("a b", "a b", "a b")],
 )  # fmt: skip
 def test_setting_value_read_from_its_own_text(text, value, again):
     found = read(text)

@@ -200,6 +200,19 @@ mass = 1.0
 """
 
 
+def test_file_without_checks_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(FALL)
+    laws = [row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": name}
+            for name in ("penetration", "energy_growth")]  # fmt: skip
+    own = row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": "final[ball.y]"}
+    only = "Only energy and overlap are judged: the file states no check of its own"
+    assert only in " ".join(" ".join(shown(laws, 100)).split())
+    for others in ([*laws, own], [row("impact", 2, "bullet", "tuned") | {"metric": "penetration"}]):
+        text = " ".join(" ".join(shown(others, 100)).split())
+        assert "Every check passes" in text and "are judged" not in text
+
+
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 120])
 def test_a_profile_that_ran_at_another_step_cures_nothing(dt):
     """A coarser step has wider tolerances: that a profile passes there says nothing of a finer one."""

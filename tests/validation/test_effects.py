@@ -19,6 +19,8 @@ from validation.settings.effects import (
     NOTHING,
     ONLY_WITH,
     REFUSED,
+    ROUNDED,
+    UNSEEN,
     UNTRIED,
     Told,
     beyond,
@@ -38,14 +40,16 @@ BASE = Slot("stack", (), 2, "toy", "default", QUICK_DT)
 
 
 def seen(**bits):
-    """Runs of a case, each with its bits; None: refused."""
+    """Runs of a case, each with its bits, which its metric tells as well; None: refused."""
     return {
-        part: Observation(BASE, part, 1, "1.0", Outcome.OK if own else Outcome.UNSUPPORTED, "no such", {}, own or "")
+        part: Observation(BASE, part, 1, "1.0", Outcome.OK, "", {"drift": (float(ord(own)), "")}, own)
+        if own
+        else Observation(BASE, part, 1, "1.0", Outcome.UNSUPPORTED, "no such")
         for part, own in bits.items()
     }
 
 
-NEEDS = Effect(1, "stack", "drift", needs={"other": 2})
+NEEDS = Effect(1, "stack", "drift", needs={"other": 2}, because="it is scaled by it")
 LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
 
 
@@ -53,7 +57,8 @@ LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
     ("effect", "runs", "verdict"),
     [
         (Effect(1, "stack", "drift"), {"base": "a", "set": "b"}, ACTS),
-        (Effect(1, "stack", "drift"), {"base": "a", "set": "a"}, NOTHING),
+        (Effect(1, "stack", "drift"), {"base": "a", "set": "a"}, UNSEEN),
+        (Effect(1, "stack", "drift", because="of joints"), {"base": "a", "set": "a"}, NOTHING),
         (Effect(1, "stack", "drift"), {"base": "a", "set": None}, REFUSED),
         (NEEDS, {"base": "a", "set": "a", "ready": "c", "both": "d"}, ONLY_WITH),
         (NEEDS, {"base": "a", "set": "a", "ready": "c", "both": "c"}, NOTHING),
@@ -66,14 +71,14 @@ LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
     ],
 )
 def test_verdict_on_a_setting_by_the_bits_of_its_runs(effect, runs, verdict):
-    assert judged("toy", "1.0", "knob", effect, seen(**runs)).verdict == verdict
+    assert judged("toy", "1.0", "knob", effect, seen(**runs), 1e-9).verdict == verdict
 
 
 def test_setting_that_changes_a_metric_alone():
     """Contacts are no part of a state."""
     runs = seen(base="a", set="a")
     runs["set"] = replace(runs["set"], metrics={"load": (1.0, "")}, readback={"knob": 1})
-    told = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs)
+    told = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs, 1e-9)
     assert (told.verdict, told.after, told.read) == (ACTS, "1", "yes")
 
 
@@ -85,10 +90,29 @@ def test_setting_that_changes_a_metric_alone():
 def test_digits_that_tell_two_numbers_apart(before, after, told):
     runs = {part: replace(each, metrics={"load": (value, "")})
             for (part, each), value in zip(seen(base="a", set="b").items(), (before, after), strict=True)}  # fmt: skip
-    found = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs)
+    found = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs, 1e-9)
     assert (found.before, found.after) == told
     same = "no change" if before == after else f"{told[0]} -> {told[1] or '-'}"
     assert shown_by(asdict(found)) == f"load of stack {same} at 1"
+
+
+@pytest.mark.parametrize(
+    ("values", "outcome", "round_off", "verdict", "shown"),
+    [({"load": (1.0, 1.0 + 9e-10)}, Outcome.OK, 1e-9, ROUNDED, "load"),
+     ({"load": (1.0, 1.0 + 2e-9)}, Outcome.OK, 1e-9, ACTS, "load"),
+     ({"load": (1.0, 1.0 + 2e-9)}, Outcome.OK, 1e-4, ROUNDED, "load"),
+     ({"load": (None, None), "drift": (1.0, 2.0)}, Outcome.OK, 1e-9, ACTS, "drift"),
+     ({"load": (None, None)}, Outcome.OK, 1e-9, ROUNDED, "load"),
+     ({"load": (1.0, 1.0), "drift": (None, 1.0), "turn": (1.0, 2.0)}, Outcome.OK, 1e-9, ACTS, "turn"),
+     ({"load": (1.0, None)}, Outcome.OK, 1e-9, ACTS, "load"),
+     ({"load": (1.0, 1.0)}, Outcome.DIVERGED, 1e-9, ACTS, "load")],
+)  # fmt: skip
+def test_change_of_the_size_of_round_off(values, outcome, round_off, verdict, shown):
+    runs = {part: replace(each, metrics={name: (pair[k], "") for name, pair in values.items()})
+            for k, (part, each) in enumerate(seen(base="a", set="b").items())}  # fmt: skip
+    runs["set"] = replace(runs["set"], outcome=outcome)
+    told = judged("toy", "1.0", "knob", Effect(1, "stack", "load"), runs, round_off)
+    assert (told.verdict, told.metric) == (verdict, shown)
 
 
 def test_planted_setting_without_effect_and_one_that_acts(monkeypatch):
@@ -101,7 +125,7 @@ def test_planted_setting_without_effect_and_one_that_acts(monkeypatch):
     told = {each.setting: each for each in measure("chipmunk")}
     verdicts = {name: each.verdict for name, each in told.items()}
     assert verdicts == {
-        "collision_persistence": NOTHING, "damping": ACTS, "collision_bias": REFUSED, "iterations": UNTRIED,
+        "collision_persistence": UNSEEN, "damping": ACTS, "collision_bias": REFUSED, "iterations": UNTRIED,
     }  # fmt: skip
     assert told["collision_persistence"].read == "yes" and told["damping"].before == "98.1"
     assert told["collision_persistence"].because == "no bit of flight changes"
@@ -113,7 +137,10 @@ def kept(monkeypatch):
 
     def keep(**told):
         cases = {name: effect for name, (effect, _) in told.items()}
-        rows = {name: Told("toy", "1.0", name, v, because=cases[name].because) for name, (_, v) in told.items()}
+        rows = {
+            name: Told("toy", "1.0", name, v, scene=each.scene, because=each.because)
+            for name, (each, v) in told.items()
+        }
         monkeypatch.setattr(effects, "effects_of", lambda engine: cases)
         monkeypatch.setattr(effects, "of_release", lambda engine, version: rows if version == "1.0" else {})
 
@@ -128,6 +155,12 @@ def test_line_on_a_value_that_does_nothing(kept):
     kept(erp=(Effect(because="of joints"), NOTHING), knob=(Effect(), ACTS), new=(Effect(), UNTRIED))
     assert told({"erp": 0.5, "knob": 1, "new": 2, "other": 3}) == ["erp=0.5 does nothing in toy 1.0: of joints"]
     assert told({"erp": 0.5}, version="2.0") == []
+
+
+def test_line_on_a_value_that_was_not_seen_to_act(kept):
+    kept(knob=(Effect(scene="stack"), UNSEEN), loose=(Effect(scene="stack"), ROUNDED))
+    (line,) = told({"knob": 0.5, "loose": 1})
+    assert line == "knob=0.5 may do nothing in toy 1.0: it changes no bit of scene stack, where it was tried"
 
 
 def test_line_on_a_value_that_needs_another(kept):

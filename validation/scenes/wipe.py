@@ -119,7 +119,6 @@ SCENE = CanonicalScene(
         "a pressure sensor under a body does not show its weight",
         "the friction force that is reported is not mu times the normal force",
         "a force plate gives the wrong reading",
-        "a contact force reads 0 although the bodies touch",
         "impulses of contacts are noisy when a body is dragged over a surface",
     ),
     family="grip and force",

@@ -7,6 +7,8 @@
 The cases are in ``tuning.toml`` of the engine (`adapters.experiment.Effect`). Results are kept beside them
 (``effects.csv``) by release of the engine; ``crosscheck tune ENGINE --effects`` measures them again. They are compared
 bit by bit, in states, contacts that the scene reads, and metrics: no setting that acts is taken for one that does not.
+A setting acts if a metric changes by more than round-off of the engine's precision. Where no bit changes and no reason
+is known, it may still act in another scene.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ from validation.posed import resolve
 from validation.running.plan import QUICK_DT
 from validation.settings.switching import observe, switched
 
-ACTS, NOTHING, CLAMPED, ONLY_WITH, REFUSED, UNTRIED = (
-    "acts", "without effect", "clamped", "only with", "refused", "not tried",
+ACTS, ROUNDED, UNSEEN, NOTHING, CLAMPED, ONLY_WITH, REFUSED, UNTRIED = (
+    "acts", "within round-off", "not seen to act", "without effect", "clamped", "only with", "refused", "not tried",
 )  # fmt: skip
 
 
@@ -49,7 +51,8 @@ class Told:
     verdict
         `ACTS` and so on.
     value, scene, metric, before, after
-        What it was set to, its case, and the metric without and with the setting; empty where there is none.
+        What it was set to, its case, and the metric without and with the setting; empty where there is none. Where the
+        metric of the case is the same, that of the scene which changes most.
     read
         ``yes`` if what the engine reads back changes with it; ``no``; empty where it was not tried.
     because
@@ -93,7 +96,7 @@ def measure(engine: str, jobs: int = 1) -> list[Told]:
             found.append(Told(engine, version, name, UNTRIED, because=effect.untried))
         else:
             own = {part: seen[slot] for part, slot in runs[name].items()}
-            found.append(judged(engine, version, name, effect, own))
+            found.append(judged(engine, version, name, effect, own, load(engine).facts.round_off))
     return found
 
 
@@ -110,17 +113,23 @@ def _slots(engine: str, name: str, effect: Effect) -> dict[str, Slot]:
     return found
 
 
-def judged(engine: str, version: str, name: str, effect: Effect, seen: Mapping[str, Observation]) -> Told:
+def judged(
+    engine: str, version: str, name: str, effect: Effect, seen: Mapping[str, Observation], round_off: float
+) -> Told:
     """The verdict on a setting by the runs of its case.
 
     Parameters
     ----------
     seen
         Runs by ``base``, ``set``; ``ready``, ``both`` with what it needs; ``beyond``.
+    round_off
+        Of a metric of order 1, or of its own share; `adapters.engine.EngineFacts.round_off`.
     """
     base, tried = seen["base"], seen["set"]
     ready = seen["ready"] if effect.needs and seen["ready"].outcome in RAN else base
-    verdict, because = NOTHING, effect.because or f"no bit of {effect.scene} changes"
+    verdict, because = NOTHING, effect.because
+    if not because:
+        verdict, because = UNSEEN, f"no bit of {effect.scene} changes"
     if _differ(base, tried):
         verdict, because = ACTS, effect.because
     elif effect.needs and _differ(ready, seen["both"]):
@@ -130,13 +139,17 @@ def judged(engine: str, version: str, name: str, effect: Effect, seen: Mapping[s
         because = f"{others}: {effect.because}" if effect.because else others
     elif tried.outcome not in RAN:
         verdict, because = REFUSED, tried.reason
+    metric = _changed(effect.metric, base, tried, round_off)
+    if verdict in (ACTS, ONLY_WITH) and not metric and base.outcome == tried.outcome:
+        verdict, because = ROUNDED, f"no metric of {effect.scene} changes by more"
     far = seen.get("beyond")
     if verdict in (ACTS, ONLY_WITH) and far and far.outcome in RAN and not _differ(far, tried):
         limit = text_of(effect.set) + (" at a step of 1/240 s" if effect.in_steps else "")
         verdict, because = CLAMPED, f"{text_of(effect.beyond)} is as {limit}: {effect.because}"
-    before, after = _texts(*(each.metrics.get(effect.metric, (None, ""))[0] for each in (base, tried)))
+    metric = metric or effect.metric
+    before, after = _texts(*_values(metric, base, tried))
     read = "" if tried.outcome not in RAN else "yes" if base.readback != tried.readback else "no"
-    case = text_of(effect.set), effect.scene, effect.metric
+    case = text_of(effect.set), effect.scene, metric
     return Told(engine, version, name, verdict, *case, before, after, read, because)
 
 
@@ -150,11 +163,32 @@ def _differ(one: Observation, other: Observation) -> bool:
 RAN = (Outcome.OK, Outcome.DIVERGED, Outcome.INVALID, Outcome.REFUSED)
 
 
+def _values(metric: str, *runs: Observation) -> list[float | None]:
+    """The metric of each run; None where it is no number."""
+    found = [run.metrics.get(metric, (None, ""))[0] for run in runs]
+    return [value if value is not None and math.isfinite(value) else None for value in found]
+
+
+def _changed(metric: str, base: Observation, tried: Observation, round_off: float) -> str:
+    """The metric, or where it is the same the one that changes most; empty if none changes by more than round-off."""
+
+    def change(name: str) -> float:
+        before, after = _values(name, base, tried)
+        if before is None or after is None:
+            return 0.0 if before == after else math.inf
+        return abs(after - before) / max(1.0, abs(before), abs(after))
+
+    changes = {name: change(name) for name in (metric, *base.metrics, *tried.metrics)}
+    found = [name for name, size in changes.items() if size > round_off]
+    if metric in found:
+        return metric
+    return max(found, key=lambda name: (changes[name] < math.inf, changes[name]), default="")
+
+
 def _texts(*values: float | None) -> list[str]:
     """Numbers with four digits, or as many more as tell them apart; empty for one that is none."""
-    known = [value is not None and math.isfinite(value) for value in values]
     for digits in range(4, 18):
-        texts = [f"{value:.{digits}g}" if told else "" for value, told in zip(values, known, strict=True)]
+        texts = ["" if value is None else f"{value:.{digits}g}" for value in values]
         if len(set(texts)) == len(set(values)):
             break
     return texts
@@ -248,6 +282,8 @@ def idle(
             continue
         if told.verdict == NOTHING:
             yield f"{label} does nothing in {where}: {told.because}"
+        elif told.verdict == UNSEEN:
+            yield f"{label} may do nothing in {where}: it changes no bit of scene {told.scene}, where it was tried"
         elif told.verdict == ONLY_WITH and not all(_has(own, other, need) for other, need in effect.needs.items()):
             others = " and ".join(f"{other}={text_of(need)}" for other, need in effect.needs.items())
             yield f"{label} acts in {where} only with another setting, such as {others}"
