@@ -25,7 +25,7 @@ MISFIT = object()
 def read(text: str) -> Any:
     """Value of a setting from text: a number, ``true``, ``none``, a word, or several with commas between.
 
-    Numbers may have spaces between them instead, as MJCF and fixes of MuJoCo have them.
+    Numbers may have spaces between them instead, as fixes print them for model files.
     """
     if "," in text:
         values = tuple(map(read, text.split(",")))

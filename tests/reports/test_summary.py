@@ -206,7 +206,7 @@ def test_file_without_checks_of_its_own(tmp_path, monkeypatch):
     laws = [row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": name}
             for name in ("penetration", "energy_growth")]  # fmt: skip
     own = row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": "final[ball.y]"}
-    only = "Only energy and overlap are judged: the file states no check of its own"
+    only = "Only energy and overlaps are judged: the file states no check of its own"
     assert only in " ".join(" ".join(shown(laws, 100)).split())
     for others in ([*laws, own], [row("impact", 2, "bullet", "tuned") | {"metric": "penetration"}]):
         text = " ".join(" ".join(shown(others, 100)).split())
