@@ -86,6 +86,7 @@ def cleared(simulation: Simulation, heard: list[Told]) -> Ask:
         heard.clear()
         advance(steps)
 
+    # Of this world alone: the list is emptied wherever the world is stepped, also by code that knows of no readings.
     simulation.advance = fresh  # type: ignore[method-assign]
     return lambda body: acting_on(body, heard)
 

@@ -54,6 +54,8 @@ from reference_solver.certificate.audit import (
 )
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
+from reference_solver.exact.bodies import world_of
+from reference_solver.exact.features import no_gap
 from reference_solver.exact.refusals import Refused
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import POSE_SIZE, Array, Model
@@ -77,8 +79,6 @@ CLOSER = 1e-2
 #: Shares of the tolerance of the event loop to which a run is made again. The finer one's steps are three quarters as
 #: long, those of the coarser one 1.3 times.
 TOLERANCES = (0.1, 10.0)
-#: Gaps of the event loop that are none, as a share of the smallest half width, and units in the last place.
-NO_GAP, GAP_UNITS = 1e-13, 8.0
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
 #: Distances from the origin to which the run is moved, in smallest half widths. At the second one gaps are closed some
@@ -234,8 +234,9 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         reasons.append("the run at half the step is no numbers")
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
-    none = NO_GAP * _size(model) + GAP_UNITS * float(np.spacing(place))
-    joint = joint_blows(model, record, settings.dt, none) if settings.scheme == "exact" else 0.0
+    joint = np.zeros(len(record.t))
+    if settings.scheme == "exact":
+        joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)

@@ -122,8 +122,8 @@ class World:
     extent, size
         Half widths of the bodies (n,), and the smallest of them [m].
     weight
-        Largest acceleration by loads [m/s^2], of points that far from centres; without loads, what the first speeds
-        could come from within the smallest half width.
+        Largest acceleration by loads [m/s^2], where they turn a body that of points at a distance of ``size``; without
+        loads, the one that reaches the speeds of the start within ``size``, or 1 where nothing moves.
     load
         What the lightest body weighs [N].
     """
@@ -139,7 +139,7 @@ class World:
 
     @cached_property
     def time(self) -> float:
-        """What it takes to fall through the smallest half width, but for a factor [s]."""
+        """Time in which a body falls through half of ``size`` [s]."""
         return math.sqrt(self.size / self.weight)
 
     @cached_property
@@ -149,7 +149,7 @@ class World:
 
     @cached_property
     def per_length(self) -> Array:
-        """(q,): of a twist or a turn for a unit of length."""
+        """(q,): 1 for ways, and for turns the angle that moves a point at a distance of ``size`` by 1 m [rad/m]."""
         q, d = self.shape[1], self.dimension
         return np.array([1.0] * d + [1.0 / self.size] * (q - d))
 

@@ -20,8 +20,8 @@ from reference_solver.model import Array
 
 #: Shares at which monitors are looked at: of a step, and of a piece of any length, whose beginning counts.
 OF_STEP, OF_CONSTANT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1e-6, *np.linspace(0.125, 1.0, 8))
-#: Shares of the smallest half width and of the world's speed below which margins and slips are round-off.
-MARGIN, SPEED = 1e-12, 1e-12
+#: Share of the smallest half width below which margins are round-off.
+MARGIN = 1e-12
 
 
 class Kind(Enum):
@@ -78,7 +78,7 @@ class Monitors:
         self._ended = np.minimum(world.slipping, 0.5 * begun)
         count = len(modes)
         self.noise = np.full((count, self.width + 3), MARGIN * world.size)
-        self.noise[:, self.width] = SPEED * world.speed
+        self.noise[:, self.width] = world.still
         self.noise[:, self.width + 1 :] = NONE * (
             LEAST * world.load + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
         )
@@ -113,7 +113,7 @@ class Monitors:
 def first_event(world: World, piece: Piece, stuck: bool) -> Event:
     """Return the first event of a piece; where something ends as the piece begins, that alone.
 
-    ``stuck``: whether the event before was now, so that what is as near as round-off is not met again.
+    ``stuck``: whether the last piece was an instant; then what is as near as round-off is not met again.
     """
     event = Event(Kind.LOOK, 1.0)
     if len(piece.held.contacts):

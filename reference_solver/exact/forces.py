@@ -22,7 +22,8 @@ from reference_solver.exact.problem import (
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
-#: Share of the largest load or acceleration that is round-off where a mode ends, and of a body's weight at least.
+#: Loads and accelerations below this share of the largest are round-off where a mode ends. The largest load counts as
+#: this share of the lightest body's weight at least: contacts that carry nothing have no scale of their own.
 NONE, LEAST = 1e-9, 1e-3
 #: Turn of a slip that shows how forces change with it [rad].
 TURN = 1e-6

@@ -18,7 +18,8 @@ from reference_solver.exact.series import height
 from reference_solver.model import Array
 from reference_solver.pieces import CHAIN, FROZEN
 
-#: Impacts of one instant, and of how many of them the speeds are compared to tell a cycle.
+#: Impacts of one instant, after which 32 looks have found no cycle that slows down; a look compares the speeds of this
+#: many with those of as many before.
 MOST, LOOK_BACK = 4096, 64
 #: A contact without restitution that parts more slowly than this share of the fastest approach takes part (E21).
 SLOW = 1e-6

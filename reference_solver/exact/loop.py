@@ -66,7 +66,7 @@ class Loop:
     step: float = 0.0
     pieces: int = 0
     events: int = 0
-    stuck: bool = False  # whether the piece before was an instant
+    stuck: bool = False  # whether the piece before was an instant, see `PROGRESS`
     blows: list[Blow] = field(default_factory=list)
     row: float = 0.0  # where a count of pieces in a row began [s]
     held: Held | None = None  # what goes on from the piece before

@@ -19,7 +19,8 @@ from reference_solver.model import Array
 #: Changes of rows below this share of their size are round-off, and so are accelerations below this share of what
 #: forces of contacts make one by one.
 STEADY, REST = 1e-13, 1e-12
-#: Share of the world's speed from which on errors of speeds are relative to them.
+#: Errors of speeds are relative to the speeds at the start of a step and this share of the world's speed: what starts
+#: from rest would have no scale.
 LEAST = 1e-2
 #: How much shorter or longer than the last a step may be, and what is left to safety.
 SHORTER, LONGER, SAFE = 0.2, 5.0, 0.9
@@ -87,9 +88,9 @@ class Piece:
 
     def cut(self, share: float) -> Piece:
         """Return the piece up to a share."""
-        way = self.way * share ** np.arange(self.way.shape[2])
-        velocity = self.velocity * share ** np.arange(self.velocity.shape[2])
-        push = self.push * share ** np.arange(self.push.shape[2])
+        way, velocity, push = (
+            each * share ** np.arange(each.shape[2]) for each in (self.way, self.velocity, self.push)
+        )
         return replace(self, length=share * self.length, way=way, velocity=velocity, push=push)
 
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import Held
 from reference_solver.exact.problem import SINGULAR, STICK
-from reference_solver.exact.record import Blow
+from reference_solver.exact.record import NO_BLOW, Blow
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
 
-#: Shares of the smallest half width and of the world's speed below which gaps and speeds are left alone.
-GAP, SPEED = 1e-14, 1e-13
+#: Share of the smallest half width below which gaps are left alone; speeds are below `NO_BLOW`.
+GAP = 1e-14
 
 
 def projected(world: World, state: State, held: Held) -> tuple[State, Blow | None]:
@@ -40,7 +40,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     sticks = np.flatnonzero((held.answer.modes == STICK) | ended)
     keeps = np.concatenate([normal, (sticks[:, None] * d + np.arange(1, d)).ravel()])
     speed = contacts.rows.speed.ravel()[keeps]
-    if np.abs(speed).max() <= SPEED * world.speed:
+    if np.abs(speed).max() <= NO_BLOW * world.speed:
         return state, None
     impulses = _least(contacts, keeps, -speed).reshape(-1, d)
     after = replace(state, velocity=state.velocity + contacts.changes(impulses))

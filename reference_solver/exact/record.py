@@ -25,9 +25,9 @@ from reference_solver.model import Array
 from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
 from reference_solver.records import Contacts as Handed
 
-#: Share of the smallest half width by which ways of a part may differ from cubic polynomials.
+#: Share of the smallest half width by which ways of a part may differ from cubic polynomials: the audit's limit.
 CLOSE = 1e-9
-#: Share of the world's speed below which changes of velocity are round-off and no blow.
+#: Share of the world's speed, some hundred last places, below which changes of velocity are round-off and no blow.
 NO_BLOW = 1e-13
 #: Shares of a part, and their weights, at which moments of its impulses are taken: enough for polynomials of degree 7.
 GAUSS = [0.5 + 0.5 * roots_legendre(4)[0], 0.5 * roots_legendre(4)[1]]

@@ -1,8 +1,7 @@
 """Ends of series of rebounds: what bounces or rocks too low to be followed is summed up (E22).
 
 A contact that leaves with the speed u under an acceleration -g towards each other rises by u^2 / (2 g). All its
-rebounds together leave it closed. As soon as the rise is less than gaps can tell, it stays so for the time that they
-take.
+rebounds together leave it closed. As soon as the rise counts as no gap, it stays so for the time that they take.
 """
 
 from __future__ import annotations
@@ -10,18 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
+from reference_solver.exact.features import NO_GAP
 from reference_solver.exact.forces import Held, accelerations, decide
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.refusals import Refused
 from reference_solver.exact.rows import Contacts
 
-#: Rebounds no higher than this share of the smallest half width are summed, and than what coordinates resolve.
-LOW = 1e-13
-
 
 def height(world: World, state: State) -> float:
-    """Return how high a rebound may be that is summed [m]."""
-    return LOW * world.size + 2.0 * float(np.spacing(np.abs(state.place).max()))
+    """Return how high a rebound may be that is summed [m]: no higher than gaps that are none, or coordinates tell."""
+    return NO_GAP * world.size + 2.0 * float(np.spacing(np.abs(state.place).max()))
 
 
 def settling(world: World, state: State, contacts: Contacts) -> Held | None:

@@ -28,8 +28,8 @@ POWERS = np.arange(COUNT)
 THROUGH = np.linalg.inv(NODES[:, None] ** POWERS)
 UP_TO = NODES[:, None] ** (POWERS + 1) / (POWERS + 1) @ THROUGH
 SERIES = np.linalg.inv(legendre.legvander(2.0 * NODES - 1.0, COUNT - 1))
-#: An explicit step is stable up to this many 1/k; corrections below this share of the tolerance end the iteration,
-#: which takes at most so many rounds.
+#: An explicit step is stable up to this many 1/k. Corrections below this share of the tolerance end the iteration (the
+#: same, IV.8: between .1 and .01). In so many rounds halves become a millionth; a shorter step is better than more.
 STABLE, CLOSE, MOST = 5.0, 0.03, 20
 
 

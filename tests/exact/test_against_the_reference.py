@@ -31,8 +31,8 @@ def test_random_world_is_the_same_within_both_bounds(key):
 
 
 @pytest.mark.parametrize("seed", [1004, 1036, 1042, 1043, 1049, 1073, 1074, 1096])
-def test_world_of_small_gaps_and_low_rebounds_is_certified(seed):
-    """What is nearly closed, or rises hardly at all, would be struck with others, or for ever, or off by its time."""
+def test_certificate_of_small_gaps_and_low_rebounds(seed):
+    """Without care a gap that is nearly closed is struck with others, and a low rebound without end or too late."""
     known, world = ANSWERS[f"fuzz2 {seed}"], world_of(f"fuzz2 {seed}")
     found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
     assert found.holds, found.reasons

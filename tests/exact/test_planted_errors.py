@@ -205,11 +205,16 @@ def test_run_without_error_is_certified(model):
 
 @pytest.mark.parametrize("gap", [4e-14, 4e-12])
 @pytest.mark.parametrize("pull", [0.0, G])
-def test_gap_of_a_joint_blow_is_covered(pull, gap):
-    """A disc meets the floor and, a gap later, the wall; what is moved along one moves no other."""
+@pytest.mark.parametrize("small", [0.5, 0.01])
+def test_gap_of_a_joint_blow(small, pull, gap):
+    """A disc meets the floor and, a gap later, the wall; what is moved along one moves no other.
+
+    Gaps that are none go by the bodies that meet: a smaller one elsewhere changes none of them.
+    """
     wall = Body(HalfSpace((1.0, 0.0)), motion="fixed")
     disc = Body(Disc(0.5), 1.0, 0.125, (0.5987 + gap, 0.5987, 0.0), (-1.0, -1.0, 0.0))
-    both, alone = (Model(2, [*those, disc], (-pull, -pull), 0.5, 0.0) for those in ([FLOOR, wall], [wall]))
+    other = Body(Disc(small), 1.0, 0.5 * small**2, (3.0, 3.0, 0.0))
+    both, alone = (Model(2, [*those, other, disc], (-pull, -pull), 0.5, 0.0) for those in ([FLOOR, wall], [wall]))
     found = certify(both, Settings.exact(DT), 48)
     truth = Simulation(alone, Settings.exact(DT)).record(48).pose[:, -1, 0]
     assert found.holds, found.reasons

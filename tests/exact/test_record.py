@@ -120,7 +120,7 @@ def test_rebounds_that_coordinates_do_not_resolve():
     Simulation(model, Settings.exact(world.dt)).advance(round(0.04 / world.dt))
 
 
-def test_impact_within_round_off_of_a_sample_leaves_the_error_small():
+def test_error_after_an_impact_within_round_off_of_a_sample():
     """The gap until that sample tells no acceleration."""
     ball = Body(Disc(0.5), 1.0, 0.125, (0.0, np.nextafter(0.75, 0.0), 0.0), (0.0, -1.0, 0.0))
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), ball], (0.0, 0.0), 1.0, 0.0)

@@ -51,8 +51,8 @@ PARTS = (
     "hard_cases.gates",
     "self_test",
 )
-#: The part that takes more time than all others together (560 of 702 s of CPU when it was one). Its runs are measured
-#: one by one, so that no process waits.
+#: The part that takes more CPU than all others together, some four fifths. Its runs are measured one by one, so that
+#: no process waits.
 IN_RUNS = "piles"
 #: Number of processes; each has its own kernels in memory [300 MB], and the stated times are for two cores.
 WORKERS = 2

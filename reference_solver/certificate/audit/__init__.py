@@ -198,14 +198,14 @@ def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.nda
     return moved
 
 
-def joint_blows(model: Model, record: Record, dt: float, gap: float) -> np.ndarray:
-    """Return how far (s,) it moves bodies that contacts open by ``gap`` [m] are struck with others [m].
+def joint_blows(model: Model, record: Record, dt: float, none: np.ndarray) -> np.ndarray:
+    """Return how far (s,) bodies move since contacts are struck with others that are still open [m].
 
-    What is struck late keeps its change of velocity for as long, and meets with what loads add until then, twice that
-    where it rebounds. Raises ValueError if the record has no pieces.
+    They are open by ``none`` (n, n) [m] of their pair at most. What is struck late gets its change of velocity so much
+    later; loads act until then, and where it rebounds count twice. Raises ValueError if the record has no pieces.
     """
     moved, pull = np.zeros(len(record.t)), float(np.linalg.norm(model.gravity))
-    for begin, late, speed in zip(*contact.joint_blows(_run_of(model, record, dt), gap), strict=True):
+    for begin, late, speed in zip(*contact.joint_blows(_run_of(model, record, dt), none), strict=True):
         since = record.t - begin
         moved += np.where(since > 0.0, late * (speed + 2.0 * pull * since), 0.0)
     return moved

@@ -152,21 +152,22 @@ def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]
     return np.array(times), np.array(speed)
 
 
-def joint_blows(run: Run, gap: float) -> tuple[Array, Array, Array]:
-    """When (k,) several contacts are struck at once [s], how late one may be (k,) [s], and what (k,) speed changes.
+def joint_blows(run: Run, none: Array) -> tuple[Array, Array, Array]:
+    """When (k,) several contacts are struck at once [s], how late one may be (k,) [s], and what (k,) speeds change by.
 
-    One that is open by up to ``gap`` [m] and closes with the speed u would be struck ``gap / u`` later.
+    Contacts of a pair that are open by its gap in ``none`` (n, n) [m], and close with the speed u, would be struck
+    ``gap / u`` later.
     """
     pieces, owner = run.pieces, run.contact_owner
     approach = -(run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
     meets = run.is_impact[owner] & (approach > LIES * speeds(run))
-    slowest = np.full(len(pieces), np.inf)
-    np.minimum.at(slowest, owner[meets], approach[meets])
+    late = np.zeros(len(pieces))
+    np.maximum.at(late, owner[meets], none[pieces.body_a[meets], pieces.body_b[meets]] / approach[meets])
     several = np.flatnonzero(np.bincount(owner[meets], minlength=len(pieces)) > 1)
     twist, reach = pieces.twist_after - pieces.twist_before, np.where(run.free, run.reach, 0.0)[pieces.body]
     speed = np.linalg.norm(twist[:, : run.d], axis=1) + reach * np.linalg.norm(twist[:, run.d :], axis=1)
     fastest = [speed[pieces.first_body[k] : pieces.first_body[k + 1]].max() for k in several]
-    return pieces.begin[several], gap / slowest[several], np.array(fastest)
+    return pieces.begin[several], late[several], np.array(fastest)
 
 
 def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:

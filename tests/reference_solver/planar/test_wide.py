@@ -137,7 +137,8 @@ def bits(number):
 
 
 @pytest.mark.parametrize("shift", range(len(ODD)))
-def test_each_lane_holds_what_floats_give(shift):
+def test_lanes_of_odd_numbers(shift):
+    """Each has the bits that floats give."""
     one, other = np.array([ODD]), np.roll([ODD], shift)
     found, wanted = np.zeros((2, 9, LANES))
     of_lanes(one, other, found)
