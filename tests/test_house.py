@@ -160,7 +160,7 @@ def test_engine_folder_imports_the_vocabulary_alone(engine):
 
 
 def test_imports_without_circles():
-    """Within functions and for types as well; the solver makes many worlds of one, which it may know."""
+    """Within functions and for types as well; a module may know the package that it is in."""
     files = [path for package in LINE[1:] for path in (ROOT / package).rglob("*.py")]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in files}
     line = TopologicalSorter()
