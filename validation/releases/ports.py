@@ -64,7 +64,8 @@ class Compared:
     because
         Why there is no comparison, or how the port ended.
     proof
-        Settings of both with which the motions are the same: to the end, or beyond the time at which they differ.
+        Settings of both with which the motions are the same: to the end, or beyond the time at which they differ, with a
+        fourth (`SHARE`) of the distance at most.
     """
 
     slot: Slot
@@ -122,7 +123,10 @@ def ask(slot: Slot, port: str) -> Compared:
         return found
     for switched in ported.switches:
         again = _asked(blank, own, ported, posed, switched)
-        if again.whole or (found.verdict == "differs" and again.verdict == "same" and again.until > found.since):
+        # A setting may also make round-off larger; so the distance must go as well, where the port did not end.
+        gone = bool(found.because) or SHARE * again.apart < found.apart
+        beyond = again.verdict == "same" and again.until > found.since and gone
+        if beyond if found.verdict == "differs" else again.whole:
             return replace(found, proof=", ".join(f"{name}={text_of(value)}" for name, value in switched.items()))
     return found
 

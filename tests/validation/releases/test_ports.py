@@ -107,6 +107,16 @@ def test_scene_that_neither_runs(monkeypatch):
     assert found.verdict == "neither" and found.because == "pairs: the adapter of mujoco has no restitution above 1"
 
 
+def test_difference_that_a_setting_hides_in_round_off(monkeypatch):
+    """With the setting more is explained by round-off, and the distance is as large as before."""
+    monkeypatch.setattr(registry, "load", lambda name: Port() if name == "port" else ENGINE)
+    before = Compared(slot("oblique"), "port", "differs", 0.4, 0.4, 4e-3, "ball", 0.1)
+    for apart, proof in ((3.9e-3, ""), (0.9e-3, "impratio=2")):
+        answers = iter([before, replace(before, verdict="same", apart=apart, since=math.nan)])
+        monkeypatch.setattr("validation.releases.ports._asked", lambda *asked, told=answers: next(told))
+        assert ask(slot("oblique"), "port").proof == proof
+
+
 @pytest.mark.parametrize("number", range(3))
 def test_moved_start(number):
     scene = posed_for(ENGINE, CATALOGUE["stack"].scene(3, {"n": 3}))
