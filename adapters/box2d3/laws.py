@@ -10,7 +10,7 @@ from adapters.box2d3.ball_on_plane import Chosen, ball_law
 from adapters.box2d3.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box2d3.shipped import CHECKED_ON, RESTITUTION_THRESHOLD, SUBSTEPS
 from adapters.law import Deviation, deviations, settings_of
-from adapters.law.single_motions import corner_law, rounded_motions, standstill_law
+from adapters.law.single_motions import corner_law, rounded_motions, standstills
 from adapters.law.single_precision import late_rebound_law
 from adapters.scene import Scene
 
@@ -66,15 +66,7 @@ DEVIATIONS += deviations(
     "contact_solver.c, b2SolveContact and b2ApplyRestitutionTask; motion in adapters/box2d3/ball_on_plane.py",
     CHECKED_ON,
 )
-DEVIATIONS += deviations(
-    "box2d3",
-    PROFILES,
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(metric, _lengths(profile)),
-    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "math_functions.h, b2Vec2: a pair of floats; motion in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
+DEVIATIONS += standstills("box2d3", PROFILES, "math_functions.h, b2Vec2: a pair of floats", CHECKED_ON, _lengths)
 DEVIATIONS += tuple(
     Deviation(
         "box2d3",

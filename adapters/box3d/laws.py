@@ -8,7 +8,7 @@ from functools import partial
 from adapters.box3d.profiles import PROFILES, TUNED_SUBSTEPS
 from adapters.box3d.shipped import CHECKED_ON, SUBSTEPS
 from adapters.law import Deviation, deviations, settings_of
-from adapters.law.single_motions import rounded_motions, standstill_law
+from adapters.law.single_motions import rounded_motions, standstills
 from adapters.law.single_precision import late_rebound_law, plane_law
 
 #: Metrics of blows in free space, by scene, which neither friction nor rotation within the step changes.
@@ -49,16 +49,12 @@ for _profile, _scene, _metrics in (
         "math_functions.h, b3Vec3: three floats; motion in adapters/law/single_precision.py",
         CHECKED_ON,
     )
-DEVIATIONS += deviations(
+DEVIATIONS += standstills(
     "box3d",
     PROFILES,
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(
-        metric, lambda scene, dt: (settings_of(PROFILES[profile], scene, dt)["units_per_metre"], 0.0)
-    ),
-    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "math_functions.h, b3Pos: three floats; motion in adapters/law/single_motions.py",
+    "math_functions.h, b3Pos: three floats",
     CHECKED_ON,
+    lambda profile: lambda scene, dt: (settings_of(PROFILES[profile], scene, dt)["units_per_metre"], 0.0),
 )
 #: Blows in free space, after which the motion is planar to round-off.
 DEVIATIONS += deviations(

@@ -18,7 +18,7 @@ def _vector(told: Any) -> Any:
 
 
 def _manifolds(simulation: Box3DSimulation) -> Iterator[tuple[int, int, Any]]:
-    """Bodies of each manifold by the scene's index, and the manifold; each contact once."""
+    """Two bodies, by their indices in the scene, and a manifold between them; each manifold once."""
     lib, index = simulation.lib, simulation.index
     for own, body in enumerate(simulation.bodies):
         room = lib.b3Body_GetContactCapacity(body)
@@ -61,7 +61,7 @@ _TOUCHING = ("rest", "slope", "sliding", "blow", "grip")
 _LAST = "the last substep"
 _PART = Cause(_TOUCHING, "it is the impulse of one substep of several", {"substeps": 1})
 _SUM = Cause(_TOUCHING, "it adds up the impulse after each solve and each relaxation: one substep counts several times")
-_ONE = Cause(("rest", "blow"), "the force of the last substep stands for the whole step")
+_ONE = Cause(("rest", "blow"), "it is the force of the last substep, and that of the others differs")
 _SMOOTH = Cause(_TOUCHING, "it adds up normal parts; friction is not in it")
 READINGS = (
     Reading(

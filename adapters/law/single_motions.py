@@ -48,6 +48,33 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
     return law
 
 
+def standstills(
+    engine: str,
+    profiles: Iterable[str],
+    source: str,
+    versions: tuple[str, ...],
+    chosen: Callable[[str], Chosen] = lambda profile: lambda scene, dt: (1.0, 0.0),
+) -> tuple[Deviation, ...]:
+    """`standstill_law` of an engine whose numbers have 24 bits.
+
+    Parameters
+    ----------
+    source
+        Where it is seen that the engine computes in single precision.
+    chosen
+        Units and skin by profile; metres without a skin by default.
+    """
+    return deviations(
+        engine,
+        profiles,
+        {"far_origin": ("stopping_distance",)},
+        lambda metric, profile: standstill_law(metric, chosen(profile)),
+        "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
+        f"{source}; motion in adapters/law/single_motions.py",
+        versions,
+    )
+
+
 def corner_law(metric: str, chosen: Chosen, threshold: float) -> Law:
     """A tilted box that lands on one corner without friction, rotation or load, in single precision.
 

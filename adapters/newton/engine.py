@@ -8,12 +8,13 @@ Overlaps at a step's end are corrected, all contacts at once; a body gets the me
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import final
 
-from adapters.engine import Declared, EngineFacts, Quirk, Scheme
+from adapters.engine import Declared, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.newton.family import NewtonFamily
+from adapters.newton.family import FACTS, NewtonFamily
 from adapters.newton.profiles import KINDS, PROFILES, TUNED_ITERATIONS
 from adapters.newton.script import python
 from adapters.newton.shipped import ITERATIONS, LEAST_APPROACH, RELAXATION, STOPPED
@@ -30,17 +31,14 @@ LEAST_SHARE = 7.0
 class NewtonEngine(NewtonFamily):
     """Spatial engine; see the module's docstring for its step."""
 
-    facts = EngineFacts(
+    facts = replace(
+        FACTS,
         name="newton",
         title="Newton (XPBD)",
-        package="newton",
-        dimensions=frozenset({3}),
         scheme=Scheme("detect, forces and position, then contacts on positions", 1),
         customary_dt=1.0 / 600.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
-        precision="single",
-        apart=True,
-        abilities=frozenset({"surface velocity", "moving half-space", "course", "capsule", "hull"}),
+        abilities=FACTS.abilities | {"surface velocity"},
         quirks=(
             Quirk(
                 "restitution is ignored unless enable_restitution is set",

@@ -5,9 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from adapters.checked_engine import CheckedEngine
+from adapters.engine import EngineFacts, Scheme
 from adapters.newton.simulation import imported
 from adapters.scene import Scene
 from adapters.scene.means import no_means
+
+#: Facts of all of them; each has its own name, title, scheme and usual step.
+FACTS = EngineFacts(
+    name="newton",
+    title="Newton",
+    package="newton",
+    dimensions=frozenset({3}),
+    scheme=Scheme("detect, solve", 1),
+    customary_dt=1.0 / 600.0,
+    precision="single",
+    apart=True,
+    abilities=frozenset({"moving half-space", "course", "capsule", "hull"}),
+)
 
 
 class NewtonFamily(CheckedEngine):

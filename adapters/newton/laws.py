@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
-from adapters.law.single_motions import standstill_law
+from adapters.law.single_motions import standstills
 from adapters.law.single_precision import UNIT, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
 from adapters.newton.profiles import PROFILES
@@ -56,15 +56,7 @@ DEVIATIONS += deviations(
     "ModelBuilder.rigid_gap; motion in adapters/law/unswept.py",
     CHECKED_ON,
 )
-DEVIATIONS += deviations(
-    "newton",
-    PROFILES,
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
-    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "xpbd/kernels.py, built for floats; motion in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
+DEVIATIONS += standstills("newton", PROFILES, "xpbd/kernels.py, built for floats", CHECKED_ON)
 #: A blow of a face in free space, after which the motion is planar to round-off.
 DEVIATIONS += deviations(
     "newton",

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
+from adapters.newton import shapes
 from adapters.newton.shipped import (
     GAP,
     ITERATIONS,
@@ -32,10 +33,10 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
         "rebound_iterations": settings.whole(1, 10_000),
         "torsional": settings.number(0.0, 1e9),
         "rolling": settings.number(0.0, 1e9),
-        "gap": settings.number(0.0, 1e9),
+        **shapes.KINDS,
     }
 )
-_SOLVER, _SHAPE = "SolverXPBD", "ModelBuilder.ShapeConfig"
+_SOLVER, _SHAPE = "SolverXPBD", shapes.SHAPE
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
@@ -62,7 +63,7 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
         ),
         Setting("torsional", TORSIONAL, f"{said}: friction about the normal [m]", f"{_SHAPE}, mu_torsional"),
         Setting("rolling", ROLLING, f"{said}: friction against rolling [m]", f"{_SHAPE}, mu_rolling"),
-        Setting("gap", GAP, f"{said}: contacts act from this distance, of each shape [m]", "ModelBuilder.rigid_gap"),
+        shapes.GAP_AS_SHIPPED,
     ]  # fmt: skip
 
 
@@ -71,7 +72,7 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     changed = {
         "iterations": (
             TUNED_ITERATIONS,
-            "two iterations leave overlaps, which become velocities, and slip, which becomes creep",
+            "two iterations correct a part of each overlap and slip: what is left moves the body in the next steps",
             "derived",
         ),
         "torsional": (0.0, "the scene has no such friction", f"{_SHAPE}, mu_torsional"),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from adapters.newton import shapes
 from adapters.newton.shipped import GAP, ROLLING, STOPPED, TORSIONAL
 from adapters.unset import Unset
 
-_SHAPE, _SOLVER = "ModelBuilder.ShapeConfig", "SolverXPBD"
+_SHAPE, _SOLVER = shapes.SHAPE, "SolverXPBD"
 _PAIR = "xpbd/kernels.py, _solve_body_contact_positions"
 UNSET = (
-    Unset("friction of a pair", "1: mu", _SHAPE, 1.0),
+    shapes.FRICTION_UNSET,
     Unset("friction of 0.2 and 0.9", "0.55, the mean", _PAIR, 0.55),
     Unset("friction against rolling [m]", f"{ROLLING:g}: mu_rolling", _SHAPE, ROLLING),
     Unset("friction about the normal [m]", f"{TORSIONAL:g}: mu_torsional", _SHAPE, TORSIONAL),

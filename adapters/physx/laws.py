@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
-from adapters.law.single_motions import rounded_motions, standstill_law
+from adapters.law.single_motions import rounded_motions, standstills
 from adapters.law.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
 from adapters.law.unswept import passing_law, wall_law
 from adapters.needs import needs
@@ -75,15 +75,7 @@ DEVIATIONS += deviations(
     "measured with 3.0.3; motion in adapters/law/unswept.py and adapters/law/single_precision.py",
     _RELEASES,
 )
-DEVIATIONS += deviations(
-    "physx",
-    PROFILES,
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
-    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "PxTransform, built of floats; motion in adapters/law/single_motions.py",
-    _RELEASES,
-)
+DEVIATIONS += standstills("physx", PROFILES, "PxTransform, built of floats", _RELEASES)
 DEVIATIONS += rounded_motions(
     "physx",
     PROFILES,

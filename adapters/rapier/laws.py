@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from adapters.law import Deviation, deviations, exactly
-from adapters.law.single_motions import rounded_motions, standstill_law
+from adapters.law import Deviation, exactly
+from adapters.law.single_motions import rounded_motions, standstills
 from adapters.law.single_precision import Method, rounded_law
 from adapters.rapier.profiles import SUBSTEPS, TUNED_SUBSTEPS
 
@@ -44,15 +44,7 @@ DEVIATIONS: tuple[Deviation, ...] = tuple(
     for scene, metrics in BLOWS.items()
     for metric in metrics
 )
-DEVIATIONS += deviations(
-    "rapier",
-    ("default", "tuned"),
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(metric, lambda scene, dt: (1.0, 0.0)),
-    "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
-    "rapier3d, built for f32; motion in adapters/law/single_motions.py",
-    ("0.36.",),
-)
+DEVIATIONS += standstills("rapier", ("default", "tuned"), "rapier3d, built for f32", ("0.36.",))
 DEVIATIONS += rounded_motions(
     "rapier",
     ("default", "tuned"),

@@ -90,7 +90,7 @@ def test_expected_failures_told_and_unexpected_pass_as_failure(toy_class):
     assert told["receipt mass"].status == "unexpected pass"
 
 
-def test_check_expected_to_fail_in_one_profile_fails_in_another():
+def test_failure_expected_in_one_profile_only():
     one = Expected("states", "it starts late", "its manual", "late")
     assert judged("states", "late: off by 1", "", one).status == "expected"
     assert judged("states", "plain: off by 1", "", one).status == "FAIL"

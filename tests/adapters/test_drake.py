@@ -221,7 +221,7 @@ def test_facets_of_a_surface_not_mirror_symmetric():
 
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-7])
-def test_a_fall_with_error_control_is_off_by_the_root_of_the_accuracy(accuracy):
+def test_error_of_a_fall_by_the_root_of_the_accuracy(accuracy):
     # A step of h and two of h/2 differ by g h^2/4, which is the accuracy; two of h/2 fall g t h/4 too far in t.
     scene = replace(resting(pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0)), duration=0.5)
     found = run(ENGINE, scene, DT, {**settings(scene, "cenic"), "accuracy": accuracy})
@@ -230,7 +230,7 @@ def test_a_fall_with_error_control_is_off_by_the_root_of_the_accuracy(accuracy):
     assert 0.7 * min(most, 9.81 * found.t[-1] * DT / 4.0) <= late <= most
 
 
-def test_a_blow_is_not_in_the_error_that_is_controlled():
+def test_error_of_a_blow_at_any_accuracy():
     # Closed form of Hunt and Crossley: d w + ln(1 - d w) is the same before and after the blow.
     scene = CATALOGUE["impact"].scene(3, {"e": 0.0, "v": 0.1})
 
@@ -247,7 +247,7 @@ def test_a_blow_is_not_in_the_error_that_is_controlled():
     assert abs(rebound(1e-8, 1.0 / 16000.0) - right) < 0.005
 
 
-def test_an_accuracy_of_a_profile_with_a_step_is_refused():
+def test_refusal_of_an_accuracy_with_a_step():
     scene = resting()
     assert ENGINE.checked({**settings(scene), "approximation": "cenic"})["accuracy"] == ACCURACY
     with pytest.raises(EngineError, match=r"^accuracy: of approximation=cenic only; lagged has a step$"):

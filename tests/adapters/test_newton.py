@@ -314,7 +314,7 @@ def test_errors_by_the_step(name, dimension, params, metric, most):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_block_that_nearly_tips_and_does_by_an_error_of_the_step(dimension):
+def test_tipping_below_the_limit_slope_by_an_error_of_the_step(dimension):
     """It tips at 98 % of the slope that it bears, and stands at half the step."""
     coarse, fine = (measured_of(ENGINE, "tilt_table", "tuned", dimension, {}, dt)["moved"] for dt in (DT, 0.5 * DT))
     assert coarse > 1.0 and fine < 0.01

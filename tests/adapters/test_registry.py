@@ -275,5 +275,5 @@ def test_broken_engines_listed_under_their_names(plugins) -> None:
     assert {entry["status"] for entry in listed.values()} == {"installed", "not installed"}
 
 
-def test_engine_in_the_folder_of_another_is_installed_by_its_extra():
+def test_reason_of_an_engine_in_the_folder_of_another():
     assert registry.find("newton_kamino").reason == registry.find("newton").reason

@@ -63,7 +63,7 @@ def has(name: str) -> bool:
 def wrong(name, scene, dimension, params, fault):
     """Checks that fail although the program tells their values; at least one is judged."""
     if not has(name):
-        pytest.skip("no python3-siconos of Debian" if name == "siconos" else "no solve-nivp")
+        pytest.skip("needs Debian's package python3-siconos" if name == "siconos" else "needs solve-nivp")
 
     class Oracle(PipeEngine):
         command = (DEBIAN if name == "siconos" else sys.executable, f"{name}_world.py", fault)

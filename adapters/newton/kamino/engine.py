@@ -7,12 +7,13 @@ PADMM solves the nonlinear problem of Coulomb's cone with De Saxce's correction;
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.engine import Declared, EngineFacts, Quirk, Scheme
+from adapters.engine import Declared, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.newton.family import NewtonFamily
+from adapters.newton.family import FACTS, NewtonFamily
 from adapters.newton.kamino.profiles import KINDS, PROFILES
 from adapters.newton.simulation import NewtonSimulation
 
@@ -24,7 +25,7 @@ class KaminoSimulation(NewtonSimulation):
     """A model with Kamino's solver."""
 
     def _room(self) -> int:
-        """Eight contacts a pair, and as many as three neighbours of each body have.
+        """Eight contacts for each pair of touching bodies, of which there are at most three for each free body.
 
         The engine estimates a thousand, all of which its kernels visit: 23 ms a step, and 0.2 ms with those that count.
         """
@@ -66,17 +67,13 @@ class KaminoSimulation(NewtonSimulation):
 class KaminoEngine(NewtonFamily):
     """Spatial engine; see the module's docstring for its step."""
 
-    facts = EngineFacts(
+    facts = replace(
+        FACTS,
         name="newton_kamino",
         title="Kamino (Newton)",
-        package="newton",
-        dimensions=frozenset({3}),
         scheme=Scheme("detect, solve velocities, then positions", 1),
         customary_dt=1.0 / 1000.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
-        precision="single",
-        apart=True,
-        abilities=frozenset({"moving half-space", "course", "capsule", "hull"}),
         quirks=(
             Quirk(
                 "restitution of a pair is the smaller of two values",
@@ -84,7 +81,7 @@ class KaminoEngine(NewtonFamily):
                 "MaterialManagerConfig, restitution_mix_mode",
             ),
             Quirk(
-                "a step gives back a hundredth of each overlap as a speed, also in a rebound",
+                "a step corrects a hundredth of each overlap by a speed, which adds to that of a rebound",
                 "unchanged: rebounds are up to e + 0.01",
                 "ConstraintStabilizationConfig, gamma; measured",
             ),
@@ -109,5 +106,5 @@ class KaminoEngine(NewtonFamily):
         if needs.regime != "impact":
             return {}
         half = 0.5 * next(x.value for x in self.settings(profile, needs, dt) if x.name == "recovery")
-        because = "a step gives back a hundredth of the overlap in which a rebound finds a body, as a speed"
+        because = "a hundredth of the overlap at a blow is corrected in its step, by a speed that adds to the rebound"
         return {"restitution": Declared(needs.restitution + half, half + SOLVED, because)}

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.newton.shipped import GAP
+from adapters.newton import shapes
 
 #: Most iterations of PADMM and alternations of DVI. [`PADMMSolverConfig`, `DVISolverConfig`]
 ITERATIONS = {"padmm": 200, "dvi": 24}
@@ -29,7 +29,7 @@ KINDS: Mapping[str, settings.Check] = MappingProxyType(
         "recovery": settings.number(0.0, 1.0),
         "left": settings.number(0.0, 1e9),
         "warm_start": settings.flag,
-        "gap": settings.number(0.0, 1e9),
+        **shapes.KINDS,
     }
 )
 _STABLE = "ConstraintStabilizationConfig"
@@ -44,7 +44,7 @@ def _shipped(method: str) -> list[Setting]:
         Setting("recovery", RECOVERY, f"{said}: share of an overlap that a step removes", f"{_STABLE}, gamma"),
         Setting("left", LEFT, f"{said}: overlap that is left [m]", f"{_STABLE}, delta"),
         Setting("warm_start", True, f"{said}: from the impulses of the step before", f"{config}, warmstart_mode"),
-        Setting("gap", GAP, f"{said}: contacts are sought within it, of each shape [m]", "ModelBuilder.rigid_gap"),
+        shapes.GAP_AS_SHIPPED,
     ]
 
 
@@ -61,7 +61,7 @@ def dvi_profile(needs: Needs, dt: float) -> list[Setting]:
 def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     """PADMM that lifts what rests out of its overlaps, and leaves rebounds alone."""
     recovery = (
-        (0.0, "overlaps that a step gives back as a speed make a rebound faster", "measured")
+        (0.0, "correcting an overlap makes the rebound from it faster", "measured")
         if needs.regime == "impact"
         else (0.2, "with a hundredth a step, boxes that slide and stand sink by 0.2 mm", "measured")
     )

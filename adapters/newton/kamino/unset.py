@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from adapters.newton import shapes
 from adapters.newton.kamino.profiles import ITERATIONS, RECOVERY
-from adapters.newton.shipped import GAP
 from adapters.unset import Unset
 
-_SHAPE, _MIXED = "ModelBuilder.ShapeConfig", "MaterialManagerConfig"
+_MIXED = "MaterialManagerConfig"
 UNSET = (
-    Unset("friction of a pair", "1: mu", _SHAPE, 1.0),
+    shapes.FRICTION_UNSET,
     Unset("friction of 0.2 and 0.9", "0.55, the mean", f"{_MIXED}, friction_mix_mode", 0.55),
-    Unset("restitution of a pair", "0; the smaller of two", f"{_SHAPE}; {_MIXED}, restitution_mix_mode", 0.0),
+    Unset("restitution of a pair", "0; the smaller of two", f"{shapes.SHAPE}; {_MIXED}, restitution_mix_mode", 0.0),
     Unset("solver", "padmm", "SolverKamino.Config, dynamics_solver"),
     Unset("iterations", f"{ITERATIONS['padmm']}", "PADMMSolverConfig, max_iterations", ITERATIONS["padmm"]),
     Unset("share of an overlap corrected in a step", f"{RECOVERY:g}", "ConstraintStabilizationConfig, gamma", RECOVERY),
-    Unset("contacts sought within [m]", f"{GAP:g} of each shape", "ModelBuilder.rigid_gap"),
+    shapes.GAP_UNSET,
 )

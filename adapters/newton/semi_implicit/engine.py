@@ -5,12 +5,14 @@ step:  detect  ->  forces of contacts from overlaps and speeds at its start  -> 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.engine import Declared, EngineFacts, Quirk, Scheme
+from adapters.engine import Declared, Quirk, Scheme
 from adapters.needs import Needs
-from adapters.newton.family import NewtonFamily
+from adapters.newton import shapes
+from adapters.newton.family import FACTS, NewtonFamily
 from adapters.newton.semi_implicit.profiles import KINDS, PROFILES
 from adapters.newton.semi_implicit.springs import declared
 from adapters.newton.simulation import NewtonSimulation
@@ -41,23 +43,15 @@ class SemiImplicitSimulation(NewtonSimulation):
 class SemiImplicitEngine(NewtonFamily):
     """Spatial engine; see the module's docstring for its step."""
 
-    facts = EngineFacts(
+    facts = replace(
+        FACTS,
         name="newton_semi_implicit",
         title="Newton SI (semi-implicit)",
-        package="newton",
-        dimensions=frozenset({3}),
         scheme=Scheme("detect, forces, velocity, then position", 1),
         customary_dt=1.0 / 600.0,
         roles=MappingProxyType({"default": "shipped"}),
-        precision="single",
-        apart=True,
-        abilities=frozenset({"moving half-space", "course", "capsule", "hull"}),
         quirks=(
-            Quirk(
-                "restitution is ignored: contacts are springs of 2.5 kN/m with dampers of 100 N s/m, whatever the mass",
-                "unchanged",
-                "ModelBuilder.ShapeConfig, restitution, ke, kd",
-            ),
+            shapes.spring_quirk("unchanged"),
             Quirk(
                 "forces of contacts are not reported",
                 "impulses are not stated (NaN)",

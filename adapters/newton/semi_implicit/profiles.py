@@ -11,7 +11,7 @@ from types import MappingProxyType
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.newton.shipped import DAMPING, GAP, STIFFNESS
+from adapters.newton import shapes
 
 #: Slope of friction over the slip [N s/m]. [`ModelBuilder.ShapeConfig`, kf]
 SLOPE = 1000.0
@@ -19,24 +19,22 @@ SLOPE = 1000.0
 SPIN_DAMPING = 0.05
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
-        "stiffness": settings.number(1e-6, 1e12),
-        "damping": settings.number(0.0, 1e12),
+        **shapes.SPRING_KINDS,
         "slope": settings.number(0.0, 1e12),
         "spin_damping": settings.number(0.0, 1e3),
-        "gap": settings.number(0.0, 1e9),
+        **shapes.KINDS,
     }
 )
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
     """As constructed; the step bounds stiffness and damping for a given mass, which a profile does not know."""
-    said, shape = "as shipped", "ModelBuilder.ShapeConfig"
+    said = "as shipped"
     return [
-        Setting("stiffness", STIFFNESS, f"{said}: of a contact [N/m]", f"{shape}, ke"),
-        Setting("damping", DAMPING, f"{said}: of a contact that closes [N s/m]", f"{shape}, kd"),
-        Setting("slope", SLOPE, f"{said}: friction over slip below the cone [N s/m]", f"{shape}, kf"),
+        *shapes.SPRINGS_AS_SHIPPED,
+        Setting("slope", SLOPE, f"{said}: friction over slip below the cone [N s/m]", f"{shapes.SHAPE}, kf"),
         Setting("spin_damping", SPIN_DAMPING, f"{said}: of spins [1/s]", "SolverSemiImplicit, angular_damping"),
-        Setting("gap", GAP, f"{said}: contacts are sought within it, of each shape [m]", "ModelBuilder.rigid_gap"),
+        shapes.GAP_AS_SHIPPED,
     ]
 
 

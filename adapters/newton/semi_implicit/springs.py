@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from adapters.engine import Declared
+from adapters.newton.shapes import SPRING_REBOUND
 from adapters.receipts.probes import REBOUND_MASS, REBOUND_SPEED, REBOUND_TIME
 
 #: Phases of a step at which a ball may reach the floor.
@@ -29,5 +30,4 @@ def declared(stiffness: float, damping: float, dt: float, left: float) -> Declar
     ratios = [rebound(stiffness, damping, dt, (k + 0.5) / PHASES) for k in range(PHASES)]
     steepest = max(abs(x - y) for x, y in pairwise(ratios))
     half = 0.5 * (max(ratios) - min(ratios)) + steepest + left
-    because = "spring and damper: the rebound depends on mass and step, not on e"
-    return Declared(0.5 * (max(ratios) + min(ratios)), half, because)
+    return Declared(0.5 * (max(ratios) + min(ratios)), half, SPRING_REBOUND)

@@ -5,13 +5,15 @@ step:  detect  ->  x + v dt + g dt^2  ->  n sweeps: each body to the minimum of 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, final
 
-from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
+from adapters.engine import Declared, Expected, Quirk, Scheme
 from adapters.law.single_precision import UNIT
 from adapters.needs import Needs
-from adapters.newton.family import NewtonFamily
+from adapters.newton import shapes
+from adapters.newton.family import FACTS, NewtonFamily
 from adapters.newton.simulation import NewtonSimulation
 from adapters.newton.vbd.profiles import KINDS, PROFILES
 from adapters.receipts import FRICTION_SHARE
@@ -49,23 +51,15 @@ class VbdSimulation(NewtonSimulation):
 class VbdEngine(NewtonFamily):
     """Spatial engine; see the module's docstring for its step."""
 
-    facts = EngineFacts(
+    facts = replace(
+        FACTS,
         name="newton_vbd",
         title="VBD (Newton)",
-        package="newton",
-        dimensions=frozenset({3}),
         scheme=Scheme("detect, an implicit step, velocities from positions", 1),
         customary_dt=1.0 / 600.0,
         roles=MappingProxyType({"default": "shipped", "tuned": "tuned"}),
-        precision="single",
-        apart=True,
-        abilities=frozenset({"moving half-space", "course", "capsule", "hull"}),
         quirks=(
-            Quirk(
-                "restitution is ignored: contacts are springs of 2.5 kN/m with dampers of 100 N s/m, whatever the mass",
-                "unchanged; `tuned` has stiffer ones",
-                "ModelBuilder.ShapeConfig, restitution, ke, kd",
-            ),
+            shapes.spring_quirk("unchanged; `tuned` has stiffer ones"),
             Quirk(
                 "forces of contacts are those after the last sweep: in a blow 2.8 N s where it gives 1.9 N s",
                 "impulses are not stated (NaN)",
@@ -108,6 +102,5 @@ class VbdEngine(NewtonFamily):
             half, why = 0.5 * needs.friction, "a soft contact throws a sliding box up, and it slides less"
             told["friction"] = Declared(half, half + FRICTION_SHARE * needs.friction + self.facts.round_off, why)
         if needs.regime == "impact":
-            why = "spring and damper: the rebound depends on mass and step, not on e"
-            told["restitution"] = Declared(0.5, 0.5 + self.facts.round_off, why)
+            told["restitution"] = Declared(0.5, 0.5 + self.facts.round_off, shapes.SPRING_REBOUND)
         return told

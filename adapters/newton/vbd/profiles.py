@@ -12,7 +12,7 @@ from types import MappingProxyType
 from adapters import settings
 from adapters.engine import ProfileRule, Setting
 from adapters.needs import Needs
-from adapters.newton.shipped import DAMPING, GAP, STIFFNESS
+from adapters.newton import shapes
 
 #: Sweeps over bodies. [`SolverVBD`, iterations]
 ITERATIONS, TUNED_ITERATIONS = 10, 100
@@ -21,21 +21,18 @@ TUNED_STIFFNESS = 1e7
 KINDS: Mapping[str, settings.Check] = MappingProxyType(
     {
         "iterations": settings.whole(1, 100_000),
-        "stiffness": settings.number(1e-6, 1e12),
-        "damping": settings.number(0.0, 1e12),
-        "gap": settings.number(0.0, 1e9),
+        **shapes.SPRING_KINDS,
+        **shapes.KINDS,
     }
 )
 
 
 def default_profile(needs: Needs, dt: float) -> list[Setting]:
     """As constructed."""
-    said, shape = "as shipped", "ModelBuilder.ShapeConfig"
     return [
-        Setting("iterations", ITERATIONS, f"{said}: sweeps over all bodies", "SolverVBD, iterations"),
-        Setting("stiffness", STIFFNESS, f"{said}: of a contact [N/m]", f"{shape}, ke"),
-        Setting("damping", DAMPING, f"{said}: of a contact that closes [N s/m]", f"{shape}, kd"),
-        Setting("gap", GAP, f"{said}: contacts are sought within it, of each shape [m]", "ModelBuilder.rigid_gap"),
+        Setting("iterations", ITERATIONS, "as shipped: sweeps over all bodies", "SolverVBD, iterations"),
+        *shapes.SPRINGS_AS_SHIPPED,
+        shapes.GAP_AS_SHIPPED,
     ]
 
 
