@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import FLOOR, driven, measured_of
+from driven import FLOOR, driven, measured_of, struck
 
 from adapters.conformance import items
 from adapters.engine import EngineError
@@ -35,11 +35,6 @@ BOX = Body("box", Box((0.5, 0.5, 0.25)), 3.0, (0.3125, 0.3125, 0.5), (0.0, 0.0, 
 
 def resting(mu=0.5, duration=0.25, **changes):
     return Scene("rest", 1, 3, (FLOOR, replace(BOX, **changes)), (Pair(friction=mu),), (0.0, 0.0, -9.81), duration)
-
-
-def struck(e, speed, gap, steps=12):
-    ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5 + gap, *UPRIGHT), (0, 0, -speed, 0, 0, 0))
-    return Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e),), (0.0, 0.0, 0.0), steps * DT)
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)

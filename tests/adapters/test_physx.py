@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven import FLOOR, driven, resting
+from driven import FLOOR, driven, resting, struck
 
 from adapters.conformance import items
 from adapters.engine import EngineError
@@ -24,11 +24,6 @@ ENGINE = PhysxEngine()
 DT = 1.0 / 240.0
 settings, drive = driven(ENGINE, "default")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-
-
-def struck(e, speed, gap, mu=0.0, slip=0.0, steps=12):
-    ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5 + gap, *UPRIGHT), (slip, 0, -speed, 0, 0, 0))
-    return Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=e, friction=mu),), (0.0, 0.0, 0.0), steps * DT)
 
 
 @pytest.mark.parametrize("item", items(ENGINE), ids=str)
