@@ -64,8 +64,8 @@ class Compared:
     because
         Why there is no comparison, or how the port ended.
     proof
-        Settings of both with which the motions are the same: to the end, or beyond the time at which they differ, with a
-        fourth (`SHARE`) of the distance at most.
+        Settings of both with which the motions are the same: to the end, or beyond the time at which they differ, with
+        a fourth (`SHARE`) of the distance at most.
     """
 
     slot: Slot
