@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
-Scheme = Literal["fixed", "located", "midpoint", "exact"]
+Scheme = Literal["fixed", "located", "midpoint"]
 
 #: Difference of both orders of a phase, as a share of the motion in it: mostly 50 to 1000 times the error that is made.
 ACCURACY = 1e-8
@@ -51,11 +51,12 @@ class Settings:
     scheme
         ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
         steps are cut where bodies meet and where a slide ends (E19 to E24). ``midpoint``: located impacts, and phases
-        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28). ``exact``: the loop
-        of events of `reference_solver.exact`, in which ``dt`` only says when to look.
+        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28).
     accuracy
-        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35);
-        with ``exact`` the tolerance of the Runge-Kutta method there.
+        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35).
+    tolerance
+        The loop of events (`reference_solver.exact`), in which ``dt`` only says when to look: error that a step of the
+        Runge-Kutta method may make where contacts turn, as a share of the motion in it. None: steps of length ``dt``.
 
     Raises
     ------
@@ -77,6 +78,7 @@ class Settings:
     direct: bool = True
     scheme: Scheme = "fixed"
     accuracy: float = ACCURACY
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         _require("dt", self.dt, math.isfinite(self.dt) and self.dt > 0.0, "a positive, finite time")
@@ -97,11 +99,13 @@ class Settings:
             _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
         _require("accuracy", self.accuracy, 1e-12 <= self.accuracy <= 1e-4, "in [1e-12, 1e-4]")
+        share = self.tolerance
+        _require("tolerance", share, share is None or 1e-12 <= share <= 1e-4, "None or in [1e-12, 1e-4]")
 
     @property
     def is_textbook(self) -> bool:
         """Whether a step makes a fixed number of sweeps, row by row."""
-        return self.scheme == "fixed" and self.solver == "scalar" and self.residual is None
+        return self.tolerance is None and self.scheme == "fixed" and self.solver == "scalar" and self.residual is None
 
     @classmethod
     def classical(cls, dt: float, iterations: int = 10, pull: float = 9.81) -> Settings:
@@ -125,18 +129,18 @@ class Settings:
         )
 
     @classmethod
-    def reference(cls, dt: float) -> Settings:
+    def reference(cls, dt: float, tolerance: float = TOLERANCE) -> Settings:
+        """Return the loop of events; ``dt`` only says when to look."""
+        return cls(dt=dt, tolerance=tolerance)
+
+    @classmethod
+    def located(cls, dt: float) -> Settings:
         """Return contact problems solved to round-off, in steps that are cut where bodies meet and slides end."""
         return replace(cls.fixed_step(dt), scheme="located")
 
     @classmethod
-    def exact(cls, dt: float, tolerance: float = TOLERANCE) -> Settings:
-        """Return the loop of events, which will be `reference`; ``dt`` only says when to look."""
-        return replace(cls.fixed_step(dt), scheme="exact", accuracy=tolerance)
-
-    @classmethod
     def fixed_step(cls, dt: float) -> Settings:
-        """Return `reference` without located events: one discrete contact problem per step, solved to round-off."""
+        """Return one discrete contact problem per step, solved to round-off."""
         return cls(
             dt=dt,
             solver="block",  # scalar rows stall on two-point manifolds at 1e-4

@@ -85,8 +85,10 @@ class Simulation:
         self.model = model
         self.settings = settings
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
-        package = import_module(EVENT_LOOP if settings.scheme == "exact" else WORLDS[model.dimension])
-        self._certified = certified or settings.residual is not None or settings.scheme != "fixed"
+        package = import_module(WORLDS[model.dimension] if settings.tolerance is None else EVENT_LOOP)
+        self._certified = (
+            certified or settings.residual is not None or settings.scheme != "fixed" or settings.tolerance is not None
+        )
         self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0
 

@@ -174,8 +174,9 @@ class ReferenceEngine(Engine):
         """See `Engine.at_other_tolerances`: steps of the event loop only say when it is looked at."""
         from reference_solver.certificate.truth import TOLERANCES
 
-        shares = TOLERANCES if settings["scheme"] == "exact" else ()
-        return [{**settings, "accuracy": share * settings["accuracy"]} for share in shares]
+        if settings.get("tolerance") is None:
+            return []
+        return [{**settings, "tolerance": share * settings["tolerance"]} for share in TOLERANCES]
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Friction of a rebounding box in 3-D with fixed sweeps; all else is exact in both profiles.
@@ -187,8 +188,11 @@ class ReferenceEngine(Engine):
         sweeps it is 0.02 to 0.24 of the share below at e = 1, 1/30 and 1/60 s, and round-off at smaller steps; in 2-D,
         at e = 0, and with twenty sweeps (tried at mu = 0.3) round-off as well.
         """
-        fixed = {setting.name: setting.value for setting in self.settings(profile, needs, dt)}["residual"] is None
-        if not fixed or needs.dimension == 2 or not needs.restitution > 0.0 < needs.friction:
+        if (
+            self.facts.roles[profile] == "solution"
+            or needs.dimension == 2
+            or not needs.restitution > 0.0 < needs.friction
+        ):
             return {}
         load = slide_load(needs.friction)
         slowest = slide_speed(needs.friction) - needs.friction * load * SLIDE_TIME

@@ -1,14 +1,13 @@
 """Profiles of our own solver: its settings and their reasons.
 
 classical   a fixed number of sweeps, as in textbooks
-reference   the same contact equations solved to a residual and certified, in steps that are cut where bodies meet
-and where slides end
+reference   the loop of events: motion in closed form, or to a tolerance, from one event to the next, and certified
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -33,10 +32,8 @@ REASONS = {
     "does not stall",
     "direct": "where sweeps converge slowly (mass ratios, tall columns) Newton's method completes the step; it needs a "
     "residual stop, and is not used with fixed sweeps",
-    "scheme": "fixed: an impact is found at the start of the next step, as in engines; located: a step is "
-    "divided where bodies meet and where a slide ends",
-    "accuracy": "difference between the two orders of integration of a phase with turning contacts, as a share of its "
-    "motion; mostly 50 to 1000 times the true error (E35)",
+    "tolerance": "the loop of events: error that a step may make where contacts turn, as a share of the motion in it; "
+    "all other motion is exact to round-off",
     "margin": "pairs with e = 0 are in contact within this share of the smallest half width, and close by at most the "
     "gap; pairs with e > 0 only where they touch, so that no body is slowed before its impact",
 }
@@ -46,21 +43,21 @@ def classical_profile(needs: Needs, dt: float) -> list[Setting]:
     """Fixed sweeps."""
     from reference_solver import Settings
 
-    return _as_settings(Settings.classical(dt, pull=needs.pull))
+    return _as_settings(Settings.classical(dt, pull=needs.pull), set(REASONS) - {"tolerance"})
 
 
 def reference_profile(needs: Needs, dt: float) -> list[Setting]:
-    """Residual stop; there is no iteration count to replace."""
+    """A tolerance: nothing else acts on the loop of events."""
     from reference_solver import Settings
 
-    return [s for s in _as_settings(Settings.reference(dt)) if s.name != "iterations"]
+    return _as_settings(Settings.reference(dt), {"tolerance"})
 
 
-def _as_settings(chosen: Any) -> list[Setting]:
+def _as_settings(chosen: Any, names: Collection[str]) -> list[Setting]:
     return [
         Setting(field.name, getattr(chosen, field.name), REASONS[field.name], SOURCE)
         for field in fields(chosen)
-        if field.name != "dt"
+        if field.name in names
     ]
 
 
@@ -78,8 +75,7 @@ KINDS: Mapping[str, Check] = MappingProxyType(
         "solver": word("scalar", "block"),
         "margin": number(0.0, 0.1),
         "direct": flag,
-        "scheme": word("fixed", "located", "midpoint"),
-        "accuracy": number(1e-12, 1e-4),
+        "tolerance": number(1e-12, 1e-4),
     }
 )
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"classical": classical_profile, "reference": reference_profile})

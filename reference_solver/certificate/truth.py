@@ -221,7 +221,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
-    findings = [*audit(model, record, settings.dt, located=settings.scheme in ("located", "exact")), shared]
+    findings = [
+        *audit(model, record, settings.dt, located=settings.scheme == "located" or settings.tolerance is not None),
+        shared,
+    ]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
@@ -235,7 +238,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
     joint = np.zeros(len(record.t))
-    if settings.scheme == "exact":
+    if by_events:
         joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
@@ -275,7 +278,7 @@ def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: st
 def _poses(model: Model, settings: Settings, steps: int, stride: int) -> Array:
     """Return poses (s, n, 3 | 7) of a run, no numbers from where the event loop refuses it."""
     simulation = Simulation(model, settings)
-    if settings.scheme != "exact":
+    if settings.tolerance is None:
         return simulation.record(steps, stride).pose
     found = np.full((steps // stride + 1, *simulation.pose.shape), np.nan)
     found[0] = simulation.pose
@@ -362,8 +365,8 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
 def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
     """Bound (s,) of what the record of ``run`` is off for its finite step [m]; the largest so far."""
     settings = run.settings
-    if settings.scheme == "exact":
-        return _error_of_loop(model, settings, record, steps, stride)
+    if settings.tolerance is not None:
+        return _error_of_loop(model, settings, settings.tolerance, record, steps, stride)
     half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
     error = 2.0 * distance(model, record.pose, half.pose)
     samples = len(record.t) - 1
@@ -390,11 +393,13 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     return _with_ends(model, record, settings.dt, error)
 
 
-def _error_of_loop(model: Model, settings: Settings, record: Record, steps: int, stride: int) -> Array:
+def _error_of_loop(
+    model: Model, settings: Settings, tolerance: float, record: Record, steps: int, stride: int
+) -> Array:
     """Bound (s,) of what a run of the event loop is off for its tolerance [m]: steps say only when it is looked at."""
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
     for share in TOLERANCES:  # bodies that nothing touches may turn as well
-        other = _poses(model, replace(settings, accuracy=share * settings.accuracy), steps, stride)
+        other = _poses(model, replace(settings, tolerance=share * tolerance), steps, stride)
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))
     return _with_ends(model, record, settings.dt, error)
 

@@ -31,7 +31,8 @@ class World:
     def __init__(self, model: Model, settings: Settings, needs: Needs, certified: bool = True) -> None:
         self._dt, self._steps = settings.dt, 0
         world, state = world_of(model), start_of(model)
-        self._loop = Loop(world, state, settings.accuracy, LONGEST * world.time)
+        assert settings.tolerance is not None
+        self._loop = Loop(world, state, settings.tolerance, LONGEST * world.time)
         self._recorder = Recorder(world)
         self._part: Part | None = None  # up to where the world was looked at
         self._parts: list[Part | Blow] = []  # what happened in the last step
@@ -97,4 +98,4 @@ class World:
         ------
         ValueError
         """
-        raise ValueError("scheme: the event loop has no problem of one step; use Settings.fixed_step")
+        raise ValueError("tolerance: the event loop has no problem of one step; use Settings.fixed_step")

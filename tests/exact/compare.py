@@ -25,6 +25,7 @@ from reference_solver import Settings, Simulation
 from reference_solver.certificate.relations import Change
 from reference_solver.certificate.truth import distance
 from reference_solver.exact import Refused
+from reference_solver.settings import TOLERANCE
 
 #: Coarser tolerance with which the loop is run again: twice the difference bounds the error of the finer run if that
 #: of the coarser one is half as large again.
@@ -67,7 +68,7 @@ class Verdict:
 
 def poses(world: World, tolerance: float | None = None) -> tuple[np.ndarray, str]:
     """Return poses (s, n, 3 | 7) as far as the loop has them, and why it has no more."""
-    settings = Settings.exact(world.dt) if tolerance is None else Settings.exact(world.dt, tolerance)
+    settings = Settings.reference(world.dt) if tolerance is None else Settings.reference(world.dt, tolerance)
     simulation = Simulation(world.model, settings)
     found, why = [simulation.pose], ""
     try:
@@ -90,7 +91,7 @@ def compared(known: Answer, limit: float, change: Change | None = None) -> Verdi
         with limited(limit):
             found, why = poses(world)
             cpu = time.process_time() - begin
-            coarser, _ = poses(world, COARSER * Settings.exact(world.dt).accuracy)
+            coarser, _ = poses(world, COARSER * TOLERANCE)
     except Late:
         return Verdict(known.key, "late", np.nan, np.nan, limit, f"after {limit:g} s")
     except Exception as error:  # what is no refusal is a fault of the loop

@@ -16,9 +16,9 @@ import numpy as np
 from compare import COARSER, Late, limited, poses
 from oracle import World
 
-from reference_solver import Settings
 from reference_solver.certificate.truth import distance
 from reference_solver.exact import Refused
+from reference_solver.settings import TOLERANCE
 from tests.verification.known.gates import MOTIONS, SEEDS
 from tests.verification.known.motion import TRUTH, Motion, off
 
@@ -29,7 +29,7 @@ def held(motion: Motion) -> tuple[str, str]:
     found, why = poses(world)
     if why:
         return "refused", why
-    coarser, why = poses(world, COARSER * Settings.exact(world.dt).accuracy)
+    coarser, why = poses(world, COARSER * TOLERANCE)
     if why:
         return "refused", f"at a coarser tolerance: {why}"
     miss = off(motion, found[-1])

@@ -58,7 +58,7 @@ class Posed(ReferenceSimulation):
 
 def exact_profile(needs: Any, dt: float) -> list[Setting]:
     """Settings of the loop."""
-    settings = vars(Settings.exact(dt))
+    settings = vars(Settings.reference(dt))
     return [Setting(k, v, REASONS[k], SOURCE) for k, v in settings.items() if k not in ("dt", "iterations")]
 
 

@@ -34,7 +34,7 @@ def test_random_world_is_the_same_within_both_bounds(key):
 def test_certificate_of_small_gaps_and_low_rebounds(seed):
     """Without care a gap that is nearly closed is struck with others, and a low rebound without end or too late."""
     known, world = ANSWERS[f"fuzz2 {seed}"], world_of(f"fuzz2 {seed}")
-    found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
+    found = certify(world.model, Settings.reference(world.dt), world.samples * world.stride, world.stride)
     assert found.holds, found.reasons
     assert (distance(world.model, found.pose, np.array(known.pose)) <= found.error + known.error)[
         found.t < found.horizon
@@ -63,7 +63,7 @@ def test_contacts_that_sweeps_over_them_do_not_solve(key):
 def test_first_step_that_leads_beyond_all_numbers():
     """A light capsule is squeezed out from under a heavy ball, without friction: momentum along the floor stays."""
     world = world_of("fuzz3 1018")
-    simulation = Simulation(world.model, Settings.exact(world.dt))
+    simulation = Simulation(world.model, Settings.reference(world.dt))
     mass = np.array([body.mass for body in world.model.bodies])
     before = mass @ simulation.twist[:, :2]
     simulation.advance(world.samples * world.stride)

@@ -44,7 +44,7 @@ def box(d, half, place, velocity=None, mass=1.0):
 
 
 def record(model, time, stride=1):
-    return Simulation(model, Settings.exact(DT)).record(round(time / DT), stride)
+    return Simulation(model, Settings.reference(DT)).record(round(time / DT), stride)
 
 
 def height_of_bounce(t, height, e):
@@ -74,7 +74,7 @@ def test_time_of_all_rebounds(d, e):
     """They are over at (1 + e) / (1 - e) sqrt(2 h / g)."""
     model = Model(d, [ground(d), ball(d, up(d, 1.5))], up(d, -G), e, 0.0)
     last = (1.0 + e) / (1.0 - e) * math.sqrt(2.0 / G)
-    pieces = Simulation(model, Settings.exact(DT)).record(math.ceil(last / DT), pieces=True).pieces
+    pieces = Simulation(model, Settings.reference(DT)).record(math.ceil(last / DT), pieces=True).pieces
     (end,) = np.flatnonzero(pieces.scheme == ROCKING)
     assert abs(pieces.begin[end] + pieces.length[end] - last) < 1e-12
 
@@ -133,7 +133,7 @@ def test_collision_count_of_two_balls_and_a_wall_as_pi(d):
     wall = Body(HalfSpace((1.0,) + (0.0,) * (d - 1)), motion="fixed", pose=(*(0.0,) * d, *UPRIGHT[d]))
     aside = (0.0,) * (d - 1)
     light, heavy = ball(d, (1.0, *aside)), ball(d, (3.0, *aside), (-1.0, *aside), 100.0)
-    simulation = Simulation(Model(d, [wall, light, heavy], (0.0,) * d, 1.0, 0.0), Settings.exact(DT))
+    simulation = Simulation(Model(d, [wall, light, heavy], (0.0,) * d, 1.0, 0.0), Settings.reference(DT))
     found = simulation.record(960)
     velocity = found.twist[:, 1:, 0]
     assert simulation._world._loop.pieces == 31 + 1  # every blow ends a piece
@@ -207,7 +207,7 @@ def test_rebound_of_a_rod_beside_a_negligible_one(slow):
     left, right = 2.0 * blow + slow, -fast
     twist = (0.0, 0.5 * (left + right), 0.5 * (right - left) / half)
     rod = Body(Capsule(half, radius), 1.0, half**2 / 3.0, (0.0, radius, 0.0), twist)
-    simulation = Simulation(Model(2, [ground(2), rod], (0.0, -G), e, 0.0), Settings.exact(short))
+    simulation = Simulation(Model(2, [ground(2), rod], (0.0, -G), e, 0.0), Settings.reference(short))
     simulation.advance(1)
     speed, spin = simulation.twist[1, 1:]
     assert abs(speed - half * spin) < SMALL

@@ -19,7 +19,7 @@ def falling_box_and_disc():
 
 
 def looked_at(dt, *parts):
-    simulation = Simulation(falling_box_and_disc(), Settings.exact(dt))
+    simulation = Simulation(falling_box_and_disc(), Settings.reference(dt))
     for steps in parts:
         simulation.advance(steps)
     return simulation.pose, simulation.twist
@@ -40,7 +40,7 @@ def test_run_with_another_dt_has_the_same_bits(steps):
 
 
 def test_copy_goes_on_with_the_same_bits():
-    simulation = Simulation(falling_box_and_disc(), Settings.exact(1 / 240))
+    simulation = Simulation(falling_box_and_disc(), Settings.reference(1 / 240))
     simulation.advance(100)
     other = copy.copy(simulation)
     other.advance(140)
@@ -53,7 +53,7 @@ def test_tolerance_as_change_of_an_answer():
     """A rod falls over on its round end, without an event: coarser tolerances differ by more."""
     rod = Body(Capsule(0.4, 0.1), 1.0, 0.06, (0.0, 0.1 + 0.4 * np.sin(1.4), 1.4))
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), rod], (0.0, -G), 0.0, 3.0)
-    settings = [Settings.exact(1 / 240, tolerance) for tolerance in (1e-12, 1e-10, 3e-9)]
+    settings = [Settings.reference(1 / 240, tolerance) for tolerance in (1e-12, 1e-10, 3e-9)]
     runs = [Simulation(model, each).record(120).pose for each in settings]
     near, far = (np.abs(run - runs[0]).max() for run in runs[1:])
     assert 0.0 < near < far < 1e-4
@@ -61,4 +61,4 @@ def test_tolerance_as_change_of_an_answer():
 
 def test_no_problem_of_a_step():
     with pytest.raises(ValueError, match="fixed_step"):
-        Simulation(falling_box_and_disc(), Settings.exact(1 / 240)).step_problem()
+        Simulation(falling_box_and_disc(), Settings.reference(1 / 240)).step_problem()

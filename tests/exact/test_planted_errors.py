@@ -187,9 +187,9 @@ PLANTED = {
 @pytest.mark.parametrize("name", PLANTED)
 def test_planted_error_is_seen_or_covered(name, monkeypatch):
     model, plant = PLANTED[name]
-    truth = Simulation(model, Settings.exact(DT, 1e-12)).record(100).pose
+    truth = Simulation(model, Settings.reference(DT, 1e-12)).record(100).pose
     plant(monkeypatch)
-    found = certify(model, Settings.exact(DT), 100)
+    found = certify(model, Settings.reference(DT), 100)
     if found.holds:
         within = found.t < found.horizon
         assert (distance(model, found.pose, truth) <= found.error)[within].all()
@@ -198,7 +198,7 @@ def test_planted_error_is_seen_or_covered(name, monkeypatch):
 @pytest.mark.parametrize("model", [BOUNCE, LANDS, SLIDES, FALLS, HILL, TABLE, TURNS])
 def test_run_without_error_is_certified(model):
     """Errors are seen: what they are planted in is certified, to less than they are."""
-    found = certify(model, Settings.exact(DT), 100)
+    found = certify(model, Settings.reference(DT), 100)
     assert found.holds, found.reasons
     assert found.error[-1] < 1e-9
 
@@ -215,8 +215,8 @@ def test_gap_of_a_joint_blow(small, pull, gap):
     disc = Body(Disc(0.5), 1.0, 0.125, (0.5987 + gap, 0.5987, 0.0), (-1.0, -1.0, 0.0))
     other = Body(Disc(small), 1.0, 0.5 * small**2, (3.0, 3.0, 0.0))
     both, alone = (Model(2, [*those, other, disc], (-pull, -pull), 0.5, 0.0) for those in ([FLOOR, wall], [wall]))
-    found = certify(both, Settings.exact(DT), 48)
-    truth = Simulation(alone, Settings.exact(DT)).record(48).pose[:, -1, 0]
+    found = certify(both, Settings.reference(DT), 48)
+    truth = Simulation(alone, Settings.reference(DT)).record(48).pose[:, -1, 0]
     assert found.holds, found.reasons
     off = np.abs(found.pose[:, -1, 0] - truth)
     is_none = gap < 5e-14  # a ten-trillionth of the radius
@@ -228,8 +228,8 @@ def test_refused_run_has_no_certificate():
     roof = Body(HalfSpace((0.0, -1.0), -0.5), motion="prescribed", twist=(0.0, -1.0, 0.0))
     model = Model(2, [FLOOR, roof, Body(Disc(0.2), 1.0, 0.02, (0.0, 0.25, 0.0))], (0.0, -G), 0.0, 0.0)
     with pytest.raises(Refused):
-        Simulation(model, Settings.exact(DT)).advance(240)
-    found = certify(model, Settings.exact(DT), 240)
+        Simulation(model, Settings.reference(DT)).advance(240)
+    found = certify(model, Settings.reference(DT), 240)
     assert not found.holds and "crushed" in found.reasons[0] and np.isinf(found.error).all()
 
 
@@ -238,7 +238,7 @@ def test_corruptions_of_the_self_test_are_seen():
     asked = [each for each in self_test.CORRUPTIONS if each.name not in NOT_OF_THE_LOOP]
     missed = []
     for each in asked:
-        scene = replace(self_test.SCENES[each.scene], settings=Settings.exact(DT))
+        scene = replace(self_test.SCENES[each.scene], settings=Settings.reference(DT))
         if not self_test.seen_by(*each.plant(scene, self_test.JUDGED)):
             missed.append(each.name)
     assert len(asked) > 70 and not missed

@@ -25,9 +25,9 @@ def test_random_splits_have_the_bits_of_the_whole(key, seed):
     """Whatever parts a run is made in, recorded or not, on a copy or not."""
     world, random = world_of(key), np.random.default_rng(seed)
     steps = world.samples * world.stride
-    whole = Simulation(world.model, Settings.exact(world.dt))
+    whole = Simulation(world.model, Settings.reference(world.dt))
     whole.advance(steps)
-    simulation, left = Simulation(world.model, Settings.exact(world.dt)), steps
+    simulation, left = Simulation(world.model, Settings.reference(world.dt)), steps
     while left:
         part = int(random.integers(1, left + 1))
         if random.random() < 0.5:
@@ -43,8 +43,8 @@ def test_random_splits_have_the_bits_of_the_whole(key, seed):
 def test_record_in_parts_has_the_pieces_of_the_whole(key):
     world = world_of(key)
     steps = world.samples * world.stride
-    whole = Simulation(world.model, Settings.exact(world.dt)).record(steps, pieces=True)
-    simulation = Simulation(world.model, Settings.exact(world.dt))
+    whole = Simulation(world.model, Settings.reference(world.dt)).record(steps, pieces=True)
+    simulation = Simulation(world.model, Settings.reference(world.dt))
     parts = [simulation.record(each, pieces=True) for each in (steps // 3, steps - steps // 3)]
     for name in ("impulse", "moment", "point", "pose_after", "twist_after", "body", "body_a", "feature"):
         joined = np.concatenate([getattr(part.pieces, name) for part in parts])
@@ -55,7 +55,7 @@ def test_contacts_carry_the_weight_of_a_step():
     """Two boxes that rest on each other: corners carry their weights, and friction nothing."""
     bodies = [Body(Box((0.5, 0.5)), 2.0, 1 / 3, (0.0, 0.5 + i, 0.0)) for i in range(2)]
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), *bodies], (0.0, -G), 0.0, 0.5)
-    simulation = Simulation(model, Settings.exact(DT))
+    simulation = Simulation(model, Settings.reference(DT))
     simulation.advance(10)
     found = simulation.contacts()
     for pair, weight in (((0, 1), 4.0 * G), ((1, 2), 2.0 * G)):
@@ -68,7 +68,7 @@ def test_contacts_of_a_step_with_a_blow():
     """A disc that lands and stays: the blow and what holds it afterwards are one contact."""
     disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5 + 0.5 * G * (2.5 * DT) ** 2, 0.0))
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), disc], (0.0, -G), 0.0, 0.5)
-    record = Simulation(model, Settings.exact(DT)).record(4, contacts=True)
+    record = Simulation(model, Settings.reference(DT)).record(4, contacts=True)
     assert np.diff(record.offset).tolist() == [0, 0, 0, 1, 1]
     assert record.contacts.impulse[:, 1] == pytest.approx([3.0 * G * DT, G * DT], rel=1e-12)
 
@@ -78,7 +78,7 @@ def test_record_of_bodies_that_a_belt_moves():
     belt = Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(1.0, 0.0, 0.0))
     boxes = [Body(Box((0.5, 0.5)), 1.0, 1 / 6, (2.0 * i, 0.5, 0.0)) for i in range(2)]
     model = Model(2, [belt, *boxes], (0.0, -G), 0.0, 0.5)
-    pieces = Simulation(model, Settings.exact(DT)).record(10, pieces=True).pieces
+    pieces = Simulation(model, Settings.reference(DT)).record(10, pieces=True).pieces
     begin = np.repeat(pieces.begin, np.diff(pieces.first_body))
     own = pieces.body == 0
     assert own.sum() == len(pieces) == 20
@@ -89,7 +89,7 @@ def test_record_of_bodies_that_a_belt_moves():
 def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
     """Last places of speeds are an impact beside a corner that slides, or parts, a million million times as fast."""
     world = world_of(key)
-    found = certify(world.model, Settings.exact(world.dt), world.samples * world.stride, world.stride)
+    found = certify(world.model, Settings.reference(world.dt), world.samples * world.stride, world.stride)
     assert found.holds and np.isinf(found.horizon)
 
 
@@ -100,7 +100,7 @@ def test_impulses_that_moved_the_bodies(key):
     A step that an event cuts short has the impulses of its part.
     """
     world = world_of(key)
-    record = Simulation(world.model, Settings.exact(world.dt)).record(
+    record = Simulation(world.model, Settings.reference(world.dt)).record(
         world.samples * world.stride, world.stride, pieces=True
     )
     found = {finding.name: finding for finding in audit(world.model, record, world.dt)}
@@ -110,20 +110,20 @@ def test_impulses_that_moved_the_bodies(key):
 def test_tolerance_that_slips_reach_but_for_round_off():
     """The iteration of an implicit step ends where round-off is all that still changes."""
     world = world_of("fuzz3 35")
-    Simulation(world.model, Settings.exact(world.dt, 1e-12)).advance(round(0.24 / world.dt))
+    Simulation(world.model, Settings.reference(world.dt, 1e-12)).advance(round(0.24 / world.dt))
 
 
 def test_rebounds_that_coordinates_do_not_resolve():
     """Far from the origin a capsule rebounds by a unit in the last place of where it is, and comes to rest."""
     world = world_of("fuzz3 45")
     model = away(world.model, 3000.0).model(world.model)
-    Simulation(model, Settings.exact(world.dt)).advance(round(0.04 / world.dt))
+    Simulation(model, Settings.reference(world.dt)).advance(round(0.04 / world.dt))
 
 
 def test_error_after_an_impact_within_round_off_of_a_sample():
     """The gap until that sample tells no acceleration."""
     ball = Body(Disc(0.5), 1.0, 0.125, (0.0, np.nextafter(0.75, 0.0), 0.0), (0.0, -1.0, 0.0))
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), ball], (0.0, 0.0), 1.0, 0.0)
-    found = certify(model, Settings.exact(1 / 64), 32)
+    found = certify(model, Settings.reference(1 / 64), 32)
     assert found.holds
     assert found.error.max() < 1e-12

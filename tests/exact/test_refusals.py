@@ -22,7 +22,7 @@ def ball(height, speed=0.0, mass=1.0, aside=0.0):
 
 
 def advance(bodies, e=0.5, mu=0.0, steps=240, gravity=G):
-    Simulation(Model(2, bodies, (0.0, -gravity), e, mu), Settings.exact(1 / 240)).advance(steps)
+    Simulation(Model(2, bodies, (0.0, -gravity), e, mu), Settings.reference(1 / 240)).advance(steps)
 
 
 def test_ball_between_closing_walls_is_crushed():
@@ -46,10 +46,10 @@ def test_edges_in_space_whose_meeting_is_missed(monkeypatch):
     across = np.sqrt(0.5) * np.array((half, side, side, half))  # turned by 45 degrees about x, then by 90 about z
     upper = Body(shape, 1.0, (0.1, 0.2, 0.2), (0.0, 0.0, 0.5, *across))
     model = Model(3, [lower, upper], (0.0, 0.0, -G), 0.0, 0.5)
-    Simulation(model, Settings.exact(1 / 240)).advance(120)
+    Simulation(model, Settings.reference(1 / 240)).advance(120)
     monkeypatch.setattr(events, "next_meeting", lambda *_: (NEVER, False))
     with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
-        Simulation(model, Settings.exact(1 / 240)).advance(120)
+        Simulation(model, Settings.reference(1 / 240)).advance(120)
 
 
 def test_impacts_of_an_instant_that_do_not_end(monkeypatch):
