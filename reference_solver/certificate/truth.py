@@ -221,10 +221,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
-    findings = [
-        *audit(model, record, settings.dt, located=settings.scheme == "located" or settings.tolerance is not None),
-        shared,
-    ]
+    by_events = settings.tolerance is not None
+    findings = [*audit(model, record, settings.dt, located=by_events or settings.scheme == "located"), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
