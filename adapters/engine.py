@@ -291,6 +291,8 @@ class Engine(ABC):
     releases: Releases | None = None
     #: Further settings that a user may change, by name, with a check of each (`adapters.settings`).
     kinds: Mapping[str, Callable[[Any], str]] = MappingProxyType({})
+    #: Settings that an earlier version had, by name, with what takes their place.
+    former: Mapping[str, str] = MappingProxyType({})
     #: Conformance checks that the engine is known to fail.
     expected: tuple[Expected, ...] = ()
     #: Writers of a run for the engine alone, by format (``crosscheck export --to``). The scene has a dimension of the
@@ -378,7 +380,7 @@ class Engine(ABC):
         return None
 
     def at_other_tolerances(self, settings: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-        """Settings of the same run to a finer and to a coarser tolerance; none if its error comes from its steps."""
+        """Settings of the run that `certify` certifies, to other tolerances: what differs there tells its error."""
         return []
 
     def kernels(self) -> Path | None:

@@ -1,7 +1,10 @@
-"""The adapter of our own sequential-impulse solver (`reference_solver`).
+"""The adapter of our own solver (`reference_solver`): time stepping as in textbooks, and the loop of events.
 
-    step:  detect at x  ->  sample u- = J v (before forces)  ->  v* = v + h M^-1 f  ->  sweep the contact rows
-           (target -e u-, accumulated clamping, Coulomb with the current total)  ->  x += h v  ->  split impulses
+    classical, a step:   detect at x  ->  sample u- = J v (before forces)  ->  v* = v + h M^-1 f  ->  sweep the contact
+                         rows (target -e u-, accumulated clamping, Coulomb with the current total)  ->  x += h v  ->
+                         split impulses
+    reference, a piece:  find what touches  ->  strike  ->  decide which contacts hold, stick and slip  ->  move to the
+                         next event
 
 The two profiles are in `adapters.reference.profiles`.
 """
@@ -13,7 +16,6 @@ import math
 import warnings
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import fields
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -30,7 +32,7 @@ from adapters.needs import Needs
 from adapters.plain import Notice
 from adapters.receipts import FRICTION_SHARE
 from adapters.receipts.probes import SLIDE_TIME, slide_load, slide_speed
-from adapters.reference.profiles import KINDS, PROFILES, SOURCE
+from adapters.reference.profiles import FORMER, KINDS, PROFILES, SOURCE, STEPS
 from adapters.reference.script import python
 from adapters.reference.simulation import ReferenceSimulation, json_ready, solver_model
 from adapters.reference.start import overlap_at_the_start, too_far_at_the_start
@@ -39,8 +41,8 @@ from adapters.scene.drives import as_moving
 
 #: Largest integer of a kernel.
 LARGEST = 2**63 - 1
-#: Steps divided at events, with constant accelerations between them.
-LOCATED = Scheme("detect, impacts, forces up to the next event, move; the rest of the step is the next part", 0)
+#: Steps only say when the world is looked at.
+BY_EVENTS = Scheme("find the next event, move to it, impacts, forces; whatever the step", 0)
 
 
 class ReferenceEngine(Engine):
@@ -48,7 +50,7 @@ class ReferenceEngine(Engine):
 
     facts = EngineFacts(
         name="reference",
-        title="Reference sequential-impulse solver",
+        title="Reference solver: textbook steps, and events",
         package="contact-crosscheck",
         dimensions=frozenset({2, 3}),
         scheme=Scheme("detect, sample restitution, forces, solve, position", 1),
@@ -56,7 +58,7 @@ class ReferenceEngine(Engine):
         roles=MappingProxyType({"classical": "textbook", "reference": "solution"}),
         colour="#3568ad",
         abilities=frozenset({"moving half-space", "turning half-space", "capsule", "polygon"}),
-        profile_schemes=MappingProxyType({"reference": LOCATED}),
+        profile_schemes=MappingProxyType({"reference": BY_EVENTS}),
         quirks=(
             Quirk(
                 "classical updates velocity before position: free fall from rest is ahead by g t dt / 2",
@@ -65,13 +67,13 @@ class ReferenceEngine(Engine):
             ),
             Quirk(
                 "classical detects contacts at the start of a step, so a bounce is late by up to v dt",
-                "unchanged: tolerances allow for a step; reference divides its steps at events",
+                "unchanged: tolerances allow for a step; reference finds the instant",
                 SOURCE,
             ),
         ),
     )
     profiles = PROFILES
-    kinds = KINDS
+    kinds, former = KINDS, FORMER
     exports = MappingProxyType({"python": python})
     #: 160 discs that settle take 79 ms a step, as long as a whole run of most scenes.
     most_bodies = 100
@@ -142,7 +144,7 @@ class ReferenceEngine(Engine):
         from reference_solver.certificate.truth import certify
 
         chosen = Settings(dt=dt, **settings)
-        if chosen.residual is None:
+        if chosen.tolerance is None:
             return None
         found = certify(solver_model(as_moving(scene)), chosen, steps)
         reasons = list(found.reasons)
@@ -171,11 +173,9 @@ class ReferenceEngine(Engine):
         }
 
     def at_other_tolerances(self, settings: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-        """See `Engine.at_other_tolerances`: steps of the event loop only say when it is looked at."""
+        """See `Engine.at_other_tolerances`: a tenth of the tolerance and ten times it."""
         from reference_solver.certificate.truth import TOLERANCES
 
-        if settings.get("tolerance") is None:
-            return []
         return [{**settings, "tolerance": share * settings["tolerance"]} for share in TOLERANCES]
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
@@ -266,16 +266,20 @@ def _checked(settings: Mapping[str, Any], dt: float) -> Any:
     Raises
     ------
     EngineError
-        For an unknown setting, or an integer beyond the range of a kernel.
+        For an unknown setting, one of another profile, or an integer beyond the range of a kernel.
     ValueError, TypeError, OverflowError
         For a value that it refuses.
     """
     from reference_solver import Settings
 
-    known = [field.name for field in fields(Settings) if field.name != "dt"]
+    by_events = "tolerance" in settings
+    if by_events and settings.keys() >= STEPS:
+        raise EngineError("tolerance: is of profile reference; classical makes steps, which have no such setting")
     for name, value in settings.items():
-        if name not in known:
-            raise EngineError(f"{name}: reference has no such setting, it has {', '.join(known)}")
+        if name not in KINDS:
+            raise EngineError(f"{name}: reference has no such setting, it has {', '.join(KINDS)}")
+        if by_events and name in STEPS:
+            raise EngineError(f"{name}: is of the steps of profile classical; profile reference has tolerance alone")
         if isinstance(value, int) and value > LARGEST:
             raise EngineError(f"{name}: is larger than {LARGEST}, the largest integer of a kernel")
     return Settings(dt=dt, **settings)

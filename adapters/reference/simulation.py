@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from adapters.engine import Array, Contacts, Recorded, Simulation
+from adapters.engine import Array, Contacts, EngineError, Recorded, Simulation
 from adapters.scene import Body, Box, Capsule, Disc, HalfSpace, Polygon, Scene, Shape, Sphere
 from adapters.scene.meeting import told_pairs
 
@@ -80,8 +82,15 @@ class ReferenceSimulation(Simulation):
         self.solver = Solver(model, settings, certified=False)
 
     def advance(self, steps: int) -> None:
-        """See `Simulation.advance`."""
-        self.solver.advance(steps)
+        """See `Simulation.advance`.
+
+        Raises
+        ------
+        EngineError
+            Where the loop of events has no answer.
+        """
+        with _answering():
+            self.solver.advance(steps)
 
     def pose(self) -> Array:
         """See `Simulation.pose`."""
@@ -97,7 +106,8 @@ class ReferenceSimulation(Simulation):
 
     def record(self, samples: int, stride: int, contacts: bool) -> Recorded | None:
         """See `Simulation.record`: one call of compiled code takes all samples."""
-        found = self.solver.record(samples * stride, stride, contacts)
+        with _answering():
+            found = self.solver.record(samples * stride, stride, contacts)
         counts = np.diff(found.offset)[1:]  # the first sample is the state before
         return Recorded(found.pose[1:], found.twist[1:], counts, _contacts(found.contacts) if contacts else None)
 
@@ -123,12 +133,23 @@ class ReferenceSimulation(Simulation):
         }
 
     def certificate(self) -> dict[str, Any]:
-        """The result of `reference_solver.Simulation.certificate`; ``certified`` with a residual stop.
+        """The result of `reference_solver.Simulation.certificate`; ``certified`` of the loop of events alone.
 
-        A fixed number of sweeps is not certified: its residual is to be shown.
+        Steps are not certified: their residual is to be shown.
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
-        return found if self.settings.residual is None else {**found, "certified": found["holds"]}
+        return found if self.settings.tolerance is None else {**found, "certified": found["holds"]}
+
+
+@contextmanager
+def _answering() -> Iterator[None]:
+    """What the loop of events refuses is an error of the engine."""
+    from reference_solver.exact import Refused
+
+    try:
+        yield
+    except Refused as refused:
+        raise EngineError(str(refused)) from None
 
 
 def _contacts(found: Any) -> Contacts:

@@ -7,7 +7,8 @@ They become part of the profile's name: ``--set cone=elliptic --set impratio=10`
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from adapters.engine import Engine, EngineError, Setting
@@ -18,6 +19,7 @@ from adapters.settings import Check, like, text_of
 NEAR = 4
 #: Words that are values.
 NAMED = {"true": True, "false": False, "none": None}
+NOTHING: Mapping[str, str] = MappingProxyType({})
 #: Placeholder for a value that an engine cannot take.
 MISFIT = object()
 
@@ -102,8 +104,8 @@ def own(engine: Engine, asked: Sequence[tuple[str, Any]], profile: Sequence[Sett
     found: dict[str, Any] = {}
     for name, value in asked:
         if name not in kinds:
-            where = f"; crosscheck describe {engine.name} lists all"
-            raise EngineError(f"set: {engine.name} has no setting {one_line(name, NAME)!r}{near(name, kinds)}{where}")
+            close, where = near(name, kinds, engine.former), f"; crosscheck describe {engine.name} lists all"
+            raise EngineError(f"set: {engine.name} has no setting {one_line(name, NAME)!r}{close}{where}")
         if isinstance(value, int) and not isinstance(value, bool) and isinstance(stock.get(name), float):
             value = float(value)  # 10 and 10.0 are the same setting
         # A single word of a list has no comma, a word may look like a number or none, and may be in lower case.
@@ -120,8 +122,10 @@ def own(engine: Engine, asked: Sequence[tuple[str, Any]], profile: Sequence[Sett
     return tuple(sorted(found.items()))
 
 
-def near(name: str, known: Iterable[str]) -> str:
-    """Similar names; empty if there are none."""
+def near(name: str, known: Iterable[str], former: Mapping[str, str] = NOTHING) -> str:
+    """What takes the place of a ``former`` setting, or similar names; empty if there are none."""
+    if name in former:
+        return f"; {former[name]}"
     low = {each.lower(): each for each in known}
     parts = [each for each in low if name.lower() in each]
     close = list(dict.fromkeys([*parts, *difflib.get_close_matches(name.lower(), low, n=NEAR)]))[:NEAR]

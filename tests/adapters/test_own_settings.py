@@ -1,5 +1,7 @@
 """Settings of a user's own: how they are read, which an engine takes, and that the engine gets each of them."""
 
+from types import MappingProxyType
+
 import numpy as np
 import pytest
 
@@ -78,6 +80,7 @@ class Toy:
     """An engine that states kinds of some of its settings, and refuses two that do not go together."""
 
     name = "toy"
+    former = MappingProxyType({"swing": "warm takes its place"})
 
     def settable(self):
         return {"sweeps": whole(1, 9), "warm": flag, "cone": word("round", "Square"), "off": words("a", "b")}
@@ -103,6 +106,7 @@ def test_value_converted_to_the_engine_s_kind(text, expected):
 @pytest.mark.parametrize(
     ("texts", "said"),
     [(["sweep=3"], "set: toy has no setting 'sweep'; near it: sweeps; crosscheck describe toy lists all"),
+     (["swing=3"], "set: toy has no setting 'swing'; warm takes its place; crosscheck describe toy lists all"),
      (["sweeps=10"], "set: sweeps=10: must be a whole number from 1 to 9"),
      (["sweeps=3.5"], "set: sweeps=3.5: must be a whole number from 1 to 9"),
      (["slop=tiny"], "set: slop=tiny: must be a finite number"),

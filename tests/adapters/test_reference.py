@@ -16,8 +16,9 @@ from adapters.engine import EngineError
 from adapters.needs import needs
 from adapters.receipts import FRICTION_SHARE, receipts
 from adapters.reference import ReferenceEngine
-from adapters.reference.profiles import REASONS
+from adapters.reference.profiles import FORMER, KINDS, REASONS
 from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
+from adapters.settings.own import given, own
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
 from reference_solver.simulation import UNCERTIFIED
@@ -128,7 +129,7 @@ def test_a_resting_box_carries_its_weight(dimension: int, profile: str) -> None:
     trajectory = drive(make(floor(dimension), box, mu=0.5, g=9.81, T=0.1), profile)
     assert trajectory.contacts is not None
     load = trajectory.contacts.impulse_between(0, 1)[-1]
-    # The residual stop leaves 1e-13 of a step's speed, 10 sweeps with warm starting 1e-6 after two dozen steps.
+    # Forces at rest are solved to round-off, 10 sweeps with warm starting 1e-6 after two dozen steps.
     assert load[dimension - 1] == pytest.approx(9.81 * DT, rel=1e-12 if profile == "reference" else 1e-6)
     assert len(trajectory.contacts.rows.a[trajectory.contacts.offset[-2] :]) == (2 if dimension == 2 else 4)
 
@@ -188,7 +189,7 @@ def test_solver_state_equal_to_the_requested_scene(dimension: int, profile: str)
     assert held["dt"] == DT and held["gravity"][-1] == -9.0
     assert held["bodies"] == {"ball": {"mass": 2.0, "inertia": 0.11 if dimension == 2 else [0.11, 0.12, 0.13]}}
     assert held["pairs"] == {"floor-ball": {"restitution": 0.5, "friction": 0.3}}
-    assert (held["residual"] is None) == (profile == "classical")
+    assert (held["tolerance"] is None) == (profile == "classical")
     assert isinstance(held["left_out"], list)
     assert json.loads(json.dumps(held)) == held
 
@@ -196,13 +197,54 @@ def test_solver_state_equal_to_the_requested_scene(dimension: int, profile: str)
 def test_every_setting_of_the_solver_has_its_reason() -> None:
     from reference_solver import Settings
 
-    names = {field.name for field in fields(Settings)} - {"dt"}
-    assert set(REASONS) == names
+    names = {field.name for field in fields(Settings)} - {"dt"} - set(FORMER)
+    assert set(REASONS) == set(KINDS) == names
     scene = make(floor(2), body("ball", 2, (0.0, 1.0)))
     classical, reference = (ENGINE.settings(profile, needs(scene), DT) for profile in PROFILES)
-    assert {s.name for s in classical} == names and {s.name for s in reference} == names - {"iterations"}
+    assert {s.name for s in classical} == names - {"tolerance"} and {s.name for s in reference} == {"tolerance"}
     assert all(s.because and s.source for s in (*classical, *reference))
     assert {s.name: s.value for s in classical}["iterations"] == 10
+
+
+@pytest.mark.parametrize(
+    ("profile", "text", "said"),
+    [
+        ("reference", "scheme=fixed", "reference has no setting 'scheme'; the profile says it: reference goes from "
+         "event to event, classical makes steps; crosscheck describe reference lists all"),
+        ("classical", "accuracy=1e-9", "reference has no setting 'accuracy'; tolerance of profile reference takes its "
+         "place; crosscheck describe reference lists all"),
+        ("reference", "residual=1e-9", "residual: is of the steps of profile classical; profile reference has "
+         "tolerance alone"),
+        ("classical", "tolerance=1e-9", "tolerance: is of profile reference; classical makes steps, which have no such "
+         "setting"),
+        ("reference", "tolerance=1e-12", "tolerance=1e-12: must be a number from 1e-11 to 1e-05"),
+        ("reference", "tolerance=none", "tolerance=none: must be a number from 1e-11 to 1e-05"),
+        ("reference", "tolerance=fine", "tolerance=fine: must be a number from 1e-11 to 1e-05"),
+    ],
+)  # fmt: skip
+def test_setting_of_the_other_profile_or_of_an_earlier_version(profile: str, text: str, said: str) -> None:
+    scene = make(floor(2), body("ball", 2, (0.0, 1.0)))
+    with pytest.raises(EngineError) as error:
+        own(ENGINE, given([text]), ENGINE.settings(profile, needs(scene), DT))
+    assert str(error.value) == f"set: {said}"
+
+
+@pytest.mark.parametrize("tolerance", [1e-11, 1e-5])
+def test_both_ends_of_the_tolerance_certified(tolerance: float) -> None:
+    scene = make(floor(2), body("ball", 2, (0.0, 0.6)), e=0.5, g=9.81)
+    settings = {"tolerance": tolerance}
+    end = run(ENGINE, scene, DT, settings, Sampling(1, 0.0)).pose[-1]
+    found = ENGINE.certify(scene, DT, settings, round(scene.duration / DT), end)
+    assert found is not None and found["holds"], found["reasons"]
+    for other in ENGINE.at_other_tolerances(settings):
+        assert np.abs(run(ENGINE, scene, DT, other, Sampling(1, 0.0)).pose[-1] - end).max() < 1e-12
+
+
+def test_refusal_of_the_loop_in_one_line() -> None:
+    lid = Body("lid", HalfSpace((0.0, -1.0), -2.0), twist=(0.0, -1.0, 0.0), motion="prescribed")
+    scene = make(floor(2), lid, body("ball", 2, (0.0, 0.5)), g=9.81, T=2.0)
+    with pytest.raises(EngineError, match=r"^no impulses part the bodies that meet at 1 s: [^\n]*\Z"):
+        drive(scene, "reference")
 
 
 def test_iteration_count_for_classical_and_refused_by_reference() -> None:
@@ -278,14 +320,9 @@ def test_every_valid_scene_accepted() -> None:
 
 @both
 def test_distant_scene_refused_before_the_run(dimension: int) -> None:
-    """The certificate of a run says the same: on either side of the limit of one step of numbers in half widths."""
+    """On either side of the limit of one step of numbers in half widths."""
     limit = 1e-8 * 0.5 / float(np.finfo(float).eps)
-    refusal = None
-    for share in (0.9, 1.1):
-        scene = make(floor(dimension), body("ball", dimension, (share * limit, 1.0)), T=0.01)
-        refusal = ENGINE.refuses(scene, "reference")
-        assert ENGINE.refuses(scene, "classical") is None
-        found = drive(scene, "reference").certificate
-        assert found["resolution"] == pytest.approx(share * 1e-8, rel=1e-12)
-        assert (refusal is not None) == (share > 1.0) == ("coordinates too large" in " ".join(found["reasons"]))
+    near, far = (make(floor(dimension), body("ball", dimension, (share * limit, 1.0))) for share in (0.9, 1.1))
+    assert ENGINE.refuses(near, "reference") is None and ENGINE.refuses(far, "classical") is None
+    refusal = ENGINE.refuses(far, "reference")
     assert refusal is not None and refusal.startswith(f"ball lies {1.1 * limit:.3g} m from the origin")

@@ -194,7 +194,8 @@ def knowing(request: Request) -> list[str]:
         who = {name: [engine for engine, names in known.items() if name in names] for name in asked}
         lost = next((name for name in asked if not who[name]), None)
         if lost is not None:
-            close = near(lost, dict.fromkeys(name for names in known.values() for name in sorted(names)))
+            former = {name: said for engine in here.values() for name, said in engine.former.items()}
+            close = near(lost, dict.fromkeys(name for names in known.values() for name in sorted(names)), former)
             raise EngineError(f"set: no installed engine has a setting {one_line(lost, NAME)!r}{close}")
         told = "; ".join(f"{name}: {', '.join(engines)}" for name, engines in who.items())
         raise EngineError(f"set: no engine has all of these settings ({told}); name one with --engine")
