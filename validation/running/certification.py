@@ -49,7 +49,8 @@ def _metric_errors(
     the difference covers it. None where only one of two runs has the metric.
     """
     canonical, scene = prepared.canonical, prepared.scene
-    sampling, found = canonical.sampling(scene), {}
+    sampling = canonical.sampling(scene)
+    found: dict[str, float | None] = {}
     here = {name: value for name, (value, _) in canonical.measure(scene, trajectory).items()}
     for other in engine.at_other_tolerances(settings):
         there = canonical.measure(scene, run(engine, scene, slot.dt, other, sampling))
