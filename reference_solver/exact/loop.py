@@ -177,6 +177,8 @@ class Loop:
         if not self.stuck:
             self.left = frozenset()
         self.state = piece.state(1.0)
+        if piece.held.lasts > 0.0 and event.kind is Kind.LOOK:  # rebounds that are summed end where contacts are closed
+            self._project(piece.held)
         if not piece.turns:
             self.step = 0.0
             return None

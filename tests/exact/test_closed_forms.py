@@ -69,10 +69,10 @@ def test_bounce_down_to_rest(d, e):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("e", [0.2, 0.8])
-def test_time_of_all_rebounds(d, e):
-    """They are over at (1 + e) / (1 - e) sqrt(2 h / g)."""
-    model = Model(d, [ground(d), ball(d, up(d, 1.5))], up(d, -G), e, 0.0)
+@pytest.mark.parametrize(("e", "far"), [(0.2, 0.0), (0.8, 0.0), (0.95, 2000.0)])
+def test_time_of_all_rebounds(d, e, far):
+    """They are over at (1 + e) / (1 - e) sqrt(2 h / g), ``far`` [m] from the origin as well."""
+    model = Model(d, [ground(d), ball(d, (far, *up(d, 1.5)[1:]))], up(d, -G), e, 0.0)
     last = (1.0 + e) / (1.0 - e) * math.sqrt(2.0 / G)
     pieces = Simulation(model, Settings.reference(DT)).record(math.ceil(last / DT), pieces=True).pieces
     (end,) = np.flatnonzero(pieces.scheme == ROCKING)
