@@ -8,6 +8,7 @@ import pytest
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate.truth import certify, distance
 from reference_solver.exact import Refused, events, forces, impacts, loop, rows, stiff, world
+from reference_solver.exact.cones import NoSolution
 from tests.verification import self_test
 
 DT, G = 1 / 240, 9.81
@@ -222,6 +223,34 @@ def test_gap_of_a_joint_blow(small, pull, gap):
     is_none = gap < 5e-14  # a ten-trillionth of the radius
     assert (gap < off.max() < 1e-12 if is_none else off.max() < 1e-14) and found.error[-1] < 1e-9
     assert (off <= found.error).all()
+
+
+def rod(spin, friction):
+    """A thin rod that is pushed along the floor, 30 degrees from upright and its lower end ahead; it stays down."""
+    wide, long = 0.1, 5.0
+    a, b = 0.5 * long - np.sqrt(0.75) * wide, np.sqrt(0.75) * long + 0.5 * wide
+    body = Body(Box((wide, long)), 1.0, (wide**2 + long**2) / 3.0, (0.0, b, np.pi / 6), (6.0, -spin * a, spin))
+    return planar(body, friction=friction)
+
+
+def test_one_motion_where_sliding_is_not_possible():
+    """Beyond a friction of (i^2 + a^2)/(a b) = 1.34 an impulse stops the end, and no forces would hold it up."""
+    found = certify(rod(0.0, 1.6), Settings.reference(DT), 12)
+    assert found.holds and not found.several and not found.unique, found.reasons
+
+
+def test_jam_where_forces_exist_seen(monkeypatch):
+    decide, calls = loop.decide, []
+
+    def none_at_first(*asked):
+        calls.append(asked)
+        if len(calls) == 1:
+            raise NoSolution
+        return decide(*asked)
+
+    monkeypatch.setattr(loop, "decide", none_at_first)
+    found = certify(rod(2.0, 1.6), Settings.reference(DT), 12)
+    assert found.several and found.determined == 0.0 and "go on as they are, or jam" in found.unique
 
 
 def test_refused_run_has_no_certificate():

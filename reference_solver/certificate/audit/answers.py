@@ -82,9 +82,11 @@ class _Instants(NamedTuple):
     """What the problems of all contacts (c,) are made of."""
 
     asked: NDArray[np.bool_]  # (c,) takes part
+    jams: NDArray[np.bool_]  # (c,) is of an impact in which nothing approaches: it does what no forces can (E54)
     row: Indices  # (c, 2) rows of both bodies; -1 where one is not free
-    free: Array  # (c, d) velocities without impulses of the piece; accelerations but for those by loads
-    slip: Array  # (c, d - 1)
+    free: Array  # (c, d) velocities without impulses of the piece
+    wander: Array  # (c, d) accelerations but for those by loads
+    slip: Array  # (c, d - 1) as a force phase begins
     push: Array  # (c, 2, d, 3 | 6) what unit impulses do to both bodies, times the root of M
     pull: Array  # (m, 3 | 6) what loads do to the bodies of all rows, times the root of M
     given: Array  # (c, d)
@@ -95,7 +97,8 @@ def answers(run: Run) -> Answers:
     """Return where another answer exists first, and where the search ended."""
     found, spent = Answers(np.inf, "", np.inf, 0), 0.0
     known: dict[bytes, list[Array]] = {}
-    for own, problem in _problems(run):
+    at = _instants(run)
+    for own, lasts, problem in _problems(run, at):
         begin = float(run.pieces.begin[run.contact_owner[own[0]]])
         key = _key(problem) if problem else b""
         if problem and key not in known and spent + _cost(problem) <= BUDGET:
@@ -104,22 +107,26 @@ def answers(run: Run) -> Answers:
             if begin < found.unsearched:
                 found = found._replace(unsearched=begin, contacts=len(own))
             continue
-        two = _two(known[key], problem)
-        if two is not None and begin < found.begin:
-            found = found._replace(begin=begin, told=_told(run, own, *two))
+        others = known[key]
+        if at.jams[own[0]] and not lasts:  # without impulses it goes on as it is, for which no forces may exist
+            others = [u for u in others if np.abs(u - problem.free).max() > TWO]
+        two = _two(others, problem)
+        jams = "may go on as they are, or jam" if at.jams[own[0]] and lasts and others else ""
+        if (two is not None or jams) and begin < found.begin:
+            bodies = f"bodies {run.pieces.body_a[own[0]]} and {run.pieces.body_b[own[0]]}"
+            found = found._replace(begin=begin, told=_told(run, own, *two) if two and not jams else f"{bodies} {jams}")
     return found
 
 
-def _problems(run: Run) -> Iterator[tuple[Indices, Problem | None]]:
+def _problems(run: Run, at: _Instants) -> Iterator[tuple[Indices, bool, Problem | None]]:
     """Yield the clusters of contacts with friction that may have several answers: their numbers, and their problem.
 
-    None stands for a problem of too many modes.
+    And whether that is one of forces; a jam has both. None stands for a problem of too many modes.
     """
     pieces, owner = run.pieces, run.contact_owner
     if not len(owner):
         return
     mu = run.model.friction[pieces.body_a, pieces.body_b]
-    at = _instants(run)
     for k in np.unique(owner[at.asked & (mu > 0.0)]):
         own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
         for each in clusters(own[at.asked[own]], at.row):
@@ -128,11 +135,13 @@ def _problems(run: Run) -> Iterator[tuple[Indices, Problem | None]]:
                 continue
             pairs = [pieces.body_a[cluster], pieces.body_b[cluster], *np.round(pieces.normal[cluster] / TWO).T]
             face = np.unique(np.column_stack(pairs), axis=0, return_inverse=True)[1].ravel()
-            modes = modes_of((mu[cluster] > 0.0) & ~at.slip[cluster].any(axis=1), face, run.d)
-            if not len(modes):
-                yield cluster, None
-            elif (problem := _problem(run, at, cluster, mu, modes)) is not None:
-                yield cluster, problem
+            for lasts in (False, True) if at.jams[cluster[0]] else (not run.is_impact[k],):
+                slip = at.slip[cluster] if lasts else 0.0 * at.slip[cluster]
+                modes = modes_of((mu[cluster] > 0.0) & ~slip.any(axis=1), face, run.d)
+                if not len(modes):
+                    yield cluster, lasts, None
+                elif (problem := _problem(run, at, cluster, mu, slip, lasts, modes)) is not None:
+                    yield cluster, lasts, problem
 
 
 def _instants(run: Run) -> _Instants:
@@ -148,7 +157,12 @@ def _instants(run: Run) -> _Instants:
     _, pair = np.unique((owner * len(run.free) + a) * len(run.free) + b, return_inverse=True)
     met = np.bincount(pair, closed) > 0.0
     exact = np.where(run.is_impact, pieces.scheme != CHAIN, np.isin(pieces.scheme, (FROZEN, FIFTH_ORDER)))
-    asked = np.where(impact, met[pair], closed) & (row >= 0).any(axis=1) & exact[owner]
+    after = np.einsum("cj,ckj->ck", run.meeting_velocity(after=True), axes)
+    approach, change = np.zeros((2, len(pieces.begin)))
+    np.maximum.at(approach, owner, -u[:, 0])
+    np.maximum.at(change, owner, np.abs(after - u).max(axis=1))
+    jams = (run.is_impact & (pieces.scheme == FROZEN) & (approach + noise < TWO * change))[owner] & closed
+    asked = np.where(impact & ~jams, met[pair], closed) & (row >= 0).any(axis=1) & exact[owner]
     push = np.zeros((*row.shape, d, pieces.twist_before.shape[1]))
     for side, sign in ((0, -1.0), (1, 1.0)):
         for j in range(d):
@@ -156,21 +170,19 @@ def _instants(run: Run) -> _Instants:
     asked &= np.isfinite(push).all(axis=(1, 2, 3))
     # What restitution wants; where a rebound is held that is nothing (E22).
     wanted = run.model.restitution[a, b] * np.maximum(-u[:, 0], 0.0)
-    held = (run.meeting_velocity(after=True) * n).sum(axis=1) < 0.5 * wanted
+    held = after[:, 0] < 0.5 * wanted
     free = u - np.column_stack([np.where(held, 0.0, wanted), np.zeros((len(u), d - 1))])
-    lasting = asked & ~impact
-    wander = accelerations(run, lasting)
-    free[lasting, 0] = wander[lasting, 0]
-    free[lasting, 1:] = np.einsum("cj,ckj->ck", wander[lasting, 1:], axes[lasting, 1:])
+    rates = accelerations(run, asked & (~impact | jams))
+    wander = np.column_stack([rates[:, 0], np.einsum("cj,ckj->ck", rates[:, 1:], axes[:, 1:])])
     size = np.linalg.norm(u[:, 1:], axis=1)
-    slides = ~impact & (size > SLIP_NOISE * speed + noise)
+    slides = size > SLIP_NOISE * speed + noise
     slip = np.where(slides[:, None], u[:, 1:], 0.0) / np.where(slides, size, 1.0)[:, None]
     body = pieces.body
     pull = run.force[body] / np.sqrt(run.mass[body])[:, None]
     pull = np.column_stack([pull, by_root_of_inertia(run, np.arange(len(body)), _torques(run))])
     length = pieces.length[owner]
     given = np.einsum("cj,ckj->ck", pieces.impulse, axes) / np.where(length > 0.0, length, 1.0)[:, None]
-    return _Instants(asked, row, free, slip, push, pull, given, noise)
+    return _Instants(asked, jams, row, free, wander, slip, push, pull, given, noise)
 
 
 def _torques(run: Run) -> Array:
@@ -182,7 +194,9 @@ def _torques(run: Run) -> Array:
     return np.asarray(torque - np.where(run.free[run.pieces.body][:, None], np.cross(w, run.spin[0]), 0.0))
 
 
-def _problem(run: Run, at: _Instants, own: Indices, mu: Array, modes: Indices) -> Problem | None:
+def _problem(
+    run: Run, at: _Instants, own: Indices, mu: Array, slip: Array, lasts: bool, modes: Indices
+) -> Problem | None:
     """Return the problem of a cluster of contacts; None if it has one answer for certain, or all is round-off."""
     d, c = run.d, len(own)
     rows = np.unique(at.row[own])
@@ -192,18 +206,20 @@ def _problem(run: Run, at: _Instants, own: Indices, mu: Array, modes: Indices) -
         known = np.flatnonzero(at.row[own, side] >= 0)
         moves[known, :, np.searchsorted(rows, at.row[own[known], side])] += at.push[own[known], side]
     flat = moves.reshape(c * d, -1)
-    matrix, free, lasts = (flat @ flat.T).reshape(c, d, c, d), at.free[own], 1.0
-    if not run.is_impact[run.contact_owner[own[0]]]:
-        free, lasts = free + (flat @ at.pull[rows].ravel()).reshape(c, d), run.dt
+    matrix, free, time = (flat @ flat.T).reshape(c, d, c, d), at.free[own], 1.0
+    if lasts:
+        free, time = at.wander[own] + (flat @ at.pull[rows].ravel()).reshape(c, d), run.dt
     scale = 1.0 / np.sqrt(np.diagonal(matrix[:, 0, :, 0]))
     size = np.abs(scale[:, None] * free).max()
-    if _is_single(matrix, mu[own]) or not np.isfinite(size) or np.abs(free).max() * lasts <= at.noise:
+    if not np.isfinite(size) or np.abs(free).max() * time <= at.noise:
+        return None
+    if _is_single(matrix, mu[own]) and not at.jams[own[0]]:
         return None
     return Problem(
         scale[:, None, None, None] * matrix * scale[None, None, :, None],
         scale[:, None] * free / size,
         mu[own],
-        at.slip[own],
+        slip,
         at.given[own] / scale[:, None] / size,
         modes,
     )
