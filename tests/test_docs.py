@@ -187,7 +187,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
     for name in tracked.stdout.split():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
-    for name in ("reference_solver", "reports"):
+    for name in ("reference_solver", "reports", "tests"):
         (tmp_path / name).symlink_to(ROOT / name)
     built = tmp_path / "html"
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(source), str(built)]
