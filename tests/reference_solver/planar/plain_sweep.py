@@ -1,4 +1,4 @@
-"""The plain sweep of sequential impulses, to be read; `sequential_impulses.sweep_rows` does the same in fewer operations.
+"""The plain sweep of sequential impulses, to be read; `sequential_impulses.sweep_rows` does it in fewer operations.
 
 For each row in turn: relative velocity, impulse, clamp, apply (E10, E11). ``row`` is a line of `Rows.real`, whose
 columns are those of `columns`.

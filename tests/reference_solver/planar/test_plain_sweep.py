@@ -4,12 +4,12 @@ import copy
 
 import numpy as np
 import pytest
-from tests.reference_solver.planar.plain_sweep import plain_sweep
 
 from reference_solver import Settings
 from reference_solver.compilation import from_python
 from reference_solver.planar.columns import FRICTION, PN, PT
 from reference_solver.planar.sequential_impulses import sweep_rows
+from tests.reference_solver.planar.plain_sweep import plain_sweep
 
 G = 9.81
 
