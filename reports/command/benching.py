@@ -23,7 +23,6 @@ from reports import speed
 from reports.command import statuses
 from reports.command.files import folder
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.piles import show_piles
 from reports.command.selection import JOBS, SECONDS, Cases, gathered, missing, option, selection
 from reports.command.targets import show_targets
 from reports.progress import run_plan
@@ -54,9 +53,6 @@ class Benching:
     against: str | None = option(None, "Compare the time ratios with an earlier benchmark, or 'latest'.", metavar="RUN")
     dry_run: bool = option(False, "Print the number of cases, and stop.")
     fresh: bool = option(False, "Start a new run, and reuse no result of an earlier one.")
-    piles: int | None = option(
-        None, "Instead, time the reference solver on piles of 20 to N bodies.", type=click.IntRange(20), metavar="N"
-    )
     targets: bool = option(
         False, "Instead, compare the textbook step with each engine, and the ratios with floors and targets."
     )
@@ -77,14 +73,10 @@ def bench(cases: Cases, how: Benching, out: Path, as_json: bool) -> None:
     Prints CPU time at equal error, scaling and overhead of SCENES. Errors are measured first, in worker processes; then
     cases are timed one at a time. --quick takes a minute on two cores: a dozen scenes, each in its first dimension
     unless --dim names others. --full takes up to two hours (piles of a thousand boxes). With --against, exits with 1 if
-    fewer than 90 % of the time ratios agree. With --piles, times the reference solver on piles, in its exact and in its
-    textbook profile. With --targets, times the textbook profile against other engines at 10 sweeps and at equal error,
-    in under ten minutes on one core; a ratio below its floor is shown and is no failure.
+    fewer than 90 % of the time ratios agree. With --targets, times the textbook profile against other engines at 10
+    sweeps and at equal error, in under ten minutes on one core; a ratio below its floor is shown and is no failure.
     """
     console = terminal(stderr=True)
-    if how.piles is not None:
-        show_piles(console, as_json, how.piles, how.seed or 0)
-        return
     if how.targets:
         show_targets(console, as_json, out, cases.scenes, how.seed)
         return

@@ -10,10 +10,8 @@ import pytest
 from rich.console import Console
 
 from reports import speed
-from reports.command import benching, piles
+from reports.command import benching
 from validation.bench import timing as timings
-from validation.bench.piles import Row
-from validation.bench.statistics import Spread
 from validation.cells import Observation, Outcome, Slot
 from validation.files.distance import primary_of
 from validation.posed import resolve
@@ -144,13 +142,3 @@ def test_the_quality_of_the_timings_is_one_line():
     )
     assert speed.quality_line(table[table["void"] != ""]) == "nothing was timed"
     assert speed.quality_line(table.iloc[:0, :0]) == "nothing was timed", "a run that was ended before its first time"
-
-
-def test_pile_costs_complete_in_a_narrow_terminal():
-    """Intervals were cut at 80 columns: of a ratio its lower end was left."""
-    spread = Spread(6, 0.0123, 0.0874, 0.0341, 1.74)
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(piles._costs([Row("spatial boxes", 160, spread, spread, Spread(6, 1.0, 54.0, 30.1, 160.2))]))
-    said = console.export_text()
-    assert "…" not in said
-    assert all(word in said for word in ("spatial boxes", "160", "87.4 ms", "34.1", "1.74", "54", "30", "1.6e+02"))

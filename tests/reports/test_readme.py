@@ -161,7 +161,6 @@ NOT_RUN = {
     "crosscheck releases mujoco 3.2.7,3.12.0 stack": "network: it installs releases",
     "crosscheck bisect mujoco 3.4.0..3.12.0 stack --check drift": "network: it installs releases",
     "crosscheck accept --engine myengine": "writes into an engine's folder; test_accept_command.py runs it",
-    "crosscheck bench --piles 80": "more than ten minutes of timing, one pile after the other",
     "crosscheck bench --targets": "ten minutes of timing; tests/reports/test_targets_command.py runs it on one scene",
     "crosscheck run --full": "half an hour on two cores",
     "crosscheck run --full --cluster tcp://HOST:PORT": "network, and half an hour on two cores",

@@ -15,11 +15,10 @@ from rich.console import Console
 
 from reports import page, speed, starved, tables
 from reports import releases as told_releases
-from reports.command import accepting, benching, inspecting, main, piles, posing, releasing
+from reports.command import accepting, benching, inspecting, main, posing, releasing
 from reports.palette import PAPER
 from reports.starved import Starved
 from validation.bench import agreement
-from validation.bench.piles import KINDS, Lap
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
 from validation.findings import Family, Finding
@@ -87,21 +86,6 @@ def test_sensitivity_of_checks_alone(monkeypatch):
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("most", "found"), [(80, "1.50 +- 0.00   1.00 +- 0.00"), (20, "-")])
-def test_exponent_of_pile_cost_from_two_sizes(monkeypatch, most, found):
-    """Cost n^1.5 when cut at events, n when fixed."""
-
-    def laps(kind, limit, seed):
-        sizes = [20 * 2**k for k in range(3) if 20 * 2**k <= limit]
-        return [Lap(kind, n, cost * n**1.5, cost * n) for n in sizes for cost in (1e-5, 1.1e-5, 1.2e-5)]
-
-    monkeypatch.setattr(piles, "laps", laps)
-    said = printed(lambda console: piles.show_piles(console, False, most, 0))
-    assert sum(line.startswith("clocking") for line in said) == len(KINDS) * (3 if most == 80 else 1)
-    assert any(line.split()[:5] == ["discs", "20", "984", "us", "[894"] for line in said)
-    assert sum(line.endswith(found) and " to " in line for line in said) == len(KINDS)
 
 
 NAMES = {"purpose": "bodies", "scene": "pyramid", "dimension": 2, "engine": "bullet", "profile": "tuned"}
