@@ -448,7 +448,7 @@ def _horizon(
 def distance(model: Model, one: Array, other: Array) -> Array:
     """Return how far (s,) any point of a free body is from where it is in another run, at most [m].
 
-    Infinite where either is no number: a run that ended (E28) is as far from any other as can be.
+    Infinite where either is no number: a run that ended is as far from any other as can be.
     """
     d = model.dimension
     known = np.asarray(np.isfinite(one).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2)))

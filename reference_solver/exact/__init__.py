@@ -1,4 +1,4 @@
-"""The exact solver as a loop over events, one source for plane and space; not yet the reference.
+"""The exact solver as a loop over events, one source for plane and space.
 
 Between two events motion is smooth. So the world goes from event to event, and ``dt`` only says when to look:
 

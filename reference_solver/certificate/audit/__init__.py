@@ -1,7 +1,7 @@
 """The audit of a run: what it did against the model alone, by code that shares nothing with the solver.
 
 `audit` reads the pieces of a run (`reference_solver.pieces`) and a `Model`, computes masses, levers, laws and gaps
-anew, and returns one `Finding` for each check. Nothing here imports ``planar/``, ``spatial/`` or ``direct/``.
+anew, and returns one `Finding` for each check. Nothing here imports ``exact/``, a textbook or ``direct/``.
 """
 
 from __future__ import annotations
