@@ -28,7 +28,7 @@ from reference_solver.planar.state import MANIFOLDS
 
 
 def plain_sweep(bodies, rows, backwards):
-    """One sweep over all contacts; ``backwards``: the second point of two comes first."""
+    """One sweep; ``backwards``: the second point of two comes first."""
     for m in range(rows.counts[MANIFOLDS]):
         points = range(rows.manifold[m], rows.manifold[m + 1])
         for c in reversed(points) if backwards else points:
@@ -38,7 +38,7 @@ def plain_sweep(bodies, rows, backwards):
 
             u = relative_velocity(bodies, a, b, normal, row[AN], row[BN])
             impulse = row[PN] - (u - row[TARGET]) * row[NORMAL_MASS]
-            impulse = max(impulse, 0.0)  # the sum over all sweeps: a contact never pulls
+            impulse = max(impulse, 0.0)  # of all sweeps: nothing pulls
             apply(bodies, a, b, normal, row[AN], row[BN], impulse - row[PN])
             row[PN] = impulse
 
@@ -51,7 +51,7 @@ def plain_sweep(bodies, rows, backwards):
 
 
 def relative_velocity(bodies, a, b, direction, arm_a, arm_b):
-    """Velocity of B less that of A at the contact (E2) [m/s]; arms are r x direction [m]."""
+    """Velocity of B less that of A at the contact (E2) [m/s]."""
     va, vb = bodies.twist[a], bodies.twist[b]
     return direction @ (vb[:2] - va[:2]) + arm_b * vb[2] - arm_a * va[2]
 
@@ -59,5 +59,6 @@ def relative_velocity(bodies, a, b, direction, arm_a, arm_b):
 def apply(bodies, a, b, direction, arm_a, arm_b, impulse):
     """Add an impulse [N s] to B and its opposite to A (E4)."""
     for i, arm, sign in ((a, arm_a, -1.0), (b, arm_b, 1.0)):
-        bodies.twist[i, :2] += sign * impulse * bodies.real[i, INVERSE_MASS] * direction
-        bodies.twist[i, 2] += sign * impulse * bodies.real[i, INVERSE_INERTIA] * arm
+        inverse_mass, inverse_inertia = bodies.real[i, [INVERSE_MASS, INVERSE_INERTIA]]
+        bodies.twist[i, :2] += sign * impulse * inverse_mass * direction
+        bodies.twist[i, 2] += sign * impulse * inverse_inertia * arm
