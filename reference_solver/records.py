@@ -76,13 +76,17 @@ def joined(parts: Sequence[Frames]) -> Frames:
     """Return the samples of consecutive runs as those of one."""
     ends = np.cumsum([0] + [part.offset[-1] for part in parts])
     offsets = [part.offset[1:] + end for part, end in zip(parts, ends, strict=False)]
-    contacts = [part.contacts for part in parts]
     return Frames(
         np.concatenate([part.pose for part in parts]),
         np.concatenate([part.twist for part in parts]),
         np.concatenate([np.zeros(1, np.int64), *offsets]),
-        Contacts(*(np.concatenate([getattr(c, f.name) for c in contacts]) for f in fields(Contacts))),
+        joined_contacts([part.contacts for part in parts]),
     )
+
+
+def joined_contacts(parts: Sequence[Contacts]) -> Contacts:
+    """Return contacts one after the other."""
+    return Contacts(*(np.concatenate([getattr(c, f.name) for c in parts]) for f in fields(Contacts)))
 
 
 @dataclass(frozen=True)

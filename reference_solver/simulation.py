@@ -44,6 +44,13 @@ class World(Protocol):
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Make ``steps`` steps."""
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the event loop has made no step to its tolerance."""
+
+    def recorded(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, Journal]:
+        """Make steps of the event loop; return what was done as well."""
+
     def copy(self) -> Self:
         """Return a world of its own in the same state."""
 
@@ -163,12 +170,16 @@ class Simulation:
     ) -> tuple[Frames, list[Array], list[Journal]]:
         """Run part by part: each has a journal, and a tally that is then entered in that of the run."""
         whole, parts, tallies, journals = self._world.tally.copy(), [], [], []
-        part = stride if certificates else stride * max(1, STEPS_PER_JOURNAL // stride)
+        by_events = self.settings.tolerance is not None
+        part = stride if certificates else max(1, steps) if by_events else stride * max(1, STEPS_PER_JOURNAL // stride)
         taken = 0  # by the part before, as pieces of a step
         for chunk in [part] * (steps // part) + [steps % part] * (steps % part > 0):
             self._world.tally[:] = 0.0
             self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
-            if pieces:
+            if pieces and by_events:
+                frames, journal = self._world.recorded(chunk, stride, contacts)
+                journals.append(journal)
+            elif pieces:
                 frames, journal = self._journalled(chunk, stride, contacts, max(2, taken) * chunk + 16)
                 taken = -(-room_taken(journal) // chunk)
                 journals.append(journal)
@@ -210,6 +221,11 @@ class Simulation:
     def time(self) -> float:
         """Simulated time [s]."""
         return self._steps * self.settings.dt
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether all motion of the event loop so far is in closed form: any tolerance gives the same bits."""
+        return self._world.is_closed
 
     def contacts(self) -> Contacts:
         """Contacts of the last step with the impulses it applied."""

@@ -103,6 +103,11 @@ class State:
         """(n, 3 | 7)."""
         return np.concatenate([self.place, self.orientation], axis=1)
 
+    @property
+    def numbers(self) -> Array:
+        """(n, 3 + q | 7 + q): pose and twist."""
+        return np.concatenate([self.place, self.orientation, self.velocity], axis=1)
+
     def moved(self, way: Array) -> State:
         """Return the state after displacements and turns (n, d + s)."""
         d = self.place.shape[1]

@@ -39,7 +39,7 @@ def check(world: World, piece: Piece) -> None:
 def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
     """Return the bodies that are deepest in each other at shares of a piece, the share, and how deep [m]."""
     bodies, d = world.bodies, world.dimension
-    poses = np.array([piece.state(share).pose for share in LOOK])
+    poses, _ = piece.looked_at(np.array(LOOK))
     place, reach = poses[:, :, :d], bodies.reach + bodies.radius
     apart = np.linalg.norm(place[:, :, None] - place[:, None], axis=3) - reach[:, None] - reach
     moves = (bodies.free[:, None] + bodies.free) > 0

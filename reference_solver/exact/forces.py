@@ -117,7 +117,8 @@ class Held:
         if not hasattr(self, "_groups"):
             groups = contacts.groups
             self._groups = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
-        held = answer.modes, directions, contacts.friction, answer.forces, loads_shared(contacts, answer.forces)
+            self._shared = loads_shared(contacts, answer.forces)
+        held = answer.modes, directions, contacts.friction, answer.forces, self._shared
         solve_groups(contacts.features, held, contacts.rows, free, self._groups, forces, acceleration)
         return forces, acceleration
 

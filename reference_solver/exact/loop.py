@@ -65,6 +65,7 @@ class Loop:
     longest: float
     step: float = 0.0
     pieces: int = 0
+    steps: int = 0  # made to the tolerance
     events: int = 0
     stuck: bool = False  # whether the piece before was an instant, see `PROGRESS`
     blows: list[Blow] = field(default_factory=list)
@@ -146,6 +147,7 @@ class Loop:
             if piece is not None:
                 return piece
             self.step = FIRST_STEP * self.world.time
+        self.steps += 1
         tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
         piece, self.step = step(self.world, self.state, held, tolerance, min(self.step, self.longest))
         return piece

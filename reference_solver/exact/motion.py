@@ -78,13 +78,33 @@ class Piece:
         powers = np.arange(self.push.shape[2])
         return np.asarray(self.push @ (powers * s ** np.maximum(powers - 1, 0) if rate else s**powers))
 
+    def way_at(self, shares: Array) -> tuple[Array, Array]:
+        """Return ways and twists (k, n, q) at shares (k,).
+
+        Products by share and body, so that the bits of one state do not depend on which others are asked for.
+        """
+        shape = (len(shares), *self.start.velocity.shape)
+        way, velocity = (
+            np.matmul(each, (shares[:, None] ** np.arange(each.shape[2]))[:, None, :, None]).reshape(shape)
+            for each in (self.way, self.velocity)
+        )
+        return way, velocity
+
+    def states(self, shares: Array) -> tuple[Array, Array, Array]:
+        """Return places (k, n, d), orientations (k, n, 1 | 4) and twists (k, n, q) at shares (k,)."""
+        d = self.start.place.shape[1]
+        way, velocity = self.way_at(shares)
+        return self.start.place + way[..., :d], turned(self.start.orientation, way[..., d:]), velocity
+
+    def looked_at(self, shares: Array) -> tuple[Array, Array]:
+        """Return poses (k, n, 3 | 7) and twists (k, n, q) at shares (k,)."""
+        place, orientation, velocity = self.states(shares)
+        return np.concatenate([place, orientation], axis=2), velocity
+
     def state(self, s: float) -> State:
         """Return the state at a share."""
-        d = self.start.place.shape[1]
-        way = self.way @ s ** np.arange(self.way.shape[2])
-        velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])
-        place, orientation = self.start.place + way[:, :d], turned(self.start.orientation, way[:, d:])
-        return State(self.start.t + s * self.length, place, orientation, velocity)
+        place, orientation, velocity = self.states(np.array([s]))
+        return State(self.start.t + s * self.length, place[0], orientation[0], velocity[0])
 
     def cut(self, share: float) -> Piece:
         """Return the piece up to a share."""

@@ -45,7 +45,7 @@ class Answer(NamedTuple):
 
 def directed(slips: Array, least: float, otherwise: Array | float = 0.0) -> Array:
     """Return the directions (m, k) of slips (m, k) that are larger than ``least``, and ``otherwise`` for the others."""
-    size = np.linalg.norm(slips, axis=1, keepdims=True)
+    size = np.sqrt((slips * slips).sum(axis=1, keepdims=True))
     moves = size > least
     return np.where(moves, slips / np.where(moves, size, 1.0), otherwise)
 

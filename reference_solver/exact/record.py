@@ -22,7 +22,7 @@ from reference_solver.exact.forces import Held
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.rows import Contacts, labels, moments
 from reference_solver.model import Array
-from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal
+from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal, allocate_journal
 from reference_solver.records import Contacts as Handed
 
 #: Share of the smallest half width by which ways of a part may differ from cubic polynomials: the audit's limit.
@@ -45,7 +45,13 @@ class Acting(NamedTuple):
 
     def chosen(self, which: NDArray[np.bool_]) -> Acting:
         """Return some of them."""
-        return self._replace(**{name: each[which] for name, each in self._asdict().items()})
+        features, *numbers = self
+        return Acting(features[which], *(each[which] for each in numbers))
+
+    @property
+    def wrench(self) -> Array:
+        """(m, 3 d + s): points, normals, impulses, moments."""
+        return np.concatenate(self[2:], axis=-1)
 
     @classmethod
     def of(cls, contacts: Contacts, impulse: Array, moment: Array | None = None) -> Acting:
@@ -55,18 +61,31 @@ class Acting(NamedTuple):
         return cls(contacts.features, rows.gap.copy(), rows.place.copy(), rows.frame[:, 0].copy(), impulse, own)
 
     @classmethod
-    def between(cls, part: Part) -> Acting:
-        """Return what contacts did in a part of a piece, without moving those that the loop goes on with."""
-        piece = part.piece
-        contacts = piece.own_contacts.at(*piece.at(part.first))
-        if not piece.turns:
-            force = contacts.along_axes(piece.held.answer.forces)
-            return cls.of(contacts, (part.last - part.first) * piece.length * force)
-        whole, own = part.first == 0.0 and part.last == 1.0, Held(contacts, piece.held.answer, piece.held.acceleration)
-        first, length = contacts.rows.place.copy(), part.last - part.first
+    def between(cls, piece: Piece, begin: Array, end: Array) -> list[Acting]:
+        """Return what contacts did between shares (k,) of a piece; those that the loop goes on with stay."""
+        if not len(piece.held.contacts):
+            return [cls.of(piece.held.contacts, np.zeros((0, piece.start.place.shape[1])))] * len(begin)
+        if piece.turns:
+            return [cls._turning(piece, *both) for both in zip(begin.tolist(), end.tolist(), strict=True)]
+        contacts = piece.own_contacts
+        gap, place, frame = contacts.along_way(*piece.way_at(begin), piece.start)
+        impulse = np.einsum("mk,smkp->smp", piece.held.answer.forces, frame)
+        impulse *= ((end - begin) * piece.length)[:, None, None]
+        features = np.broadcast_to(contacts.features, (len(gap), *contacts.features.shape))
+        return [
+            cls(*each)
+            for each in zip(features, gap, place, frame[:, :, 0], impulse, moments(place, impulse), strict=True)
+        ]
+
+    @classmethod
+    def _turning(cls, piece: Piece, begin: float, end: float) -> Acting:
+        """Return what contacts did between shares of a piece in which they turn."""
+        contacts = piece.own_contacts.at(*piece.at(begin))
+        whole, own = begin == 0.0 and end == 1.0, Held(contacts, piece.held.answer, piece.held.acceleration)
+        first, length = contacts.rows.place.copy(), end - begin
         impulse, moment = np.zeros(first.shape), np.zeros(())
         for node, weight in zip(*GAUSS, strict=True):
-            share = part.first + length * node
+            share = begin + length * node
             place, axes, velocity = piece.at(share)
             if whole:  # what moved the bodies, to the last place
                 contacts.at(place, axes, velocity)
@@ -77,7 +96,7 @@ class Acting(NamedTuple):
             impulse = impulse + length * weight * rate
             # Far from the origin the way of a place is known to more digits than the place.
             moment = moment + length * weight * moments(contacts.rows.place - first, rate)
-        return cls.of(contacts.at(*piece.at(part.first)), impulse, moment + moments(first, impulse))
+        return cls.of(contacts.at(*piece.at(begin)), impulse, moment + moments(first, impulse))
 
 
 @dataclass(frozen=True)
@@ -112,17 +131,6 @@ class Part(NamedTuple):
     last: float
 
 
-class Row(NamedTuple):
-    """A piece of the record: begin in its step and length [s], labels, bodies, states before and after, contacts."""
-
-    time: tuple[float, float]
-    label: tuple[int, ...]
-    bodies: Indices
-    before: Array
-    after: Array
-    acting: Acting
-
-
 class Recorder:
     """Writes what a world does."""
 
@@ -132,16 +140,19 @@ class Recorder:
     def begin(self, pose: Array, twist: Array) -> None:
         """Begin a record where bodies are."""
         self._state = np.concatenate([pose, twist], axis=1)
-        self._rows: list[Row] = []
+        self._rows: list[tuple[Array | Indices, ...]] = [allocate_journal(self._world.dimension, len(pose), 0)[1:8]]
         self._bodies = self._contacts = 0
 
     def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
         """Return contacts as a simulation hands them out: each once, as it was first, with the sum of its impulses."""
-        found = [part.acting if isinstance(part, Blow) else Acting.between(part) for part in parts]
-        if not any(len(each.gap) for each in found):
-            return Handed.empty(0, self._world.dimension)
+        found = [
+            part.acting if isinstance(part, Blow) else Acting.between(part.piece, *np.array(part[1:])[:, None])[0]
+            for part in parts
+        ]
         every = Acting(*(np.concatenate(each) for each in zip(*found, strict=True)))
-        key = np.column_stack([every.features[:, :2], self._numbered(every.features)])
+        if not len(every.gap):
+            return Handed.empty(0, self._world.dimension)
+        key = self._keys(every.features)
         order = np.lexsort(key.T[::-1])
         begins = np.append(True, (np.diff(key[order], axis=0) != 0).any(axis=1))
         first = order[begins]
@@ -149,66 +160,101 @@ class Recorder:
         a, b, feature = key[first].T
         return Handed(a, b, feature, every.point[first], every.normal[first], impulse, every.gap[first])
 
-    def _numbered(self, features: Indices) -> Indices:
-        """Return one number (m,) for the features of each contact (m, 6)."""
+    def contacts_between(self, piece: Piece, begin: Array, end: Array) -> Handed:
+        """Return contacts of steps between shares (k,) of one piece, all of one step after all of another."""
+        key = self._keys(piece.held.contacts.features)
+        order = np.lexsort(key.T[::-1])
+        _, *fields = zip(*Acting.between(piece, begin, end), strict=True)
+        gap, point, normal, impulse, _ = (np.concatenate(np.array(each)[:, order]) for each in fields)
+        a, b, feature = np.tile(key[order].T, len(begin))
+        return Handed(a, b, feature, point, normal, impulse, gap)
+
+    def _keys(self, features: Indices) -> Indices:
+        """Return bodies A and B and one number for the features of each contact (m, 6)."""
         bodies = self._world.bodies
         most = max(bodies.point.shape[1], bodies.normal.shape[1], bodies.line.shape[1])
-        return np.asarray(((features[:, 2] * most + features[:, 3]) * 3 + features[:, 4]) * most + features[:, 5])
+        number = ((features[:, 2] * most + features[:, 3]) * 3 + features[:, 4]) * most + features[:, 5]
+        return np.column_stack([features[:, :2], number])
 
-    def write(self, step: int, dt: float, parts: Sequence[Part | Blow]) -> None:
-        """Write what happened in a step."""
-        for is_blow, group in groupby(parts, lambda part: isinstance(part, Blow)):
+    def write(self, step: int, dt: float, before: Sequence[Part | Blow], piece: Piece, shares: Array) -> None:
+        """Write what happened in a step up to a piece, and the piece in parts between shares (k + 1,), one a step."""
+        for is_blow, group in groupby(before, lambda part: isinstance(part, Blow)):
             if is_blow:
                 self._write_blows(step, dt, [part for part in group if isinstance(part, Blow)])
                 continue
             for part in group:
                 if isinstance(part, Part):
-                    for share in self._shares(part):
-                        self._write_part(step, dt, share)
+                    self._write_parts(np.array([step]), dt, part.piece, np.array(part[1:]))
+        self._write_parts(step + np.arange(len(shares) - 1), dt, piece, shares)
 
     def _write_blows(self, step: int, dt: float, blows: list[Blow]) -> None:
         """Write blows of one instant: those of bodies that share contacts follow each other."""
-        begin = blows[0].after.t - step * dt
-        self._bring(blows[0].after)
+        time = np.array([[blows[0].after.t - step * dt, 0.0]])
+        self._bring(blows[0].after.numbers)
         features = np.concatenate([blow.acting.features for blow in blows])
         for bodies, _ in self._groups(features):
+            free = bodies[self._world.bodies.free[bodies] == 1]
             for blow in blows:
-                free = bodies[self._world.bodies.free[bodies] == 1]
-                own = np.asarray(np.isin(blow.acting.features[:, :2], free).any(axis=1))
-                gained = blow.after.velocity[bodies] - self._state[bodies, -self._world.shape[1] :]
+                acting = blow.acting.chosen(np.asarray(np.isin(blow.acting.features[:, :2], free).any(axis=1)))
+                before, after = self._state[bodies], blow.after.numbers[bodies]
+                gained = (after - before)[:, -self._world.shape[1] :]
                 if np.abs(gained / self._world.per_length).max() > NO_BLOW * self._world.speed:
-                    rocks = blow.scheme == ROCKING
-                    label = (step, FORCES if rocks else IMPACT, blow.scheme)
-                    self._enter((begin, 0.0), label, bodies, blow.after, blow.acting.chosen(own))
+                    label = np.array([[step, FORCES if blow.scheme == ROCKING else IMPACT, blow.scheme, 0, 0]])
+                    self._enter(time, label, bodies, before, after, acting.features, acting.wrench)
+                    self._state[free] = blow.after.numbers[free]
 
-    def _shares(self, part: Part) -> list[Part]:
-        """Return a part in so many that cubic polynomials through their ends, which the audit follows, are close."""
-        piece, first, last = part
-        if not piece.turns:
-            return [part]
+    def _write_parts(self, steps: Indices, dt: float, piece: Piece, shares: Array) -> None:
+        """Write a piece between shares (k + 1,), a part in each of the steps (k,)."""
+        if piece.turns:
+            ends = [self._shares(piece, *both) for both in pairwise(shares.tolist())]
+            steps = np.repeat(steps, list(map(len, ends)))
+            shares = np.array([shares[0], *(end for each in ends for end in each)])
+        states = np.concatenate(piece.looked_at(shares), axis=2)
+        acting, features = Acting.between(piece, shares[:-1], shares[1:]), piece.held.contacts.features
+        self._bring(states[0])
+        groups = list(self._groups(features))
+        if not groups:
+            return
+        bodies, own, k = np.concatenate([each for each, _ in groups]), [each for _, each in groups], len(steps)
+        contacts = np.concatenate([np.flatnonzero(each) for each in own])
+        scheme = FIFTH_ORDER if piece.turns else ROCKING if piece.held.lasts > 0.0 else FROZEN
+        label = np.zeros((k, len(groups), 5), np.int64)
+        label[:, :, 0], label[:, :, 1] = steps[:, None], FORCES
+        label[:, :, 2] = [scheme if each.any() else FROZEN for each in own]
+        label[:, :, 3] = np.cumsum([0, *(len(each) for each, _ in groups[:-1])]) + len(bodies) * np.arange(k)[:, None]
+        label[:, :, 4] = np.cumsum([0, *map(np.sum, own[:-1])]) + len(contacts) * np.arange(k)[:, None]
+        # Times are counted from their steps, and lengths known to more digits than times have.
+        begin = piece.start.t + shares[:-1] * piece.length - steps * dt
+        time = np.repeat(np.column_stack([begin, np.diff(shares) * piece.length]), len(groups), axis=0)
+        before = np.concatenate([self._state[None], states[1:-1]])
+        wrench = np.array([each.wrench for each in acting])[:, contacts]
+        self._enter(
+            time,
+            label.reshape(-1, 5),
+            np.tile(bodies, k),
+            before[:, bodies],
+            states[1:, bodies],
+            np.tile(features[contacts], (k, 1)),
+            wrench,
+        )
+        self._state = states[-1]
+
+    def _shares(self, piece: Piece, first: float, last: float) -> list[float]:
+        """Return shares where a part ends in so many that cubic polynomials through their ends are close to it.
+
+        The audit follows these.
+        """
         s = np.array([first, 0.5 * (first + last), last])[:, None]
         way, rate = (each @ (s ** np.arange(each.shape[2])).T for each in (piece.way, piece.velocity))
         bend = 0.125 * (last - first) * piece.length * (rate[..., 0] - rate[..., 2])
         off = np.abs(way[..., 1] - 0.5 * (way[..., 0] + way[..., 2]) - bend).max() / (CLOSE * self._world.size)
         ends = np.linspace(first, last, 1 + max(1, int(np.ceil(off**0.25))))  # errors fall with the fourth power
-        return [Part(piece, *both) for both in pairwise(ends.tolist())]
+        return ends[1:].tolist()
 
-    def _write_part(self, step: int, dt: float, part: Part) -> None:
-        piece, start, end = part.piece, part.piece.state(part.first), part.piece.state(part.last)
-        self._bring(start)
-        length = (part.last - part.first) * piece.length  # to more digits than times have
-        acting = Acting.between(part)
-        for bodies, own in self._groups(acting.features):
-            scheme = FIFTH_ORDER if piece.turns and own.any() else FROZEN
-            if piece.held.lasts > 0.0 and own.any():
-                scheme = ROCKING
-            label = (step, FORCES, scheme)
-            self._enter((start.t - step * dt, length), label, bodies, end, acting.chosen(own))
-
-    def _bring(self, state: State) -> None:
+    def _bring(self, state: Array) -> None:
         """Bring bodies that are not free to a state: they are where they are, whether anything touches them or not."""
         moved = self._world.bodies.free == 0
-        self._state[moved] = np.concatenate([state.pose, state.velocity], axis=1)[moved]
+        self._state[moved] = state[moved]
 
     def _groups(self, features: Indices) -> Iterator[tuple[Indices, NDArray[np.bool_]]]:
         """Yield bodies that share contacts, with what is moved and touches them, and which contacts (m,) are theirs."""
@@ -224,33 +270,18 @@ class Recorder:
             yield np.flatnonzero(free & (label == group) | touched & moved), own
 
     def _enter(
-        self, time: tuple[float, float], label: tuple[int, ...], bodies: Indices, after: State, acting: Acting
+        self, time: Array, label: Indices, body: Indices, before: Array, after: Array, features: Indices, wrench: Array
     ) -> None:
-        state = np.concatenate([after.pose[bodies], after.velocity[bodies]], axis=1)
-        numbers = (*label, self._bodies, self._contacts)
-        self._rows.append(Row(time, numbers, bodies, self._state[bodies], state, acting))
-        self._bodies += len(bodies)
-        self._contacts += len(acting.gap)
-        free = self._world.bodies.free[bodies] == 1  # several groups may touch what is moved
-        self._state[bodies[free]] = state[free]
+        """Enter pieces, whose labels count bodies and contacts from the first of them."""
+        label += np.array([0, 0, 0, self._bodies, self._contacts])
+        name = self._keys(features)
+        before, after, wrench = (each.reshape(-1, each.shape[-1]) for each in (before, after, wrench))
+        self._rows.append((time, label, body, before, after, name, wrench))
+        self._bodies += len(body)
+        self._contacts += len(name)
 
     def journal(self, first: int, steps: int) -> Journal:
         """Return what was written of ``steps`` steps from the step ``first`` on, as a journal without room for more."""
-        d = self._world.dimension
-        rows, number = self._rows, self._state.shape[1]
-        acting = [row.acting for row in rows]
-        feature = np.concatenate([np.zeros((0, 6), np.int64), *(each.features for each in acting)])
-        wrench = [np.concatenate([a.point, a.normal, a.impulse, a.moment], axis=1) for a in acting]
-        width = 3 * d + (1 if d == 2 else 3)
-        return Journal(
-            used=np.array([len(rows), self._bodies, self._contacts, steps]),
-            time=np.array([row.time for row in rows]).reshape(-1, 2),
-            label=np.array([row.label for row in rows], np.int64).reshape(-1, 5) - np.array([first, 0, 0, 0, 0]),
-            body=np.concatenate([np.zeros(0, np.int64), *(row.bodies for row in rows)]),
-            before=np.concatenate([np.zeros((0, number)), *(row.before for row in rows)]),
-            after=np.concatenate([np.zeros((0, number)), *(row.after for row in rows)]),
-            name=np.column_stack([feature[:, :2], self._numbered(feature)]),
-            wrench=np.concatenate([np.zeros((0, width)), *wrench]),
-            pose=np.zeros((0, 0)),
-            twist=np.zeros((0, 0)),
-        )
+        time, label, *others = (np.concatenate(each) for each in zip(*self._rows, strict=True))
+        none, used = np.zeros((0, 0)), np.array([len(time), self._bodies, self._contacts, steps])
+        return Journal(*(used, time, label - np.array([first, 0, 0, 0, 0]), *others, none, none))

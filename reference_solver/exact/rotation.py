@@ -27,14 +27,12 @@ def turned(orientation: Array, turn: Array) -> Array:
     """Return orientations (..., 1 | 4) after turns (..., 1 | 3)."""
     if orientation.shape[-1] == 1:
         return orientation + turn
-    half = 0.5 * np.linalg.norm(turn, axis=-1, keepdims=True)
+    half = 0.5 * np.sqrt((turn * turn).sum(-1, keepdims=True))
     real, imaginary = np.cos(half), 0.5 * np.sinc(half / np.pi) * turn
-    first, rest = orientation[..., :1], orientation[..., 1:]
-    product = np.concatenate(
-        [
-            real * first - (imaginary * rest).sum(-1, keepdims=True),
-            real * rest + imaginary * first + np.cross(imaginary, rest),
-        ],
-        axis=-1,
-    )
-    return product / np.linalg.norm(product, axis=-1, keepdims=True)
+    w, rest = orientation[..., 0], orientation[..., 1:]
+    u, v = ([each[..., k] for k in range(3)] for each in (imaginary, rest))
+    product = np.empty((*turn.shape[:-1], 4))
+    product[..., 0] = real[..., 0] * w - (imaginary * rest).sum(-1)
+    for k, i, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        product[..., 1 + k] = real[..., 0] * v[k] + u[k] * w + (u[i] * v[j] - u[j] * v[i])
+    return product / np.sqrt((product * product).sum(-1, keepdims=True))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.features import TOUCH, find, no_gap
 from reference_solver.exact.kernels.features import LINE
+from reference_solver.exact.kernels.motion import write_along
 from reference_solver.exact.kernels.rows import write_rows
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
@@ -105,6 +106,16 @@ class Contacts:
         """Bring rows to a state; return itself."""
         return self.at(state.place, state.axes, state.velocity)
 
+    def along_way(self, way: Array, velocity: Array, start: State) -> tuple[Array, Array, Array]:
+        """Return gaps (k, m), places (k, m, d), frames (k, m, d, d) after ways (k, n, q) from a start, with twists."""
+        k, d = len(way), self.world.dimension
+        found = np.empty((k, len(self))), np.empty((k, len(self), d)), np.empty((k, len(self), d, d))
+        write_along(
+            self.world.bodies, start.place, start.axes, way, velocity, (self.features, self.along), self.rows, found
+        )
+        self._matrices = None
+        return found
+
     def chosen(self, which: NDArray[Any]) -> Contacts:
         """Return some of the contacts, by numbers or by a mask, with their rows."""
         part = Contacts(self.world, self.features[which], self.along[which])
@@ -173,10 +184,9 @@ def labels(free: Sequence[int], pairs: Iterable[Sequence[int]]) -> list[int]:
 
 
 def moments(place: Array, force: Array) -> Array:
-    """Return moments (m, 1 | 3) of forces at places (m, d) about the origin."""
-    if place.shape[1] == 2:
-        return (place[:, 0] * force[:, 1] - place[:, 1] * force[:, 0])[:, None]
-    return np.cross(place, force)
+    """Return moments (..., 1 | 3) of forces at places (..., d) about the origin."""
+    parts = ((0, 1),) if place.shape[-1] == 2 else ((1, 2), (2, 0), (0, 1))
+    return np.stack([place[..., i] * force[..., j] - place[..., j] * force[..., i] for i, j in parts], axis=-1)
 
 
 def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:

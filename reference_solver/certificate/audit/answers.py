@@ -27,7 +27,16 @@ from numpy.typing import NDArray
 from reference_solver.certificate.audit.contact import SLIP_NOISE, speeds
 from reference_solver.certificate.audit.rolling import accelerations
 from reference_solver.certificate.audit.run import Indices, Run
-from reference_solver.certificate.audit.sharing import HELD, SIDES_OF, by_root_of_inertia, clusters, pushed, tangents_of
+from reference_solver.certificate.audit.sharing import (
+    HELD,
+    SIDES_OF,
+    Known,
+    by_root_of_inertia,
+    clusters,
+    joined_contents,
+    pushed,
+    tangents_of,
+)
 from reference_solver.exact_contact import non_negative_least_squares
 from reference_solver.model import Array
 from reference_solver.pieces import CHAIN, FIFTH_ORDER, FROZEN
@@ -127,14 +136,19 @@ def _problems(run: Run, at: _Instants) -> Iterator[tuple[Indices, bool, Problem 
     if not len(owner):
         return
     mu = run.model.friction[pieces.body_a, pieces.body_b]
+    contents, known = _contents(run, at), Known(run)
     for k in np.unique(owner[at.asked & (mu > 0.0)]):
         own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
+        if known.answer(own, contents, lambda own: own) is not own:
+            continue
         for each in clusters(own[at.asked[own]], at.row):
             cluster = np.sort(each)
             if not mu[cluster].any():
                 continue
             pairs = [pieces.body_a[cluster], pieces.body_b[cluster], *np.round(pieces.normal[cluster] / TWO).T]
-            face = np.unique(np.column_stack(pairs), axis=0, return_inverse=True)[1].ravel()
+            faces = list(zip(*(each.tolist() for each in pairs), strict=True))
+            number = {each: i for i, each in enumerate(sorted(set(faces)))}
+            face = np.array([number[each] for each in faces])
             for lasts in (False, True) if at.jams[cluster[0]] else (not run.is_impact[k],):
                 slip = at.slip[cluster] if lasts else 0.0 * at.slip[cluster]
                 modes = modes_of((mu[cluster] > 0.0) & ~slip.any(axis=1), face, run.d)
@@ -183,6 +197,17 @@ def _instants(run: Run) -> _Instants:
     length = pieces.length[owner]
     given = np.einsum("cj,ckj->ck", pieces.impulse, axes) / np.where(length > 0.0, length, 1.0)[:, None]
     return _Instants(asked, jams, row, free, wander, slip, push, pull, given, noise)
+
+
+def _contents(run: Run, at: _Instants) -> tuple[Array, Array]:
+    """What problems of contacts (c,) are made of, see `Known.answer`."""
+    c, impact = len(at.asked), run.is_impact[run.contact_owner]
+    kind = np.column_stack([at.asked, at.jams, impact, at.slip])
+    push, pull = at.push.reshape(c, -1), np.where(at.row[:, :, None] >= 0, at.pull[at.row], 0.0).reshape(c, -1)
+    free, wander = np.where(impact[:, None], at.free, 0.0), np.where((~impact | at.jams)[:, None], at.wander, 0.0)
+    speed, rate, pushed, pulled = (np.abs(each).max(axis=1) for each in (free, wander, push, pull))
+    rates = wander, rate + pushed * pulled
+    return joined_contents((kind, np.ones(c)), (free, speed), rates, (push, pushed), (pull, pulled))
 
 
 def _torques(run: Run) -> Array:

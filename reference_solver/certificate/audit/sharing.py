@@ -13,7 +13,8 @@ Other modes are for `answers`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ HELD = 1e-9
 REDUNDANT = 1e-9
 #: Share of unit forces up to which what is left of their sum is round-off: some thousand last places.
 ROUND_OFF = 1e-12
+#: Share of their size by which numbers may differ from those of the same contacts in an earlier piece, for an answer to
+#: be that one: a hundredth of that to which `answers` tells problems apart.
+UNCHANGED = 1e-10
 #: Sides of the polygon that replaces the circle of sticking friction in space; at its corners friction exceeds mu p_n
 #: by 2 %.
 SIDES = 16
@@ -44,6 +48,32 @@ class Spread(NamedTuple):
 
     gain: Array  # (m,) largest difference at any point of the body [m/s]
     contacts: dict[int, Indices]  # the contacts that share a load, for each row with a difference
+
+
+class Known:
+    """Answers of clusters of contacts: what rests, or slides straight, has one all along.
+
+    Parameters
+    ----------
+    run
+        Whose contacts are asked for.
+    """
+
+    def __init__(self, run: Run) -> None:
+        pieces = run.pieces
+        self._names = np.column_stack([pieces.body_a, pieces.body_b, pieces.feature])
+        self._answers: dict[bytes, tuple[Indices, Any]] = {}
+
+    def answer(self, own: Indices, contents: tuple[Array, Array], ask: Callable[[Indices], Any]) -> Any:
+        """Return what ``ask`` says of contacts, or said of the same ones in an earlier piece with the same contents.
+
+        ``contents`` (c, k) of all contacts, and sizes by which their changes are measured (c, k).
+        """
+        key, (told, size) = self._names[own].tobytes(), contents
+        before = self._answers.get(key)
+        if before is None or not (np.abs(told[own] - told[before[0]]) <= UNCHANGED * size[before[0]]).all():
+            before = self._answers[key] = own, ask(own)
+        return before[1]
 
 
 class _Contacts(NamedTuple):
@@ -69,11 +99,17 @@ def shared_loads(run: Run) -> Spread:
     if not len(owner):
         return found
     contacts = _contacts(run)
+    contents, known = _contents(run, contacts), Known(run)
     for k in np.unique(owner[contacts.rubs]):
         own = np.arange(pieces.first_contact[k], pieces.first_contact[k + 1])
         for cluster in clusters(own[contacts.held[own]], contacts.row):
             if len(cluster) > 1 and contacts.rubs[cluster].any():
-                _share(run, contacts, cluster, found)
+                gain, takes = known.answer(cluster, contents, lambda own: _share(run, contacts, own))
+                rows = np.unique(contacts.row[cluster])
+                rows = rows[rows >= 0]
+                found.gain[rows] += gain
+                for row, taking in zip(rows[gain > 0.0].tolist(), takes[gain > 0.0], strict=True):
+                    found.contacts[row] = np.sort(cluster[taking])
     return found
 
 
@@ -199,8 +235,23 @@ def clusters(own: Indices, row: Indices) -> list[Indices]:
     return [np.array(members) for _, members in groups]
 
 
-def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
-    """Enter the spread of a cluster of contacts."""
+def _contents(run: Run, contacts: _Contacts) -> tuple[Array, Array]:
+    """What spreads of contacts (c,) are made of, see `Known.answer`."""
+    c, owner = len(contacts.mu), run.contact_owner
+    modes = np.column_stack([contacts.held, contacts.rubs, contacts.sticks]).astype(float)
+    push, largest = contacts.push.reshape(c, -1), np.zeros(len(run.pieces))
+    np.maximum.at(largest, owner, np.abs(contacts.given).max(axis=1))
+    return joined_contents((modes, np.ones(c)), (contacts.given, largest[owner]), (push, np.abs(push).max(axis=1)))
+
+
+def joined_contents(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return parts (c, k) as one table, and their sizes (c,) as another."""
+    tables = [part for part, _ in parts], [np.broadcast_to(size[:, None], part.shape) for part, size in parts]
+    return np.concatenate(tables[0], axis=1), np.concatenate(tables[1], axis=1)
+
+
+def _share(run: Run, contacts: _Contacts, own: Indices) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the spread of each free body (r,) of a cluster of contacts (c,), and which contacts make it (r, c)."""
     d, many = run.d, len(own)
     rows = np.unique(contacts.row[own])
     rows = rows[rows >= 0]
@@ -222,8 +273,9 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
     ways = ways[strength <= REDUNDANT * strength[0]]
     directions, strength, turn = np.linalg.svd(moves.T @ ways.T, full_matrices=False)
     moving = np.flatnonzero(strength > ROUND_OFF)
+    gained, takes = np.zeros(len(rows)), np.zeros((len(rows), many), bool)
     if not len(moving):
-        return
+        return gained, takes
     ways = ways / size
     given = contacts.given[own[of], np.where(part == 1, 0, part - 1)]
     limits = _limits(contacts.mu[own], stuck, d)
@@ -234,11 +286,10 @@ def _share(run: Run, contacts: _Contacts, own: Indices, found: Spread) -> None:
         reach = run.reach[run.pieces.body[rows]]
         gain = np.linalg.norm(motion[:, :d], axis=1) / np.sqrt(run.mass[run.pieces.body[rows]])
         gain += reach * np.linalg.norm(by_root_of_inertia(run, rows, motion[:, d:]), axis=1)
-        taking = own[np.unique(of[np.abs(turn[k] @ ways) * size > REDUNDANT])]
         if spread > 0.0:
-            for row in rows[gain > 0.0].tolist():
-                found.contacts[row] = np.union1d(found.contacts.get(row, taking), taking)
-            found.gain[rows[gain > 0.0]] += spread * gain[gain > 0.0]
+            gained += np.where(gain > 0.0, spread * gain, 0.0)
+            takes[np.ix_(gain > 0.0, of[np.abs(turn[k] @ ways) * size > REDUNDANT])] = True
+    return gained, takes
 
 
 def _limits(mu: Array, stuck: Indices, d: int) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 
 from reference_solver.exact.kernels.compiled import kernel
 from reference_solver.exact.kernels.rotation import turn_axes, write_turn_rate
-from reference_solver.exact.kernels.rows import write_inverse_inertia
+from reference_solver.exact.kernels.rows import write_inverse_inertia, write_rows
 
 
 @kernel
@@ -51,3 +51,18 @@ def write_moved(place, axes, way, velocity, moved):
             moved[2][i, p] = velocity[i, p]
         turn_axes(axes[i], way[i, d:], moved[1][i])
         write_turn_rate(way[i, d:], velocity[i, d:], moved[2][i, d:])
+
+
+@kernel
+def write_along(bodies, place, axes, way, velocity, contacts, rows, found):
+    """Write gaps (k, m), places (k, m, d) and frames (k, m, d, d) of contacts after ways with twists (k, n, q).
+
+    ``contacts``: features and tangents that frames take up; ``rows``: room.
+    """
+    features, along = contacts
+    moved = np.empty(place.shape), np.empty(axes.shape), np.empty(way.shape[1:])
+    for k in range(len(way)):
+        write_moved(place, axes, way[k], velocity[k], moved)
+        rows.frame[:, 1] = along
+        write_rows(bodies, (moved[0], moved[1], velocity[k]), features, rows)
+        found[0][k], found[1][k], found[2][k] = rows.gap, rows.place, rows.frame
