@@ -75,7 +75,7 @@ class ReferenceEngine(Engine):
     profiles = PROFILES
     kinds, former = KINDS, FORMER
     exports = MappingProxyType({"python": python})
-    #: 160 discs that settle take 79 ms a step, as long as a whole run of most scenes.
+    #: Events grow with bodies that touch: heaps of more take minutes, or end in a refusal.
     most_bodies = 100
 
     def version(self) -> str:

@@ -197,9 +197,7 @@ def test_a_unit_that_is_empty_leaves_no_space_behind():
 )
 def test_reference_run_with_too_large_a_step_error(error, outcome, said):
     row = judged(metrics={"creep": (0.0, "")}, certificate={"metric_errors": {"creep": error}})
-    wanted = (
-        f"its error for the step is {said}; a truth has at most {MOST:.3g}, a tenth of the tolerance" if said else ""
-    )
+    wanted = f"its error is {said}; a truth has at most {MOST:.3g}, a tenth of the tolerance" if said else ""
     assert (row.outcome, row.reason) == (outcome, wanted)
     assert row.physics == ("pass" if outcome == "ok" else None)
     assert (row.value, row.cells) == (0.0, ["c0ffee"])  # what was measured stays to be seen

@@ -15,7 +15,6 @@ Other benchmarks, timed in the same way:
 
     targets.py     the textbook step against other engines at 10 sweeps and at equal error (targets.toml, errors.py)
     scenes.py      scenes that only a bench has
-    piles.py       cost of steps that are cut at events, in piles
     guard.py       whether the textbook step has become slower (guard.toml)
 
 Protocol

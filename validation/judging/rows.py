@@ -50,7 +50,7 @@ SYMBOLS = {"restitution": "e", "friction": "mu"}
 Ready = Mapping[Asked, list[Prediction]]
 #: Scenes from files with several motions: by what was asked, when they part [s], and what is said of them.
 Several = Mapping[tuple[object, ...], tuple[float, str]]
-#: Largest error for the step of a run that is truth, as a share of the tolerance it is judged with.
+#: Largest error of a run that is truth, as a share of the tolerance it is judged with.
 TRUTH_SHARE = 0.1
 
 
@@ -331,7 +331,7 @@ def _is_lawful(observation: Observation, check: Check) -> bool:
 
 
 def _doubt(observation: Observation, check: Check) -> str:
-    """Why a certified run cannot be the truth of this check: its step error is not small against the tolerance."""
+    """Why a certified run cannot be the truth of this check: its error is not small against the tolerance."""
     errors = observation.certificate.get("metric_errors")
     if observation.outcome is not Outcome.OK or errors is None or check.bound is None:
         return ""
@@ -339,7 +339,7 @@ def _doubt(observation: Observation, check: Check) -> str:
     if error is not None and error <= most:
         return ""
     known = "infinite" if error is None else f"{error:.3g}"
-    return f"its error for the step is {known}; a truth has at most {most:.3g}, a tenth of the tolerance"
+    return f"its error is {known}; a truth has at most {most:.3g}, a tenth of the tolerance"
 
 
 def _certificate(observation: Observation, check: Check) -> str:
