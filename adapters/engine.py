@@ -379,8 +379,13 @@ class Engine(ABC):
         """
         return None
 
-    def at_other_tolerances(self, settings: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-        """Settings of the run that `certify` certifies, to other tolerances: what differs there tells its error."""
+    def at_other_tolerances(
+        self, settings: Mapping[str, Any], certificate: Mapping[str, Any]
+    ) -> list[Mapping[str, Any]]:
+        """Settings of a run with this light ``certificate``, to other tolerances: what differs there tells its error.
+
+        Empty if the tolerance had no part in the run.
+        """
         return []
 
     def kernels(self) -> Path | None:

@@ -133,12 +133,15 @@ class ReferenceSimulation(Simulation):
         }
 
     def certificate(self) -> dict[str, Any]:
-        """The result of `reference_solver.Simulation.certificate`; ``certified`` of the loop of events alone.
+        """The result of `reference_solver.Simulation.certificate`.
 
+        Of the loop of events also whether it is ``certified``, and ``closed``: whether all motion was in closed form.
         Steps are not certified: their residual is to be shown.
         """
         found = {key: json_ready(value) for key, value in self.solver.certificate.items()}
-        return found if self.settings.tolerance is None else {**found, "certified": found["holds"]}
+        if self.settings.tolerance is None:
+            return found
+        return {**found, "certified": found["holds"], "closed": self.solver.is_closed}
 
 
 @contextmanager

@@ -236,8 +236,18 @@ def test_both_ends_of_the_tolerance_certified(tolerance: float) -> None:
     end = run(ENGINE, scene, DT, settings, Sampling(1, 0.0)).pose[-1]
     found = ENGINE.certify(scene, DT, settings, round(scene.duration / DT), end)
     assert found is not None and found["holds"], found["reasons"]
-    for other in ENGINE.at_other_tolerances(settings):
-        assert np.abs(run(ENGINE, scene, DT, other, Sampling(1, 0.0)).pose[-1] - end).max() < 1e-12
+
+
+@pytest.mark.parametrize(("spins", "others"), [((0.0, 0.0, 0.0), 0), ((2.0, 0.01, 1.0), 2)])
+def test_other_tolerances_where_a_step_was_made_to_one(spins: tuple[float, ...], others: int) -> None:
+    """A brick that flies without a spin is in closed form; one that tumbles is not, and differs a little."""
+    brick = body("brick", 3, (0.0, 0.0), box=True, inertia=(0.1, 0.2, 0.3))
+    scene = make(replace(brick, twist=(0.0, 0.0, 0.0, *spins)), T=1.0)
+    found = drive(scene, "reference")
+    asked = ENGINE.at_other_tolerances({"tolerance": 1e-11}, found.certificate)
+    apart = [np.abs(run(ENGINE, scene, DT, other, Sampling(1, 0.0)).pose - found.pose).max() for other in asked]
+    assert len(asked) == others and all(0.0 < each < 1e-9 for each in apart)
+    assert ENGINE.build(scene, DT, {"tolerance": 1e-12}) and found.certificate["closed"] is (others == 0)
 
 
 def test_refusal_of_the_loop_in_one_line() -> None:

@@ -21,7 +21,7 @@ class Certifying:
     def certify(self, *asked):
         return {"holds": True, "reasons": []}
 
-    def at_other_tolerances(self, settings):
+    def at_other_tolerances(self, settings, certificate):
         return [{"tolerance": share * settings["tolerance"]} for share in (0.1, 10.0)]
 
 

@@ -50,12 +50,12 @@ def _metric_errors(
     """
     canonical, scene = prepared.canonical, prepared.scene
     sampling = canonical.sampling(scene)
-    found: dict[str, float | None] = {}
     here = {name: value for name, (value, _) in canonical.measure(scene, trajectory).items()}
-    for other in engine.at_other_tolerances(settings):
+    found: dict[str, float | None] = dict.fromkeys(here, 0.0)
+    for other in engine.at_other_tolerances(settings, trajectory.certificate):
         there = canonical.measure(scene, run(engine, scene, slot.dt, other, sampling))
         for name, value in here.items():
-            found[name] = _larger(found.get(name, 0.0), _difference(value, there[name][0]))
+            found[name] = _larger(found[name], _difference(value, there[name][0]))
     return found
 
 
