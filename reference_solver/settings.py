@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import Literal
 
 Solver = Literal["scalar", "block"]
 PositionCorrection = Literal["split", "baumgarte", "none"]
-Scheme = Literal["fixed", "located", "midpoint"]
 
-#: Difference of both orders of a phase, as a share of the motion in it: mostly 50 to 1000 times the error that is made.
-ACCURACY = 1e-8
 #: Error that a step of the event loop may make where contacts turn, as a share of the motion in it.
 TOLERANCE = 1e-11
 
@@ -48,12 +45,6 @@ class Settings:
     margin
         Pairs with e = 0 are in contact while their gap is below this fraction of the smaller half width; they may
         close it, not more (E8). Pairs with e > 0 are in contact only where they touch.
-    scheme
-        ``fixed``: one solve per step, impacts are found at the start of the step after (E5 to E8, E17). ``located``:
-        steps are cut where bodies meet and where a slide ends (E19 to E24). ``midpoint``: located impacts, and phases
-        whose contacts turn at impulse level, by the mid-point rule: second order, one solve (E28).
-    accuracy
-        Largest difference of both orders of a phase whose contacts turn, as a share of what bodies move in it (E35).
     tolerance
         The loop of events (`reference_solver.exact`), in which ``dt`` only says when to look: error that a step of the
         Runge-Kutta method may make where contacts turn, as a share of the motion in it. None: steps of length ``dt``.
@@ -76,8 +67,6 @@ class Settings:
     solver: Solver = "scalar"
     margin: float = 0.01
     direct: bool = True
-    scheme: Scheme = "fixed"
-    accuracy: float = ACCURACY
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
@@ -93,19 +82,14 @@ class Settings:
         _require("beta", self.beta, 0.0 < self.beta <= 1.0, "in (0, 1]")
         _require("slop", self.slop, math.isfinite(self.slop) and self.slop >= 0.0, "a length of at least 0")
         _require("solver", self.solver, self.solver in ("scalar", "block"), "'scalar' or 'block'")
-        _require("scheme", self.scheme, self.scheme in get_args(Scheme), f"one of {', '.join(get_args(Scheme))}")
-        if self.scheme != "fixed":
-            allowed = ("split", "none")
-            _require("position_correction", self.position_correction, self.position_correction in allowed, allowed)
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
-        _require("accuracy", self.accuracy, 1e-12 <= self.accuracy <= 1e-4, "in [1e-12, 1e-4]")
         share = self.tolerance
         _require("tolerance", share, share is None or 1e-12 <= share <= 1e-4, "None or in [1e-12, 1e-4]")
 
     @property
     def is_textbook(self) -> bool:
         """Whether a step makes a fixed number of sweeps, row by row."""
-        return self.tolerance is None and self.scheme == "fixed" and self.solver == "scalar" and self.residual is None
+        return self.tolerance is None and self.solver == "scalar" and self.residual is None
 
     @classmethod
     def classical(cls, dt: float, iterations: int = 10, pull: float = 9.81) -> Settings:
@@ -132,11 +116,6 @@ class Settings:
     def reference(cls, dt: float, tolerance: float = TOLERANCE) -> Settings:
         """Return the loop of events; ``dt`` only says when to look."""
         return cls(dt=dt, tolerance=tolerance)
-
-    @classmethod
-    def located(cls, dt: float) -> Settings:
-        """Return contact problems solved to round-off, in steps that are cut where bodies meet and slides end."""
-        return replace(cls.fixed_step(dt), scheme="located")
 
     @classmethod
     def fixed_step(cls, dt: float) -> Settings:

@@ -68,7 +68,7 @@ STEPS_PER_JOURNAL = 64
 UNCERTIFIED = ("sweeps", "worst_sweeps", "projected")
 
 #: Package of each dimension, imported when first used: loading kernels costs time. The event loop serves both.
-WORLDS = {2: "reference_solver.planar", 3: "reference_solver.spatial"}
+WORLDS = {2: "reference_solver.textbook2", 3: "reference_solver.textbook3"}
 EVENT_LOOP = "reference_solver.exact"
 
 
@@ -93,9 +93,7 @@ class Simulation:
         self.settings = settings
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
         package = import_module(WORLDS[model.dimension] if settings.tolerance is None else EVENT_LOOP)
-        self._certified = (
-            certified or settings.residual is not None or settings.scheme != "fixed" or settings.tolerance is not None
-        )
+        self._certified = certified or settings.residual is not None or settings.tolerance is not None
         self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0
 
@@ -142,10 +140,12 @@ class Simulation:
         Raises
         ------
         ValueError
-            If ``steps`` is negative or ``stride`` below 1.
+            If ``steps`` is negative or ``stride`` below 1, or pieces are asked of steps.
         """
         require_count("steps", steps, 0)
         require_count("stride", stride, 1)
+        if pieces and self.settings.tolerance is None:
+            raise ValueError("pieces: the loop of events has them; a step of length dt has none")
         first, start_pose, start_twist = self._steps, self.pose, self.twist
         tallies: list[Array] = []
         journals: list[Journal] = []
@@ -232,10 +232,7 @@ class Simulation:
         return self._world.contacts()
 
     def step_problem(self) -> StepProblem:
-        """Contact problem that a step of length `Settings.dt` from here has to solve (E64); nothing moves.
-
-        Impacts and forces stand in one problem, as in a step at fixed dt, whatever the scheme cuts a step into.
-        """
+        """Contact problem that a step of length `Settings.dt` from here has to solve (E64); nothing moves."""
         return self._world.step_problem()
 
     @property

@@ -40,30 +40,16 @@ NOT_FINITE = 18
 SOLVES = 19
 #: Contact solves whose answer is the direct solver's (E44), and its factorisations.
 DIRECT, FACTORISATIONS = 20, 21
-#: Events located inside steps: impacts, ends of slides (E19).
-EVENTS_LOCATED = 22
-#: Steps with more events than are located; what was left of them went at impulse level (E28).
-STEPS_HELD = 23
 #: Contact solves whose velocities are proven to be the only answer (E66).
-UNIQUE = 24
-
+UNIQUE = 22
 #: Worst overlap at the start of the run, as a share of the smaller half width.
-START_OVERLAP = 25
-#: Contact solves opened, contacts or none, and at least 1 after the first part of a step; tells the solve of the start.
-OPENED = 26
+START_OVERLAP = 23
+#: Contact solves opened, contacts or none: tells the solve of the start.
+OPENED = 24
 #: Coarsest last place of a body's coordinates, as a share of its smallest half width.
-RESOLUTION = 27
-#: Steps that ended the run because their events were more than the budget (E28).
-EXHAUSTED = 28
-#: Bodies A and B of a contact problem that has no solution, one more than their numbers; 0 where there is none.
-CONTRADICTED_A, CONTRADICTED_B = 29, 30
-#: Bodies A and B, one more than their numbers, of impacts that follow each other in an instant without end, and to no
-#: limit that is proven (E22). 0 where there are none.
-ENDLESS_A, ENDLESS_B = 31, 32
-#: Parts of steps that are cut at events (E19).
-SUB_STEPS = 33
+RESOLUTION = 25
 
-SIZE = 34
+SIZE = 26
 
 #: Entries that add up over a run; of all others the largest counts.
 SUMS = (
@@ -77,11 +63,7 @@ SUMS = (
     SOLVES,
     DIRECT,
     FACTORISATIONS,
-    EVENTS_LOCATED,
-    STEPS_HELD,
     UNIQUE,
-    EXHAUSTED,
-    SUB_STEPS,
 )
 
 

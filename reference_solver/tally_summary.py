@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from reference_solver import tally as entries
 from reference_solver.model import Array
-from reference_solver.stepping.noise import EVENT_BUDGET
 
 
 class Gate(NamedTuple):
@@ -46,10 +45,6 @@ GATES = (
     Gate("pumped", entries.PUMPED, 1e-10, "energy created without restitution"),
 )
 
-#: Largest overlap where events are located, as a share of the smaller half width: what weight closes in a step of
-#: 1/240 s, g h^2, of a half width of .17 m. Steps of piles that go at impulse level (E28) leave more, and are refused.
-LOCATED_OVERLAP = 1e-3
-
 
 def summary(tally: Array) -> dict[str, Any]:
     """Return the tally under its public names (see ``Simulation.certificate``)."""
@@ -63,8 +58,6 @@ def summary(tally: Array) -> dict[str, Any]:
         "unique": int(tally[entries.UNIQUE]),
         "direct": int(tally[entries.DIRECT]),
         "factorisations": int(tally[entries.FACTORISATIONS]),
-        "events": int(tally[entries.EVENTS_LOCATED]),
-        "held_steps": int(tally[entries.STEPS_HELD]),
     }
     values |= {gate.name: float(tally[gate.entry]) for gate in GATES}
     values |= {
@@ -88,17 +81,6 @@ def reasons(tally: Array) -> tuple[str, ...]:
     """Return what keeps a run from serving as truth, one sentence each; empty if nothing does."""
     missed = [gate for gate in GATES if not tally[gate.entry] <= gate.limit]
     found = [f"{gate.meaning}: {gate.name} {tally[gate.entry]:.3g}, at most {gate.limit:.3g}" for gate in missed]
-    if tally[entries.SUB_STEPS] > 0.0 and not tally[entries.PENETRATION] <= LOCATED_OVERLAP:
-        overlap = f"penetration {tally[entries.PENETRATION]:.3g}, at most {LOCATED_OVERLAP:.3g}"
-        found.append(f"bodies overlap where events are located: {overlap}")
     if tally[entries.NOT_FINITE] > 0.0:
         found.append(f"velocities are no numbers after {int(tally[entries.NOT_FINITE])} contact solves")
-    if tally[entries.EXHAUSTED] > 0.0:
-        found.append(f"a step has more than {EVENT_BUDGET} events: the run ended there")
-    if tally[entries.CONTRADICTED_A] > 0.0:
-        pair = [int(tally[entry]) - 1 for entry in (entries.CONTRADICTED_A, entries.CONTRADICTED_B)]
-        found.append(f"no impulses keep bodies {pair[0]} and {pair[1]} apart: the run ended there")
-    if tally[entries.ENDLESS_A] > 0.0:
-        pair = [int(tally[entry]) - 1 for entry in (entries.ENDLESS_A, entries.ENDLESS_B)]
-        found.append(f"impacts of bodies {pair[0]} and {pair[1]} accumulate at one instant, to no limit that is proven")
     return tuple(found)

@@ -1,20 +1,9 @@
 """The full certificate: the audit of a run, how far it is off for its finite step, and for how long that can be told.
 
-*Error.* The run is made again at half the step. A scheme of order p is off by C h^p, so that both differ by
-``(1 - 2^-p)`` of that: twice their difference, the largest so far, is at least what the run is off, whatever p >= 1.
-Halves end where the whole steps end. What a solver decides by the time that is left of a step (whether a series of
-rebounds is over, E22) comes out alike in both, and so does what is wrong with it. So the run is made a third time with
-28 steps for each 5, or others near that ratio without a common divisor: none of them end together but the last of all,
-where the runs are compared as well. So many, because phases that the solver shortens by its own judgement of their
-error are no shorter at half the step, and at 13 for 5 hardly: their errors were up to three times what such runs told.
-Each rebound is smaller than the one before by e, and a run that leaves some out is off by as much for all steps that
-leave out as many: then it is made with 56 for 5, too, and what a series that ends may leave out (E22) is added.
+*Error.* Steps say only when the event loop is looked at. The run is made again to a finer and to a coarser tolerance.
 What is decided within round-off (which of two corners strikes first, whether what hardly slips does) is decided by the
 order of bodies and by signs: the mirrored world, its bodies in reverse order, is as true, and ends where the run does.
-What all of these are off alike, since phases end by the solver's judgement of their error and not by the step, a run
-tells that is made to a hundredth of the accuracy.
-Of the event loop steps say only when it is looked at: it is made again to a finer and to a coarser tolerance instead.
-What it strikes together may touch a little later: by a gap that counts as none.
+What the loop strikes together may touch a little later: by a gap that counts as none.
 To all this comes what solves leave of their speeds, as far as a disturbance of that size would grow (below), and how
 far apart two motions can be that both obey the laws, where contacts can share a load in more than one way
 (`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
@@ -34,8 +23,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import count
-from math import gcd, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -59,7 +47,7 @@ from reference_solver.exact.features import no_gap
 from reference_solver.exact.refusals import Refused
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import POSE_SIZE, Array, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, IMPACT
+from reference_solver.pieces import CHAIN, IMPACT
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import smallest_extent
@@ -70,15 +58,11 @@ GROWTH = 1e3
 #: Size of the disturbance, as a share of the fastest speed of the run: thousands of units in the last place, so that
 #: what it grows to is told from the round-off of either run.
 DISTURBANCE = 1e-12
-#: Steps in a row that are made again as more that end elsewhere, but for the last; how many more, and with rebounds. In
-#: few, since an error may come and go: what topples is off while it falls, and no more once it lies.
-BLOCK, FINER, FINEST = 5, 5.618, 11.09
-#: Share of the accuracy of phases (E35) to which a run is made again: it tells what all runs are off alike, whatever
-#: their steps, since the solver judges by it how long its phases may be.
-CLOSER = 1e-2
 #: Shares of the tolerance of the event loop to which a run is made again. The finer one's steps are three quarters as
 #: long, those of the coarser one 1.3 times.
 TOLERANCES = (0.1, 10.0)
+#: Steps within which what happens a little sooner or later far from the origin may be told.
+BLOCK = 5
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
 #: Distances from the origin to which the run is moved, in smallest half widths. At the second one gaps are closed some
@@ -188,12 +172,12 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 
 
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs twelve to twenty runs, seven of the event loop, and the audit.
+    """Run ``model`` and certify the run; costs seven runs, and the audit.
 
     Raises
     ------
     ValueError
-        If ``steps`` is below 1 or ``stride`` below 1.
+        If ``steps`` is below 1, ``stride`` below 1, or ``settings`` are not of the event loop.
     """
     if steps < 1:
         raise ValueError(f"steps: {steps!r} must be a whole number of at least 1")
@@ -221,8 +205,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
-    by_events = settings.tolerance is not None
-    findings = [*audit(model, record, settings.dt, located=by_events or settings.scheme == "located"), shared]
+    findings = [*audit(model, record, settings.dt), shared]
     light = run.certificate
     reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
     if not light["converged"]:
@@ -232,12 +215,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
-        reasons.append("the run at half the step is no numbers")
+        reasons.append("the run at another tolerance is no numbers")
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
-    joint = np.zeros(len(record.t))
-    if by_events:
-        joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
+    joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
@@ -361,42 +342,12 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
 
 
 def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
-    """Bound (s,) of what the record of ``run`` is off for its finite step [m]; the largest so far."""
+    """Bound (s,) of what a run is off for its tolerance [m]; the largest so far."""
     settings = run.settings
-    if settings.tolerance is not None:
-        return _error_of_loop(model, run, settings.tolerance, record, steps, stride)
-    half = Simulation(model, replace(settings, dt=0.5 * settings.dt)).record(2 * steps, 2 * stride)
-    error = 2.0 * distance(model, record.pose, half.pose)
-    samples = len(record.t) - 1
-    each = min(max(BLOCK // stride, 1), samples)  # samples from one comparison to the next
-    block, blocks = each * stride, -(-samples // each)
-    # What a block ends with may have come at any time in it. The run goes on to the end of its last one.
-    until = (np.arange(samples + 1) + each - 1) // each
-    beyond = run.record(blocks * block - samples * stride, stride).pose[1:]
-    coarse = np.concatenate([record.pose, beyond])[::each]
-    leaves_out = len(ends_of_series(model, record, settings.dt)[0]) > 0
-    for ratio in (FINER, FINEST) if leaves_out else (FINER,):
-        more = next(k for k in count(round(ratio * block)) if gcd(k, block) == 1)
-        share = block / more
-        other = Simulation(model, replace(settings, dt=share * settings.dt)).record(blocks * more, more)
-        # What rebounds leave out need not fall with the step: then the finer run may be off by half as much.
-        off = distance(model, coarse, other.pose) * max(2.0 if leaves_out else 0.0, 1.0 / (1.0 - share))
-        off[-1] = off[-1] if np.isfinite(off[-1]) or not len(beyond) else 0.0  # ended after the last sample
-        error = np.maximum(error, off[until])
-    error = np.maximum(error, distance(model, record.pose, _mirrored(model, settings, steps, stride)))
-    if record.pieces is not None and (record.pieces.scheme == FIFTH_ORDER).any():
-        # An error that falls with the accuracy that is asked for is made a hundredth of.
-        closer = Simulation(model, replace(settings, accuracy=CLOSER * settings.accuracy)).record(steps, stride)
-        error = np.maximum(error, distance(model, record.pose, closer.pose) / (1.0 - CLOSER))
-    return _with_ends(model, record, settings.dt, error)
-
-
-def _error_of_loop(model: Model, run: Simulation, tolerance: float, record: Record, steps: int, stride: int) -> Array:
-    """Bound (s,) of what a run of the event loop is off for its tolerance [m]: steps say only when it is looked at."""
-    settings = run.settings
+    assert settings.tolerance is not None
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
     for share in () if run.is_closed else TOLERANCES:
-        other = _poses(model, replace(settings, tolerance=share * tolerance), steps, stride)
+        other = _poses(model, replace(settings, tolerance=share * settings.tolerance), steps, stride)
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))
     return _with_ends(model, record, settings.dt, error)
 

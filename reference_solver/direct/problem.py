@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.structures import structure
 
@@ -130,25 +129,4 @@ def allocate_problem(dimension: int, bodies: int, contacts: int, used: bool) -> 
         table=np.zeros((pivoted, pivoted + 2)),
         basic=np.zeros(pivoted, np.int64),
         free=np.zeros(pivoted + 1, np.int64),
-    )
-
-
-@inner_kernel
-def problem_part(problem: Problem, count: int) -> Problem:
-    """Room of the direct solver for the first bodies."""
-    held = min(count, len(problem.body))
-    return Problem(
-        problem.size,
-        problem.contact,
-        problem.body[:held],
-        problem.neighbour,
-        problem.first,
-        problem.start,
-        problem.lower,
-        problem.upper,
-        problem.diagonal,
-        problem.right,
-        problem.table,
-        problem.basic,
-        problem.free,
     )

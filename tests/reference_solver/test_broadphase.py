@@ -8,35 +8,32 @@ import pytest
 
 from reference_solver.compilation import KERNEL, OPTIONS
 from reference_solver.model import Body, Disc, HalfSpace, Model, Sphere
-from reference_solver.needs import ALL_PAIRS_LIMIT, needs
-from reference_solver.planar.state import allocate_bodies as planar_bodies
-from reference_solver.spatial.state import allocate_bodies as spatial_bodies
-from reference_solver.stepping.broadphase import allocate_boxes, boxes_part, pair_bodies
+from reference_solver.needs import ALL_PAIRS_LIMIT
+from reference_solver.textbook.broadphase import allocate_boxes, pair_bodies
 
 
 def world(dimension, n):
     """Bodies of which every seventh does not move; a half-space is first."""
     if dimension == 2:
         shapes = [HalfSpace((0.0, 1.0)), *[Disc(0.5)] * (n - 1)]
-        place, inertia, allocate = (0.0,) * 3, 1.0, planar_bodies
+        place, inertia = (0.0,) * 3, 1.0
     else:
         shapes = [HalfSpace((0.0, 0.0, 1.0)), *[Sphere(0.5)] * (n - 1)]
-        place, inertia, allocate = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (1.0,) * 3, spatial_bodies
+        place, inertia = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (1.0,) * 3
     bodies = [
         Body(shape, 1.0, inertia, place, motion="fixed" if i % 7 == 0 else "free") for i, shape in enumerate(shapes)
     ]
-    model = Model(dimension, bodies, (0.0,) * dimension, 0.0, 0.0)
-    return allocate(model, needs(model)), np.array([body.motion == "free" for body in bodies])
+    return Model(dimension, bodies, (0.0,) * dimension, 0.0, 0.0)
 
 
 @numba.njit(**OPTIONS, **KERNEL)
-def find(bodies, boxes, count):
-    return pair_bodies(bodies, boxes_part(boxes, count), 1)
+def find(boxes):
+    return pair_bodies(boxes, 1)
 
 
-def expected(boxes, free, count):
-    found = []
-    for i, j in combinations(range(count), 2):
+def expected(boxes):
+    found, free = [], boxes.free
+    for i, j in combinations(range(len(free)), 2):
         if (free[i] or free[j]) and np.all(boxes.low[i] <= boxes.high[j]) and np.all(boxes.low[j] <= boxes.high[i]):
             found.append((i, j))
     return found
@@ -79,19 +76,16 @@ CASES = (
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
 def test_the_grid_finds_what_all_pairs_have(dimension, case):
-    rng, n = np.random.default_rng(CASES.index(case)), 150
-    bodies, free = world(dimension, n)
-    boxes = allocate_boxes(n, dimension, n * n)
-    for count in (n, ALL_PAIRS_LIMIT + 1, 100):
+    rng = np.random.default_rng(CASES.index(case))
+    for n in (150, ALL_PAIRS_LIMIT + 1, 100):
+        boxes = allocate_boxes(world(dimension, n), n * n)
         boxes.low[:], boxes.high[:] = spread_out(rng, n, dimension, case)
-        truth = expected(boxes, free, count)
-        found = find(bodies, boxes, count)
-        assert [(key >> 32, key & 0xFFFFFFFF) for key in boxes.candidate[:found].tolist()] == truth
+        found = find(boxes)
+        assert [(key >> 32, key & 0xFFFFFFFF) for key in boxes.candidate[:found].tolist()] == expected(boxes)
 
 
 def test_too_little_room_is_told_and_nothing_is_written_behind_it():
-    bodies, free = world(2, 100)
-    boxes = allocate_boxes(100, 2, 40)
+    boxes = allocate_boxes(world(2, 100), 40)
     boxes.low[:], boxes.high[:] = -1.0, 1.0
-    assert len(expected(boxes, free, 100)) > 40
-    assert find(bodies, boxes, 100) == 41
+    assert len(expected(boxes)) > 40
+    assert find(boxes) == 41

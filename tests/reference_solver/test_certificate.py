@@ -11,12 +11,12 @@ from reference_solver import Body, Box, Disc, Model, Settings, Simulation, Spher
 from reference_solver import tally as entries
 from reference_solver.coulomb import cone_defect, into_cone
 from reference_solver.exact_contact import coulomb_solutions
-from reference_solver.planar.certificate import certify as certify_planar
-from reference_solver.planar.certificate import open_solve as open_planar
-from reference_solver.planar.columns import GAP, PN, PT
-from reference_solver.spatial.certificate import certify as certify_spatial
-from reference_solver.spatial.certificate import open_solve as open_spatial
 from reference_solver.tally_summary import GATES, reasons
+from reference_solver.textbook2.certificate import certify as certify_planar
+from reference_solver.textbook2.certificate import open_solve as open_planar
+from reference_solver.textbook2.columns import GAP, PN, PT
+from reference_solver.textbook3.certificate import certify as certify_spatial
+from reference_solver.textbook3.certificate import open_solve as open_spatial
 from tests.verification.space import SPACES
 
 DT, G = 1.0 / 240.0, 9.81

@@ -36,7 +36,7 @@ def test_the_cache_folder_is_named_after_the_sources():
     ("file", "covered"),
     [
         ("model.py", True),
-        ("planar/rows.py", True),
+        ("textbook2/rows.py", True),
         ("piles.py", False),
         ("certificate/truth.py", False),
         ("certificate/audit/run.py", False),
@@ -105,12 +105,12 @@ def test_another_checkout_of_the_same_sources_finds_the_machine_code(tmp_path):
 def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
     code = (
         "from numba.core import config; kept = lambda: (config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES);"
-        "before = kept(); import reference_solver.planar; print(kept() == before)"
+        "before = kept(); import reference_solver.textbook2; print(kept() == before)"
     )
     assert run(code, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1") == "True"
 
 
 def test_the_solver_imports_nothing_of_the_rest():
     rest = {"adapters", "validation", "reports"}
-    code = f"import sys, reference_solver.planar; print({rest} & {{name.split('.')[0] for name in sys.modules}})"
+    code = f"import sys, reference_solver.textbook2; print({rest} & {{name.split('.')[0] for name in sys.modules}})"
     assert run(code, NUMBA_DISABLE_JIT="1") == "set()"

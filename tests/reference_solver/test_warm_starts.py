@@ -14,7 +14,7 @@ from tests.verification.space import GRAVITY, SPACES
 #: Takes the disc away from warm starts, uncompiled.
 WITHOUT = """
 import sys; sys.path.insert(0, {!r})
-from reference_solver.spatial import prepare
+from reference_solver.textbook3 import prepare
 prepare.back_into_disc = lambda one, two, radius: (one, two)
 import test_warm_starts as own
 print(own.across(own.SPACES[1]))

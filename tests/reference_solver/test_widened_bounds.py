@@ -2,17 +2,12 @@
 
 import itertools
 
-import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.compilation import from_python
-from reference_solver.stepping import islands
 
 DT, RADIUS = 1.0 / 60.0, 0.3
 GRAVITY = 9.81
-
-leaves = from_python(islands.leaves)
 
 
 def ball(dimension, x, speed=0.0, mass=1.0):
@@ -85,13 +80,3 @@ def test_what_is_made_anew_is_counted_once(dimension):
         simulation.advance(1)
         counts.add((simulation.certificate["events"], simulation.certificate["solves"]))
     assert len(counts) == 1 and counts.pop()[0] == 2
-
-
-def test_bounds_hold_for_the_whole_way_and_are_twice_as_wide_where_they_do_not():
-    limit = np.array([[-1.0, -1.0, 1.0, 3.0]])
-    assert not leaves(limit, 0, 0, 0.5, 0.5) and not leaves(limit, 0, 0, -0.5, 0.5)
-    assert limit.tolist() == [[-1.0, -1.0, 1.0, 3.0]]
-    assert leaves(limit, 0, 0, 0.5, 0.75)
-    assert limit.tolist() == [[-2.5, -1.0, 2.5, 3.0]]
-    assert leaves(limit, 0, 1, -0.5, 0.75)  # about 1, the middle: 2 (1.5 + .75) to either side
-    assert limit.tolist() == [[-2.5, -3.5, 2.5, 5.5]]
