@@ -376,7 +376,12 @@ def test_no_duplicate_code_between_dimensions():
     """At most 40 functions have one name; those of a hundred words and more share at most six of seven."""
     rooms = "textbook2", "textbook3"
     told = {
-        room: {node.name: words_of(node) for path, node in solver_functions() if path.parts[0] == room}
+        room: {
+            node.name: words_of(node)
+            for path in (ROOT / "reference_solver" / room).glob("*.py")
+            for node in ast.parse(path.read_text()).body
+            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        }
         for room in rooms
     }
     both = set(told[rooms[0]]) & set(told[rooms[1]])

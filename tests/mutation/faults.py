@@ -21,7 +21,7 @@ OPTIONAL = tuple(
     f"adapters/{name}/" for name in ("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "newton")
 )
 #: Rooms of the solver that have kernels, and how kernels are marked.
-ROOMS = ("stepping", "planar", "spatial", "direct")
+ROOMS = ("textbook", "textbook2", "textbook3", "direct")
 DECORATORS = ("kernel", "inner_kernel", "spliced_kernel")
 OTHER_WAY = {ast.Lt: ">", ast.Gt: "<", ast.LtE: ">=", ast.GtE: "<=", ast.Eq: "!=", ast.NotEq: "=="}
 #: A module and the first and last of its lines.

@@ -21,7 +21,7 @@ def tools(monkeypatch):
 
 
 def test_a_fault_changes_one_statement_of_a_kernel_or_one_constant(tools):
-    faults, only = tools("faults"), "reference_solver/stepping/phase.py"
+    faults, only = tools("faults"), "reference_solver/textbook3/manifolds.py"
     chosen = list(islice(faults.faults(3, only), 40))
     told = [each.told for each in chosen]
     assert [each.told for each in islice(faults.faults(3, only), 20)] == told[:20]
@@ -35,14 +35,14 @@ def test_a_fault_changes_one_statement_of_a_kernel_or_one_constant(tools):
 
 
 def test_constants_replaced_where_kernels_name_them(tools):
-    faults, module = tools("faults"), "reference_solver/stepping/turning_slips.py"
-    fault = next(each for each in faults.faults_of(module) if (each.function, each.kind) == ("TURNED", "doubled"))
-    assert "TURNED = 2.0 * 0.5\n" in fault.made()
+    faults, module = tools("faults"), "reference_solver/textbook2/pair_modes.py"
+    fault = next(each for each in faults.faults_of(module) if (each.function, each.kind) == ("PARALLEL", "doubled"))
+    assert "PARALLEL = 2.0 * 1e-12\n" in fault.made()
     lines = (faults.ROOT / module).read_text().splitlines()
     names = {
         lines[first - 1].partition("(")[0].removeprefix("def ") for name, first, _ in fault.places if name == module
     }
-    assert names == {"follow_slip", "steady_slip"}
+    assert names == {"try_sticking", "try_mode"}
 
 
 TOY = "def twice(x):\n    if x < 0:\n        return 0\n    return 2 * x\n"

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere, simulation
-from reference_solver.pieces import FIFTH_ORDER, FIXED, FORCES, FROZEN, IMPACT, IMPULSE_LEVEL
+from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT
 
 DT, G = 1.0 / 60.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-PROFILES = ("reference", "fixed_step", "classical")
 
 
-def tumbling(dimension, profile, restitution=0.3):
+def tumbling(dimension, restitution=0.3):
     """Two boxes and a ball fall onto a floor: impacts, slides, and motion between them."""
     if dimension == 2:
         floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
@@ -28,13 +27,12 @@ def tumbling(dimension, profile, restitution=0.3):
         ]
         ball = Body(Sphere(0.2), 1.0, (0.02,) * 3, (1.5, 0.0, 0.3, *UPRIGHT))
     model = Model(dimension, [floor, *boxes, ball], (*(0.0,) * (dimension - 1), -G), restitution, 0.5)
-    return Simulation(model, getattr(Settings, profile)(DT))
+    return Simulation(model, Settings.reference(DT))
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("profile", PROFILES)
-def test_recording_changes_no_bit(dimension, profile):
-    plain, recorded = tumbling(dimension, profile), tumbling(dimension, profile)
+def test_recording_changes_no_bit(dimension):
+    plain, recorded = tumbling(dimension), tumbling(dimension)
     one = plain.record(30, 3, contacts=True)
     other = recorded.record(30, 3, contacts=True, certificates=True, pieces=True)
     assert one.pieces is None and len(other.pieces) >= 30
@@ -48,16 +46,15 @@ def test_recording_changes_no_bit(dimension, profile):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("profile", PROFILES)
-def test_pieces_join_and_explain_every_velocity(dimension, profile):
+def test_pieces_join_and_explain_every_velocity(dimension):
     """Each body goes on where it was, and its momentum changes by the impulses on it and its weight, to round-off."""
-    run = tumbling(dimension, profile)
+    run = tumbling(dimension)
     start = run.pose
     first, then = run.record(20, pieces=True), run.record(10, pieces=True)
     assert then.pieces.step.min() == 20 and then.pieces.begin[0] == pytest.approx(20 * DT, abs=1e-15)
     pieces, last = first.pieces, {}
-    assert set(pieces.kind) == ({FORCES, IMPACT} if profile == "reference" else {FORCES})
-    assert set(pieces.scheme) <= ({FROZEN, FIFTH_ORDER, IMPULSE_LEVEL} if profile == "reference" else {FIXED})
+    assert set(pieces.kind) == {FORCES, IMPACT}
+    assert set(pieces.scheme) <= {FROZEN, FIFTH_ORDER}
     owner = np.repeat(np.arange(len(pieces)), np.diff(pieces.first_body))
     for i in (1, 2, 3):  # each has its pieces, of the island it is in
         assert pieces.length[owner[pieces.body == i]].sum() == pytest.approx(20 * DT, abs=1e-13)
@@ -84,18 +81,24 @@ def test_pieces_join_and_explain_every_velocity(dimension, profile):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_journal_that_is_too_small_grows(dimension, monkeypatch):
-    plain = tumbling(dimension, "reference").record(24, pieces=True).pieces
+    plain = tumbling(dimension).record(24, pieces=True).pieces
     tight = simulation.allocate_journal
 
     def small(d, bodies, pieces):
         return tight(d, bodies, max(pieces - 2 * 24 - 15, 0) if pieces <= 2 * 24 + 16 else pieces)
 
     monkeypatch.setattr(simulation, "allocate_journal", small)
-    grown = tumbling(dimension, "reference").record(24, pieces=True).pieces
+    grown = tumbling(dimension).record(24, pieces=True).pieces
     assert len(grown) == len(plain) > 24
     for name in ("begin", "body", "pose_after", "twist_after", "impulse", "moment"):
         assert (getattr(grown, name) == getattr(plain, name)).all()
 
 
 def test_a_run_of_no_steps_has_no_pieces():
-    assert len(tumbling(2, "reference").record(0, pieces=True).pieces) == 0
+    assert len(tumbling(2).record(0, pieces=True).pieces) == 0
+
+
+def test_pieces_of_a_step_at_fixed_dt():
+    model = tumbling(2).model
+    with pytest.raises(ValueError, match="pieces"):
+        Simulation(model, Settings.classical(DT)).record(1, pieces=True)

@@ -1,4 +1,4 @@
-"""Steps with more events than are located go on by the fixed-step law, certified and counted (E28)."""
+"""Events without number, or none where there might be some."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Bodies that an impact drives out of their bounds (E29): they meet what is there, and bring along what holds it."""
+"""Bodies that an impact drives: they meet what is there, and bring along what holds it."""
 
 import itertools
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from reference_solver.certificate.audit import audit
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import CHAIN, FORCES, FROZEN, IMPACT, Pieces
+from reference_solver.pieces import CHAIN, FORCES, IMPACT, Pieces
 from reference_solver.records import Record
 from reference_solver.settings import Settings
 from reference_solver.shapes import Box, Disc, HalfSpace, Sphere
@@ -342,15 +342,6 @@ def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], 
         return model, replace(record, pieces=pieces, pose=pose, twist=twist), simulation
 
     return plant
-
-
-def unlocated(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
-    """Solve one contact problem per step, at ``size`` of a step, and say that events were located."""
-    changed = replace(scene.settings, scheme="fixed")
-    model, record, simulation = run(replace(scene, settings=changed))
-    assert record.pieces is not None
-    pieces = replace(record.pieces, scheme=np.full_like(record.pieces.scheme, FROZEN))
-    return model, replace(record, pieces=pieces), simulation
 
 
 def field(name: str, change: Callable[[Array, float], Array], at: str = "last") -> Callable[[Pieces, float], Pieces]:
@@ -694,14 +685,6 @@ CORRUPTIONS = (
     Corruption(
         "events", "impact of a box too late, of a step", "box that lands", given(_floor_by(-1.4 * DT)), TOUCHING
     ),
-    Corruption(
-        "events",
-        "none is located (any size)",
-        "disc that bounces",
-        settings(scheme=lambda size: "fixed"),
-    ),
-    Corruption("events", "impacts a step late, said to be located (any size)", "disc that bounces", unlocated),
-    Corruption("events", "ends of slides a step late, said to be located (any size)", "box that stops", unlocated),
     Corruption("events", "step", "disc in flight", settings(dt=lambda size: DT * (1.0 + size))),
     Corruption(
         "events",

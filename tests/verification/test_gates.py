@@ -17,7 +17,7 @@ from tests.verification import (
 )
 from tests.verification.gate import Gate
 from tests.verification.space import SPACES
-from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, SPATIAL
+from tests.verification.turning_scenes import CASES, PLANE, SPATIAL
 
 
 def long(*call):
@@ -65,7 +65,6 @@ ALONE = [
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
     *[(gate, PLANE, name) for gate in (turning.errors, turning.order) for name in CASES[2]],
-    *[(turning.impulse_order, PLANE, name) for name in SMOOTH[2]],
     (turning.long_board,),
     long(random_scenes.gates),
     (falling.dominoes,),

@@ -13,12 +13,12 @@ from reference_solver.simulation import Simulation
 from tests.verification.gate import Gate
 from tests.verification.orders import RATES, fitted
 from tests.verification.space import GRAVITY, Space
-from tests.verification.turning_scenes import CASES, PLANE, SMOOTH, board_on_log, case
+from tests.verification.turning_scenes import CASES, PLANE, board_on_log, case
 
 #: Largest error at 60 and at 240 steps a second [m, rad].
 ALLOWED = {60: 1e-8, 240: 1e-10}
-#: Least observed order, of the fifth-order scheme and of the impulse-level scheme on cases without events.
-ORDER, IMPULSE_ORDER = 4.5, 1.9
+#: Least observed order.
+ORDER = 4.5
 #: What the control of phase lengths holds errors below, of motions of a metre or a radian (`phase.ERROR`): there they
 #: fall no more with the step.
 HELD_BELOW = 1e-11
@@ -39,13 +39,6 @@ def order(space: Space, name: str) -> Iterator[Gate]:
     found = fitted(tuple(case(space, name).error(rate) for rate in RATES), floor=HELD_BELOW)
     measured = math.inf if found is None else found
     yield Gate.at_least("turning contact: observed order", name, measured, ORDER, space.name)
-
-
-def impulse_order(space: Space, name: str) -> Iterator[Gate]:
-    """Yield the observed order of the impulse-level scheme in one case."""
-    found = fitted(tuple(case(space, name).error(rate, "midpoint") for rate in RATES))
-    measured = math.inf if found is None else found
-    yield Gate.at_least("impulse-level scheme: observed order", name, measured, IMPULSE_ORDER, space.name)
 
 
 def long_board() -> Iterator[Gate]:
@@ -83,8 +76,6 @@ def _peaks(angle: Array) -> Array:
 
 def rows(space: Space) -> Iterator[Gate]:
     """Yield errors and orders of all cases in one dimension."""
-    for name in SMOOTH[space.dimension]:
-        yield from impulse_order(space, name)
     for name in CASES[space.dimension]:
         yield from errors(space, name)
         yield from order(space, name)

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 
 from reference_solver.model import Array, Body, Model
-from reference_solver.settings import Scheme, Settings
+from reference_solver.settings import Settings
 from reference_solver.shapes import Box, Capsule, Disc
 from reference_solver.simulation import Simulation
 from tests.verification import runge_kutta
@@ -84,9 +84,9 @@ class Case:
         pull = (*(0.0,) * self.space.up, -GRAVITY)
         return Model(self.space.dimension, list(self.bodies), pull, 0.0, self.friction)
 
-    def error(self, rate: int, scheme: Scheme = "located") -> float:
+    def error(self, rate: int) -> float:
         """Largest difference from the truth at ``rate`` steps a second [m; rad or quaternion]."""
-        simulation = Simulation(self.model(), replace(Settings.reference(1.0 / rate), scheme=scheme))
+        simulation = Simulation(self.model(), Settings.reference(1.0 / rate))
         simulation.advance(round(self.time * rate))
         pose = simulation.pose[-1].copy()
         if self.space.dimension == 3 and pose[3:] @ self.truth[3:] < 0.0:

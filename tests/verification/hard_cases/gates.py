@@ -17,7 +17,7 @@ def gates() -> Iterator[Gate]:
 
 def made_by(case: HardCase) -> str:
     """Name of the settings that the case is meant for."""
-    return f"{'reference' if case.settings.scheme == 'located' else 'fixed_step'}, hard case"
+    return f"{'fixed_step' if case.settings.tolerance is None else 'reference'}, hard case"
 
 
 def of_case(case: HardCase) -> Iterator[Gate]:
