@@ -124,7 +124,7 @@ def test_enumeration_says_whether_a_problem_has_one_solution():
     """A resting box has one velocity, whatever its redundant corners carry; the numbers of solutions are O9's."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     box = Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, 0.5, 0.0))
-    simulation = Simulation(Model(2, [floor, box], (0.0, -G), 0.0, 0.5), Settings.reference(DT))
+    simulation = Simulation(Model(2, [floor, box], (0.0, -G), 0.0, 0.5), Settings.fixed_step(DT))
     problem = simulation.step_problem()
     (found,) = problem.solutions()
     assert problem.pair_sums(found.impulse) == pytest.approx(np.array([[0.0, G * DT]]), abs=1e-15)
@@ -188,5 +188,5 @@ def test_enumeration_is_planar():
 
 def test_a_world_without_contacts_has_an_empty_problem():
     disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 5.0, 0.0))
-    simulation = Simulation(Model(2, [disc], (0.0, -G), 0.0, 0.5), Settings.reference(DT))
+    simulation = Simulation(Model(2, [disc], (0.0, -G), 0.0, 0.5), Settings.fixed_step(DT))
     assert simulation.step_problem().contacts == 0
