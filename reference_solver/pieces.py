@@ -4,9 +4,6 @@ A *piece* is an impact, at one instant, or a force phase, over a time; pieces of
 may overlap in time. Of each piece stand here: when it began and how long it was, what it was and by which scheme, of
 each of its bodies pose and twist before and after, and of each of its contacts place, normal, and the impulse with its
 moment about the world's origin (levers may turn within a piece, so that point times impulse need not be the moment).
-
-Kernels (`journal.py`) cannot make room. They count on where an array is full, and whoever reads the count makes the
-steps again with more room (`simulation.py`). A journal without room is switched off, and costs one comparison a piece.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference_solver.model import POSE_SIZE, TWIST_SIZE, Array
-from reference_solver.structures import structure
 
 Indices = NDArray[np.int64]
 
@@ -37,11 +33,10 @@ CONTACTS_PER_BODY = 4
 PIECES, BODIES, CONTACTS, STEPS = 0, 1, 2, 3
 
 
-@structure
 class Journal(NamedTuple):
-    """Room for the pieces of a run, as kernels fill it; arrays of length 0 where nothing is recorded."""
+    """The pieces of a run as rows of arrays."""
 
-    used: Indices  # (4,): see PIECES .. STEPS; counts go on where there is no room
+    used: Indices  # (4,): see PIECES .. STEPS
     time: Array  # (p, 2): begin, counted from the start of its step, and length [s]
     label: Indices  # (p, 5): step, kind, scheme, first body row, first contact row
     body: Indices  # (k,): number of the body
@@ -69,19 +64,6 @@ def allocate_journal(dimension: int, bodies: int, pieces: int) -> Journal:
         pose=np.zeros((n, p)),
         twist=np.zeros((n, v)),
     )
-
-
-def is_full(journal: Journal) -> bool:
-    """Whether something did not fit."""
-    rooms = (len(journal.time), len(journal.body), len(journal.name))
-    return bool(len(journal.time) and (journal.used[:3] > rooms).any())
-
-
-def room_taken(journal: Journal) -> int:
-    """How many ``pieces`` `allocate_journal` must be asked for to hold what this one does."""
-    pieces, bodies, contacts, _ = (int(count) for count in journal.used)
-    n = max(len(journal.pose), 1)
-    return max(pieces, -(-bodies // n), -(-contacts // (CONTACTS_PER_BODY * n)))
 
 
 @dataclass(frozen=True)

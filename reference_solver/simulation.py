@@ -1,6 +1,6 @@
 """The public face of the solver: build, advance, read.
 
-The two dimensions are two packages behind one interface, chosen from one table. Each exposes a class ``World``:
+The loop of events and the textbooks of both dimensions are packages behind one interface: a class ``World``:
 
     World(model, settings, needs, certified)
         Allocates all arrays. `needs` says what to model; what it lacks is left out. `certified`: see `Simulation`.
@@ -12,7 +12,6 @@ The two dimensions are two packages behind one interface, chosen from one table.
     world.contacts() -> Contacts     of the last step made
     world.step_problem() -> StepProblem     of the next step, which is not made
     world.tally                      float64 array over the whole run, indexed by the constants in tally.py
-    world.journal                    room for the pieces of the run (pieces.py), none unless they are recorded
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ import numpy as np
 from reference_solver.checks import require_count
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
-from reference_solver.pieces import Journal, allocate_journal, is_full, pieces_of, room_taken
+from reference_solver.pieces import Journal, allocate_journal, pieces_of
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
@@ -34,12 +33,11 @@ from reference_solver.tally_summary import columns, summary
 
 
 class World(Protocol):
-    """What `Simulation` asks of the planar and the spatial package."""
+    """What `Simulation` asks of the loop and of the textbooks; `recorded` and `is_closed` of the loop alone."""
 
     pose: Array
     twist: Array
     tally: Array
-    journal: Journal
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Make ``steps`` steps."""
@@ -60,9 +58,6 @@ class World(Protocol):
     def step_problem(self) -> StepProblem:
         """Contact problem of the next step."""
 
-
-#: Steps that share a journal: enough that compiled code is entered seldom, few enough that making them again is cheap.
-STEPS_PER_JOURNAL = 64
 
 #: What is counted of a run that is not certified.
 UNCERTIFIED = ("sweeps", "worst_sweeps", "projected")
@@ -170,18 +165,12 @@ class Simulation:
     ) -> tuple[Frames, list[Array], list[Journal]]:
         """Run part by part: each has a journal, and a tally that is then entered in that of the run."""
         whole, parts, tallies, journals = self._world.tally.copy(), [], [], []
-        by_events = self.settings.tolerance is not None
-        part = stride if certificates else max(1, steps) if by_events else stride * max(1, STEPS_PER_JOURNAL // stride)
-        taken = 0  # by the part before, as pieces of a step
+        part = stride if certificates else max(1, steps)
         for chunk in [part] * (steps // part) + [steps % part] * (steps % part > 0):
             self._world.tally[:] = 0.0
             self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
-            if pieces and by_events:
+            if pieces:
                 frames, journal = self._world.recorded(chunk, stride, contacts)
-                journals.append(journal)
-            elif pieces:
-                frames, journal = self._journalled(chunk, stride, contacts, max(2, taken) * chunk + 16)
-                taken = -(-room_taken(journal) // chunk)
                 journals.append(journal)
             else:
                 frames = self._world.run(chunk, stride, contacts)
@@ -192,20 +181,6 @@ class Simulation:
         parts = parts or [self._world.run(0, stride, contacts)]
         journals = journals or [allocate_journal(self.model.dimension, len(self.model.bodies), 0)]
         return joined(parts), tallies[: steps // stride], journals
-
-    def _journalled(self, steps: int, stride: int, contacts: bool, room: int) -> tuple[Frames, Journal]:
-        """Run once with pieces recorded; again from the start, with twice the ``room``, while there was too little."""
-        n = len(self.model.bodies)
-        while True:
-            trial = self._world.copy()
-            trial.journal = allocate_journal(self.model.dimension, n, room)
-            frames = trial.run(steps, stride, contacts)
-            if not is_full(trial.journal):
-                break
-            room *= 2
-        self._world, journal = trial, trial.journal
-        trial.journal = allocate_journal(self.model.dimension, n, 0)
-        return frames, journal
 
     @property
     def pose(self) -> Array:

@@ -1,4 +1,4 @@
-"""The full certificate: the audit of a run, how far it is off for its finite step, and for how long that can be told.
+"""The full certificate: the audit of a run, how far it is off for its tolerance, and for how long that can be told.
 
 *Error.* Steps say only when the event loop is looked at. The run is made again to a finer and to a coarser tolerance.
 What is decided within round-off (which of two corners strikes first, whether what hardly slips does) is decided by the

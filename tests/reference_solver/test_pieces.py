@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere, simulation
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT
 
 DT, G = 1.0 / 60.0, 9.81
@@ -77,21 +77,6 @@ def test_pieces_join_and_explain_every_velocity(dimension):
                 pushed + run.model.bodies[i].mass * pieces.length[k] * weight, abs=1e-13
             )  # N s, of some 10
     assert all((first.pose[-1][i] == last[i][0]).all() for i in last)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_a_journal_that_is_too_small_grows(dimension, monkeypatch):
-    plain = tumbling(dimension).record(24, pieces=True).pieces
-    tight = simulation.allocate_journal
-
-    def small(d, bodies, pieces):
-        return tight(d, bodies, max(pieces - 2 * 24 - 15, 0) if pieces <= 2 * 24 + 16 else pieces)
-
-    monkeypatch.setattr(simulation, "allocate_journal", small)
-    grown = tumbling(dimension).record(24, pieces=True).pieces
-    assert len(grown) == len(plain) > 24
-    for name in ("begin", "body", "pose_after", "twist_after", "impulse", "moment"):
-        assert (getattr(grown, name) == getattr(plain, name)).all()
 
 
 def test_a_run_of_no_steps_has_no_pieces():
