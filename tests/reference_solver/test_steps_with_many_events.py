@@ -53,7 +53,6 @@ def test_a_ball_with_little_play_never_leaves_its_room():
     simulation.advance(30)
     unfolded = (speed * 30 * dt + play) % (4.0 * play)
     assert simulation.pose[2, 0] == pytest.approx(play - abs(unfolded - 2.0 * play), abs=1e-11)
-    assert simulation.certificate["events"] == int((speed * 30 * dt + play) / (2.0 * play))
     assert simulation.certificate["holds"], simulation.certificate["reasons"]
 
 
@@ -91,25 +90,6 @@ def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count)
     assert (contacts.impulse * contacts.normal).sum(axis=1) == pytest.approx([10.0 * DT] * count, rel=1e-9)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_a_corner_that_pivots_has_no_events(dimension):
-    """A leaning box that turns about a sticking corner: levers turn in each step, and that ends no slide."""
-    angle, half = 0.25, (0.5, 0.25)
-    low = half[0] * math.sin(angle) + half[1] * math.cos(angle)
-    if dimension == 2:
-        box = Body(Box(half), 1.0, (half[0] ** 2 + half[1] ** 2) / 3.0, (0.0, low, angle))
-    else:
-        turn = (math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0)
-        box = Body(Box((half[0], half[0], half[1])), 1.0, (0.1, 0.2, 0.1), (0.0, 0.0, low, *turn))
-    gravity = (*(0.0,) * (dimension - 1), -G)
-    floor = half_space(tuple(np.eye(dimension)[-1]))
-    simulation = Simulation(Model(dimension, [floor, box], gravity, 0.0, 2.0), Settings.reference(DT))
-    simulation.advance(25)
-    assert simulation.certificate["holds"], simulation.certificate["reasons"]
-    assert abs(simulation.twist[1, -1 if dimension == 2 else 4]) > 0.5  # it does turn
-    assert simulation.certificate["events"] == 0
-
-
 def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
     """Three contacts at once, e = 0: no chatter, no held step."""
     planes = [half_space(tuple(np.eye(3)[k])) for k in range(3)]
@@ -118,8 +98,6 @@ def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
     simulation.advance(240)
     assert simulation.pose[-1, :3] == pytest.approx([0.5, 0.5, 0.5], abs=1e-13)
     assert np.abs(simulation.twist[-1]).max() <= 1e-15
-    assert simulation.certificate["held_steps"] == 0
-    assert simulation.certificate["events"] == 3
 
 
 @pytest.mark.parametrize("free", [False, True])

@@ -84,10 +84,10 @@ def test_box_tips_beyond_its_base_and_not_before(build, reference):
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.5, 0.9])
-def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, reference, depth):
+def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, fixed_step, depth):
     """Two discs overlapping by a share of their radius: projected apart, symmetric, velocity untouched."""
     gap = 1.0 - 0.5 * depth
-    simulation = build.simulation([build.disc(0.0, 0.0), build.disc(gap, 0.0)], reference)
+    simulation = build.simulation([build.disc(0.0, 0.0), build.disc(gap, 0.0)], fixed_step)
     simulation.advance(3)
     assert np.abs(simulation.twist).max() == 0.0
     assert simulation.pose[1, 0] - simulation.pose[0, 0] == pytest.approx(1.0, abs=1e-12)
@@ -95,10 +95,10 @@ def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, reference, dep
     assert simulation.certificate["projected"] == pytest.approx(0.5 * depth, rel=1e-9)
 
 
-def test_overlapping_column_is_separated(build, reference):
+def test_overlapping_column_is_separated(build, fixed_step):
     """Ten boxes each 1 mm into the one below: all gaps close to zero, and the column then stands."""
     boxes = [build.box(0.0, 0.499 + 0.999 * i) for i in range(10)]
-    simulation = build.simulation([build.floor(), *boxes], reference, (0.0, -G), 0.0, 0.5)
+    simulation = build.simulation([build.floor(), *boxes], fixed_step, (0.0, -G), 0.0, 0.5)
     simulation.advance(60)
     assert simulation.contacts().gap.min() >= -1e-9
     assert np.abs(simulation.twist).max() <= 1e-10
