@@ -81,10 +81,11 @@ def test_off_centre_strike_on_a_free_rod(build, settings, offset, e):
     half, m, big, v = (1.0, 0.01), 0.3, 2.0, 4.0
     rod = build.box(0.0, 0.0, half=half, mass=big)
     ball = build.disc(offset, half[1] + 0.05, (0.0, -v, 0.0), radius=0.05, mass=m)
-    pieces = build.simulation([rod, ball], settings, restitution=e).record(1, pieces=True).pieces
-    # The impact alone: with e = 0 the ball stays on the rod that turns, and they go on pushing each other.
-    (last,) = np.flatnonzero(pieces.kind == IMPACT) if IMPACT in pieces.kind else (0,)
-    twist = pieces.twist_after[pieces.first_body[last] : pieces.first_body[last + 1]]
+    record = build.simulation([rod, ball], settings, restitution=e).record(1, pieces=settings.tolerance is not None)
+    twist, pieces = record.twist[-1], record.pieces
+    if pieces is not None:  # the impact alone: with e = 0 the ball stays on the rod that turns, and goes on pushing
+        (last,) = np.flatnonzero(pieces.kind == IMPACT)
+        twist = pieces.twist_after[pieces.first_body[last] : pieces.first_body[last + 1]]
     impulse = (1.0 + e) * v / (1.0 / m + 1.0 / big + offset**2 / rod.inertia)
     assert twist[0] == pytest.approx([0.0, -impulse / big, -impulse * offset / rod.inertia], abs=1e-13 * v)
     assert twist[1, 1] == pytest.approx(-v + impulse / m, abs=1e-13 * v)

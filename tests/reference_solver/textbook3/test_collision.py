@@ -5,13 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, event, example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.textbook3.box_box import crossing_edge, is_crossing
 from reference_solver.textbook3.manifolds import FLAT
-from reference_solver.textbook3.state import allocate_bodies
 
 DT = 1.0 / 240.0
 SETTINGS = Settings.fixed_step(DT)
@@ -164,28 +162,6 @@ def test_a_square_turned_by_45_degrees_keeps_the_corners_that_are_shared(setting
     assert np.sort(flat, axis=1) == pytest.approx(np.tile([math.sqrt(0.5) - 0.5, 0.5], (kept, 1)), abs=1e-12)
     assert contacts.point[:, :2].mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert len(set(map(tuple, contacts.point.round(9)))) == kept
-
-
-@given(halves, halves, st.tuples(numbers, numbers), st.floats(0.05, 1.5), st.booleans(), st.integers(0, 2))
-def test_a_feature_that_names_two_edges_names_those_that_cross_there(half_a, half_b, place, yaw, below, turned):
-    """The contact lies on both lines: whichever of the faces clips, and whichever axes of the boxes stand upright."""
-    turn_a = [(1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.5, -0.5, -0.5, -0.5)][turned]
-    turn_b = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    far = (abs(matrix(turn_a).T @ (0.0, 0.0, 1.0)) @ half_a + half_b[2] - 1e-4) * (-1.0 if below else 1.0)
-    a, b = body(Box(half_a), (0.0, 0.0, 0.0), turn_a), body(Box(half_b), (*place, far), turn_b)
-    contacts = touch(a, b)
-    crossings = [c for c in range(len(contacts)) if is_crossing.py_func(int(contacts.feature[c]))]
-    simulation = Simulation(Model(3, (a, b), (0.0, 0.0, 0.0), 0.0, 0.5), SETTINGS)
-    bodies = allocate_bodies(simulation.model, simulation.needs)
-    for c in crossings:
-        for i, each in enumerate((a, b)):
-            middle, along = crossing_edge.py_func(bodies, i, int(contacts.feature[c]), i == 1)
-            r = matrix(each.pose[3:])
-            off = contacts.point[c] - np.array(each.pose[:3]) - r @ middle
-            # A point lies half-way between two surfaces: half an overlap or a gap from either.
-            assert np.linalg.norm(np.cross(r @ along, off)) <= max(1e-4, 0.5 * abs(contacts.gap[c])) + 1e-9
-            assert abs(off @ (r @ along)) <= np.array(along) @ each.shape.half_extents + 1e-9
-    event(f"{len(crossings)} crossings")
 
 
 def test_crossed_edges_touch_where_they_cross():
