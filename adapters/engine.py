@@ -391,8 +391,8 @@ class Engine(ABC):
     def kernels(self) -> Path | None:
         """Folder of machine code that this engine compiles at its first steps; None if it compiles nothing.
 
-        It is another one for other sources. What is compiled may depend on the profile and the dimension alone: the
-        first steps of one scene then serve all.
+        It is another one for other sources. What is compiled may depend on the profile, the dimension and the scene:
+        the first steps of all scenes of a plan compile it.
         """
         return None
 

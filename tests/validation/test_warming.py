@@ -28,28 +28,28 @@ def compiled():
 def test_kernels_of_whole_cells_compiled_by_first_steps(dimension, monkeypatch, tmp_path):
     """One cell of each scene of the quick suite, moved by an ulp: run once, not again for a certificate.
 
-    The first steps are those of one scene for each profile.
+    The first steps are those of each scene.
     """
     monkeypatch.setattr(warming, "_folder", lambda name: tmp_path)
     parts = warming.missing(slots(Request(list(OURS), ["reference"], dimensions=[dimension], ulps=[1])))
     assert [part.key[1] for part in parts] == ["classical", "reference"]
     assert all(warming.compile_one(part.slots) for part in parts)
     ready = compiled()
-    assert {"run_located", "run_steps"} <= {name for _, name, _ in ready}
+    assert {"run_steps", "first_meeting"} <= {name for _, name, _ in ready}
     for slot in (slot for part in parts for slot in part.slots):
         execute(slot)
         assert compiled() == ready, slot
 
 
-def test_compilation_makes_the_first_steps_of_one_cell(monkeypatch):
+def test_compilation_makes_the_first_steps_of_each_cell(monkeypatch):
     made = []
     run = warming.run
     monkeypatch.setattr(warming, "run", lambda *arguments: made.append(run(*arguments)))
     assert warming.compile_one([SLOT, replace(SLOT, params=(("v", 2.0),))])
-    assert [len(trajectory.t) - 1 for trajectory in made] == [warming.STEPS]
+    assert [len(trajectory.t) - 1 for trajectory in made] == [warming.STEPS] * 2
 
 
-def test_compilation_takes_the_next_cell_where_the_engine_refuses_one(monkeypatch):
+def test_compilation_by_other_cells_where_the_engine_refuses_some(monkeypatch):
     asked = []
 
     def first_steps(slot):
@@ -58,7 +58,7 @@ def test_compilation_takes_the_next_cell_where_the_engine_refuses_one(monkeypatc
             raise RuntimeError("planted")
 
     monkeypatch.setattr(warming, "first_steps", first_steps)
-    assert warming.compile_one([SLOT] * 4) and len(asked) == 3
+    assert warming.compile_one([SLOT] * 4) and len(asked) == 4
     asked.clear()
     assert not warming.compile_one([SLOT] * 2)
 

@@ -1,9 +1,9 @@
-"""Which kernels a plan still needs, and how they are compiled: by the first steps of one of their cells.
+"""Which kernels a plan still needs, and how they are compiled: by the first steps of a cell of each scene.
 
 Engines that compile at their first steps store the machine code on disk (`adapters.engine.Engine.kernels`). Which
-kernels a cell calls depends on its dimension and profile alone, so these are compiled once for all scenes, by
-`validation.workers` before their cells start and outside of time limits. A mark beside the kernels says that they are
-there: a run that needs nothing compiled looks for files, and starts no process.
+kernels a cell calls depends on its dimension and profile, and of a loop of events on what touches. They are compiled
+once for all cells by `validation.workers`, before these start and outside of time limits. A mark beside the kernels
+says that they are there: a run that needs nothing compiled looks for files, and starts no process.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Part:
     key
         Of the cells that call them.
     slots
-        A cell of each scene of the plan; the first that the engine does not refuse is stepped.
+        A cell of each scene of the plan.
     mark
         File that says that they are compiled.
     """
@@ -93,15 +93,16 @@ def _folder(name: str) -> Path | None:
 
 @stage("compiling kernels", whole=True)
 def compile_one(slots: Sequence[Slot]) -> bool:
-    """Make the first steps of the first cell that can make them; whether there is one.
+    """Make the first steps of all cells that can make them; whether there is one.
 
     What goes wrong is reported by the cells themselves.
     """
+    made = False
     for slot in slots:
         with contextlib.suppress(Exception):
             first_steps(slot)
-            return True
-    return False
+            made = True
+    return made
 
 
 def first_steps(slot: Slot) -> None:
