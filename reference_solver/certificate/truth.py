@@ -254,7 +254,7 @@ def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: st
     return Certificate(False, (why,), (), t, *made)
 
 
-def _poses(model: Model, settings: Settings, steps: int, stride: int) -> Array:
+def poses_of(model: Model, settings: Settings, steps: int, stride: int) -> Array:
     """Return poses (s, n, 3 | 7) of a run, no numbers from where the event loop refuses it."""
     with suppress(Refused):
         return Simulation(model, settings).record(steps, stride).pose
@@ -326,7 +326,7 @@ def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int,
     within = found.t < found.horizon
     for far in PLACES:
         change = away(model, far)
-        moved = _poses(change.model(model), settings, steps, stride)
+        moved = poses_of(change.model(model), settings, steps, stride)
         apart = distance(model, change.pose(found.pose, found.t), moved)
         # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
         error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
@@ -347,7 +347,7 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     assert settings.tolerance is not None
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
     for share in () if run.is_closed else TOLERANCES:
-        other = _poses(model, replace(settings, tolerance=share * settings.tolerance), steps, stride)
+        other = poses_of(model, replace(settings, tolerance=share * settings.tolerance), steps, stride)
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))
     return _with_ends(model, record, settings.dt, error)
 
@@ -370,7 +370,7 @@ def _mirrored(model: Model, settings: Settings, steps: int, stride: int) -> Arra
     d = model.dimension
     mirror = Change(d, signs=(-1.0,) + (1.0,) * (d - 1))
     backwards = list(range(len(model.bodies)))[::-1]
-    pose = _poses(mirror.model(permuted(model, backwards)), settings, steps, stride)
+    pose = poses_of(mirror.model(permuted(model, backwards)), settings, steps, stride)
     return mirror.pose(pose[:, backwards], np.multiply(stride * settings.dt, np.arange(len(pose)), dtype=np.float64))
 
 
@@ -387,7 +387,7 @@ def _horizon(
         if body.motion == "free":
             twist[:d] += size * random.choice([-1.0, 1.0], d)
         bodies.append(replace(body, twist=tuple(twist)))
-    apart = distance(model, record.pose, _poses(replace(model, bodies=bodies), settings, steps, stride))
+    apart = distance(model, record.pose, poses_of(replace(model, bodies=bodies), settings, steps, stride))
     noise = 8.0 * np.spacing(np.abs(record.pose).max(axis=(1, 2)))
     free_flight = size * np.sqrt(d) * max(record.t[-1], settings.dt) + noise
     growth = np.maximum.accumulate(np.where(np.isfinite(apart), apart, np.inf) / free_flight)

@@ -13,26 +13,27 @@ from reference_solver.exact.motion import Piece
 from reference_solver.exact.refusals import EnergyGrows, Overlap
 from reference_solver.geometry import gap
 
-#: Overlap that is refused, as a share of the smallest half width; growth of energy, as a share of what there is.
-DEEP, GROWS = 1e-8, 1e-9
+#: Overlap that is refused, as a share of the smallest half width; growth of energy, as a share of what there is; and
+#: how many tolerances of a step either may be, where those are coarse.
+DEEP, GROWS, TOLERATED = 1e-8, 1e-9, 1e2
 #: Shares of a piece at which bodies are looked at.
 LOOK = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-def check(world: World, piece: Piece) -> None:
-    """Refuse a piece in which bodies overlap, or a planar one whose energy grows.
+def check(world: World, piece: Piece, tolerance: float) -> None:
+    """Refuse a piece in which bodies overlap, or a planar one whose energy grows, by more than its tolerance explains.
 
     Raises
     ------
     Overlap, EnergyGrows
     """
     a, b, share, depth = deepest(world, piece)
-    if depth > DEEP * world.size:
+    if depth > max(DEEP, TOLERATED * tolerance) * world.size:
         raise Overlap(a=a, b=b, depth=depth, t=piece.start.t + share * piece.length)
     if world.dimension == 2 and not _is_driven(world, piece):
         before, size = energy(world, piece, 0.0)
         after, _ = energy(world, piece, 1.0)
-        if after - before > GROWS * (size + abs(before)):
+        if after - before > max(GROWS, TOLERATED * tolerance) * (size + abs(before)):
             raise EnergyGrows(amount=after - before, t=piece.start.t)
 
 

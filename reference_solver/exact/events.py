@@ -22,6 +22,8 @@ from reference_solver.model import Array
 OF_STEP, OF_CONSTANT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1e-6, *np.linspace(0.125, 1.0, 8))
 #: Share of the smallest half width below which margins are round-off.
 MARGIN = 1e-12
+#: Most rounds of Brent's method: where a monitor steps in its last places at its root it needs more than a hundred.
+MOST_ROUNDS = 1000
 
 
 class Kind(Enum):
@@ -134,7 +136,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
         for k, column in np.argwhere(values < -monitors.noise).tolist():
             kind = monitors.kind(column)
             if before[k, column] > monitors.noise[k, column]:
-                share = brentq(_component(monitors, k, column), last, now, xtol=1e-16, rtol=1e-15)
+                share = brentq(_component(monitors, k, column), last, now, xtol=1e-16, rtol=1e-15, maxiter=MOST_ROUNDS)
             elif last > 0.0:
                 share = last
             else:  # it is at its end from the beginning

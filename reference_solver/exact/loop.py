@@ -37,8 +37,8 @@ GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
 #: Share of the tolerance that is asked for where a body that turns touches nothing: free rotation is known to nearly
 #: round-off.
 FREE = 1e-2
-#: Share of the world's speed below which speeds are round-off.
-NO_SPEED = 1e-14
+#: Share of the world's speed, and of what impacts changed, below which what they leave of speeds is round-off.
+NO_SPEED, NO_SHARE = 1e-14, 1e-11
 
 
 @dataclass
@@ -92,7 +92,7 @@ class Loop:
                 self.left, self.held = self.left | event.left, self._revised(held, event)
                 continue
             piece = self._cut(piece, event)
-            check(self.world, piece)
+            check(self.world, piece, self.tolerance)
             blows, self.blows = self.blows, []
             self.held = self._entered(piece, event)
             return blows, piece
@@ -104,8 +104,9 @@ class Loop:
         blows = strike(self.world, self.state, contacts.chosen(contacts.touch(none)))
         if blows:
             struck = blows[-1].after
-            stops = (np.abs(struck.velocity) < NO_SPEED * self.world.speed * self.world.per_length) & (
-                struck.velocity != self.state.velocity
+            change = np.abs(struck.velocity - self.state.velocity)
+            stops = np.abs(struck.velocity) < np.minimum(
+                NO_SPEED * self.world.speed * self.world.per_length, NO_SHARE * change
             )
             velocity = np.where(stops, 0.0, struck.velocity)
             self.state = replace(struck, velocity=velocity)

@@ -196,15 +196,21 @@ class Problem:
         if near is not None:
             scale, start = loads_shared(self.contacts, near).ravel()[rows], near.ravel()[rows]
         found = solve_near(matrix, wanted, start, scale)
-        if np.abs(matrix @ found - wanted).max() > NONE * self.size:
+        forces = self.spread(modes, directions, rows, found)
+        if np.abs(matrix @ found - wanted).max() > NONE * self._told_by(forces):
             return None
-        return Answer(modes, directions, self.spread(modes, directions, rows, found))
+        return Answer(modes, directions, forces)
+
+    def _told_by(self, forces: Array) -> float:
+        """What velocities are measured by: of light bodies between heavy ones, by all that forces do one by one."""
+        alone = np.abs(self.rows) @ (np.abs(self.yields) @ np.abs(forces.ravel()))
+        return max(self.size, 10.0 * ROUND_OFF / NONE * float(alone.max()))
 
     def broken(self, answer: Answer) -> float:
         """Share of their size by which velocities or forces break a law."""
         p = answer.forces
         u = (self.rows @ (self.yields @ p.ravel()) + self.free).reshape(p.shape)
-        size_u, stiffest = self.size, float(np.einsum("ij,ji->i", self.rows, self.yields).max())
+        size_u, stiffest = self._told_by(p), float(np.einsum("ij,ji->i", self.rows, self.yields).max())
         size_p = max(np.abs(p).max(), size_u / stiffest)
         speed, friction = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
         limit = self.friction * p[:, 0]

@@ -44,7 +44,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
         return state, None
     impulses = _least(contacts, keeps, -speed).reshape(-1, d)
     after = replace(state, velocity=state.velocity + contacts.changes(impulses))
-    blow = Blow.of(after, contacts, impulses, ROCKING) if ended.any() else None
+    blow = Blow.of(after, contacts, impulses, ROCKING)
     contacts.at_state(after)
     return after, blow
 

@@ -80,7 +80,7 @@ def sampled(model: Model, dt: float, steps: int) -> World:
 
 def random_world(seed: int) -> World:
     """Return a planar world of `random_scenes`."""
-    rate = random_scenes.RATE
+    rate = 240
     return sampled(random_scenes.scene(random_scenes.SEED + seed), 1.0 / rate, round(rate * random_scenes.TIME))
 
 

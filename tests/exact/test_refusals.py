@@ -11,6 +11,7 @@ from reference_solver.exact.kernels.meeting import NEVER
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import Answer, Problem
 from reference_solver.exact.rows import touching_contacts
+from reference_solver.settings import TOLERANCE
 
 G = 9.81
 FLOOR = Body(HalfSpace((0.0, 1.0)), motion="fixed")
@@ -87,7 +88,7 @@ def test_contacts_that_create_energy():
     way, velocity = np.zeros((1, 3, 3)), np.zeros((1, 3, 2))
     way[0, 0, 2], velocity[0, 0, 1] = 0.5, 1.0
     with pytest.raises(refusals.EnergyGrows, match="energy grows by"):
-        check(world, Piece(state, 1.0, way, velocity, held, turns=False))
+        check(world, Piece(state, 1.0, way, velocity, held, turns=False), TOLERANCE)
 
 
 def posed(model):

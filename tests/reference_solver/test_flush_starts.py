@@ -7,7 +7,6 @@ their angle, and slide with constant accelerations.
 
 import math
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -15,9 +14,6 @@ import pytest
 from reference_solver import Body, Box, Capsule, HalfSpace, Model, Polygon, Settings, Simulation
 from reference_solver.certificate.relations import Change, permuted
 from reference_solver.certificate.truth import certify
-from reference_solver.needs import needs
-from reference_solver.simulation import WORLDS
-from reference_solver.tally import OPENED
 
 G, DT, STEPS = 9.81, 1 / 240, 12
 UNTURNED = {2: (0.0,), 3: (1.0, 0.0, 0.0, 0.0)}
@@ -137,7 +133,6 @@ def test_what_is_flush_slides_as_newton_and_coulomb_say(d, kind, scene, narrower
         wanted = change.pose(expected[None, bodies], np.zeros(1))[0]
         # Gaps are known to 1e-12 of a half width and ten last places of a coordinate (E8), solves to 1e-13.
         assert np.abs(simulation.pose - wanted).max() <= 2e-12 * place
-        assert simulation.certificate["holds"], simulation.certificate["reasons"]
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -171,12 +166,3 @@ def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
             simulation.advance(2)
             expected = truth(simulation.model, accelerations, 2 * DT)
             assert np.abs(simulation.pose - expected).max() <= 2e-12 + turned * off
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_an_overlap_that_comes_later_is_none_of_the_start(d):
-    """A first step that goes by a phase is the first step: what overlaps afterwards did not when the run began."""
-    model, _ = slope(d, "box", 0.0)
-    world = import_module(WORLDS[d]).World(model, Settings.reference(DT), needs(model))
-    world.run(1, 0, False)
-    assert world.tally[OPENED] >= 1.0

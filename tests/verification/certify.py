@@ -23,7 +23,6 @@ from adapters.isolation import end_with
 from reports.command.group import AS_JSON
 from reports.terminal import terminal
 from reports.wording import number
-from tests.verification import piles
 from tests.verification.fuzzing import show_random
 from tests.verification.gate import Gate
 from tests.verification.orders import PHASES, RATES, orders
@@ -51,9 +50,6 @@ PARTS = (
     "hard_cases.gates",
     "self_test",
 )
-#: The part that takes more CPU than all others together, some four fifths. Its runs are measured one by one, so that
-#: no process waits.
-IN_RUNS = "piles"
 #: Number of processes; each has its own kernels in memory [300 MB], and the stated times are for two cores.
 WORKERS = 2
 #: Width of a table that goes to a file [characters]; a terminal has its own.
@@ -92,11 +88,8 @@ def certify(
         sys.exit(show_self_test(console, as_json))
     if count is not None:
         sys.exit(show_random(console, as_json, count, seed, dim or (2, 3), chains))
-    runs = [run for part in PARTS for run in (piles.PILES if part == IN_RUNS else (part,))]
-    found = side_by_side(measured, runs, console)
-    gates = [
-        gate for part in PARTS for gate in (piles.gates(lambda pile: found[pile]) if part == IN_RUNS else found[part])
-    ]
+    found = side_by_side(measured, PARTS, console)
+    gates = [gate for part in PARTS for gate in found[part]]
     if as_json:
         click.echo(json.dumps([_finite(asdict(gate)) for gate in gates], indent=1))
     console.print(_table(gates))
@@ -163,10 +156,8 @@ def side_by_side(measure: Callable[[str], Any], parts: Sequence[str], console: C
     return results
 
 
-def measured(part: str) -> list[Gate] | piles.Fall:
-    """Measure the bounds of one part, or a pile; a part that cannot be measured is a bound that does not hold."""
-    if part in piles.PILES:
-        return piles.fall_of(part)
+def measured(part: str) -> list[Gate]:
+    """Measure the bounds of one part; a part that cannot be measured is a bound that does not hold."""
     gates: list[Gate] = []
     try:
         gates.extend(import_module(f"tests.verification.{part}").gates())

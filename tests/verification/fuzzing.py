@@ -28,7 +28,7 @@ WORKERS, LIMIT = 2, 900.0
 READY, START = b"ready", 120.0
 #: Largest number of seeds in a line.
 NAMED = 6
-#: Distance from runs with other steps beyond which a refused result counts as wrong [m].
+#: Distance from runs to other tolerances beyond which a refused result counts as wrong [m].
 WRONG = 1e-6
 
 #: Seed, dimension, and optionally the kind of scene that is drawn.
@@ -177,7 +177,7 @@ def _refusals(refused: Sequence[dict[str, Any]]) -> Table:
         worst = max((value for value in values if value == value), default=math.nan)
         seeds = " ".join(str(answer["seed"]) for answer in those[:NAMED]) + (" ..." if len(those) > NAMED else "")
         table.add_row(name, str(len(those)), str(alone[name]), str(wrong), number(worst, 2), seeds)
-    table.caption = f"off: those of them that are more than {WRONG:g} m off runs with other steps"
+    table.caption = f"off: those of them that are more than {WRONG:g} m off runs to other tolerances"
     return table
 
 

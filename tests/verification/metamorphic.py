@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from reference_solver.certificate.relations import Change, permuted
+from reference_solver.certificate.truth import SOLVE
 from reference_solver.settings import Settings
 from tests.verification.gate import Gate
 from tests.verification.relations import (
@@ -137,8 +138,7 @@ def change_of(relation: str, space: Space, trial: Trial) -> Change:
 def bound(change: Change, steps: int) -> float:
     """Largest difference that round-off explains (E73) [m, m/s]."""
     far = sum(abs(s) for s in change.shift or ()) + sum(abs(v) for v in change.boost or ()) * steps * DT
-    residual = Settings.reference(DT).residual or 0.0
-    return GROWTH * (residual * SPEED + steps * float(np.finfo(float).eps) * (PLACE + far))
+    return GROWTH * (SOLVE * SPEED + steps * float(np.finfo(float).eps) * (PLACE + far))
 
 
 def measure(relation: str, scene: str, space: Space, profile: str, trial: Trial) -> float:

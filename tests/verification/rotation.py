@@ -8,8 +8,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from reference_solver.exact.loop import FREE
 from reference_solver.model import Array, Body, Box, Model
-from reference_solver.settings import Settings
+from reference_solver.settings import TOLERANCE, Settings
 from reference_solver.simulation import Simulation
 from tests.verification import runge_kutta
 from tests.verification.gate import Gate
@@ -120,5 +121,7 @@ def angular_momentum(profile: str, steps: int = 10_000) -> Iterator[Gate]:
     drift = np.abs(length / length[0] - 1.0).max()
     turned = np.linalg.norm(direction - direction[0], axis=1).max()
     name = f"{profile}, spatial"
-    yield Gate.at_most("free rotation: |L|, relative", f"{steps} steps", drift, 1e-13, name)
-    yield Gate.at_most("free rotation: direction of L [rad]", f"{steps} steps", turned, 1e-13, name)
+    # The loop errs by a share of the tolerance in each radian, of which there are some hundred; the textbook turns L.
+    allowed = 1e-13 if profile == "classical" else FREE * TOLERANCE * float(np.linalg.norm(SPIN)) * record.t[-1]
+    yield Gate.at_most("free rotation: |L|, relative", f"{steps} steps", drift, allowed, name)
+    yield Gate.at_most("free rotation: direction of L [rad]", f"{steps} steps", turned, allowed, name)

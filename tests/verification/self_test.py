@@ -100,7 +100,7 @@ SCENES = {
     "disc that spins up": _planar([_disc(0.0, 0.5, 0.0, 0.0, 0.0, torque=0.4, force=(0.3, 0.0))], steps=40),
     "disc in flight": _planar([_disc(0.0, 5.0, 1.0, 2.0, 3.0)], 0.5, steps=60),
     "sphere that slides": _spatial(
-        [Body(Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0.5, *UPRIGHT), (2.0, 1.0, 0.0, 0.0, 0.0, 1.0))], steps=40
+        [Body(Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0.5, *UPRIGHT), (2.0, 1.0, 0.0, 0.0, 0.0, 1.0))], steps=20
     ),
     "sphere that bounces": _spatial(
         [Body(Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0.7, *UPRIGHT), (1.0, 0.5, -1.0, 1.0, 0.0, 0.0))], 0.8, 0.1
@@ -148,7 +148,7 @@ class Corruption:
     family: str
     name: str
     scene: str
-    plant: Callable[[Scene, float], tuple[Model, Record, Simulation]]
+    plant: Callable[[Scene, float], tuple[Model, Record]]
     missed: str = ""
 
 
@@ -161,17 +161,14 @@ class Trial:
     seen: tuple[str, ...]
 
 
-def run(scene: Scene) -> tuple[Model, Record, Simulation]:
+def run(scene: Scene) -> tuple[Model, Record]:
     """Run a scene as it is."""
-    simulation = Simulation(scene.model, scene.settings)
-    return scene.model, simulation.record(scene.steps, pieces=True), simulation
+    return scene.model, Simulation(scene.model, scene.settings).record(scene.steps, pieces=True)
 
 
-def seen_by(model: Model, record: Record, simulation: Simulation) -> tuple[str, ...]:
-    """Names of the checks, and of the solver's own gates, that refuse a run."""
-    found = tuple(finding.name for finding in audit(model, record, DT) if not finding.holds)
-    own = simulation.certificate
-    return found + (() if own["holds"] else ("own certificate",)) + (() if own["converged"] else ("unconverged",))
+def seen_by(model: Model, record: Record) -> tuple[str, ...]:
+    """Names of the checks that refuse a run."""
+    return tuple(finding.name for finding in audit(model, record, DT) if not finding.holds)
 
 
 def trials(sizes: tuple[float, ...] = SIZES, every: int = 1) -> Iterator[Trial]:
@@ -196,12 +193,11 @@ def gates() -> Iterator[Gate]:
 Edit = Callable[[Model, float], Model]
 
 
-def given(edit: Edit) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
+def given(edit: Edit) -> Callable[[Scene, float], tuple[Model, Record]]:
     """Let the solver run another model than the certificate is given."""
 
-    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
-        _, record, simulation = run(replace(scene, model=edit(scene.model, size)))
-        return scene.model, record, simulation
+    def plant(scene: Scene, size: float) -> tuple[Model, Record]:
+        return scene.model, run(replace(scene, model=edit(scene.model, size)))[1]
 
     return plant
 
@@ -267,19 +263,19 @@ def _floor_by(by: float) -> Edit:
 
 def obstacle(
     deep: Callable[[float], tuple[float, float]],
-) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
+) -> Callable[[Scene, float], tuple[Model, Record]]:
     """Give the certificate a fixed disc at the place ``deep(size)`` that the solver does not look at.
 
     To the solver it is a hundred kilometres away.
     """
 
-    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+    def plant(scene: Scene, size: float) -> tuple[Model, Record]:
         x, y = deep(size)
         post = Body(Disc(0.5), pose=(x, y, 0.0), motion="fixed")
         restitution, friction = scene.model.restitution[0, 1], scene.model.friction[0, 1]
         model = replace(scene.model, bodies=[*scene.model.bodies, post], restitution=restitution, friction=friction)
         away = replace(model, bodies=[*scene.model.bodies, replace(post, pose=(1e5, y, 0.0))])
-        _, record, simulation = run(replace(scene, model=away))
+        _, record = run(replace(scene, model=away))
         pose = record.pose.copy()
         pose[:, -1] = post.pose
         pieces = record.pieces
@@ -288,7 +284,7 @@ def obstacle(
         before, after = pieces.pose_before.copy(), pieces.pose_after.copy()
         before[rows], after[rows] = post.pose, post.pose
         pieces = replace(pieces, pose_before=before, pose_after=after)
-        return model, replace(record, pose=pose, pieces=pieces), simulation
+        return model, replace(record, pose=pose, pieces=pieces)
 
     return plant
 
@@ -308,24 +304,19 @@ def grazed(size: float) -> tuple[float, float]:
 # Corruptions of its settings.
 
 
-def settings(**fields: Callable[[float], Any]) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
-    """Change settings; ``dt`` is claimed to be the true one."""
-
-    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
-        changed = replace(scene.settings, **{name: value(size) for name, value in fields.items()})
-        return run(replace(scene, settings=changed))
-
-    return plant
+def another_step(scene: Scene, size: float) -> tuple[Model, Record]:
+    """Look at other times than those that are claimed."""
+    return run(replace(scene, settings=Settings.reference(DT * (1.0 + size))))
 
 
 # Corruptions of what it hands out.
 
 
-def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
+def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], tuple[Model, Record]]:
     """Change the pieces; the samples are made to fit them."""
 
-    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
-        model, record, simulation = run(scene)
+    def plant(scene: Scene, size: float) -> tuple[Model, Record]:
+        model, record = run(scene)
         assert record.pieces is not None
         copy = replace(record.pieces, **{n: v.copy() for n, v in vars(record.pieces).items()})
         pieces = edit(copy, size)
@@ -339,7 +330,7 @@ def handed(edit: Callable[[Pieces, float], Pieces]) -> Callable[[Scene, float], 
                 pieces.pose_after[rows[last[known]]],
                 pieces.twist_after[rows[last[known]]],
             )
-        return model, replace(record, pieces=pieces, pose=pose, twist=twist), simulation
+        return model, replace(record, pieces=pieces, pose=pose, twist=twist)
 
     return plant
 
@@ -487,23 +478,23 @@ def _longer(pieces: Pieces, size: float) -> Pieces:
     return pieces
 
 
-def _sampled(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+def _sampled(scene: Scene, size: float) -> tuple[Model, Record]:
     """Hand out a last sample that is not where the pieces end."""
-    model, record, simulation = run(scene)
+    model, record = run(scene)
     pose = record.pose.copy()
     pose[-1, 1, 0] += 0.5 * size
-    return model, replace(record, pose=pose), simulation
+    return model, replace(record, pose=pose)
 
 
-def _sampled_between(name: str) -> Callable[[Scene, float], tuple[Model, Record, Simulation]]:
+def _sampled_between(name: str) -> Callable[[Scene, float], tuple[Model, Record]]:
     """Hand out a sample in the middle of the run that is not what the pieces have there."""
 
-    def plant(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
-        model, record, simulation = run(scene)
+    def plant(scene: Scene, size: float) -> tuple[Model, Record]:
+        model, record = run(scene)
         values = getattr(record, name).copy()
         values[len(values) // 2, 1, 0] += 0.5 * size
         changed: dict[str, Any] = {name: values}
-        return model, replace(record, **changed), simulation
+        return model, replace(record, **changed)
 
     return plant
 
@@ -537,12 +528,12 @@ def _spun(pieces: Pieces, size: float) -> Pieces:
     return pieces
 
 
-def _called_endless(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+def _called_endless(scene: Scene, size: float) -> tuple[Model, Record]:
     """Make impacts without a rebound, and say of each that it is a chain without end."""
-    _, record, simulation = run(replace(scene, model=replace(scene.model, restitution=0.0)))
+    _, record = run(replace(scene, model=replace(scene.model, restitution=0.0)))
     assert record.pieces is not None
     pieces = replace(record.pieces, scheme=np.where(record.pieces.kind == IMPACT, CHAIN, record.pieces.scheme))
-    return scene.model, replace(record, pieces=pieces), simulation
+    return scene.model, replace(record, pieces=pieces)
 
 
 def _pair_after_pair(pieces: Pieces, size: float) -> Pieces:
@@ -560,36 +551,38 @@ def _pair_after_pair(pieces: Pieces, size: float) -> Pieces:
     return replace(pieces, **fields, first_contact=first)
 
 
-def _left_out(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+def _left_out(scene: Scene, size: float) -> tuple[Model, Record]:
     """Tamper with the state between two steps: a velocity changes that no piece tells of."""
-    simulation = Simulation(scene.model, scene.settings)
-    first = simulation.record(scene.steps // 2, pieces=True)
-    simulation._world.twist[1] *= 1.0 + size
-    then = simulation.record(scene.steps // 2, pieces=True)
-    return scene.model, _joined(first, then), simulation
+    half = scene.steps // 2
+    first = Simulation(scene.model, scene.settings).record(half, pieces=True)
+    return scene.model, _joined(first, _onward(scene.model, first, 1.0 + size).record(half, pieces=True))
 
 
-def _beyond_the_end(scene: Scene, size: float) -> tuple[Model, Record, Simulation]:
+def _beyond_the_end(scene: Scene, size: float) -> tuple[Model, Record]:
     """Let a ball roll on a face that ends too late by the size; half of that beyond the true end that is found."""
     (box, ball), steps = scene.model.bodies, 10
     half, speed = box.shape.half_extents, ball.twist[0]  # type: ignore[union-attr, index]
     ball = replace(ball, pose=(half[0] * (1.0 + 0.5 * size) - speed * steps * DT, *ball.pose[1:]))
     longer = replace(box, shape=Box((half[0] * (1.0 + size), *half[1:])))
     first = Simulation(replace(scene.model, bodies=[longer, ball]), REFERENCE).record(steps, pieces=True)
-    later = replace(ball, pose=tuple(first.pose[-1, 1]), twist=tuple(first.twist[-1, 1]))
-    simulation = Simulation(replace(scene.model, bodies=[box, later]), REFERENCE)
-    then = simulation.record(scene.steps - steps, pieces=True)
-    return replace(scene.model, bodies=[box, ball]), _joined(first, then), simulation
+    true = replace(scene.model, bodies=[box, ball])
+    return true, _joined(first, _onward(true, first).record(scene.steps - steps, pieces=True))
+
+
+def _onward(model: Model, record: Record, faster: float = 1.0) -> Simulation:
+    """Return a run that begins where a record ends, body 1 so many times as fast."""
+    one = replace(
+        model.bodies[1], pose=tuple(record.pose[-1, 1]), twist=tuple(np.multiply(faster, record.twist[-1, 1]))
+    )
+    return Simulation(replace(model, bodies=[model.bodies[0], one]), REFERENCE)
 
 
 def _joined(first: Record, then: Record) -> Record:
-    """Two records of one simulation as one, or of another that begins where the first ends."""
+    """Two records as one, of which the second begins where the first ends."""
     one, two = first.pieces, then.pieces
     assert one is not None and two is not None
-    steps = len(first.t) - 1
-    if then.t[0] == 0.0:
-        then = replace(then, t=then.t + first.t[-1])
-        two = replace(two, step=two.step + steps, begin=two.begin + first.t[-1])
+    then = replace(then, t=then.t + first.t[-1])
+    two = replace(two, step=two.step + len(first.t) - 1, begin=two.begin + first.t[-1])
     fields = {n: np.concatenate([getattr(one, n), getattr(two, n)]) for n in vars(one) if not n.startswith("first_")}
     starts = {
         n: np.append(getattr(one, n)[:-1], getattr(one, n)[-1] + getattr(two, n))
@@ -685,13 +678,7 @@ CORRUPTIONS = (
     Corruption(
         "events", "impact of a box too late, of a step", "box that lands", given(_floor_by(-1.4 * DT)), TOUCHING
     ),
-    Corruption("events", "step", "disc in flight", settings(dt=lambda size: DT * (1.0 + size))),
-    Corruption(
-        "events",
-        "residual of the solves",
-        "discs in a row",
-        settings(residual=lambda size: size, direct=lambda size: False, warm_starting=lambda size: False),
-    ),
+    Corruption("events", "step", "disc in flight", another_step),
     Corruption("motion", "place in flight", "disc in flight", handed(jumped("pose", 0))),
     Corruption("motion", "angle in flight [rad]", "disc in flight", handed(jumped("pose", 2, 1.0))),
     Corruption("motion", "velocity in flight [m/s]", "disc in flight", handed(jumped("twist", 0, 1.0))),
@@ -702,7 +689,6 @@ CORRUPTIONS = (
     Corruption("motion", "orientation in space [rad]", "cube in flight", handed(_turned)),
     Corruption("motion", "length of a quaternion", "cube in flight", handed(jumped("pose", 3, 1.0))),
     Corruption("motion", "spin in space [rad/s]", "cube in flight", handed(jumped("twist", 4, 1.0))),
-    Corruption("motion", "place of a fixed body", "stack", handed(jumped("pose", 0, 0.5, 0))),
     Corruption("motion", "place of a belt", "box on a belt", handed(jumped("pose", 1, 0.5, 0))),
     Corruption(
         "bookkeeping", "size of an impulse", "box that slides", handed(field("impulse", lambda p, s: p * (1.0 + s)))

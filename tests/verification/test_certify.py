@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.verification import certify as command
-from tests.verification import piles, rotation
+from tests.verification import rotation
 from tests.verification.gate import Gate
 from tests.verification.orders import RATES, Order
 from tests.verification.self_test import JUDGED, SIZES, Corruption, Trial
@@ -48,54 +48,6 @@ def test_exception_in_a_part_as_a_failed_gate(monkeypatch):
     kept, broken = command.measured("rotation")
     assert kept.holds and not broken.holds
     assert "no answer" in broken.case
-
-
-@pytest.mark.parametrize(
-    ("seed", "fall", "broken"),
-    [
-        (2, piles.Fall((), 1e-5, 0.0), set()),
-        (2, piles.Fall((), 1e-3, 0.0), {"pile: overlap, of a half width"}),
-        (2, piles.Fall((), 1e-5, 1e-9), {"pile: energy gained, of all"}),
-        # one pile of seventeen is more than the twentieth that may be refused
-        (
-            3,
-            piles.Fall(("a gap is missed",), 1e-5, 0.0),
-            {"pile: laws broken, overlap apart", "share of piles whose certificate does not hold"},
-        ),
-    ],
-    ids=("all hold", "overlap", "energy", "law"),
-)
-def test_piles_are_measured_one_by_one_and_judged_by_kind(monkeypatch, seed, fall, broken):
-    spoilt, asked = f"pile of 50 boxes, seed {seed}", []
-
-    def at_once(measure, runs, console):
-        asked.extend(runs)
-        return {run: fall if run == spoilt else piles.Fall((), 1e-6, 0.0) for run in runs}
-
-    monkeypatch.setattr(command, "PARTS", ("piles",))
-    monkeypatch.setattr(command, "side_by_side", at_once)
-    result = CliRunner().invoke(command.certify, ["--json"])
-    rows = json.loads(result.stdout)
-    assert sorted(asked) == sorted(piles.PILES)
-    assert len(asked) == sum(len(kind.seeds) for kind in piles.KINDS.values())
-    assert {row["quantity"] for row in rows if not row["holds"]} == broken
-    assert all("50 boxes" in row["case"] or "17 piles" in row["case"] for row in rows if not row["holds"])
-    assert result.exit_code == (1 if broken else 0)
-
-
-def test_broken_pile_fails_its_promise(monkeypatch):
-    def fall(model):
-        raise RuntimeError("no answer")
-
-    monkeypatch.setattr(piles, "fall", fall)
-    monkeypatch.setattr(piles, "fall_of", piles.fall_of.__wrapped__)  # others keep what they have measured
-    fallen = command.measured("pile of 50 boxes, seed 1")
-    assert "no answer" in fallen.reasons[0]
-    rows = list(piles.gates(lambda pile: fallen))
-    told = {row.case for row in rows if "could not be measured" in row.quantity}
-    assert told == {f"{pile}: RuntimeError('no answer')" for pile in piles.PILES}
-    assert len(rows) == 3 * len(piles.KINDS) + 1 + len(piles.PILES)
-    assert not any(row.holds for row in rows)
 
 
 def test_parts_run_in_processes_and_come_back_by_name():

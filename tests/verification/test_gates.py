@@ -25,8 +25,6 @@ def long(*call):
     return pytest.param(call, marks=pytest.mark.long)
 
 
-#: Piles of many seconds of CPU each.
-LONG = ("50 spheres", "8 spatial boxes", "50 discs", "50 discs and boxes", "50 boxes")
 IN_BOTH = [
     (impact.single_rebound, "classical"),
     (impact.single_rebound, "reference"),
@@ -64,13 +62,13 @@ ALONE = [
     (rotation.error, "reference"),
     (rotation.angular_momentum, "classical"),
     (rotation.angular_momentum, "reference"),
-    *[(gate, PLANE, name) for gate in (turning.errors, turning.order) for name in CASES[2]],
+    *[(turning.errors, PLANE, name) for name in CASES[2]],
     (turning.long_board,),
     long(random_scenes.gates),
     (falling.dominoes,),
     (falling.rocking,),
-    *[long(piles.laws, name) if name in LONG else (piles.laws, name) for name in piles.KINDS],
-    *[(gate, SPATIAL, name) for gate in (turning.errors, turning.order) for name in CASES[3]],
+    (piles.gates,),
+    *[(turning.errors, SPATIAL, name) for name in CASES[3]],
     (detection.seams, SPACES[0], "polygon"),
     (detection.slender_rod,),
 ]

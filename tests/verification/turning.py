@@ -1,44 +1,30 @@
-"""Gates of contacts that turn: errors and orders against the truths of `turning_scenes`, a minute of a board."""
+"""Gates of contacts that turn: errors against the truths of `turning_scenes`, a minute of a board."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from reference_solver.model import Array
-from reference_solver.settings import Settings
+from reference_solver.settings import TOLERANCE, Settings
 from reference_solver.simulation import Simulation
 from tests.verification.gate import Gate
-from tests.verification.orders import RATES, fitted
 from tests.verification.space import GRAVITY, Space
 from tests.verification.turning_scenes import CASES, PLANE, board_on_log, case
 
-#: Largest error at 60 and at 240 steps a second [m, rad].
-ALLOWED = {60: 1e-8, 240: 1e-10}
-#: Least observed order.
-ORDER = 4.5
-#: What the control of phase lengths holds errors below, of motions of a metre or a radian (`phase.ERROR`): there they
-#: fall no more with the step.
-HELD_BELOW = 1e-11
+#: Tolerances that cases are run to. Each takes some ten steps, which may err by the tolerance of the motion in them,
+#: of a metre or a radian: so many tolerances an error may be.
+TOLERANCES, STEPS = (1e-5, 1e-7, 1e-9, TOLERANCE), 10.0
 #: Length of the long run of the board [s], and what its energy and amplitude may be off, as shares of their own.
 LONG, KEPT = 60.0, 1e-8
 
 
 def errors(space: Space, name: str) -> Iterator[Gate]:
-    """Yield the error of one case at 1/60 and 1/240 s."""
-    for rate, allowed in ALLOWED.items():
-        yield Gate.at_most(
-            "turning contact [m, rad]", f"{name}, 1/{rate}", case(space, name).error(rate), allowed, space.name
-        )
-
-
-def order(space: Space, name: str) -> Iterator[Gate]:
-    """Yield the observed order of one case; errors below `HELD_BELOW` pass it."""
-    found = fitted(tuple(case(space, name).error(rate) for rate in RATES), floor=HELD_BELOW)
-    measured = math.inf if found is None else found
-    yield Gate.at_least("turning contact: observed order", name, measured, ORDER, space.name)
+    """Yield the error of one case to each tolerance, over the tolerance: it falls as that does."""
+    for tolerance in TOLERANCES:
+        off = case(space, name).error(tolerance) / tolerance
+        yield Gate.at_most("turning contact: error, of the tolerance", f"{name}, {tolerance:g}", off, STEPS, space.name)
 
 
 def long_board() -> Iterator[Gate]:
@@ -75,10 +61,9 @@ def _peaks(angle: Array) -> Array:
 
 
 def rows(space: Space) -> Iterator[Gate]:
-    """Yield errors and orders of all cases in one dimension."""
+    """Yield errors of all cases in one dimension."""
     for name in CASES[space.dimension]:
         yield from errors(space, name)
-        yield from order(space, name)
 
 
 def gates() -> Iterator[Gate]:

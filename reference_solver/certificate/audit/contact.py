@@ -245,6 +245,8 @@ def _laws(run: Run) -> Iterator[float]:
     alone = pressed.clip(min=0.0) + np.where(run.is_followed[owner], 0.0, mass * np.maximum(-leaves, 0.0))
     fastest = np.zeros(len(pieces))
     np.maximum.at(fastest, owner, -approach)
+    for k in np.flatnonzero(run.is_followed):  # what the first impact of an instant rounds, the last one still has
+        fastest[k + 1] = max(fastest[k : k + 2])
     certain = (
         np.where(restitution > 0.0, LEFT, PARTS) * fastest[owner]
         + LIES * speed

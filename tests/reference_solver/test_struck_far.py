@@ -1,7 +1,8 @@
-"""Bodies that an impact drives: they meet what is there, and bring along what holds it."""
+"""Bodies that an impact drives much farther in a step than they were to go: they meet what is there."""
 
 import itertools
 
+import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
@@ -40,7 +41,7 @@ def world(dimension, bodies, restitution, gravity=0.0):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", ["wall", "box", "post"])
 @pytest.mark.parametrize("last", [False, True])
-def test_a_ball_that_is_struck_out_of_its_bounds_is_thrown_back_by_what_stands_beyond_them(dimension, kind, last):
+def test_a_ball_that_is_struck_is_thrown_back_by_what_stands_in_its_way(dimension, kind, last):
     """Hit after .01 m at 3 m/s it goes at 6 m/s, meets the obstacle after .06 m more, and comes back for the rest."""
     bodies = [ball(dimension, 0.0, 3.0, mass=1e12), ball(dimension, 0.61)]
     post = obstacle(dimension, kind, 0.61 + RADIUS + 0.06)
@@ -55,13 +56,15 @@ def test_a_ball_that_is_struck_out_of_its_bounds_is_thrown_back_by_what_stands_b
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_what_holds_a_ball_that_is_met_holds_it_still(dimension, order):
-    """A light ball is struck out of its bounds into a third one that rests on a shelf, nobody else's, and stays in its.
+    """A light ball is struck into a third one that rests on a shelf, nobody else's.
 
     Without the shelf it fell by g h^2/2, 1.4 mm: no more than it might have.
     """
     bodies = [ball(dimension, 0.0, 3.0, mass=1e9), ball(dimension, 0.61), ball(dimension, 1.26, mass=1e6)]
     shelf = fixed(dimension, Box((0.1,) * dimension), 1.26, 10.0 - RADIUS - 0.1)
-    simulation = world(dimension, [*(bodies[i] for i in order), shelf], 1.0, GRAVITY)
+    restitution = np.ones((4, 4))
+    restitution[3] = restitution[:, 3] = 0.0  # else the third bounces on the shelf without end
+    simulation = world(dimension, [*(bodies[i] for i in order), shelf], restitution, GRAVITY)
     simulation.advance(1)
     third = order.index(2)
     assert abs(simulation.pose[third, dimension - 1] - 10.0) < 1e-6  # blows on it are not quite level
