@@ -152,7 +152,6 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
     pieces, body, length = run.pieces, run.pieces.body, run.length
     last = pieces.twist_after[:, : run.d]
     mean = 0.5 * (pieces.twist_before[:, : run.d] + last)
-    mean = np.where(run.is_fixed[run.owner][:, None], last, mean)
     way = pieces.pose_after[:, : run.d] - pieces.pose_before[:, : run.d]
     defect = np.linalg.norm(way - length[:, None] * mean, axis=1)
     bend = np.where(run.is_frozen[run.owner], 0.0, _bend(run))
@@ -231,7 +230,7 @@ def _turn(run: Run) -> float:
         bend = np.where(run.is_frozen[owner[rows]], 0.0, bend)
     bend = np.where(_touched(run)[rows], bend, 0.0)
     if run.d == 2:
-        mean = np.where(run.is_fixed[owner[rows]], last[:, 0], 0.5 * (first + last)[:, 0])
+        mean = 0.5 * (first + last)[:, 0]
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
         noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2])) + bend
         return float(np.maximum(np.abs(turn - length * mean) - noise, 0.0).max())
@@ -253,8 +252,6 @@ def _touched(run: Run) -> NDArray[np.bool_]:
 def turned_by_momentum(run: Run, rows: NDArray[np.int64]) -> tuple[Array, Array]:
     """Quaternions (s, 4) and integrals of spins (s, 3) of rows whose momentum changes evenly, by `integrated_turn`."""
     before, after = (spin[rows] for spin in run.spin)
-    # At fixed steps a body turns with the momentum that it has afterwards.
-    before = np.where(run.is_fixed[run.owner[rows]][:, None], after, before)
     moments = run.moments[run.pieces.body[rows]]
     return integrated_turn(run.pieces.pose_before[rows, 3:], before, after, moments, run.length[rows])
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, FIXED, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, UNORDERED, Pieces
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, UNORDERED, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -188,11 +188,6 @@ class Run:
         same = np.zeros(len(pieces), bool)
         same[:-1] = (pieces.begin[1:] == pieces.begin[:-1]) & (first[1:] == first[:-1])
         return np.asarray(same & self.is_impact & np.append(self.is_impact[1:], False))
-
-    @cached_property
-    def is_fixed(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece went by the fixed-step law."""
-        return np.asarray(self.pieces.scheme == FIXED)
 
     @cached_property
     def spin(self) -> tuple[Array, Array]:

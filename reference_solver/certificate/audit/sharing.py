@@ -172,7 +172,7 @@ def _contacts(run: Run) -> _Contacts:
     # of a fixed step, against the slip that is left.
     first, last = (u - (u * n).sum(axis=1)[:, None] * n for u in (before, after))
     begins = run.is_frozen[owner] & (np.linalg.norm(first, axis=1) <= SLIP_NOISE * speed)
-    slip = np.where((impact | run.is_fixed[owner] | begins)[:, None], last, first)
+    slip = np.where((impact | begins)[:, None], last, first)
     size = np.linalg.norm(slip, axis=1)
     still = size <= SLIP_NOISE * speed
     against = np.where(still, 0.0, mu / np.where(still, 1.0, size))

@@ -150,7 +150,7 @@ def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
     """
     pieces, owner = run.pieces, run.owner[rows]
     even = (run.pushed[2][rows] == 0.0) | run.is_frozen[owner]
-    even &= ~run.is_fixed[owner] & ~run.is_impulse_level[owner]
+    even &= ~run.is_impulse_level[owner]
     spin = np.maximum(*(np.linalg.norm(x[rows, 3:], axis=1) for x in (pieces.twist_before, pieces.twist_after)))
     turns = np.where(even, np.nan_to_num(run.length[rows] * spin), 0.0)
     count = np.where(turns > FAR, np.ceil(turns / PART), 1.0).clip(max=MOST_PARTS).astype(np.int64)

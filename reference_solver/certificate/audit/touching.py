@@ -42,7 +42,7 @@ def _touching(run: Run) -> list[float]:
     """
     pieces = run.pieces
     worst, doubt, mass = np.zeros(5), unseen(run), reduced_mass(run)
-    coarse = (run.is_fixed | run.is_impulse_level)[run.contact_owner]
+    coarse = run.is_impulse_level[run.contact_owner]
     carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse & np.isfinite(pieces.normal).all(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     for pair in np.unique(pairs[carry]):
