@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from reference_solver.certificate.audit import audit
+from reference_solver.exact import Refused
 from reference_solver.model import Array, Body, Model
 from reference_solver.pieces import CHAIN, FORCES, IMPACT, Pieces
 from reference_solver.records import Record
@@ -175,7 +176,12 @@ def trials(sizes: tuple[float, ...] = SIZES, every: int = 1) -> Iterator[Trial]:
     """Plant the corruptions one at a time, at all sizes; ``every`` n-th of them only."""
     for corruption in CORRUPTIONS[::every]:
         for size in sizes:
-            yield Trial(corruption, size, seen_by(*corruption.plant(SCENES[corruption.scene], size)))
+            try:
+                planted = corruption.plant(SCENES[corruption.scene], size)
+            except Refused:  # the loop notices it by itself
+                yield Trial(corruption, size, ("refused",))
+                continue
+            yield Trial(corruption, size, seen_by(*planted))
 
 
 def gates() -> Iterator[Gate]:
