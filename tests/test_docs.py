@@ -183,8 +183,8 @@ def test_the_documentation_builds_with_links_that_lead_somewhere(built):
     assert {path.stem for path in (built / "scenes").glob("*.html")} == {*CATALOGUE, "index"}
 
 
-#: What is wider than its place (by more than the padding of code), except scripts, and names in tables that break elsewhere
-#: than at a dot, bracket, underscore or capital.
+#: What is wider than its place (by more than the padding of code), except scripts, and names in tables that break
+#: elsewhere than at a dot, bracket, underscore or capital.
 CUT = """() => [
   ...[...document.querySelectorAll('article *')].filter(e => e.scrollWidth > e.clientWidth + 8 && e.clientWidth
     && !e.closest('pre') && getComputedStyle(e).display !== 'inline'),
