@@ -15,7 +15,7 @@ from adapters.settings import text_of
 from reports.wording import number, params_text, setting_text
 from validation.cells import Observation, Slot, format_dt, scene_of
 from validation.cells import settings_of as settings_in
-from validation.fixes.kept import Cure, cures_of, panels_of
+from validation.fixes.kept import Cure, Shown, cures_of, panels_of
 from validation.fixes.panel import OTHERS, Panel, carried
 from validation.fixes.search import asked_of
 from validation.posed import is_file, resolve
@@ -233,8 +233,12 @@ def _listed(row: Mapping[str, Any]) -> Cure | None:
 
 def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
     kinds = cure.mends or (cure.metric.partition("[")[0],)
-    same_check = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
-    return same_check or row["metric"].partition("[")[0] in kinds
+    return is_shown(cure, row) or row["metric"].partition("[")[0] in kinds
+
+
+def is_shown(shown: Cure | Shown, row: Mapping[str, Any]) -> bool:
+    """Whether a row is the check that shows what a fix does."""
+    return row["metric"] == shown.metric and dict(_minimal(row)) == dict(shown.params)
 
 
 def is_standard(row: Mapping[str, Any]) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -136,9 +137,14 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "dt": format_dt, "data": as_data}
+    environment.filters |= {"number": number, "dt": format_dt, "data": as_data, "unbroken": unbroken}
     environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text, "word_of": word_of}
     return environment
+
+
+def unbroken(text: str) -> str:
+    """Text in which ``1.7e-4`` and ``2-D`` do not end a line at their hyphen."""
+    return re.sub(r"(?<=\d)(e?-)(?=[\dD])", "\\1\N{WORD JOINER}", text)
 
 
 def as_data(value: Any) -> Markup:

@@ -191,8 +191,6 @@ def test_kept_table(monkeypatch, tmp_path):
     assert [(row["scene"], row["proof"]) for row in rows] == [("conveyor", ""), ("oblique", "impratio=2")]
     page = told(rows)
     assert page["cases"][0] == ("conveyor 3-D default", ["unsupported: no"])
-    assert page["counts"] == [
-        "port: 1 differ (1 with a setting that proves why, 0 with no cause found), 1 unsupported"
-    ]
+    assert page["counts"] == ["port: 1 differ (1 with a setting that proves why, 0 with no cause found), 1 unsupported"]
     assert sentence(rows[1] | {"proof": ""}).startswith("differs, no cause found: by ")
     assert sentence(rows[1]).endswith("; the same with impratio=2") and counts(rows, "other") == "other: "
