@@ -15,7 +15,9 @@ from adapters.registry import facts
 from adapters.settings import text_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
+from validation.files.stated import STATED
 from validation.metrics import NEVER as NEVER
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file, resolve
 
 if TYPE_CHECKING:
@@ -25,6 +27,13 @@ if TYPE_CHECKING:
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Largest number of names, as of scenes, in one line.
 FEW = 4
+#: What is judged of every file, by metric.
+LAWS = {
+    "energy_growth": "energy",
+    "penetration": "overlaps",
+    "momentum_drift": "momentum",
+    OUT_OF_PLANE: "staying in plane",
+}
 #: Priority of marks of a group of rows: the first that occurs is its mark.
 MARKS = (
     "crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted", "fail", "known", "explained", "pass",
@@ -221,9 +230,25 @@ def called(scenes: Iterable[str]) -> dict[str, str]:
     return {name: stem if counts[stem] == 1 else name for name, stem in stems.items()}
 
 
+def unstated(rows: Iterable[Mapping[str, Any]]) -> str:
+    """What alone is judged of the files of a run that state no check of their own; empty if each states one."""
+    judged = [row for row in rows if is_file(row["scene"]) and row["physics"] is not None]
+    own = {row["scene"] for row in judged if row["source"] == STATED}
+    bare = [row for row in judged if row["scene"] not in own]
+    laws = sorted({LAWS.get(row["metric"], row["metric"]) for row in bare})
+    names = joined(dict.fromkeys(called({row["scene"] for row in bare}).values()))
+    return f"Only {joined(laws)} are judged of {names}: no check of its own is stated" if bare else ""
+
+
 def first_of(names: Sequence[str]) -> str:
     """The names, or the first few of many: ``a, b, c, d and 7 more``."""
     return ", ".join(names) if len(names) <= FEW else f"{', '.join(names[:FEW])} and {len(names) - FEW} more"
+
+
+def joined(words: Iterable[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    words = list(words)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else "none"
 
 
 def plural(count: int, noun: str) -> str:

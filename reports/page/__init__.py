@@ -33,7 +33,7 @@ from reports.page.families import families
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, heat_style, symbols
-from reports.wording import missing_text, number, word_of
+from reports.wording import missing_text, number, unstated, word_of
 from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
 from validation.cells import format_dt
@@ -168,6 +168,7 @@ def facts(source: Source) -> dict[str, Any]:
         "cells": len(source.observations),
         "checks": sum(row["physics"] is not None for row in source.rows),
         "judged": {row["engine"] for row in source.rows if row["physics"] is not None},
+        "unstated": unstated(source.rows),
         "machine": source.run.machine,
     }
 
