@@ -265,9 +265,9 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
     verdict = WRONG if wrong else RIGHT
     if verdict == RIGHT and situation.placed and (told := _place(situation, scene, run)):
         return Judged(situation.name, WRONG, off, told, motion)
-    counts = (wrong, len(steps)) if 0 < wrong < len(steps) else (None, None)
+    some, of = (wrong, len(steps)) if 0 < wrong < len(steps) else (None, None)
     most = max(float(each[0].max()) for each in found) / run.dt if verdict == WRONG else None
-    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion, *counts, most=most)
+    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion, some, of, most)
 
 
 def _turned(scene: Scene, run: Heard, part: Part) -> float:
