@@ -9,7 +9,7 @@ OUT ?= crosscheck-out
 SUITE ?= quick
 CONSTRAINTS ?= -c constraints.txt
 comma := ,
-EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,newton
+EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,motrixsim,newton
 # Engines of an extra with another name.
 BESIDE := newton_kamino,newton_vbd,newton_semi_implicit
 

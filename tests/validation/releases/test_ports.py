@@ -165,6 +165,15 @@ def test_releases_that_are_not_compared(offers, ports, version, line):
     assert str(caught.value) == line
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("nosuch", "no engine is called 'nosuch'"), ("bullet", "no port of bullet is known")]
+)
+def test_engine_without_ports(name, said):
+    with pytest.raises(EngineError) as caught:
+        ported(name, [])
+    assert str(caught.value) == f"ports: {said}; these can be compared: mujoco with mujoco_mjx, mujoco_warp"
+
+
 def test_port_beside_another_release(monkeypatch):
     monkeypatch.setattr(port, "version", lambda package: "3.17.0")
     here = ENGINE.version()
