@@ -23,6 +23,7 @@ $(USED): EXTRAS_OF := chipmunk,bullet,mujoco,report,shapes
 $(STAMP): EXTRAS_OF := all,dev
 $(USED) $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no working python3.11 or python3 on PATH"; exit 2; }
+	@echo "installing $(EXTRAS_OF) into $(VENV): one to five minutes at first"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$(EXTRAS_OF)]" $(CONSTRAINTS)
 	@touch $@ $(USED)

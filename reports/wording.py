@@ -153,7 +153,15 @@ def row_id(row: Mapping[str, Any]) -> str:
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """A number with its unit; a ratio has none."""
-    return number(value, digits) if unit == "1" or value is None else f"{number(value, digits)} {unit}"
+    return amount(number(value, digits), "" if value is None else unit)
+
+
+def amount(text: str, unit: str) -> str:
+    """A number as text with its unit: ``2 weights``, ``1 weight``; a ratio (unit 1 or none) has none."""
+    if unit in ("", "1"):
+        return text
+    one = text == "1" and unit.isalpha() and len(unit) > 1
+    return f"{text} {unit.removesuffix('s') if one else unit}"
 
 
 def measured(row: Mapping[str, Any], digits: int = 4) -> str:

@@ -9,7 +9,7 @@ from reports.answers import Answer, configured, named_kind, wrong_of
 from reports.findings import has_answer
 from reports.fixes import cure_paste, is_shown, is_standard, known_cures, panel_text, told, told_cures
 from reports.page.source import Plain, Source
-from reports.wording import mark_of
+from reports.wording import amount, mark_of
 from validation.fixes.kept import Cure, Shown
 
 
@@ -68,14 +68,14 @@ def _fix(cure: Cure, rows: Sequence[Plain], answer: Answer, where: str) -> Fix:
         wrong = wrong_of(rows, chosen.metric.partition("[")[0], own)
     said = told(replace(cure, **{field.name: getattr(chosen, field.name) for field in fields(Shown)}))
     check = f"{said.check}{f' at {said.at}' if said.at else ''}"
-    unit = f"\N{NO-BREAK SPACE}{said.unit}" if said.unit else ""
+    before, after = (amount(text, said.unit).replace(" ", "\N{NO-BREAK SPACE}") for text in (said.before, said.after))
     return Fix(
         where,
         wrong,
         said.settings,
         check,
-        ("" if told_here else f"{check}: ") + said.before + unit,  # the run has not this case
-        said.after + unit + (f" (true: {said.truth})" if said.truth else ""),
+        ("" if told_here else f"{check}: ") + before,  # the run has not this case
+        after + (f" (true: {said.truth})" if said.truth else ""),
         f"{said.left or 'not fixed'}: {untouched}" if untouched else said.left,
         f"{said.times}×" if said.times else "",
         cure_paste(cure),
