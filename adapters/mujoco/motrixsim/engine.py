@@ -7,6 +7,7 @@ It reads MJCF, which `adapters.mujoco` writes.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import MappingProxyType
 from typing import final
 
@@ -14,9 +15,12 @@ from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
 from adapters.mujoco.motrixsim.profiles import KINDS, PROFILES
 from adapters.mujoco.motrixsim.simulation import MotrixSimulation, imported
+from adapters.mujoco.motrixsim.springs import OFF, rebound
 from adapters.needs import Needs
 
-SPRING = "contacts are springs and dampers: the rebound depends on time constant, impedance and phase of the step"
+#: Phases of a step over which a rebound is declared.
+PHASES = 128
+SPRING = "contacts are springs and dampers: the rebound depends on the phase of the step, not on e"
 OVERLAP = "a step corrects the share erp of an overlap, with a speed that the rebound keeps"
 
 
@@ -80,8 +84,13 @@ class MotrixSimEngine(CheckedEngine):
         """Rebound of springs, which is none of e; of hard contacts with what an overlap adds to it."""
         if needs.regime != "impact":
             return {}
-        share = next(each.value for each in self.settings(profile, needs, dt) if each.name == "erp")
+        settings = {each.name: each.value for each in self.settings(profile, needs, dt)}
+        share = settings["erp"]
         if share is None:
-            return {"restitution": Declared(0.5, 0.5 + self.facts.round_off, SPRING)}
+            ratios = [rebound(settings["solref"], settings["solimp"], dt, (k + 0.5) / PHASES) for k in range(PHASES)]
+            middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
+            # Between two phases the rebound changes by no more than between neighbouring phases.
+            steepest = max(abs(x - y) for x, y in pairwise(ratios))
+            return {"restitution": Declared(middle, half + steepest + OFF, SPRING)}
         half = 0.5 * share  # of an overlap between none and the way of a step
         return {"restitution": Declared(needs.restitution + half, half + self.facts.round_off, OVERLAP)}
