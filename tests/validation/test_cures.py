@@ -432,6 +432,13 @@ def stated(engine, cure):
     return [each for slot in slots for each in readings(Observation(slot, "", 1, "", Outcome.OK, metrics=metrics))]
 
 
+def test_fix_of_an_engine_that_is_not_installed(monkeypatch):
+    """A kept fix is told everywhere: its settings do not need the engine."""
+    monkeypatch.setattr("validation.fixes.panel.load", lambda name: pytest.fail("loads the engine"))
+    cure = cures_of("physx")["incline", 3]
+    assert cure_paste(cure) == "" and "solver=pgs, iterations=255" in cure_text(cure)
+
+
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
 def test_committed_cure_measured_with_today_s_checks(engine):
     """A check that came later may fail with a cure that is told as one of all checks: so it was with `out_of_plane`."""
