@@ -9,7 +9,7 @@ OUT ?= crosscheck-out
 SUITE ?= quick
 CONSTRAINTS ?= -c constraints.txt
 comma := ,
-EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,newton
+EXTRAS := box2d,box2d3,box3d,rapier,dart,physx,drake,motrixsim,newton
 # Engines of an extra with another name.
 BESIDE := newton_kamino,newton_vbd,newton_semi_implicit
 
@@ -23,6 +23,7 @@ $(USED): EXTRAS_OF := chipmunk,bullet,mujoco,report,shapes
 $(STAMP): EXTRAS_OF := all,dev
 $(USED) $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no working python3.11 or python3 on PATH"; exit 2; }
+	@echo "installing $(EXTRAS_OF) into $(VENV): one to five minutes at first"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$(EXTRAS_OF)]" $(CONSTRAINTS)
 	@touch $@ $(USED)

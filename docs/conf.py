@@ -19,9 +19,11 @@ html_theme = "pydata_sphinx_theme"
 html_title = "contact-crosscheck"
 html_theme_options = {"navigation_with_keys": False, "secondary_sidebar_items": ["page-toc"]}
 smartquotes = False  # options begin with two hyphens
-html_sidebars = {name: [] for name in ("index", "start", "symptoms", "forces", "numbers", "method")}
+lists = ("symptoms", "forces", "numbers", "ports", "tolerances", "references")
+html_sidebars = {name: [] for name in ("index", "start", "worked-example", "method", *lists)}
 html_static_path = ["static"]
 html_css_files = ["wide.css"]
+html_js_files = ["tables.js"]
 html_show_sourcelink = False
 html_extra_path = ["../reports/published"]
 

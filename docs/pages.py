@@ -7,7 +7,7 @@ import inspect
 import json
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +128,8 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
     yield "tolerances", {"introduction": inspect.getdoc(bounds), "sections": tolerances(), "reasons": reasons()}
     yield "references", references()
     yield "worked-example", worked.example()
-    yield "numbers", {"engines": {name: numbers.of_engine(name) for name in engines}, "groups": numbers.COLUMNS}
+    own = {name: numbers.of_engine(name) for name in engines}
+    yield "numbers", {"engines": own, "groups": numbers.COLUMNS, "told": numbers_told}
     yield (
         "forces",
         {
@@ -141,6 +142,11 @@ def made(passes: pd.DataFrame) -> Iterator[tuple[str, dict[str, Any]]]:
         if rows := kept(name):
             yield "ports", {"engine": name, "title": registry.facts(name).title} | ports.told(rows)
     yield "symptoms", {"scenes": [(scene, fixes(scene.name)) for scene in CATALOGUE.values() if scene.symptoms]}
+
+
+def numbers_told(row: Mapping[str, str], columns: Iterable[str]) -> bool:
+    """Whether an engine has any number in a table; the order of a step has a list of its own."""
+    return any(row[key] for key in columns if key != "step")
 
 
 def tolerances() -> list[tuple[str, list[dict[str, str]]]]:

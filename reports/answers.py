@@ -231,15 +231,24 @@ def _wrong(rows: Sequence[Plain], failing: Sequence[Plain]) -> str:
     lost = [row for row in failing if not has_answer(row)]
     if lost:
         return f"no result for {len(lost)} of {len(rows)} checks ({LABELS[mark_of(lost[0])]}: {lost[0]['reason']})"
-    kind = named_kind(failing)
-    members = [row for row in rows if row["metric"].partition("[")[0] == kind and row["value"] is not None]
+    return wrong_of(rows, named_kind(failing), failing)
+
+
+def wrong_of(rows: Sequence[Plain], kind: str, failing: Sequence[Plain]) -> str:
+    """The error of a kind of metric in words: one value in all ``rows``, else that of the worst row of ``failing``."""
+    members, worst = (
+        [row for row in group if row["metric"].partition("[")[0] == kind and row["value"] is not None]
+        for group in (rows, failing)
+    )
     known_as = f"{kind}[1]"
     if any(row["metric"] == known_as for row in failing):
-        seen = [_as_seen(row, known_as) for row in members if row["metric"] == known_as]
-        members = [row for row in seen if row is not None] or members
+        members, worst = (
+            [seen for row in group if row["metric"] == known_as and (seen := _as_seen(row, known_as))] or group
+            for group in (members, worst)
+        )
     # The truth of a scene file depends on no parameters.
     constant = "" if is_file(rows[0]["scene"]) else _constant(kind, members)
-    return constant or _worst(kind, [row for row in members if mark_of(row) != "pass"])
+    return constant or _worst(kind, worst)
 
 
 def named_kind(failing: Iterable[Plain]) -> str:

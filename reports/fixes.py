@@ -12,10 +12,10 @@ from adapters import registry
 from adapters.engine_folder import belongs_of
 from adapters.scene import SceneError
 from adapters.settings import text_of
-from reports.wording import number, params_text, setting_text
+from reports.wording import amount, number, params_text, quantity, setting_text
 from validation.cells import Observation, Slot, format_dt, scene_of
 from validation.cells import settings_of as settings_in
-from validation.fixes.kept import Cure, cures_of, panels_of
+from validation.fixes.kept import Cure, Shown, cures_of, panels_of
 from validation.fixes.panel import OTHERS, Panel, carried
 from validation.fixes.search import asked_of
 from validation.posed import is_file, resolve
@@ -233,8 +233,12 @@ def _listed(row: Mapping[str, Any]) -> Cure | None:
 
 def _is_mended(cure: Cure, row: Mapping[str, Any]) -> bool:
     kinds = cure.mends or (cure.metric.partition("[")[0],)
-    same_check = row["metric"] == cure.metric and dict(_minimal(row)) == dict(cure.params)
-    return same_check or row["metric"].partition("[")[0] in kinds
+    return is_shown(cure, row) or row["metric"].partition("[")[0] in kinds
+
+
+def is_shown(shown: Cure | Shown, row: Mapping[str, Any]) -> bool:
+    """Whether a row is the check that shows what a fix does."""
+    return row["metric"] == shown.metric and dict(_minimal(row)) == dict(shown.params)
 
 
 def is_standard(row: Mapping[str, Any]) -> bool:
@@ -322,16 +326,17 @@ def cure_text(cure: Cure, where: str = "") -> str:
     if not cure.helps:
         return f"{where}: {NONE_HELPS} ({cure.tried} tried)"
     said = told(cure)
-    unit = f" {said.unit}" if said.unit else ""
     aim = f" (true: {said.truth})" if said.truth else ""
-    numbers = f"{said.check}{f' at {said.at}:' if said.at else ''} {said.before} -> {said.after}{unit}{aim}"
+    numbers = (
+        f"{said.check}{f' at {said.at}:' if said.at else ''} {said.before} -> {amount(said.after, said.unit)}{aim}"
+    )
     left = f", {said.left}" if said.left else ""
     cost = f", at {said.times} times the cost" if said.times else ""
     cost = ", at the same cost" if said.times == "1" else cost
     elsewhere = f"; {text}" if (text := panel_text(cure.panel)) else ""
     alone = ""
-    if cure.alone:
-        alone = f"; {_assigned(changes_in_words(cure, cure.alone))} alone: {number(cure.alone_after, 3)}{unit}"
+    if cure.alone_after is not None:
+        alone = f"; {_assigned(changes_in_words(cure, cure.alone))} alone: {quantity(cure.alone_after, cure.unit, 3)}"
     return f"{where}: {_assigned(said.settings)}; {numbers}{left}{cost}{alone}{elsewhere}"
 
 
@@ -346,8 +351,7 @@ def panel_text(panel: Panel | None) -> str:
     named: dict[str, str] = {}
     for cost in sorted(panel.breaks, key=lambda each: each.case in ORDER and ORDER.index(each.case)):
         before, after, truth = told_apart(cost.before, cost.after, cost.truth)
-        unit = "" if cost.unit == "1" else f" {cost.unit}"
-        named.setdefault(cost.case, f"{cost.case} ({cost.metric} {before} -> {after}{unit}, true {truth})")
+        named.setdefault(cost.case, f"{cost.case} ({cost.metric} {before} -> {amount(after, cost.unit)}, true {truth})")
     told = ", ".join([*list(named.values())[:NAMED], *list(named)[NAMED:]])
     return f"tried in {panel.cases} other cases: breaks {told or 'nothing'}"
 

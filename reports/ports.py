@@ -12,8 +12,7 @@ from validation.releases.ports import LOST, MOVES, SHARE
 Row = Mapping[str, str]
 #: Verdicts without a comparison of motions, in words.
 UNMOVED = {
-    "unsupported": "unsupported there",
-    "neither": "run by neither",
+    "unsupported": "unsupported",
     "lost": "lost in round-off",
     "failed": "failed",
 }
@@ -26,7 +25,7 @@ def sentence(row: Row) -> str:
     until = f"{row['until']} s" + ("" if row["until"] == row["end"] else f" of {row['end']} s")
     if row["verdict"] == "same":
         proof = f"; to the end with {row['proof']}" if row["proof"] else ""
-        return f"same to single precision until {until} ({row['apart']} m){proof}"
+        return f"same but for round-off (up to {row['apart']} m) until {until}{proof}"
     how = (
         f": {row['because']}"
         if row["because"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def run_plan(
     shown = representatives(slots) if recorded else set()
     paths = {slot: keep / f"{slot.key()}.npz" for slot in todo} if keep else {}
     with (
-        stage(console, plural(len(todo), "case")),
+        stage(console, plural(len(todo), "case")) if todo else nullcontext(),
         progress_on(console) as progress,
     ):
         total = len(slots) + len(more)

@@ -14,7 +14,10 @@ from validation.questions.readings import SITUATIONS, STOPPED, WRONG, Judged, ca
 
 Plain = dict[str, Any]
 #: What the numbers of a table mean.
-SCALE = "largest error of a step over the largest true force of that pair or body; (1/480): in 1 of 480 steps"
+SCALE = (
+    "largest error of a step over the largest true force of that pair or body; then the largest error of any, in "
+    "newtons; (1/480): in 1 of 480 steps"
+)
 #: What a call has that has no whole vector.
 PARTS = {"normal": "normal parts", "size": "sizes of normal parts"}
 #: What is known in each situation.
@@ -29,7 +32,8 @@ def said(judged: Judged) -> str:
         return judged.where
     assert judged.off is not None
     some = f" ({judged.wrong}/{judged.steps})" if judged.wrong != judged.steps else ""
-    return f"off {number(100.0 * judged.off, 2)} %{some}"
+    force = "" if judged.most is None else f", {number(judged.most, 3)} N"
+    return f"off {number(100.0 * judged.off, 2)} %{force}{some}"
 
 
 def told(engine: str, entries: Iterable[Known] | None = None) -> Plain:

@@ -18,7 +18,7 @@ from validation.running.warming import Part
 #: Least time of a stage that is shown [s].
 LEAST = 0.005
 #: How long all kernels of our solver take: 1 min 10 s and 2 min 40 s on idle machines with 2 cores of two kinds.
-WAIT = "one to three minutes"
+WAIT = "one to three minutes on idle cores"
 
 
 def clock(seconds: float) -> str:

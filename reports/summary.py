@@ -36,12 +36,9 @@ from reports.matrix import (
     unranked,
     versions_of,
 )
-from reports.wording import at, called, plural, roles_line
-from validation.posed import is_file
+from reports.wording import at, called, plural, roles_line, unstated
 
 Plain = Mapping[str, Any]
-#: What is judged of a file that states no check of its own.
-LAWS = {"energy_growth": "energy", "penetration": "overlaps", "momentum_drift": "momentum"}
 #: Largest number of alarm families in the list; `crosscheck findings --new` lists all.
 MOST_ALARMS = 6
 #: Number of lines of a table above its first row.
@@ -210,10 +207,7 @@ def _nothing_wrong(rows: Sequence[Plain]) -> str:
         return "Nothing was judged: no check of this run has a finite tolerance"
     if any(row["physics"] != "pass" for row in judged):
         return "Only checks at other iteration counts fail or have no value"
-    laws = {LAWS.get(row["metric"], "") if is_file(row["scene"]) else "" for row in judged}
-    if "" in laws:
-        return "Every check passes"
-    return f"Every check passes. Only {' and '.join(sorted(laws))} are judged: the file states no check of its own"
+    return ". ".join(filter(None, ("Every check passes", unstated(rows))))
 
 
 def _where(

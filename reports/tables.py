@@ -26,6 +26,8 @@ AFTERWARDS = (
     "Chosen afterwards: the source leaves a value open, which was chosen so that the measurement agrees; this "
     "agreement is no test. The conditions in the reason of a contradiction were found afterwards too."
 )
+#: Units of what a scene needs (`adapters.needs.Needs`), where it has one.
+NEED_UNITS = {"smallest_size": "m", "top_speed": "m/s", "gravity": "m/s^2", "pull": "m/s^2"}
 #: Columns of each listing: heading and field.
 LISTINGS: dict[str, tuple[tuple[str, str], ...]] = {
     "scenes": (("scene", "name"), ("what", "title"), ("dim.", "dimensions"), ("truth", "law")),
@@ -134,7 +136,14 @@ def _scene(data: Plain, console: Console) -> None:
         last = because
     print_table(table, console)
     _heading("What it needs from an engine", console)
-    _pairs(data["needs"], console)
+    _pairs({name.replace("_", " "): _need(name, value) for name, value in data["needs"].items()}, console)
+
+
+def _need(name: str, value: Any) -> Any:
+    """A need with its unit; ``yes`` or ``no``."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return quantity(value, NEED_UNITS[name]) if name in NEED_UNITS else value
 
 
 def _engine(data: Plain, console: Console) -> None:

@@ -15,7 +15,9 @@ from adapters.registry import facts
 from adapters.settings import text_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, format_dt, parse_dt, slot_from_dict
+from validation.files.stated import STATED
 from validation.metrics import NEVER as NEVER
+from validation.metrics import OUT_OF_PLANE
 from validation.posed import is_file, resolve
 
 if TYPE_CHECKING:
@@ -25,6 +27,13 @@ if TYPE_CHECKING:
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 #: Largest number of names, as of scenes, in one line.
 FEW = 4
+#: What is judged of every file, by metric.
+LAWS = {
+    "energy_growth": "energy",
+    "penetration": "overlaps",
+    "momentum_drift": "momentum",
+    OUT_OF_PLANE: "staying in plane",
+}
 #: Priority of marks of a group of rows: the first that occurs is its mark.
 MARKS = (
     "crashed", "timed_out", "missing", "invalid", "refused", "new", "drifted", "fail", "known", "explained", "pass",
@@ -144,7 +153,15 @@ def row_id(row: Mapping[str, Any]) -> str:
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
     """A number with its unit; a ratio has none."""
-    return number(value, digits) if unit == "1" or value is None else f"{number(value, digits)} {unit}"
+    return amount(number(value, digits), "" if value is None else unit)
+
+
+def amount(text: str, unit: str) -> str:
+    """A number as text with its unit: ``2 weights``, ``1 weight``; a ratio (unit 1 or none) has none."""
+    if unit in ("", "1"):
+        return text
+    one = text == "1" and unit.isalpha() and len(unit) > 1
+    return f"{text} {unit.removesuffix('s') if one else unit}"
 
 
 def measured(row: Mapping[str, Any], digits: int = 4) -> str:
@@ -221,9 +238,25 @@ def called(scenes: Iterable[str]) -> dict[str, str]:
     return {name: stem if counts[stem] == 1 else name for name, stem in stems.items()}
 
 
+def unstated(rows: Iterable[Mapping[str, Any]]) -> str:
+    """What alone is judged of the files of a run that state no check of their own; empty if each states one."""
+    judged = [row for row in rows if is_file(row["scene"]) and row["physics"] is not None]
+    own = {row["scene"] for row in judged if row["source"] == STATED}
+    bare = [row for row in judged if row["scene"] not in own]
+    laws = sorted({LAWS.get(row["metric"], row["metric"]) for row in bare})
+    names = joined(dict.fromkeys(called({row["scene"] for row in bare}).values()))
+    return f"Only {joined(laws)} are judged of {names}: no check of its own is stated" if bare else ""
+
+
 def first_of(names: Sequence[str]) -> str:
     """The names, or the first few of many: ``a, b, c, d and 7 more``."""
     return ", ".join(names) if len(names) <= FEW else f"{', '.join(names[:FEW])} and {len(names) - FEW} more"
+
+
+def joined(words: Iterable[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    words = list(words)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else "none"
 
 
 def plural(count: int, noun: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import os
+import shutil
 import sys
 import textwrap
 from collections import defaultdict
@@ -109,6 +110,20 @@ def pytest_runtest_setup(item):
         found = registry.find(*mark.args)
         if found.engine is None:
             pytest.skip(found.reason)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium of the system; a test that needs it is skipped, visibly, where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    executable = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if executable is None:
+        pytest.skip("there is no Chromium on this machine: apt-get install chromium")
+    with sync_api.sync_playwright() as playwright:
+        # Playwright starts it without its sandbox, which it must be as root.
+        running = playwright.chromium.launch(executable_path=executable)
+        yield running
+        running.close()
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@ graph, as on GPUs, and replays the same launches on the same arrays in 0.03 ms, 
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adapters.engine import Array, Contacts, EngineError, Row, Simulation
+from adapters.isolation.quiet import quiet
 from adapters.readback import free_parts, pair_materials
 from adapters.scene import Body, Box, Capsule, HalfSpace, Hull, Scene, Sphere
 from adapters.scene.drives import place_after, velocity_over
@@ -30,7 +30,8 @@ def imported() -> tuple[Any, Any]:
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
-    _without_a_word(warp.init)
+    with quiet():  # about a missing GPU, which does not matter here
+        warp.init()
     import newton
     from newton._src.geometry import narrow_phase
 
@@ -38,18 +39,6 @@ def imported() -> tuple[Any, Any]:
     for name in ("create_narrow_phase_kernel_gjk_mpr", "create_narrow_phase_primitive_kernel"):
         setattr(narrow_phase, name, cache(getattr(narrow_phase, name)))
     return warp, newton
-
-
-def _without_a_word(start: Callable[[], None]) -> None:
-    """Start Warp without its message from C on standard error about a missing GPU, which does not matter here."""
-    with open(os.devnull, "w") as nothing:
-        held = os.dup(2)
-        os.dup2(nothing.fileno(), 2)
-        try:
-            start()
-        finally:
-            os.dup2(held, 2)
-            os.close(held)
 
 
 def turned(quaternion: tuple[float, ...], spin: tuple[float, ...], time: float) -> Array:

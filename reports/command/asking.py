@@ -112,6 +112,8 @@ def _engine(told: Plain, scene: str) -> Iterator[str]:
         yield _wrapped(fix["text"])
         if fix["paste"]:
             yield fix["paste"]
+        for other in told["others"]:
+            yield _wrapped(f"{other['metric']} passes with {other['cure']} too ({other['source']})", "  ")
     else:
         where = f" in {' and '.join(told['where'])}"
         yield _title(f"{name} as shipped: {told['failed']} of {told['judged']} checks fail{where} {which}")

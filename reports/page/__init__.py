@@ -12,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -32,7 +33,7 @@ from reports.page.families import families
 from reports.page.scenes import scene_sections
 from reports.page.source import Bench, Source, load_source
 from reports.page.styling import engine_style, heat_style, symbols
-from reports.wording import missing_text, number, word_of
+from reports.wording import missing_text, number, unstated, word_of
 from validation.canonical import SUITES
 from validation.catalogue import CATALOGUE
 from validation.cells import format_dt
@@ -136,9 +137,14 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "dt": format_dt, "data": as_data}
+    environment.filters |= {"number": number, "dt": format_dt, "data": as_data, "unbroken": unbroken}
     environment.globals |= {"slug": verdicts.slug, "missing_text": missing_text, "word_of": word_of}
     return environment
+
+
+def unbroken(text: str) -> str:
+    """Text in which ``1.7e-4`` and ``2-D`` do not end a line at their hyphen."""
+    return re.sub(r"(?<=\d)(e?-)(?=[\dD])", "\\1\N{WORD JOINER}", text)
 
 
 def as_data(value: Any) -> Markup:
@@ -162,6 +168,7 @@ def facts(source: Source) -> dict[str, Any]:
         "cells": len(source.observations),
         "checks": sum(row["physics"] is not None for row in source.rows),
         "judged": {row["engine"] for row in source.rows if row["physics"] is not None},
+        "unstated": unstated(source.rows),
         "machine": source.run.machine,
     }
 

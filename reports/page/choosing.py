@@ -10,11 +10,10 @@ from typing import Any
 
 from adapters.registry import is_ranked, profile_of
 from reports.fixes import ROLES, Change, changes, fix, how_measured
-from reports.page.conclusions import joined
 from reports.page.source import Plain, Source
 from reports.page.verdicts import Mark, family_of, ratio_of, severity, slug
 from reports.speed import busy, duration
-from reports.wording import mark_of, number
+from reports.wording import joined, mark_of, number
 from validation.cells import format_dt
 from validation.running.plan import QUICK_DT
 

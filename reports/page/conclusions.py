@@ -25,15 +25,9 @@ from reports.page.verdicts import (
     why_anchor,
     without_prediction,
 )
-from reports.wording import mark_of, measured, number, params_text, quantity
+from reports.wording import joined, mark_of, measured, number, params_text, quantity
 
 Plain = Mapping[str, Any]
-
-
-def joined(words: Iterable[str], last: str = "and") -> str:
-    """``a, b and c``."""
-    words = list(words)
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else "none"
 
 
 def clean_profiles(source: Source, scene: str) -> dict[str, list[str]]:

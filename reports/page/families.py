@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from reports.matrix import UNJUDGED, Field, Matrix, matrix_of
-from reports.page.conclusions import clean_profiles, joined
+from reports.page.conclusions import clean_profiles
 from reports.page.source import Source
 from reports.page.verdicts import Mark, MatrixLine, family_mark, matrix_lines, slug
-from reports.wording import mark_of, plural
+from reports.wording import joined, mark_of, plural
 from validation.canonical import FAMILIES
 from validation.posed import resolve
 

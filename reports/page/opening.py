@@ -12,11 +12,11 @@ from functools import cache
 from adapters.registry import facts, names
 from reports.answers import configured
 from reports.overview import share
-from reports.page.conclusions import answering, joined
+from reports.page.conclusions import answering
 from reports.page.source import Plain, Source
 from reports.page.verdicts import family_of
 from reports.palette import role_of
-from reports.wording import ROLE_WORDS, mark_of
+from reports.wording import ROLE_WORDS, joined, mark_of
 from validation.canonical import Restitution
 from validation.posed import resolve
 

@@ -135,6 +135,12 @@ def _of_engine(engine: str, scene: str, found: Found, fix: Mapping[str, Any] | N
         "where": [f"{dimension}-D" for dimension, wrong, *_ in rows if wrong],
         "better": kept["better"] if rows and all(row[3] == 0 for row in rows) else "",
         "fix": dict(fix or {}),
+        "others": [
+            {"source": source, "metric": each["metric"], "cure": each["cure"]}
+            for source, each in table()["reports"].items()
+            if each["scene"] == scene and each["engines"][0] == engine and each["cure"] and fix
+            and each["cure"] not in fix["text"]
+        ],
         "unset": _unset(engine, found, table()["scenes"][scene]["terms"]),
     }  # fmt: skip
 

@@ -21,7 +21,7 @@ from reports.symptoms import LITTLE, OUTSIDE, PHRASE, TABLE, opened, stems, term
 from reports.symptoms.published import of_matrix, passed
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot
-from validation.field import notes
+from validation.field import CURED, notes
 from validation.findings.files import findings_of
 from validation.metrics import WORDS
 from validation.running.plan import QUICK_DT
@@ -71,7 +71,13 @@ def made() -> dict[str, Any]:
         },
         "right": {line: each["says"] for each in told["right"] for line in each["symptoms"]},
         "reports": {
-            note.source: {"scene": note.scene, "symptom": note.symptom, "engines": [note.engine, note.about]}
+            note.source: {
+                "scene": note.scene,
+                "symptom": note.symptom,
+                "engines": [note.engine, note.about],
+                "cure": note.cure_text if note.said == CURED and "profile" not in note.cure else "",
+                "metric": note.metric,
+            }
             for note in notes()
         },
         "engines": {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -157,17 +156,3 @@ def page_made(page_source, tmp_path_factory) -> tuple[Path, list[dict]]:
 def page_file(page_made) -> Path:
     """The page itself."""
     return page_made[0]
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Headless Chromium of the system; a test that needs it is skipped, visibly, where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api")
-    executable = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if executable is None:
-        pytest.skip("there is no Chromium on this machine: apt-get install chromium")
-    with sync_api.sync_playwright() as playwright:
-        # Playwright starts it without its sandbox, which it must be as root.
-        running = playwright.chromium.launch(executable_path=executable)
-        yield running
-        running.close()

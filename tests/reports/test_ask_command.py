@@ -28,7 +28,7 @@ REPORTS = [
     if each["sentence"]
 ]
 TUNED, HELD_OUT = SENTENCES[::2], SENTENCES[1::2]
-#: More symptoms, written before they were asked; three had led to scenes of something else.
+#: More symptoms, written before they were asked; 17 had led to scenes of something else.
 NEW = list(csv.DictReader((Path(__file__).parent / "asked_new.csv").open(encoding="utf-8")))
 
 
@@ -53,10 +53,10 @@ def is_right(sentence):
 
 
 @pytest.mark.parametrize(
-    ("part", "least"), [(TUNED, 0.95), (HELD_OUT, 0.9), (NEW, 1.0)], ids=["tuned", "held-out", "new"]
+    ("part", "least"), [(TUNED, 0.95), (HELD_OUT, 0.9), (NEW, 0.95)], ids=["tuned", "held-out", "new"]
 )
 def test_symptoms_in_words_of_people_lead_to_their_scenes(part, least):
-    assert len(part) == (37 if part is NEW else 60)
+    assert len(part) == (102 if part is NEW else 60)
     wrong = [(each["sentence"], each["right"], led_to(each["sentence"])) for each in part if not is_right(each)]
     assert len(wrong) <= (1.0 - least) * len(part), wrong
 
@@ -76,6 +76,18 @@ def test_scenes_of_public_reports():
 def test_contact_force_that_reads_zero():
     for question in ("contact force reads zero", "contact forces of a block at rest on a slope do not balance"):
         assert "crosscheck forces ENGINE" in asked(*question.split())
+
+
+def test_ball_at_a_seam_without_the_fix_of_a_sliding_box():
+    """That fix makes the ball hop higher."""
+    said = " ".join(asked("ball", "hops", "at", "the", "seam", "of", "two", "boxes", "bullet").split())
+    assert "crosscheck cure bullet my-scene.toml" in said and "linearDamping" not in said
+
+
+def test_fix_of_a_known_report_beside_the_smallest():
+    """It leaves reduced coordinates, and was run for its own check."""
+    said = " ".join(asked("free", "body", "gains", "speed", "sideways", "bullet").split())
+    assert "maxJointVelocity=10000 too (bulletphysics/bullet3#2655)" in said and "#4636" not in said
 
 
 @pytest.mark.parametrize("part", [TUNED, HELD_OUT], ids=["tuned", "held-out"])

@@ -61,6 +61,12 @@ def test_order_of_answer_bench_and_report(make_run):
     assert lines[-3:-1] == ["report:", "path on stdout"]
 
 
+def test_what_takes_minutes_is_said_before(make_run, tmp_path):
+    assert not any("installing" in line for line in make_run()[1])
+    (tmp_path / "venv" / ".installed-to-run").unlink()
+    assert re.fullmatch(r"installing \S+ into \S+: one to five minutes at first", make_run()[1][0])
+
+
 def test_seconds_until_verdicts_and_until_the_end(make_run):
     _, lines, _ = make_run()
     assert re.fullmatch(r"verdicts after \d+ s; now the benchmark and the report", lines[1])

@@ -268,7 +268,25 @@ def test_worst_of_each_engine_and_family_first(page_source, monkeypatch):
     made = render(Source(page_source.run, page_source.rows, page_source.observations))
     assert f"The other {len(wrong) - len(first)}, scene by scene" in made
     table = made.partition("<table class=wrongs")[0] + made.partition('class="wrongs blocks"')[2]
-    assert all(answer.wrong.replace("&", "&amp;") in table for answer in wrong if "<" not in answer.wrong)
+    assert all(page.unbroken(each.wrong).replace("&", "&amp;") in table for each in wrong if "<" not in each.wrong)
+
+
+@pytest.mark.parametrize(
+    ("metric", "params", "said", "left"),
+    [
+        ("rebound_ratio", {"e": 0.5}, "(e=0.5)", ""),
+        ("impulse", {}, "impulse ", "not fixed: rebounds at "),
+    ],
+)
+def test_sentence_beside_before_and_after_is_of_their_check(page_source, monkeypatch, metric, params, said, left):
+    """The sentence told of the worst check of the run, and the numbers of the check of the search."""
+    found = [fix for each in fixing.wrongs(page_source, page_source.answers) for fix in each.fixes]
+    assert any(fix.before.startswith(f"{fix.check}: ") for fix in found)  # the run has not the case
+    cure = replace(reports.fixes.cures_of("bullet")["impact", 2], metric=metric, params=params, shown=())
+    monkeypatch.setattr("reports.fixes.cures_of", lambda engine: {("impact", 2): cure} if engine == "bullet" else {})
+    [fix] = [fix for each in fixing.wrongs(page_source, page_source.answers) for fix in each.fixes]
+    assert said in fix.wrong and fix.left.startswith(left) and bool(left) == bool(fix.left)
+    assert not fix.before.startswith(fix.check)
 
 
 def test_settings_with_mostly_failed_checks_counted_only(page_source, monkeypatch):

@@ -412,6 +412,24 @@ def test_no_caption_is_wider_than_what_is_seen_of_its_table(browser, page_file, 
     assert [entry for entry in said if entry[1] > 1] == []
 
 
+@pytest.mark.parametrize("width", [390, 1000, 1200])
+def test_the_table_of_what_is_wrong_fits_the_window(browser, page_file, width):
+    """It was 1210 px wide in a box of 1160 px."""
+    with opened(browser, page_file, width=width) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
+        # Wide words of other runs: a scene's name, a setting, a value with its unit and its truth.
+        page.evaluate(
+            "document.querySelectorAll('.wrongs tbody tr').forEach(row => {"
+            "row.cells[0].append(' restitution_above_one 2-D and 3-D'); const set = row.cells[3];"
+            "set.append(document.createElement('code')); set.lastChild.textContent = 'contactProcessingThreshold=0';"
+            "if (row.cells[5]) row.cells[5].textContent = '-0.00406\u00a0rad/s (true: -0.0233)'; })"
+        )
+        over = page.evaluate(
+            "() => [...document.querySelectorAll('.wrongs')].map(t => t.offsetWidth - t.parentElement.clientWidth)"
+        )
+    assert over and max(over) <= 0
+
+
 def test_on_a_phone_no_line_of_a_table_is_mostly_empty(browser, page_file):
     """What lies outside the picture makes no line taller than a screen."""
     with opened(browser, page_file, width=390) as page:

@@ -58,11 +58,14 @@ def test_missing_kernels_compiled_beside_the_cells(planned, monkeypatch, tmp_pat
     monkeypatch.setattr(progress, "missing", lambda slots: [part] if slots else [])
     _, said = planned(lambda todo, leave: map(answer, todo))
     assert planned.parts == [part]
-    assert "compiling the kernels of toy, once: one to three minutes\n" in said and "compiled toy/default 2-D" in said
+    assert "compiling the kernels of toy, once: one to three minutes on idle cores\n" in said
+    assert "compiled toy/default 2-D" in said and "4 cases: " in said
     _, said = planned(lambda todo, leave: map(answer, todo), [*SLOTS, replace(SLOTS[0], engine="other")])
     assert "; other engines run meanwhile\n" in said
     _, said = planned(lambda todo, leave: map(answer, todo), SLOTS[:2], known=[answer(slot) for slot in SLOTS])
-    assert planned.parts == [] and "compil" not in said  # results that are known need no kernels
+    assert (
+        planned.parts == [] and "compil" not in said and "0 cases" not in said
+    )  # results that are known need no kernels
     monkeypatch.setattr(progress, "run_cells_on", lambda where, todo, *rest: map(answer, todo))
     _, said = planned(None, cluster="tcp://elsewhere:1", fresh=True)
     assert "compil" not in said  # its machines have caches of their own

@@ -62,7 +62,7 @@ def test_compilation_announced_with_time_and_parts(console, monkeypatch, beside,
     for part in PARTS:
         done(part)
     assert said(console).splitlines() == [
-        f"compiling the kernels of toy, once: one to three minutes{others}",
+        f"compiling the kernels of toy, once: one to three minutes on idle cores{others}",
         "compiled toy/tuned 2-D after 11 s", "compiled toy/[red] 2-D after 1 min 25 s",
     ]  # fmt: skip
 

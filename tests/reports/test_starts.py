@@ -23,6 +23,7 @@ ENGINES = {
     "dartpy",
     "pydrake",
     "sapien",
+    "motrixsim",
     "newton",
     "warp",
 }

@@ -22,7 +22,9 @@ from reports.matrix import matrix_of, sweeps_of
 from reports.summary import show
 from reports.wording import measured, quantity, row_id
 from validation.cells import Slot
+from validation.files.stated import STATED
 from validation.judging.rows import is_alarming
+from validation.posed import pinned
 from validation.records.store import Store
 from validation.running.execution import execute
 
@@ -201,13 +203,20 @@ mass = 1.0
 
 
 def test_file_without_checks_of_its_own(tmp_path, monkeypatch):
+    """Damping of a flight adds no energy and makes no overlap; a planar file in 3-D also has to stay in its plane."""
     monkeypatch.chdir(tmp_path)
     Path("a.toml").write_text(FALL)
-    laws = [row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": name}
-            for name in ("penetration", "energy_growth")]  # fmt: skip
-    own = row("impact", 2, "bullet", "tuned") | {"scene": "a.toml", "metric": "final[ball.y]"}
-    only = "Only energy and overlaps are judged: the file states no check of its own"
-    assert only in " ".join(" ".join(shown(laws, 100)).split())
+    name = pinned("a.toml")
+    laws = [row("impact", 2, "bullet", "tuned") | {"scene": name, "metric": metric}
+            for metric in ("penetration", "energy_growth", "out_of_plane")]  # fmt: skip
+    own = row("impact", 2, "bullet", "tuned") | {
+        "scene": name,
+        "metric": "final[ball.y]",
+        "source": STATED,
+    }
+    only = "Only energy, overlaps and staying in plane are judged of a: no check of its own is stated"
+    for some in (laws, [*laws, row("impact", 2, "bullet", "tuned")]):
+        assert f"Every check passes. {only}" in " ".join(" ".join(shown(some, 100)).split())
     for others in ([*laws, own], [row("impact", 2, "bullet", "tuned") | {"metric": "penetration"}]):
         text = " ".join(" ".join(shown(others, 100)).split())
         assert "Every check passes" in text and "are judged" not in text

@@ -36,7 +36,16 @@ SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engi
 
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
-    [(0.123456, "m/s", "0.1235 m/s"), (0.123456, "1", "0.1235"), (None, "m", "-"), (None, "1", "-"), (0.0, "s", "0 s")],
+    [
+        (0.123456, "m/s", "0.1235 m/s"),
+        (0.123456, "1", "0.1235"),
+        (None, "m", "-"),
+        (None, "1", "-"),
+        (1.0, "m/s", "1 m/s"),
+        (1.0, "N s", "1 N s"),
+        (0.5, "weights", "0.5 weights"),
+        (1.0, "weights", "1 weight"),
+    ],
 )
 def test_a_quantity_has_its_unit_unless_it_is_a_ratio_or_nothing(value, unit, text):
     assert quantity(value, unit) == text

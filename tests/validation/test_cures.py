@@ -24,13 +24,13 @@ from reports.fixes import (
     told_cure,
     told_cures,
 )
-from validation.cells import Observation, Outcome, Slot
+from validation.cells import Observation, Outcome, Slot, scene_of
 from validation.fixes import search as cures
 from validation.fixes.kept import Cure, cures_of, read, write
 from validation.fixes.search import Unsearched, _best, _Trials, asked_of, search
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
-from validation.settings.switching import readings
+from validation.settings.switching import readings, switched
 
 CURE = Cure(
     "mujoco", "4.0.1", "default", "pinch", 2, ({}, {"margin": 1.05}), 5, 0, 12, "creep", "m/s", {"margin": 1.05}, 0.0,
@@ -432,6 +432,13 @@ def stated(engine, cure):
     return [each for slot in slots for each in readings(Observation(slot, "", 1, "", Outcome.OK, metrics=metrics))]
 
 
+def test_fix_of_an_engine_that_is_not_installed(monkeypatch):
+    """A kept fix is told everywhere: its settings do not need the engine."""
+    monkeypatch.setattr("validation.fixes.panel.load", lambda name: pytest.fail("loads the engine"))
+    cure = cures_of("physx")["incline", 3]
+    assert cure_paste(cure) == "" and "solver=pgs, iterations=255" in cure_text(cure)
+
+
 @pytest.mark.parametrize("engine", [name for name in names() if inside(name, CURES)])
 def test_committed_cure_measured_with_today_s_checks(engine):
     """A check that came later may fail with a cure that is told as one of all checks: so it was with `out_of_plane`."""
@@ -539,3 +546,25 @@ def test_a_scene_in_other_sizes_is_judged_in_its_own_units():
     assert made.bodies[1].shape.radius == pytest.approx(0.3 * own.bodies[1].shape.radius)
     wanted = [(check.metric, check.truth, check.bound) for check in base.checks(own, 0.002 / 0.3**0.5)]
     assert [(check.metric, check.truth, check.bound) for check in small.checks(made, 0.002)] == wanted
+
+
+def test_a_blow_is_also_searched_at_both_ends_of_a_step():
+    """MuJoCo's contacts are softer below 1 mm of overlap: a fix of solref alone rebounded there at 0.9 instead of 1."""
+    assert len(cures.in_other_size(Slot("pinch", (), 3, "toy", "default", 1 / 240))) == 1
+    found = cures.in_other_size(Slot("head_on", (("e", 1.0), ("ratio", 1.0)), 3, "mujoco", "default", 1 / 240))
+    begins = []
+    for slot in found:
+        first, second = (body for body in scene_of(slot).bodies)
+        gap = second.pose[0] - first.pose[0] - first.shape.radius - second.shape.radius
+        begins.append(gap / (first.twist[0] - second.twist[0]) / slot.dt % 1.0)
+    assert begins[1:] == pytest.approx(cures.PHASES) and {slot.dt for slot in found} == {cures.ELSEWHERE[1]}
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_mujoco_s_fix_of_head_on_at_both_ends_of_a_step(dimension):
+    pytest.importorskip("mujoco")
+    changes = cures_of("mujoco")["head_on", dimension].changes
+    start = Slot("head_on", (("e", 1.0), ("ratio", 1.0)), dimension, "mujoco", "default", 1 / 240)
+    fixed = [switched(slot, changes) for slot in cures.in_other_size(start)]
+    for found in cures.observe(fixed).values():
+        assert all(reading.badness <= 1.0 for reading in readings(found))

@@ -211,6 +211,14 @@ def test_kept_table_of_chipmunk_as_measured():
     assert measure("chipmunk") == list(of_release("chipmunk", load("chipmunk").version()).values())
 
 
+def test_setting_that_acts_on_cylinders_in_a_scene_file(monkeypatch):
+    """MuJoCo has closed forms for the contacts of boxes, and searches those of cylinders."""
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr(effects, "settings_known", lambda engine: ["ccd_tolerance"])
+    (told,) = measure("mujoco")
+    assert (told.verdict, told.scene) == (ACTS, "can.toml") and told.after != told.before
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("engine", [name for name in ENGINES if name != "chipmunk"])
 def test_kept_table_as_measured(engine):

@@ -121,6 +121,8 @@ def test_a_reading_that_is_wrong_in_one_step_fails(situation):
     once = spoilt(run, lambda step, body, told: told[:-1] if step == 4 else told)
     told = judge(situation, scene, once, "vector", keeps)
     assert (told.verdict, told.wrong, told.steps) == (WRONG, 1, 30)
+    lost = max(np.abs(each[-1].impulse).max() for each in run.read[4] if each)
+    assert told.most == pytest.approx(lost / run.dt) and judge(situation, scene, run, "vector", keeps).most is None
 
 
 def test_a_force_in_flight_fails():

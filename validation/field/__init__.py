@@ -21,6 +21,7 @@ from importlib.resources import files
 from typing import Any
 
 from adapters.registry import find
+from adapters.settings import text_of
 from validation.cells import Slot, parse_dt
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
@@ -82,12 +83,8 @@ class Note:
     @property
     def cure_text(self) -> str:
         """The fix in words."""
-        words = [f"profile {v}" if name == "profile" else f"{name}={_said(v)}" for name, v in self.cure.items()]
+        words = [f"profile {v}" if name == "profile" else f"{name}={text_of(v)}" for name, v in self.cure.items()]
         return ", ".join(words)
-
-
-def _said(value: Any) -> str:
-    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,9 @@ def other_cases(engine: str, profile: str) -> tuple[tuple[str, Slot], ...]:
 
 
 def values_of(slot: Slot) -> dict[str, Any]:
-    """Settings of a case by name."""
-    return {setting.name: setting.value for setting in settings_of(load(slot.engine), slot, scene_of(slot))}
+    """Settings of a case by name; those of our engines do not need the engine itself."""
+    engine = adapter(slot.engine) or load(slot.engine)
+    return {setting.name: setting.value for setting in settings_of(engine, slot, scene_of(slot))}
 
 
 def carried(changes: Changes, here: Slot, there: Slot) -> dict[str, Any]:

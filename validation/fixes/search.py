@@ -50,6 +50,9 @@ CLOCKED = 0.5
 #: Another size and step [s] at which a fix must also hold: bodies of centimetres, as for grippers, instead of
 #: decimetres and metres, and the usual step in robotics.
 ELSEWHERE = (SIZE, 1.0 / 500.0)
+#: Parts of a step before a blow, in scenes that set its time: bodies overlap by a whole step's way at the first step of
+#: contact, or hardly. An engine whose contacts stiffen over an overlap rebounds differently there.
+PHASES = (1.0 / 32.0, 31.0 / 32.0)
 #: Share of the tolerance below which an improvement does not count.
 INVISIBLE = 1e-3
 #: Largest share of the error that may remain for a single setting to be shown beside a fix with several.
@@ -173,9 +176,13 @@ def _differing(changes: Changes, own: Changes) -> Changes:
 
 
 def in_other_size(slot: Slot) -> list[Slot]:
-    """A case in another size at another step: see `ELSEWHERE`."""
+    """A case in another size at another step (see `ELSEWHERE`); of a blow also at both ends of a step: see `PHASES`."""
     size, dt = ELSEWHERE
-    return [replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt)]
+    other = replace(slot, scene=f"{slot.scene}@{size:g}", dt=dt)
+    step = dt / math.sqrt(size)  # parameters of other sizes are in units of the scene's own
+    before = resolve(slot.scene).scene(slot.dimension, dict(slot.params)).params.get("delay")
+    times = [] if before is None else [(round(before / step) + part) * step for part in PHASES]
+    return [other, *(replace(other, params=tuple(sorted((dict(slot.params) | {"delay": t}).items()))) for t in times)]
 
 
 def at_other_steps(slot: Slot) -> list[Slot]:

@@ -56,13 +56,14 @@ _HEAD, _JUDGED = ("engine", "version", "profile", "call"), tuple(each.name for e
 
 
 def write(entries: Iterable[Known], path: Path) -> None:
-    """Write the table; two digits say how far a number is off."""
+    """Write the table; two or three digits say how far a number is off."""
     with path.open("w", encoding="utf-8", newline="") as lines:
         table = csv.writer(lines, lineterminator="\n")
         table.writerow((*_HEAD, *_JUDGED))
         for each in entries:
             told = asdict(each.judged)
-            told |= {name: f"{told[name]:.2g}" for name in ("off", "motion") if told[name] is not None}
+            digits = {"off": 2, "motion": 2, "most": 3}
+            told |= {name: f"{told[name]:.{n}g}" for name, n in digits.items() if told[name] is not None}
             table.writerow([*(getattr(each, name) for name in _HEAD), *told.values()])
 
 
@@ -75,7 +76,7 @@ def known_of(engine: str) -> tuple[Known, ...]:
 def _read(path: Path) -> Iterator[Known]:
     with path.open(encoding="utf-8", newline="") as lines:
         for row in csv.DictReader(lines):
-            off, motion = (float(row[name]) if row[name] else None for name in ("off", "motion"))
+            off, motion, most = (float(row[name]) if row[name] else None for name in ("off", "motion", "most"))
             wrong, steps = (int(row[name]) if row[name] else None for name in ("wrong", "steps"))
-            judged = Judged(row["situation"], row["verdict"], off, row["where"], motion, wrong, steps)
+            judged = Judged(row["situation"], row["verdict"], off, row["where"], motion, wrong, steps, most)
             yield Known(row["engine"], row["version"], row["profile"], row["call"], judged)

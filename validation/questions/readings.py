@@ -108,6 +108,8 @@ class Judged:
         How far the body's mean force, or impulse, is off the law, over the law's; None where it is within tolerance.
     wrong, steps
         In how many steps it is wrong, of how many; None if in all, or in none.
+    most
+        Largest error of a step, as a force [N], of all pairs and bodies; None where it is not wrong.
     """
 
     situation: str
@@ -117,6 +119,7 @@ class Judged:
     motion: float | None = None
     wrong: int | None = None
     steps: int | None = None
+    most: float | None = None
 
 
 # ---- situations ------------------------------------------------------------------------------------------------------
@@ -262,8 +265,9 @@ def judge(situation: Situation, scene: Scene, run: Heard, part: Part, keeps: Kee
     verdict = WRONG if wrong else RIGHT
     if verdict == RIGHT and situation.placed and (told := _place(situation, scene, run)):
         return Judged(situation.name, WRONG, off, told, motion)
-    counts = (wrong, len(steps)) if 0 < wrong < len(steps) else (None, None)
-    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion, *counts)
+    some, of = (wrong, len(steps)) if 0 < wrong < len(steps) else (None, None)
+    most = max(float(each[0].max()) for each in found) / run.dt if verdict == WRONG else None
+    return Judged(situation.name, verdict, off, where if verdict == WRONG else "", motion, some, of, most)
 
 
 def _turned(scene: Scene, run: Heard, part: Part) -> float:

@@ -159,7 +159,10 @@ def ported(engine: str, ports: Sequence[str], version: str = "") -> Release:
     """
     known = ports_of(engine)
     if not known:
-        raise EngineError(f"ports: no port of {engine} is known")
+        said = f"no port of {engine} is known" if engine in registry.names() else f"no engine is called {engine!r}"
+        told = {name: ", ".join(ports_of(name)) for name in registry.names()}
+        with_ports = "; ".join(f"{name} with {ports}" for name, ports in told.items() if ports)
+        raise EngineError(f"ports: {said}; these can be compared: {with_ports}")
     for name in ports:
         if name not in known:
             raise EngineError(f"ports: {name} is no port of {engine}; ports: {', '.join(known)}")

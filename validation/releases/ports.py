@@ -51,8 +51,8 @@ class Compared:
     port
         Name of the port.
     verdict
-        ``same``, ``differs``, ``lost`` (in round-off, at the first step), ``unsupported`` (by the port), ``neither``
-        (runs it) or ``failed``.
+        ``same``, ``differs``, ``lost`` (in round-off, at the first step), ``unsupported`` (by one of
+        both) or ``failed``.
     until
         Time until which the motion can be compared [s]: round-off may then have changed it by `LOST`.
     end
@@ -110,13 +110,13 @@ def ask(slot: Slot, port: str) -> Compared:
     """Compare one case; where it differs, find settings with which it does not."""
     own, ported = registry.load(slot.engine), registry.load(port)
     scene = prepare(slot).scene
-    for engine, verdict in ((own, "neither"), (ported, "unsupported")):
+    for engine in (own, ported):
         try:
             refused = checked_refusal(engine.refusal(posed_for(engine, scene), slot.profile, slot.dt))
         except EngineError as error:
             refused = str(error)
         if refused:
-            return Compared(slot, port, verdict, because=refused)
+            return Compared(slot, port, "unsupported", because=refused)
     posed, blank = posed_for(own, scene), Compared(slot, port, "failed")
     found = _asked(blank, own, ported, posed, {})
     if found.verdict == "failed" or found.whole:

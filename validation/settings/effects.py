@@ -4,9 +4,10 @@
     the case, with its needs     with the setting           only there: it acts only with another setting
     with the setting             with a value beyond it     equal: the engine clamps it
 
-The cases are in ``tuning.toml`` of the engine (`adapters.experiment.Effect`). Results are kept beside them
-(``effects.csv``) by release of the engine; ``crosscheck tune ENGINE --effects`` measures them again. They are compared
-bit by bit, in states, contacts that the scene reads, and metrics: no setting that acts is taken for one that does not.
+The cases are in ``tuning.toml`` of the engine (`adapters.experiment.Effect`); a scene file that one names is in this
+folder. Results are kept beside the cases (``effects.csv``) by release of the engine; ``crosscheck tune ENGINE
+--effects`` measures them again. They are compared bit by bit, in states, contacts that the scene reads, and metrics: no
+setting that acts is taken for one that does not.
 A setting acts if a metric changes by more than round-off of the engine's precision. Where no bit changes and no reason
 is known, it may still act in another scene.
 """
@@ -31,7 +32,7 @@ from adapters.settings import text_of
 from adapters.settings.own import kinds_of
 from validation.catalogue import CATALOGUE
 from validation.cells import Observation, Outcome, Slot, scene_of, settings_of
-from validation.posed import resolve
+from validation.posed import is_file, pinned, resolve
 from validation.running.plan import QUICK_DT
 from validation.settings.switching import observe, switched
 
@@ -103,7 +104,8 @@ def measure(engine: str, jobs: int = 1) -> list[Told]:
 def _slots(engine: str, name: str, effect: Effect) -> dict[str, Slot]:
     """The case without and with the setting; the same with what it needs; and beyond its limit."""
     profile = effect.profile or profile_of(engine, "shipped") or next(iter(load(engine).profiles))
-    base = Slot(effect.scene, tuple(sorted(effect.params.items())), effect.dimension, engine, profile, QUICK_DT)
+    scene = pinned(str(Path(__file__).with_name(effect.scene))) if is_file(effect.scene) else effect.scene
+    base = Slot(scene, tuple(sorted(effect.params.items())), effect.dimension, engine, profile, QUICK_DT)
     found = {"base": base, "set": switched(base, {name: effect.set})}
     if effect.needs:
         ready = switched(base, effect.needs)

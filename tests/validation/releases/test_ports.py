@@ -104,7 +104,7 @@ def test_scene_that_a_port_lacks(monkeypatch):
 def test_scene_that_neither_runs(monkeypatch):
     monkeypatch.setattr(registry, "load", lambda name: Port() if name == "port" else ENGINE)
     found = ask(replace(slot("restitution_above_one"), dimension=2), "port")
-    assert found.verdict == "neither" and found.because == "pairs: the adapter of mujoco has no restitution above 1"
+    assert found.verdict == "unsupported" and found.because == "pairs: the adapter of mujoco has no restitution above 1"
 
 
 def test_difference_that_a_setting_hides_in_round_off(monkeypatch):
@@ -165,6 +165,15 @@ def test_releases_that_are_not_compared(offers, ports, version, line):
     assert str(caught.value) == line
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("nosuch", "no engine is called 'nosuch'"), ("bullet", "no port of bullet is known")]
+)
+def test_engine_without_ports(name, said):
+    with pytest.raises(EngineError) as caught:
+        ported(name, [])
+    assert str(caught.value) == f"ports: {said}; these can be compared: mujoco with mujoco_mjx, mujoco_warp"
+
+
 def test_port_beside_another_release(monkeypatch):
     monkeypatch.setattr(port, "version", lambda package: "3.17.0")
     here = ENGINE.version()
@@ -190,9 +199,7 @@ def test_kept_table(monkeypatch, tmp_path):
     rows = kept.kept("mujoco")
     assert [(row["scene"], row["proof"]) for row in rows] == [("conveyor", ""), ("oblique", "impratio=2")]
     page = told(rows)
-    assert page["cases"][0] == ("conveyor 3-D default", ["unsupported there: no"])
-    assert page["counts"] == [
-        "port: 1 differ (1 with a setting that proves why, 0 with no cause found), 1 unsupported there"
-    ]
+    assert page["cases"][0] == ("conveyor 3-D default", ["unsupported: no"])
+    assert page["counts"] == ["port: 1 differ (1 with a setting that proves why, 0 with no cause found), 1 unsupported"]
     assert sentence(rows[1] | {"proof": ""}).startswith("differs, no cause found: by ")
     assert sentence(rows[1]).endswith("; the same with impratio=2") and counts(rows, "other") == "other: "

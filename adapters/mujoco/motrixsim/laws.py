@@ -1,0 +1,57 @@
+"""Designed deviations of MotrixSim from the textbook, predicted from scene and step only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from adapters.law import Deviation, deviations
+from adapters.law.single_motions import rounded_motions, standstills
+from adapters.law.single_precision import Method, plane_law, rounded_law
+from adapters.mujoco.motrixsim.profiles import PROFILES
+
+_SOURCE, _RELEASES = "motrixsim.real_dtype(): float32", ("0.10.",)
+#: Metrics of blows without gravity, by scene, of hard contacts that correct no overlap.
+BLOWS: Mapping[str, tuple[str, ...]] = {
+    "impact": ("rebound_ratio", "rebound_speed", "velocity_change", "impulse", "momentum_defect"),
+    "head_on": ("rebound_ratio", "first_speed", "second_speed", "impulse", "momentum_defect"),
+    "off_centre": ("ball_speed", "bar_speed", "spin", "energy_lost", "impulse", "momentum_defect"),
+    "stacked_balls": ("small_speed", "large_speed", "energy_lost"),
+    "cradle": ("momentum_defect", "energy_defect", *(f"speed[{k}]" for k in range(1, 6))),
+    "galperin": ("small_speed", "large_speed", "energy_defect"),
+    "oblique": ("rebound_ratio",),
+    "pair_matrix": tuple(f"restitution[{k}]" for k in range(1, 5)),
+    "closing_wall": ("speed[1]", "speed[2]", "speed[3]"),
+    "rod_gas": ("wrong_speed", "energy_defect", "misplaced"),
+}
+DEVIATIONS: tuple[Deviation, ...] = deviations(
+    "motrixsim",
+    ("tuned",),
+    BLOWS,
+    lambda metric, profile: rounded_law(metric, Method(lambda e, speed: e)),
+    "single precision, 2^-24 relative",
+    f"{_SOURCE}; motion in adapters/law/single_precision.py",
+    _RELEASES,
+)
+DEVIATIONS += deviations(
+    "motrixsim",
+    PROFILES,
+    {scene: ("out_of_plane",) for scene in ("off_centre", "oblique", "pair_matrix", "flat_box")},
+    lambda metric, profile: plane_law,
+    "single precision rounds differently on both sides of a plane",
+    f"{_SOURCE}; band in adapters/law/single_precision.py",
+    _RELEASES,
+)
+DEVIATIONS += standstills("motrixsim", PROFILES, {"far_origin": ("stopping_distance",)}, _SOURCE, _RELEASES)
+DEVIATIONS += rounded_motions(
+    "motrixsim",
+    PROFILES,
+    {
+        "kept": {"cradle": ("momentum_defect",), "rack": ("momentum_defect",)},
+        "booked": {"off_centre": ("momentum_defect",), "impact": ("momentum_defect",)},
+        "flown": {
+            "flight": ("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread", "drift_across", "ball_spin")
+        },
+    },
+    _SOURCE,
+    _RELEASES,
+)
