@@ -1,4 +1,4 @@
-"""Compare the event loop with the answers of the reference solver that `oracle` stored.
+"""Compare the event loop with the stored answers of the earlier solver.
 
     python tests/exact/compare.py [FILE] [--only TEXT] [--limit SECONDS]
 

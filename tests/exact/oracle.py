@@ -1,29 +1,21 @@
-"""The answers of the reference solver, which the event loop is compared with.
+"""Stored answers of an earlier solver, which had other equations of motion and other events, for the event loop.
 
-    python tests/exact/oracle.py FILE [--kind KIND ...] [--count N] [--first SEED]
-
-writes one line of JSON for each world into FILE (compressed by lzma): its poses at `SAMPLES` times, X, and what its
-certificate says. Worlds that FILE has already are left out. The kept file beside this one holds the first seeds of
-each kind and the cells of the standard suite; all 500 seeds of each kind take hours.
+The kept file beside this one has one line of JSON for each world, compressed by lzma: its poses at `SAMPLES` times, X,
+and what its certificate said. It holds the first seeds of each kind and the cells of the standard suite.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import lzma
-import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 from adapters.reference.simulation import solver_model
 from adapters.scene.drives import as_moving
-from reference_solver import Model, Settings
-from reference_solver.certificate.truth import certify
+from reference_solver import Model
 from tests.verification import random_scenes
 from tests.verification.fuzz.scenes import DRAWN
 from validation.catalogue import CATALOGUE
@@ -47,7 +39,7 @@ class World:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the reference solver says of a world.
+    """What the earlier solver said of a world.
 
     Parameters
     ----------
@@ -124,61 +116,9 @@ def world_of(key: str) -> World:
     return SEEDED[kind](int(seed)) if kind in SEEDED else standard_world(key)
 
 
-def keys(kind: str, count: int, first: int = 0) -> list[str]:
-    """Return the keys of a kind: of the standard suite all of them."""
-    return list(standard_slots()) if kind == "standard" else [f"{kind} {first + i}" for i in range(count)]
-
-
-def answer(key: str) -> Answer:
-    """Return what the reference solver says of a world, certified."""
-    world = world_of(key)
-    found = certify(world.model, Settings.reference(world.dt), world.samples * world.stride, world.stride)
-    return Answer(
-        key,
-        found.holds,
-        _finite(found.determined),
-        found.unique,
-        _finite(found.horizon),
-        found.reasons,
-        found.t.tolist(),
-        [_finite(x) for x in found.error],
-        np.where(np.isfinite(found.pose), found.pose, 0.0).tolist(),
-    )
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if math.isfinite(x) else None
-
-
 def stored(path: Path = KEPT) -> Iterator[Answer]:
     """Yield the answers in a file."""
     if path.exists():
         with lzma.open(path, "rt") as lines:
             for line in lines:
                 yield Answer(**json.loads(line))
-
-
-def main() -> None:
-    """Write the answers that are asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--kind", nargs="+", choices=[*SEEDED, "standard"], default=[*SEEDED, "standard"])
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--first", type=int, default=0)
-    asked = parser.parse_args()
-    there = {each.key for each in stored(asked.file)}
-    for kind in asked.kind:
-        for key in keys(kind, asked.count, asked.first):
-            if key in there:
-                continue
-            try:
-                said = answer(key)
-            except Exception as error:  # a world that cannot be built or run is an answer as well
-                said = Answer(key, False, None, "", None, (f"{type(error).__name__}: {error}",), [], [], [])
-            with lzma.open(asked.file, "at") as lines:
-                lines.write(json.dumps(asdict(said), separators=(",", ":")) + "\n")
-            print(key, "holds" if said.holds else said.reasons[:1], flush=True)
-
-
-if __name__ == "__main__":
-    main()

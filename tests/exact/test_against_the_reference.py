@@ -1,4 +1,4 @@
-"""The event loop against stored answers of the reference solver; `compare` looks at all of them."""
+"""The event loop against stored answers of the earlier solver; `compare` looks at all of them."""
 
 import numpy as np
 import pytest
