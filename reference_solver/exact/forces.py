@@ -43,12 +43,15 @@ class Held:
         (n, q) of all bodies.
     lasts
         How long they hold, where that is known [s]; else 0.
+    opened
+        What touched as well when these were found, and carries nothing.
     """
 
     contacts: Contacts
     answer: Answer
     acceleration: Array
     lasts: float = 0.0
+    opened: tuple[Contacts, ...] = ()
 
     @property
     def pressure(self) -> Array:
@@ -70,6 +73,7 @@ class Held:
             (m, d - 1) of slips, where they are not those of the velocities.
         """
         if not len(self.contacts):
+            self.forces = self.answer.forces
             return free
         contacts = self.contacts.at(place, axes, velocity)
         self.forces, acceleration = self._solved(free, self.onward(contacts) if directions is None else directions)
@@ -78,7 +82,7 @@ class Held:
     @property
     def pushes(self) -> Array:
         """(m, d) forces that `follow` found, in world axes."""
-        return self.contacts.along_axes(self.forces) if len(self.contacts) else self.answer.forces
+        return self.contacts.along_axes(self.forces)
 
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
@@ -134,7 +138,7 @@ def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
     acceleration = free + contacts.changes(answer.forces)
     if stays.all():
         return Held(contacts, answer, acceleration)
-    return Held(contacts.chosen(stays), answer.chosen(stays), acceleration)
+    return Held(contacts.chosen(stays), answer.chosen(stays), acceleration, opened=(contacts.chosen(~stays),))
 
 
 def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: float = 0.0) -> Held:
@@ -192,8 +196,8 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
     found = problem.with_modes(now, directions, answer.forces)
     if found is None:
         return None
-    if not strictly:
-        return held_by(contacts, found, free)
+    now_held = held_by(contacts, found, free)
+    now_held.opened += held.opened
     after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
     force, load = np.abs(found.forces).max(), found.forces[:, 0]
     least = -NONE * (LEAST * contacts.world.load + force)
@@ -202,4 +206,4 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
     holds = load.min() >= least and after[:, 0].min() >= small
     holds &= not ((now == STICK) & (friction > contacts.friction * load - least)).any()
     holds &= all((after[k, 1:] * directions[k]).sum() >= small for k, mode in modes.items() if mode == SLIP)
-    return held_by(contacts, found, free) if holds else None
+    return now_held if holds or not strictly else None

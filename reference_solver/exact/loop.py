@@ -195,8 +195,6 @@ class Loop:
 
     def _here(self, held: Held) -> Held:
         """Return contacts that stay closed, with their forces where the world is now."""
-        if not len(held.contacts):
-            return replace(held, acceleration=free_acceleration(self.world, self.state.axes, self.state.velocity))
         self._project(held)
         return held.at(self.state, free_acceleration(self.world, self.state.axes, self.state.velocity))
 

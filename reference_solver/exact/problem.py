@@ -215,14 +215,14 @@ class Problem:
         speed, friction = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
         limit = self.friction * p[:, 0]
         loaded = p[:, 0] > NONE * size_p
-        # Friction opposes the slip as much as it can: p_t . u_t = -mu p_n |u_t|.
-        along = np.where(self.slipping | ~loaded, 0.0, (p[:, 1:] * u[:, 1:]).sum(axis=1) + limit * speed)
+        # Friction opposes the slip as much as it can: p_t |u_t| = -mu p_n u_t.
+        off = np.linalg.norm(p[:, 1:] * speed[:, None] + limit[:, None] * u[:, 1:], axis=1)
         shares = (
             (-u[:, 0]).max() / size_u,
             (-p[:, 0]).max() / size_p,
             (friction - limit).max() / size_p,
             np.where(loaded, np.abs(u[:, 0]), 0.0).max() / size_u,
-            along.max() / size_u / size_p,
+            np.where(self.slipping | ~loaded, 0.0, off).max() / size_u / size_p,
         )
         return float(max(shares))
 

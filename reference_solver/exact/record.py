@@ -209,8 +209,17 @@ class Recorder:
             ends = [self._shares(piece, *both) for both in pairwise(shares.tolist())]
             steps = np.repeat(steps, list(map(len, ends)))
             shares = np.array([shares[0], *(end for each in ends for end in each)])
+        opened = piece.held.opened if shares[0] == 0.0 else ()
+        if opened and len(steps) > 1:  # what opens touches as the piece begins
+            self._write_parts(steps[:1], dt, piece, shares[:2])
+            self._write_parts(steps[1:], dt, piece, shares[1:])
+            return
         states = np.concatenate(piece.looked_at(shares), axis=2)
-        acting, features = Acting.between(piece, shares[:-1], shares[1:]), piece.held.contacts.features
+        acting, held = Acting.between(piece, shares[:-1], shares[1:]), len(piece.held.contacts)
+        if opened:
+            idle = [Acting.of(each, np.zeros(each.rows.place.shape)) for each in opened]
+            acting[0] = Acting(*map(np.concatenate, zip(acting[0], *idle, strict=True)))
+        features = acting[0].features
         self._bring(states[0])
         groups = list(self._groups(features))
         if not groups:
@@ -220,7 +229,7 @@ class Recorder:
         scheme = FIFTH_ORDER if piece.turns else ROCKING if piece.held.lasts > 0.0 else FROZEN
         label = np.zeros((k, len(groups), 5), np.int64)
         label[:, :, 0], label[:, :, 1] = steps[:, None], FORCES
-        label[:, :, 2] = [scheme if each.any() else FROZEN for each in own]
+        label[:, :, 2] = [scheme if each[:held].any() else FROZEN for each in own]
         label[:, :, 3] = np.cumsum([0, *(len(each) for each, _ in groups[:-1])]) + len(bodies) * np.arange(k)[:, None]
         label[:, :, 4] = np.cumsum([0, *map(np.sum, own[:-1])]) + len(contacts) * np.arange(k)[:, None]
         # Times are counted from their steps, and lengths known to more digits than times have.
@@ -228,14 +237,9 @@ class Recorder:
         time = np.repeat(np.column_stack([begin, np.diff(shares) * piece.length]), len(groups), axis=0)
         before = np.concatenate([self._state[None], states[1:-1]])
         wrench = np.array([each.wrench for each in acting])[:, contacts]
+        names = np.tile(features[contacts], (k, 1))
         self._enter(
-            time,
-            label.reshape(-1, 5),
-            np.tile(bodies, k),
-            before[:, bodies],
-            states[1:, bodies],
-            np.tile(features[contacts], (k, 1)),
-            wrench,
+            time, label.reshape(-1, 5), np.tile(bodies, k), before[:, bodies], states[1:, bodies], names, wrench
         )
         self._state = states[-1]
 

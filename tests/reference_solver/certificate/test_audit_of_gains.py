@@ -47,13 +47,26 @@ def test_a_disc_whose_floor_sinks_is_struck_alone_and_meets_the_floor_after_that
 
 
 def test_what_parts_is_not_pressed():
-    model = landing(0.25, 0.25)
+    """The same from the floor's view, whose contact is put into the blow between the discs, without a load and with."""
+    floor, light, heavy = landing(0.25, 0.25).bodies
+    bodies = [
+        replace(floor, twist=None, motion="fixed"),
+        replace(light, twist=(0.0, 0.25, 0.0)),
+        replace(heavy, twist=(0.0, 0.0, 0.0)),
+    ]
+    model = replace(landing(0.25, 0.25), bodies=bodies)
     record, _ = run(model)
-    pieces, impulse = record.pieces, record.pieces.impulse.copy()
-    first = pieces.first_contact[np.flatnonzero(pieces.kind == IMPACT)[0]]
-    assert pieces.body_a[first] == 0 and not impulse[first].any()
-    impulse[first] = 1e-6 * pieces.normal[first]
-    assert "normal" in refused(model, replace(record, pieces=replace(pieces, impulse=impulse)))
+    pieces = record.pieces
+    first, second = np.flatnonzero(pieces.kind == IMPACT)
+    at, added = pieces.first_contact[first], pieces.first_contact[second]
+    assert (pieces.body_a[at], pieces.body_a[added]) == (1, 0)
+    for push in (0.0, 1e-6):
+        moved = replace(pieces, first_contact=pieces.first_contact + (np.arange(len(pieces) + 1) > first))
+        for name in ("body_a", "body_b", "feature", "point", "normal", "impulse", "moment"):
+            rows = getattr(pieces, name)
+            moved = replace(moved, **{name: np.insert(rows, at, rows[added], axis=0)})
+        moved.impulse[at], moved.moment[at] = push * moved.normal[at], 0.0
+        assert ("normal" in refused(model, replace(record, pieces=moved))) is (push > 0.0)
 
 
 def test_what_leaves_faster_than_its_law_says_is_refused_all_the_same():

@@ -240,7 +240,7 @@ def test_the_spread_does_not_hang_on_which_answer_was_recorded():
     assert (load < 1e-12).sum() == 2
     impulse = np.column_stack([-mu * load, load])
     moved = pieces.twist_after.copy()
-    moved[2] += [*((impulse - pieces.impulse).sum(axis=0)), 0.0]
+    moved[0] += [*((impulse - pieces.impulse).sum(axis=0)), 0.0]
     other = replace(record, pieces=replace(pieces, impulse=impulse, twist_after=moved))
     assert shared(model, other)[0] == pytest.approx(way, rel=1e-9) and way > 1e-5
 
@@ -260,7 +260,7 @@ def test_a_corner_that_an_impact_leaves_without_load_could_carry_as_well(restitu
     record = Simulation(model, Settings.reference(DT)).record(6, pieces=True)
     pieces = record.pieces
     k = int(np.flatnonzero(pieces.kind == IMPACT)[0])
-    own, row = slice(pieces.first_contact[k], pieces.first_contact[k + 1]), pieces.first_body[k] + 1
+    own, row = slice(pieces.first_contact[k], pieces.first_contact[k + 1]), pieces.first_body[k]
     r, twist, load = pieces.point[own] - pieces.pose_before[row, :3], pieces.twist_after[row], pieces.impulse[own, 2]
     slip = (twist[:3] + np.cross(twist[3:], r))[:, :2]
     push = np.column_stack([-0.3 * slip / np.linalg.norm(slip, axis=1)[:, None], np.ones(4)])
