@@ -107,7 +107,8 @@ def _momentum(run: Run) -> float:
     linear, _, size, _ = run.pushed
     defect = np.linalg.norm(after - before - linear - load, axis=1)
     scale = np.linalg.norm(before, axis=1) + np.linalg.norm(after, axis=1) + size + np.linalg.norm(load, axis=1)
-    return _worst(defect, scale + mass[:, 0] * run.still[pieces.body], run.free[pieces.body])
+    still = mass[:, 0] * run.still[pieces.body]
+    return _worst(np.maximum(defect - still, 0.0), scale + still, run.free[pieces.body])
 
 
 def _spin(run: Run) -> float:

@@ -75,11 +75,13 @@ def attack(seed: int, dimension: int, kind: str = "any") -> Trial:
             continue
         poses = variant.poses(samples)
         apart = distance(variant.model, variant.seen(found.pose, found.t), poses)
-        rounds = sum(found.rounding(float(np.nanmax(np.abs(pose[:, :, :dimension])))) for pose in (found.pose, poses))
         worst = float(apart[within].max())
         if not worst <= off:
             off, farthest = worst, name
-        if found.holds and not (apart <= found.error + rounds)[within].all():
+        if not found.holds:
+            continue
+        rounds = sum(found.rounding(float(np.nanmax(np.abs(pose[:, :, :dimension])))) for pose in (found.pose, poses))
+        if not (apart <= found.error + rounds)[within].all():
             other = variant.certified(samples)
             if not other.holds:
                 refused[name] = tuple(conditions(other))
