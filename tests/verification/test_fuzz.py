@@ -125,7 +125,8 @@ class TestAttack:
     def test_short_pieces_obey_cone_sign_and_complementarity(self, dimension, seed):
         drawn = scene(seed, dimension)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
-        assert set(conditions(certificate)) == ({"shared"} if (dimension, seed) in UNDETERMINED else set())
+        refused = set(conditions(certificate))
+        assert "shared" in refused if (dimension, seed) in UNDETERMINED else refused == set()
 
     @pytest.mark.parametrize("dimension", [2, 3])
     def test_a_variant_that_is_another_world_is_a_defect(self, monkeypatch, dimension):
