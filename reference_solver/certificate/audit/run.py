@@ -89,10 +89,7 @@ class Run:
 
     @cached_property
     def still(self) -> Array:
-        """(n,) speed [m/s] below which a body stands still.
-
-        A few units in the last place of its size in a step, and of what its largest impulse makes of its speed.
-        """
+        """(n,) speed [m/s] below which a body stands still: last places of its size in a step, and of its impulses."""
         struck = np.zeros(len(self.model.bodies))
         np.maximum.at(struck, self.pieces.body, self.pushed[2])
         return UNITS * (self.extent / self.dt + struck / self.mass)
