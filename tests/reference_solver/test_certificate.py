@@ -90,8 +90,8 @@ def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
 
 
 @pytest.mark.parametrize(("dimension", "restitution"), [(2, 0.0), (2, 0.5), (3, 0.0), (3, 0.5)])
-def test_the_reference_holds(dimension, restitution):
-    certificate = pile(dimension, "reference", restitution=restitution).certificate
+def test_steps_solved_to_round_off_hold(dimension, restitution):
+    certificate = pile(dimension, "fixed_step", restitution=restitution).certificate
     assert certificate["holds"] and certificate["reasons"] == ()
     assert certificate["solves"] > 0
 
@@ -105,31 +105,26 @@ def test_what_the_textbook_leaves_unsolved_is_said(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("profile", ["reference", "classical"])
+@pytest.mark.parametrize("profile", ["fixed_step", "classical"])
 def test_the_works_of_a_run_are_its_kinetic_energy(dimension, profile):
     """State to state: what loads, contacts and surfaces did is what the bodies have, flights and impacts included."""
     start = sum(0.5 * (0.3 * i) ** 2 for i in range(4))
     simulation = pile(dimension, profile)
     works = [simulation.certificate[name] for name in ("load_work", "contact_work", "surface_work")]
-    # 130 steps of round-off, each a few units in the last place of some 100 J; in space, where rows turn, of what the
-    # control of a phase's length leaves (`phase.ERROR`), 1e-11 of some 10 J.
-    allowed = 1e-10 if profile == "reference" and dimension == 3 else 4e-14
-    assert kinetic_energy(simulation) - start == pytest.approx(sum(works), abs=130 * allowed)
+    # 130 steps of round-off, each a few units in the last place of some 100 J.
+    assert kinetic_energy(simulation) - start == pytest.approx(sum(works), abs=130 * 4e-14)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("profile", ["fixed_step", "reference"])
-def test_a_belt_does_twice_the_work_that_its_load_keeps(dimension, profile):
+def test_a_belt_does_twice_the_work_that_its_load_keeps(dimension):
     """A box set on a belt of speed V ends with m V^2 / 2; friction turned as much into heat; the belt gave m V^2.
 
-    Loads work against the floor in each sub-step; one step is cut where the slide ends, after V / (mu g).
+    Loads work against the floor in each step.
     """
     speed, mass, steps = 1.5, 2.0, 300
     belt = floor(dimension, motion="prescribed", twist=(speed, *(0.0,) * (5 if dimension == 3 else 2)))
-    certificate = simulate(dimension, [belt, box(dimension, 0.0, 0.5, mass=mass)], profile, steps).certificate
-    cut = speed / (0.5 * G * DT) % 1.0
-    pieces = steps if profile == "fixed_step" else steps - 1 + cut**2 + (1.0 - cut) ** 2
-    lost = 0.5 * mass * (G * DT) ** 2 * pieces
+    certificate = simulate(dimension, [belt, box(dimension, 0.0, 0.5, mass=mass)], "fixed_step", steps).certificate
+    lost = 0.5 * mass * (G * DT) ** 2 * steps
     assert certificate["holds"]
     assert certificate["surface_work"] == pytest.approx(mass * speed**2, rel=1e-12)
     assert certificate["load_work"] == pytest.approx(lost, rel=1e-9)
@@ -137,11 +132,11 @@ def test_a_belt_does_twice_the_work_that_its_load_keeps(dimension, profile):
 
 
 class Planted:
-    """A resting box after one reference step, its answer open to faults."""
+    """A resting box after one step, its answer open to faults."""
 
     def __init__(self, dimension):
         self.dimension = dimension
-        simulation = simulate(dimension, [floor(dimension), box(dimension, 0.0, 0.5)], "reference", 1)
+        simulation = simulate(dimension, [floor(dimension), box(dimension, 0.0, 0.5)], "fixed_step", 1)
         self.world, self.tally = simulation._world, entries.new_tally()
         self.bodies, options = self.world._bodies, self.world._options
         self.bodies.twist[:] = 0.0
@@ -231,7 +226,7 @@ class TestPlantedFaults:
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-@pytest.mark.parametrize("profile", ["classical", "fixed_step", "reference"])
+@pytest.mark.parametrize("profile", ["classical", "fixed_step"])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_start_inside_the_floor_is_said_and_not_certified(dimension, profile, speed):
     """0.2 m deep: certified until it was looked at, as bodies are pushed out by position alone."""
@@ -256,13 +251,14 @@ def test_bodies_that_land_later_or_touch_do_not_overlap_at_the_start(dimension):
 def test_coordinates_that_cannot_resolve_a_body_are_not_certified(dimension):
     """At 1e15 m the last place is an eighth of a metre; at 1e6 m it is 1e-10 m."""
     for x, holds in ((1e15, False), (1e6, True)):
-        simulation = simulate(dimension, [floor(dimension), box(dimension, x, 0.5)], "reference", 2)
+        simulation = simulate(dimension, [floor(dimension), box(dimension, x, 0.5)], "fixed_step", 2)
         assert simulation.certificate["resolution"] == pytest.approx(2.0**-52 * x / 0.5, rel=1e-9)
         assert simulation.certificate["holds"] == holds
         assert holds or any("coordinates" in reason for reason in simulation.certificate["reasons"])
 
 
-def test_kanes_paradox_is_flagged_and_no_failure():
+@pytest.mark.parametrize("profile", ["fixed_step", "reference"])
+def test_kanes_paradox_is_flagged_and_no_failure(profile):
     """A rod that strikes at its tip may gain energy under Newton's e with friction: the law does it, not the solver.
 
     W of the tip of a rod of half-length 1 and mass 1 is O21; the gain by enumeration of the same law.
@@ -286,15 +282,16 @@ def test_kanes_paradox_is_flagged_and_no_failure():
     body = Body(Box((1.0, thin)), 1.0, 1.0 / 3.0, start, (-sign * slide, -1.0, 0.0))
     assert tip[0] > 0.0
     model = Model(2, [floor(2), body], (0.0, 0.0), e, mu)
-    simulation = Simulation(model, Settings.reference(DT))
+    simulation = Simulation(model, getattr(Settings, profile)(DT))
     before = kinetic_energy(simulation)
     simulation.advance(1)
     certificate = simulation.certificate
     assert gains[sign] > 0.0
     assert kinetic_energy(simulation) - before == pytest.approx(gains[sign], rel=1e-6)  # 1e-7 thick, scaled by levers
-    assert certificate["contact_work"] == pytest.approx(gains[sign], rel=1e-6)
-    assert certificate["kane"] == 1 and certificate["created"] > 0.0
-    assert certificate["holds"]
+    if profile == "fixed_step":  # the loop of events keeps no sums
+        assert certificate["contact_work"] == pytest.approx(gains[sign], rel=1e-6)
+        assert certificate["kane"] == 1 and certificate["created"] > 0.0
+        assert certificate["holds"]
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -303,7 +300,7 @@ def test_shares_do_not_know_the_unit_of_mass(dimension):
     certificates = []
     for mass in (1.0, 2.0**20):
         bodies = [floor(dimension), *(box(dimension, 0.1 * i, 0.5 + i, mass=mass) for i in range(3))]
-        certificates.append(simulate(dimension, bodies, "reference", 30).certificate)
+        certificates.append(simulate(dimension, bodies, "fixed_step", 30).certificate)
     light, heavy = certificates
     for name in ("contact_work", "load_work", "surface_work"):
         assert heavy.pop(name) == 2.0**20 * light.pop(name)
@@ -330,7 +327,7 @@ def test_a_body_of_a_microgram_is_not_hidden_by_a_megagram(shape):
 def test_samples_carry_the_certificates_of_their_steps(dimension):
     bodies = [floor(dimension), *(box(dimension, 0.05 * i, 0.6 + 1.2 * i) for i in range(3))]
     model = Model(dimension, bodies, gravity(dimension), 0.0, 0.5)
-    whole, parts = (Simulation(model, Settings.reference(DT)) for _ in range(2))
+    whole, parts = (Simulation(model, Settings.fixed_step(DT)) for _ in range(2))
     plain, record = whole.record(100, 10, contacts=True), parts.record(100, 10, contacts=True, certificates=True)
     assert plain.certificates == {}
     for name in ("t", "pose", "twist", "offset"):
@@ -342,16 +339,3 @@ def test_samples_carry_the_certificates_of_their_steps(dimension):
     assert total["sweeps"] == record.certificates["sweeps"].sum() == whole.certificate["sweeps"]
     assert total["natural"] == record.certificates["natural"].max() == whole.certificate["natural"]
     assert total["contact_work"] == pytest.approx(whole.certificate["contact_work"], rel=1e-13)
-
-
-def test_the_first_contact_solve_after_a_phase_is_not_at_the_start():
-    """A block that turns about its corner opens no contact solve; an overlap in a later one was not there at the start.
-
-    The certificate reports it as an overlap of a located run, also where no event was located.
-    """
-    height = 0.05 * math.sin(0.6) + 0.4 * math.cos(0.6)
-    simulation = simulate(2, [floor(2), Body(Box((0.05, 0.4)), 1.0, 0.05, (0.0, height, -0.6))], "reference", 1)
-    tally = simulation._world.tally
-    assert tally[entries.SOLVES] == 0.0 and tally[entries.OPENED] >= 1.0 and reasons(tally) == ()
-    tally[entries.PENETRATION] = 0.0012
-    assert [reason.partition(":")[0] for reason in reasons(tally)] == ["bodies overlap where events are located"]
