@@ -1,4 +1,7 @@
-"""Which contacts hold, stick and slip: by complementary pivots for few planar contacts, else by the direct solver."""
+"""Which contacts hold, stick and slip: by complementary pivots for few planar contacts, else by the direct solver.
+
+What that does not find is found by sweeps in space, as where bodies approach ever so slowly and slip fast.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import numpy as np
 from reference_solver.compilation import kernel
 from reference_solver.direct import problem as direct
 from reference_solver.direct.rounds import solve_problem
+from reference_solver.exact.kernels.sweeps import sweep
 from reference_solver.exact.refusals import Refused, Unconverged
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
@@ -17,6 +21,8 @@ FEW = 16
 RESIDUAL, FOUND, BUDGET = 1e-14, 1e-8, 300
 #: How much softer contacts are taken than bodies yield, in turn: rounds go in circles with one and not with another.
 SOFTER = (1.0, 10.0, 0.1, 100.0, 0.01)
+#: Products that sweeps may take, half a second of CPU.
+PRODUCTS = 500_000_000
 
 
 class NoSolution(Refused):
@@ -46,7 +52,7 @@ def within_cones(contacts: Contacts, free: Array, slips: Array) -> Array:
         if residual <= FOUND:
             return forces
     if not planar:
-        raise Unconverged(count=len(contacts))
+        return _by_sweeps(contacts, free, slips)
     rows, yields = contacts.matrices
     return _by_pivots(rows @ yields, free, contacts.friction, slips)
 
@@ -101,6 +107,26 @@ def _by_rounds(contacts: Contacts, free: Array, slips: Array) -> tuple[Array, fl
     forces = contact.best[:, :d].copy()
     forces[slides, 1:] = -(contacts.friction * forces[:, 0])[slides, None] * slips[slides]
     return size * forces.ravel(), float(residual)
+
+
+def _by_sweeps(contacts: Contacts, free: Array, slips: Array) -> Array:
+    """Return forces in space by sweeps.
+
+    Raises
+    ------
+    Unconverged
+        If they do not settle.
+    """
+    rows, yields = contacts.matrices
+    slides = slips.any(axis=1)
+    blocks = yields.reshape(len(yields), -1, 3).copy()
+    blocks[:, :, 0] -= contacts.friction * (blocks[:, :, 1:] * slips).sum(axis=2)
+    friction = np.where(slides, 0.0, contacts.friction)
+    forces, settled = sweep(rows @ blocks.reshape(yields.shape), free, friction, PRODUCTS // free.size**2)
+    if not settled:
+        raise Unconverged(count=len(contacts))
+    forces[slides, 1:] = -(contacts.friction * forces[:, 0])[slides, None] * slips[slides]
+    return np.asarray(forces.ravel())
 
 
 def _by_pivots(yields: Array, free: Array, friction: Array, slips: Array) -> Array:

@@ -27,7 +27,7 @@ class NoImpulses(Refused):
 class Unconverged(Refused):
     """Friction of several contacts in space is not found."""
 
-    sentence = "friction of {count} contacts is not found: Newton's method ends far from a solution"
+    sentence = "friction of {count} contacts is not found, by Newton's method nor by sweeps"
 
 
 class NoForces(Refused):

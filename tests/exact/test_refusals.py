@@ -126,9 +126,21 @@ def test_neither_forces_nor_impulses(monkeypatch):
         advance([FLOOR, ball(0.5)], e=0.0)
 
 
-def test_friction_in_space_that_is_not_found(monkeypatch):
-    """Rounds that end far from a solution."""
+@pytest.mark.parametrize("mu", [0.1, 0.5])
+def test_friction_in_space_that_newton_does_not_find(mu, monkeypatch):
+    """A ball on the ground, of which friction takes 3.5 as much as of a point: sweeps find what sticks and slips."""
     monkeypatch.setattr(cones, "solve", lambda *_: 1.0)
+    ball_on_floor = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0))
+    contacts = posed(Model(3, [GROUND, ball_on_floor], (0.0, 0.0, -G), 0.0, mu)).contacts
+    found = cones.within_cones(contacts, np.array([-G, 3.0, 4.0]), np.zeros((1, 2)))
+    rubs = min(mu * G, 5.0 / 3.5)
+    assert found == pytest.approx([G, -0.6 * rubs, -0.8 * rubs], abs=1e-14)
+
+
+def test_friction_in_space_that_is_not_found(monkeypatch):
+    """Rounds that end far from a solution, and sweeps that may take no time."""
+    monkeypatch.setattr(cones, "solve", lambda *_: 1.0)
+    monkeypatch.setattr(cones, "PRODUCTS", 0)
     ball_on_floor = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0))
     contacts = posed(Model(3, [GROUND, ball_on_floor], (0.0, 0.0, -G), 0.0, 0.5)).contacts
     with pytest.raises(refusals.Unconverged, match="friction of 1 contacts is not found"):

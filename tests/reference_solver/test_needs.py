@@ -41,7 +41,7 @@ def test_left_out_names_what_the_model_cannot_show(bodies, restitution, friction
     assert Simulation(model, Settings.classical(DT)).left_out == left_out
 
 
-@pytest.mark.parametrize("profile", [Settings.classical, Settings.reference])
+@pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
 @pytest.mark.parametrize(
     ("bodies", "restitution", "friction"),
     [
@@ -72,7 +72,8 @@ def test_a_smooth_lopsided_ball_on_a_floor_keeps_its_angular_momentum():
     simulation = Simulation(Model(3, [floor, ball], (0.0, 0.0, -9.81), 0.0, 0.0), Settings.reference(DT))
     simulation.advance(120)
     turn = rotation(simulation.pose[1:2])[0]
-    assert turn @ np.diag(moments) @ turn.T @ simulation.twist[1, 3:] == pytest.approx(moments * spin, abs=1e-12)
+    # Each of some ten steps to the tolerance may be off by 1e-11 of the turn in it, half a radian or less.
+    assert turn @ np.diag(moments) @ turn.T @ simulation.twist[1, 3:] == pytest.approx(moments * spin, abs=1e-10)
     assert simulation.pose[1, :3] == pytest.approx([0.15, 0.0, 0.5], abs=1e-14)
 
 
