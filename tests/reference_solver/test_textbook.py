@@ -60,13 +60,14 @@ def test_a_dropped_body_bounces_on_its_parabolas_and_comes_to_rest(space, shape,
     assert simulation.certificate["holds"], simulation.certificate["reasons"]
 
 
+@pytest.mark.few(12)
 @shapes
 @pytest.mark.parametrize("speed", [1e2, 1e3, 1e4, 1e6])
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_nothing_passes_a_thin_wall_and_the_rebound_is_exact(space, shape, speed, e):
     wall = space.box(0.0, 0.0, half=(0.0005, 50.0), motion="fixed")
     body = getattr(space, shape)(-1.0, 0.1, space.twist(speed))
-    dt = 1 / 60
+    dt = 0.8 / speed
     simulation = space.simulation([wall, body], Settings.reference(dt), restitution=e)
     simulation.advance(1)
     velocity = simulation.twist[1, : space.dimension]
@@ -80,13 +81,13 @@ def test_nothing_passes_a_thin_wall_and_the_rebound_is_exact(space, shape, speed
 
 @pytest.mark.few(8)
 @pytest.mark.parametrize("friction", [0.0, 0.5])
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 10])
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 10, 20])
 def test_each_interface_of_a_column_carries_the_weight_above_it_for_a_second(space, reference, n, friction):
     simulation = space.simulation(space.column([1.0] * n), reference, G, 0.0, friction)
     start, weights = simulation.pose, G * DT * np.arange(n, 0, -1)
     for _ in range(240):
         simulation.advance(1)
-        # Round-off of 1e-15 times the condition of the column, which grows like n^2 (0.4 n^2): 4e-14 at n = 10.
+        # Round-off of 1e-15 times the condition of the column, which grows like n^2 (0.4 n^2): 2e-13 at n = 20.
         assert interface_impulses(simulation, space, n) / weights == pytest.approx(1.0, abs=1e-10)
         assert np.abs(simulation.pose - start).max() <= 1e-11
         assert np.abs(simulation.twist).max() <= 1e-12

