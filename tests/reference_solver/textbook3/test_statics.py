@@ -22,8 +22,8 @@ def interface_sums(simulation, n):
     return np.array([contacts.impulse[contacts.body_a == i, 2].sum() for i in range(n)])
 
 
-def test_a_column_of_20_is_solved_without_help_from_the_step_before(build, reference):
-    cold = dataclasses.replace(reference, warm_starting=False)
+def test_a_column_of_20_is_solved_without_help_from_the_step_before(build, fixed_step):
+    cold = dataclasses.replace(fixed_step, warm_starting=False)
     simulation = build.column(20, cold)
     simulation.advance(3)
     assert interface_sums(simulation, 20) == pytest.approx(G * build.dt * np.arange(20, 0, -1), rel=1e-9)
@@ -104,10 +104,10 @@ def plane(normal):
     return Body(HalfSpace(normal), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
 
 
-def test_overlap_goes_without_a_gain_of_speed(build, reference):
+def test_overlap_goes_without_a_gain_of_speed(build, fixed_step):
     """Two boxes deep in each other and in the floor are pushed apart by position alone."""
     bodies = [build.floor(), build.box((0.0, 0.0, 0.4)), build.box((0.1, 0.0, 1.2))]
-    simulation = build.simulation(bodies, reference)
+    simulation = build.simulation(bodies, fixed_step)
     simulation.advance(50)
     assert np.abs(simulation.twist).max() <= 1e-12
     assert simulation.pose[1, 2] >= 0.5 - 1e-9 and simulation.pose[2, 2] - simulation.pose[1, 2] >= 1.0 - 1e-9

