@@ -23,8 +23,8 @@ from reference_solver.shapes import smallest_extent
 NO_GAP = 1e-13
 #: Share of a step up to which a piece is an instant: slips that have all but ended are taken out in 1e-8 of one (E54).
 INSTANT = 1e-7
-#: Share of the speeds there above which what touches parts.
-PARTING = 1e-9
+#: Share of the speeds there, ten times what solves leave of them, above which what touches parts.
+PARTING = 1e-12
 
 
 def measured(run: Run) -> Iterator[tuple[str, float]]:
