@@ -26,7 +26,7 @@ def spun_rod(dt):
 
 
 def test_parts_of_a_piece_are_where_a_run_in_as_many_steps_is():
-    """With their velocities, of a cube, which has equal moments; none turns by more than a tenth of a radian, and they fill the time."""
+    """With their velocities, of a cube: equal moments; none turns by more than .1 rad, and they fill the time."""
     dt, inertia = 1.0 / 60.0, (2.0 / 3.0,) * 3
     cube = Body(Box((1.0,) * 3), 1.0, inertia, (0.0, 0.0, 2.0, *UPRIGHT), (0.3, 0.0, 0.0, 150.0, 2.0, -3.0))
     model = Model(3, (cube,), (0.0, 0.0, -G), 0.0, 0.0)
