@@ -57,15 +57,15 @@ def test_differing_certified_scene_fails_by_name(monkeypatch):
 def test_refusals_counted_apart_from_wrong_answers(monkeypatch):
     refused = [
         answer(5, certified=False, conditions={"cone": 2e-7}, off=1e-12),
-        answer(6, certified=False, conditions={"cone": 3e-5, "fallback": 1.0}, off=1e-4),
-        answer(7, certified=False, conditions={"fallback": 2.0}, off=float("inf")),
+        answer(6, certified=False, conditions={"cone": 3e-5, "endless": 1.0}, off=1e-4),
+        answer(7, certified=False, conditions={"endless": 2.0}, off=float("inf")),
     ]
     result, _ = certify(monkeypatch, *refused, flags=("--dim", "2", "--json"))
     assert result.exit_code == 0  # a refusal is honest
     rows = [line.split("│")[1:-1] for line in result.stderr.splitlines() if line.startswith("│")]
     assert [[cell.strip() for cell in row] for row in rows] == [
         ["cone", "2", "1", "1", "3.0e-5", "5 6"],
-        ["fallback", "2", "1", "2", "2", "6 7"],
+        ["endless", "2", "1", "2", "2", "6 7"],
     ]
     assert [each["off"] for each in json.loads(result.stdout)] == [1e-12, 1e-4, None]
 

@@ -16,7 +16,6 @@ from reference_solver.certificate.audit import chains, contact, energy, motion, 
 from reference_solver.certificate.audit.answers import Answers
 from reference_solver.certificate.audit.run import Run
 from reference_solver.model import Model
-from reference_solver.pieces import FIXED, FORCES, IMPULSE_LEVEL
 from reference_solver.records import Record
 
 
@@ -98,12 +97,10 @@ CHECKS = {
     "gained": Check(1e-9, "energy was gained"),
     # As much as may be gained.
     "lost": Check(1e-9, "energy was lost that friction does not take"),
-    # The fixed-step law gets g h wrong, the impulse-level scheme h^2, without saying where.
-    "fallback": Check(0.0, "steps that could not be cut at their events have errors that are not bounded"),
 }
 
 
-def audit(model: Model, record: Record, dt: float, located: bool = True) -> list[Finding]:
+def audit(model: Model, record: Record, dt: float) -> list[Finding]:
     """Return what all checks measured of a recorded run from its start.
 
     Parameters
@@ -114,8 +111,6 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
         Of `Simulation.record` with ``pieces=True``, from the first step on.
     dt
         Step [s].
-    located
-        Whether steps were to be cut at events; if not, the fixed-step law is no fallback.
 
     Raises
     ------
@@ -125,11 +120,7 @@ def audit(model: Model, record: Record, dt: float, located: bool = True) -> list
     run = _run_of(model, record, dt)
     start = np.array([body.pose for body in model.bodies], dtype=float)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return [
-            Finding(name, value, *CHECKS[name])
-            for name, value in _measured(run, start, record, located)
-            if name in CHECKS
-        ]
+        return [Finding(name, value, *CHECKS[name]) for name, value in _measured(run, start, record) if name in CHECKS]
 
 
 def _run_of(model: Model, record: Record, dt: float) -> Run:
@@ -229,13 +220,10 @@ def shared_loads(model: Model, record: Record, dt: float, until: float) -> tuple
     return apart, Finding("shared", float(apart[record.t < until].max(initial=0.0) / run.size), limit, told or meaning)
 
 
-def _measured(run: Run, start: np.ndarray, record: Record, located: bool) -> Iterator[tuple[str, float]]:
+def _measured(run: Run, start: np.ndarray, record: Record) -> Iterator[tuple[str, float]]:
     yield from motion.measured(run, start, record)
     yield from contact.measured(run)
     yield from touching.measured(run)
     yield from chains.measured(run)
     yield from space.measured(run, start)
     yield from energy.measured(run)
-    coarse = np.isin(run.pieces.scheme, (FIXED, IMPULSE_LEVEL)) & (run.pieces.kind == FORCES)
-    fixed = run.pieces.step[coarse]
-    yield "fallback", float(len(np.unique(fixed))) if located else 0.0

@@ -65,7 +65,7 @@ def without_order(run: Run) -> Indices:
     drifts = ~slow & (u > 0.0) & (u <= DRIFTS * fastest[owner]) & ~loaded & ~met[pair]
     bounces = run.model.restitution[pieces.body_a, pieces.body_b] > 0.0
     struck = np.isin(np.arange(len(owner)), pressed) & run.is_impact[owner] & np.where(bounces, left, drifts)
-    return np.flatnonzero(run.is_unordered | (np.bincount(owner[struck], minlength=len(pieces)) > 0))
+    return np.flatnonzero(np.bincount(owner[struck], minlength=len(pieces)) > 0)
 
 
 def _has_no_end(run: Run, piece: int) -> bool:

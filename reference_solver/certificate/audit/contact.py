@@ -211,9 +211,9 @@ def _laws(run: Run) -> Iterator[float]:
     speed = speeds(run)
     scale = mass * speed + pressed.clip(min=0.0)
     owner = run.contact_owner
-    # What corrects impulses at the end of a piece of the impulse-level scheme may be of any sign; the piece itself
-    # closes gaps with rows of mid-drift. Runs that hold one are no truth anyway (see `fallback`).
-    correction, coarse = run.is_correction[owner], run.is_impulse_level[owner]
+    # What is left of speeds at contacts that stay closed is taken out by impulses of any sign; low rebounds are summed
+    # up with rows of their start.
+    correction, coarse = run.is_correction[owner], run.is_rocking[owner]
     impact, chain, frozen = run.is_impact[owner], run.is_chain[owner], run.is_frozen[owner]
 
     # Impulses of one solve are known to some units in the last place of the largest of them, not of each.
@@ -290,7 +290,7 @@ def _laws(run: Run) -> Iterator[float]:
     with np.errstate(invalid="ignore"):  # of no impulse times an unknown point
         off = np.linalg.norm(pieces.moment - about, axis=1) - np.where(force > 0.0, over.stray * force, 0.0)
         off -= arm * taken_out
-    yield _worst(np.where(coarse & ~frozen, 0.0, off), arm * np.where(frozen, force, force + SOLVED * scale))
+    yield _worst(off, arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
     movable = (run.free[a] & (row_a < 0)) | (run.free[b] & (row_b < 0))

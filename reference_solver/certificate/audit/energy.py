@@ -28,8 +28,8 @@ def measured(run: Run) -> Iterator[tuple[str, float]]:
     without = np.where(exempt, 0.0, np.sign(gained) * np.maximum(np.abs(gained) - unseen, 0.0))
     yield "gained", float(max(np.cumsum(without).max(initial=0.0), without.max(initial=0.0)) / scale)
     # In a force phase friction takes energy where something slips, loads that press a gap shut lose what they do there,
-    # and nothing else does. What goes at fixed steps or at impulse level loses more.
-    asked = run.is_forces & (run.pieces.length > 0.0) & ~run.is_impulse_level
+    # and nothing else does. Low rebounds that are summed up lose more.
+    asked = run.is_forces & (run.pieces.length > 0.0) & ~run.is_rocking
     yield "lost", float(np.where(asked, -without - _friction(run) - _shut(run), 0.0).max(initial=0.0) / scale)
 
 

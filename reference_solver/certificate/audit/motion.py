@@ -20,8 +20,6 @@ STEPPED_TURN, MOST_STEPS, LEFT_OUT = 0.1, 4096, 1e-11
 BLOCK = 2048
 #: Share of h^5 times the fourth derivative of a way that its integral by both ends leaves out: 1/720, six times.
 UNSEEN = 6.0 / 720.0
-#: Largest displacement, as a share of a body, that closes a gap of the impulse-level scheme.
-CORRECTED = 1e-4
 
 
 def measured(run: Run, pose: Array, record: Record) -> Iterator[tuple[str, float]]:
@@ -163,8 +161,6 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
     noise = 8.0 * np.spacing(np.abs(pieces.pose_before[:, : run.d]).max(axis=1, initial=0.0))
     defect = np.maximum(defect - bend - noise - 4.0 * np.spacing(length * np.linalg.norm(mean, axis=1)), 0.0)
     size = np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
-    # What closes the gaps of the impulse-level scheme is of the third order of its step.
-    defect = np.where(run.is_correction[run.owner], np.maximum(defect - CORRECTED * size, 0.0), defect)
     share = np.where(run.free[body], defect / size, 0.0)
     yield "flight", float(share[~touched].max(initial=0.0))
     yield "path", float(share[touched].max(initial=0.0))
@@ -211,11 +207,11 @@ def turned_by(run: Run) -> Array:
 def _turn(run: Run) -> float:
     """Orientations of free bodies against their spins, in space by Euler's equations [rad].
 
-    Torques are constant where rows stand still; where they turn, spins bend as paths do. What the impulse-level scheme
-    turns is not asked.
+    Torques are constant where rows stand still; where they turn, spins bend as paths do. Sums of low rebounds are not
+    asked.
     """
     pieces, owner = run.pieces, run.owner
-    rows = np.flatnonzero(run.free[pieces.body] & (run.length > 0.0) & ~run.is_impulse_level[owner])
+    rows = np.flatnonzero(run.free[pieces.body] & (run.length > 0.0) & ~run.is_rocking[owner])
     if not len(rows):
         return 0.0
     length, body = run.length[rows], pieces.body[rows]

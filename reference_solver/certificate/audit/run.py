@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, FORCES, IMPACT, IMPULSE_LEVEL, ROCKING, UNORDERED, Pieces
+from reference_solver.pieces import CHAIN, FIFTH_ORDER, FORCES, IMPACT, ROCKING, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -159,14 +159,14 @@ class Run:
         return np.asarray((self.pieces.length == 0.0) | (self.pieces.scheme != FIFTH_ORDER))
 
     @cached_property
-    def is_impulse_level(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece went by the impulse-level scheme, whose rows are those of mid-drift."""
-        return np.isin(self.pieces.scheme, (IMPULSE_LEVEL, ROCKING))
+    def is_rocking(self) -> NDArray[np.bool_]:
+        """(p,) whether a piece sums up low rebounds, or holds what they leave at its end."""
+        return np.asarray(self.pieces.scheme == ROCKING)
 
     @cached_property
     def is_correction(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece changes the impulses of one of the impulse-level scheme, at its end."""
-        return np.asarray(self.is_impulse_level & (self.pieces.length == 0.0))
+        """(p,) whether a piece takes out what is left of speeds at contacts that stay closed."""
+        return np.asarray(self.is_rocking & (self.pieces.length == 0.0))
 
     @cached_property
     def is_impact(self) -> NDArray[np.bool_]:
@@ -177,11 +177,6 @@ class Run:
     def is_chain(self) -> NDArray[np.bool_]:
         """(p,) whether a piece is the sum of a chain of impacts without end."""
         return np.asarray(self.is_impact & (self.pieces.scheme == CHAIN))
-
-    @cached_property
-    def is_unordered(self) -> NDArray[np.bool_]:
-        """(p,) whether a piece is an impact of several pairs of bodies, and round-off decides which comes first."""
-        return np.asarray(self.is_impact & (self.pieces.scheme == UNORDERED))
 
     @cached_property
     def is_followed(self) -> NDArray[np.bool_]:

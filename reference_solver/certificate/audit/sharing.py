@@ -93,7 +93,7 @@ class _Contacts(NamedTuple):
 
 
 def shared_loads(run: Run) -> Spread:
-    """Return the spread of every row; pieces of the impulse-level scheme, which is no truth, have none."""
+    """Return the spread of every row; low rebounds that are summed up have none."""
     pieces, owner = run.pieces, run.contact_owner
     found = Spread(np.zeros(len(pieces.body)), {})
     if not len(owner):
@@ -164,7 +164,7 @@ def _contacts(run: Run) -> _Contacts:
     rebound = np.where(impact, run.model.restitution[sides] * np.maximum(-approach, 0.0), 0.0)
     ends = np.where(run.is_frozen[owner], leaves, _next_approach(run, approach, leaves))
     closed = (impact | (np.abs(approach) <= HELD * speed)) & (np.abs(ends - rebound) <= HELD * speed)
-    asked = impact | (run.is_forces & ~run.is_impulse_level & (pieces.length > 0.0))[owner]
+    asked = impact | (run.is_forces & ~run.is_rocking & (pieces.length > 0.0))[owner]
     row = np.column_stack([np.where(run.free[i], side, -1) for i, side in zip(sides, run.side, strict=True)])
     carries = pressed > HELD * reduced_mass(run) * speed
     held = asked & (closed | carries) & (row >= 0).any(axis=1)

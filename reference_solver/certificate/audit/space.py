@@ -9,7 +9,7 @@ import numpy as np
 
 from reference_solver.certificate.audit.motion import integrated_turn
 from reference_solver.certificate.audit.run import Indices, Run, scaled_along, twist_of
-from reference_solver.certificate.audit.turning import cubic, moved_by, unseen, vector_rate, way_between
+from reference_solver.certificate.audit.turning import cubic, moved_by, way_between
 from reference_solver.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
 
@@ -17,10 +17,6 @@ from reference_solver.model import Array, HalfSpace
 HALVINGS = 4
 #: Turn in a piece [rad] beyond which it is cut into parts, and that of a part: .1^4/384 is less than an overlap counts.
 FAR, PART, MOST_PARTS = 0.3, 0.1, 512
-#: Share of the smallest half width up to which two polynomials are one path: a tenth of an overlap that counts.
-ONE_PATH = 1e-7
-#: Shares of a piece at which contacts tell which polynomial their bodies follow.
-BETWEEN = (0.3, 0.7)
 
 
 class Path(NamedTuple):
@@ -32,7 +28,6 @@ class Path(NamedTuple):
     way: Array  # (k, 3 | 6) displacement and turn over each
     first: Array  # (k, 3 | 6) twist at the start of each
     last: Array  # (k, 3 | 6) and at its end
-    bend: Array  # (2, k, 3 | 6): t^2 (h - t)^2 (bend_0 + bend_1 t) is added to the cubic polynomial through its ends
 
 
 def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
@@ -45,7 +40,7 @@ def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
 
 def _overlaps(run: Run, start: Array) -> tuple[float, float]:
     """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width."""
-    paths = _bent(run, [_path(run, i, start) for i in range(len(run.free))])
+    paths = [_path(run, i, start) for i in range(len(run.free))]
     low, high = np.array([_extremes(path) for path in paths]).swapaxes(0, 1)
     arm = np.where(np.isfinite(run.reach), run.reach, np.inf)[:, None]
     worst, first = 0.0, 0.0
@@ -75,7 +70,6 @@ def _path(run: Run, i: int, start: Array) -> Path:
     """Motion of body i: of a free one by its pieces, of others as prescribed, step by step."""
     pieces = run.pieces
     rows = np.flatnonzero((pieces.body == i) & run.is_forces[run.owner])
-    v = 3 if run.d == 2 else 6
     if not run.free[i] or not len(rows):
         twist = twist_of(run.model.bodies[i])
         steps = int(pieces.step.max()) + 1 if len(pieces) else 1
@@ -84,62 +78,9 @@ def _path(run: Run, i: int, start: Array) -> Path:
         begin: Array = np.arange(count, dtype=np.float64) * length
         twists = np.tile(twist, (count, 1))
         poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
-        return Path(begin, length, poses, length[:, None] * twists, twists, twists, np.zeros((2, count, v)))
+        return Path(begin, length, poses, length[:, None] * twists, twists, twists)
     begin, length, before, after, first, last = _parts(run, rows)
-    return Path(begin, length, before, way_between(before, after), first, last, np.zeros((2, len(begin), v)))
-
-
-def _bent(run: Run, paths: list[Path]) -> list[Path]:
-    """Paths with polynomials of degree five where a cubic one is not enough: through the piece before or after as well.
-
-    Where forces jump between the two pieces that polynomial is none. What tells is that contacts which carry something
-    stay closed: of the cubic polynomial and both others the one is taken on which they do best at `BETWEEN`.
-    """
-    pieces, asked, off = run.pieces, np.zeros(len(run.pieces), bool), np.zeros((3, len(run.pieces)))
-    asked[run.owner[run.free[pieces.body] & (unseen(run) > ONE_PATH * run.size)]] = True
-    asked &= ~run.is_frozen
-    if not asked.any():
-        return paths
-    rows = [np.flatnonzero(asked[run.owner] & (pieces.body == i) & run.free[i]) for i in range(len(paths))]
-    at = [np.searchsorted(p.begin, pieces.begin[run.owner[r]], "right") - 1 for p, r in zip(paths, rows, strict=True)]
-    bends = [np.stack([_bend(path, k, beside) for beside in (0, -1, 1)]) for path, k in zip(paths, at, strict=True)]
-    carries = asked[run.contact_owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
-    for which in range(3):
-        for path, k, bend in zip(paths, at, bends, strict=True):
-            path.bend[:, k] = bend[which]
-        for pair in np.unique(np.column_stack([pieces.body_a, pieces.body_b])[carries], axis=0):
-            of = run.contact_owner[carries & (pieces.body_a == pair[0]) & (pieces.body_b == pair[1])]
-            a, b = (run.model.bodies[i].shape for i in pair)
-            for late in (share * pieces.length[of] for share in BETWEEN):
-                pose_a, pose_b = (_pose_when(paths[i], pieces.begin[of], late) for i in pair)
-                off[which, of] = np.maximum(off[which, of], np.abs(distinct(a, pose_a, b, pose_b).gap))
-    best = np.nan_to_num(off, nan=np.inf).argmin(axis=0)
-    for path, k, bend, r in zip(paths, at, bends, rows, strict=True):
-        path.bend[:, k] = bend[best[run.owner[r]], :, np.arange(len(r))].swapaxes(0, 1)
-    return paths
-
-
-def _bend(path: Path, k: Indices, beside: int) -> Array:
-    """``bend`` (2, s, 3 | 6) of `Path` for intervals k to go through the far ends of those before or after (-1, 1).
-
-    Zero where there is none that joins them.
-    """
-    other = np.clip(k + beside, 0, len(path.begin) - 1)
-    one, two = np.minimum(k, other), np.maximum(k, other)
-    joins = (other != k) & (path.length[other] > 0.0) & (path.last[one] == path.first[two]).all(axis=1)
-    joins &= np.abs(path.begin[one] + path.length[one] - path.begin[two]) <= 4.0 * np.spacing(path.begin[two])
-    h = path.length[k][:, None]
-    t = -path.length[other][:, None] if beside < 0 else h + path.length[other][:, None]
-    far = path.pose[other] if beside < 0 else _pose_at(path, other, path.length[other])
-    way, rate = way_between(path.pose[k], far), path.first[other] if beside < 0 else path.last[other]
-    if way.shape[1] == 6:
-        rate = np.concatenate([rate[:, :3], vector_rate(way[:, 3:], rate[:, 3:])], axis=1)
-    moved, passing = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        grown = 1.0 / (t * (h - t))
-        share = (way - moved) * grown**2
-        slope = (rate - passing) * grown**2 - 2.0 * share * (h - 2.0 * t) * grown
-    return np.where(joins[:, None], np.stack([share - slope * t, slope]), 0.0)
+    return Path(begin, length, before, way_between(before, after), first, last)
 
 
 def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
@@ -150,7 +91,7 @@ def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
     """
     pieces, owner = run.pieces, run.owner[rows]
     even = (run.pushed[2][rows] == 0.0) | run.is_frozen[owner]
-    even &= ~run.is_impulse_level[owner]
+    even &= ~run.is_rocking[owner]
     spin = np.maximum(*(np.linalg.norm(x[rows, 3:], axis=1) for x in (pieces.twist_before, pieces.twist_after)))
     turns = np.where(even, np.nan_to_num(run.length[rows] * spin), 0.0)
     count = np.where(turns > FAR, np.ceil(turns / PART), 1.0).clip(max=MOST_PARTS).astype(np.int64)
@@ -179,18 +120,12 @@ def _state(run: Run, rows: Indices, share: Array) -> tuple[Array, Array]:
     return pose, twist
 
 
-def _pose_when(path: Path, begin: Array, late: Array) -> Array:
-    """Poses (s, P) at times ``late`` after ``begin``, when intervals of this or of other bodies began."""
-    k = np.searchsorted(path.begin, begin, "right") - 1
-    return _pose_at(path, k, begin - path.begin[k] + late)
-
-
 def _pose_at(path: Path, k: Indices, t: Array) -> Array:
     """Poses (s, P) on intervals k after the time t (s,) of each."""
     h = path.length[k][:, None]
     t = np.clip(t[:, None], 0.0, h)
     moved, _ = cubic(path.way[k], path.first[k], path.last[k], path.length[k], t)
-    return moved_by(path.pose[k], moved + (t * (h - t)) ** 2 * (path.bend[0, k] + path.bend[1, k] * t))
+    return moved_by(path.pose[k], moved)
 
 
 def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:

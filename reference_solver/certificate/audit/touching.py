@@ -37,12 +37,12 @@ def _touching(run: Run) -> list[float]:
     """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
 
     Then by how much faster bodies close along a normal than along another that is as good, as a share of the speeds,
-    and how far contacts open within their pieces (`_opened`). Only contacts with an impulse are measured. Those of the
-    fixed-step law and of the impulse-level scheme may close a gap and have levers of another time: they are left out.
+    and how far contacts open within their pieces (`_opened`). Only contacts with an impulse are measured. Those of
+    low rebounds that are summed up close a gap: they are left out.
     """
     pieces = run.pieces
     worst, doubt, mass = np.zeros(5), unseen(run), reduced_mass(run)
-    coarse = run.is_impulse_level[run.contact_owner]
+    coarse = run.is_rocking[run.contact_owner]
     carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse & np.isfinite(pieces.normal).all(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
     for pair in np.unique(pairs[carry]):

@@ -76,7 +76,7 @@ def test_every_check_can_fail():
     seen = set()
     for trial in self_test.trials((1e-2,)):
         seen |= set(trial.seen)
-    own = {"finite", "pull", "scale", "unknown", "resolution", "start", "choice", "shared", "fallback"}
+    own = {"finite", "pull", "scale", "unknown", "resolution", "start", "choice", "shared"}
     assert set(CHECKS) - own <= seen, set(CHECKS) - own - seen
 
 

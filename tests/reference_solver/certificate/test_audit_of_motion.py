@@ -186,7 +186,7 @@ def test_what_is_met_within_a_step_and_left_again_is_seen(kind, share):
 #: What the largest values are with which a run passes. Sound runs come near some of them; a limit that is raised makes
 #: them pass, and others: whoever raises one says here and there why.
 LIMITS = {
-    0.0: {"finite", "joined", "unknown", "fallback", "endless"},
+    0.0: {"finite", "joined", "unknown", "endless"},
     1e-14: {"pull"},
     1e-12: {"time", "flight", "prescribed", "cone"},
     1e-10: {"momentum"},
