@@ -47,7 +47,7 @@ IN_BOTH = [
     (columns.convergence,),
     long(columns.column, 10, 100_000),
     (columns.column, 50, 1000),
-    (columns.column, 200, 1000),
+    long(columns.column, 200, 1000),
     (columns.heavy_on_light, 1e2, 1e-12),
     (columns.alternating, 1e2, 1e-12),
     (columns.heavy_on_light, 1e4, 1e-10),
