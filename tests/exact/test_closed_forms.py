@@ -1,6 +1,7 @@
 """The event loop against motions that are known in closed form, to 1e-10."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from itertools import permutations
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Polygon, Settings, Simulation, Sphere
+from reference_solver.certificate.truth import certify
 from reference_solver.exact.refusals import NoImpulses
 from reference_solver.pieces import ROCKING
 
@@ -256,3 +258,12 @@ def test_ball_between_closing_walls(closing, steps):
     ball = Body(Disc(0.5), 1.0, 0.125, (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     found = record(Model(2, [fixed, lid, ball], (0.0, 0.0), 1.0, 0.0), float(end), steps)
     assert abs(found.pose[-1, 2, 0] - float(x + v * (end - now))) < SMALL
+
+
+def test_slide_that_closes_with_a_speed_which_is_round_off_beside_it():
+    """An edge meets the floor with 2e-10 m/s where the box slides with 2 m/s: no impact without end, and it slides."""
+    sliding = box(2, (1.0, 0.25), up(2, 0.25))
+    model = Model(2, [ground(2), replace(sliding, twist=(2.0, 1.8e-10, -7.7e-10))], (0.0, -G), 0.0, 0.28)
+    end = record(model, 0.5).pose[-1, 1]
+    assert np.abs(end - (2.0 * 0.5 - 0.5 * 0.28 * G * 0.25, 0.25, 0.0)).max() < 1e-9
+    assert certify(model, Settings.reference(DT), 120).holds
