@@ -15,6 +15,8 @@ from reference_solver.model import Array
 from reference_solver.pieces import FROZEN, ROCKING
 from reference_solver.shapes import Disc, Sphere
 
+#: Share of the speeds that meet which may be left at contacts that stay closed: of 80 random scenes 2e-9 at most.
+LEFT_OVER = 1e-7
 #: A slip below this share of the speeds that meet is round-off of a phase, at whose end it is taken out.
 SLIP_NOISE = 1e-11
 #: Share of the fastest approach of an impact above which a contact with e = 0 parts for certain, and one with e > 0;
@@ -222,10 +224,11 @@ def _laws(run: Run) -> Iterator[float]:
     unseen = UNITS * np.spacing(largest)[owner]
     # A phase keeps contacts closed that hardly carry anything: speeds of round-off are taken out either way.
     taken_out = np.where(frozen, 0.0, SLIP_NOISE * mass * speed)
-    yield _worst(np.where(correction, 0.0, -pressed - unseen - taken_out - over.lean * held_back), scale)
+    pulls = -pressed - unseen - taken_out - over.lean * held_back
+    yield _worst(np.where(correction, np.abs(pressed) - LEFT_OVER * mass * speed, pulls), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning - taken_out
-    yield _worst(np.where(correction, 0.0, excess), scale)
+    yield _worst(np.where(correction, held_back - LEFT_OVER * mass * speed, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
     # allowed after an impact is -e u-, after a chain of them none; a soft rebound may be held instead.

@@ -12,7 +12,9 @@ from scipy.integrate import solve_ivp
 import reference_solver.certificate.audit as package
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere, geometry
 from reference_solver.certificate.audit import CHECKS, audit, ends_of_series
+from reference_solver.certificate.audit.contact import reduced_mass, speeds
 from reference_solver.certificate.audit.motion import integrated_turn
+from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.truth import certify, distance
 from reference_solver.geometry import rotation
 from tests.verification import self_test
@@ -466,3 +468,22 @@ def test_a_ball_that_rolls_over_the_seam_of_two_boxes(dimension, speed):
         normal[:, 0] += tilt
         told = audit(model, replace(record, pieces=replace(pieces, normal=normal)), DT)
         assert ("direction" in {finding.name for finding in told if not finding.holds}) is seen
+
+
+@pytest.mark.parametrize("share", [1e-6, 1e-2])
+def test_what_is_left_of_speeds_is_round_off(share):
+    """Contacts that stay closed are given impulses of any sign at an instant: of 1e-11 of the momentum there."""
+    drawn = scene(20, 2)
+    record, dt = (
+        Simulation(drawn.model, Settings.reference(1.0 / drawn.rate)).record(drawn.steps, pieces=True),
+        1.0 / drawn.rate,
+    )
+    assert not [str(finding) for finding in audit(drawn.model, record, dt) if not finding.holds]
+    run = Run(drawn.model, record.pieces, dt)
+    j, n = np.flatnonzero(run.is_correction[run.contact_owner])[0], record.pieces.normal
+    whole = share * (reduced_mass(run) * speeds(run))[j]
+    for along, name in ((-n[j], "pull"), (np.array([-n[j, 1], n[j, 0]]), "cone")):
+        impulse = record.pieces.impulse.copy()
+        impulse[j] = whole * along
+        changed = replace(record, pieces=replace(record.pieces, impulse=impulse))
+        assert name in {finding.name for finding in audit(drawn.model, changed, dt) if not finding.holds}
