@@ -47,7 +47,7 @@ def first_without_order(run: Run, known: Indices) -> int | None:
     struck = np.unique(owner[meets])
     of_pairs = np.unique(np.column_stack([owner, pairs])[meets], axis=0)[:, 0]
     several = struck[np.bincount(np.searchsorted(struck, of_pairs), minlength=len(struck)) > 1]
-    apart = _apart(run, lies & np.isin(owner, struck), pairs)
+    apart = _apart(run, lies & np.isin(owner, struck), meets, pairs)
     asked = np.union1d(several, owner[apart])
     row = np.column_stack(
         [np.where(run.free[i], side, -1) for i, side in zip((pieces.body_a, pieces.body_b), run.side, strict=True)]
@@ -110,8 +110,8 @@ def _soon(run: Run, meets: NDArray[np.bool_], u: Array, pairs: Indices) -> dict[
     return found
 
 
-def _apart(run: Run, lies: NDArray[np.bool_], pairs: Indices) -> NDArray[np.bool_]:
-    """Whether (c,) bodies that lie side by side had a gap since they last pushed each other.
+def _apart(run: Run, lies: NDArray[np.bool_], meets: NDArray[np.bool_], pairs: Indices) -> NDArray[np.bool_]:
+    """Whether (c,) bodies that lie side by side had a gap since they last pushed each other, or have rebounded.
 
     The event loop closes it as soon as it finds them; a load that presses them together until then does so, too.
     """
@@ -131,6 +131,7 @@ def _apart(run: Run, lies: NDArray[np.bool_], pairs: Indices) -> NDArray[np.bool
         for j in np.flatnonzero(free).tolist():
             since = begin[pressed[whole] & (begin < when[j])].max(initial=-np.inf)
             found[rows[j]] = gap[(begin > since) & (begin <= when[j])].max() > GAP_UNITS * np.spacing(place)
+            found[rows[j]] |= bool((begin[meets[whole]] < when[j]).any() and run.model.restitution[bodies] > 0.0)
     return found
 
 
