@@ -56,7 +56,7 @@ def test_a_ball_rolls_on_a_plank_that_turns(space):
         place, _, angle = rolled(space, t)
         there = np.array(space.pose(*centre(place, angle)))[: space.dimension]
         assert np.linalg.norm(pose[: space.dimension] - there) <= bound + 1e-14
-    assert found.error[-1] <= 1e-10
+    assert found.error[-1] <= 1e-9
     # It has turned by what it rolled and by what the plank did.
     turn = SPIN * TIME - (rolled(space, TIME)[0] - PLACE) / RADIUS
     want = rotation(np.array(space.pose(0.0, 0.0, turn))[None])[0]
