@@ -225,10 +225,12 @@ def _laws(run: Run) -> Iterator[float]:
     # A phase keeps contacts closed that hardly carry anything: speeds of round-off are taken out either way.
     taken_out = np.where(frozen, 0.0, SLIP_NOISE * mass * speed)
     pulls = -pressed - unseen - taken_out - over.lean * held_back
-    yield _worst(np.where(correction, np.abs(pressed) - LEFT_OVER * mass * speed, pulls), scale)
+    # What came to rest without loads still has round-off of the speeds that it had.
+    left_over = mass * (LEFT_OVER * speed + SLIP_NOISE * speed.max(initial=0.0))
+    yield _worst(np.where(correction, np.abs(pressed) - left_over, pulls), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning - taken_out
-    yield _worst(np.where(correction, held_back - LEFT_OVER * mass * speed, excess), scale)
+    yield _worst(np.where(correction, held_back - left_over, excess), scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
     # allowed after an impact is -e u-, after a chain of them none; a soft rebound may be held instead.
