@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -85,6 +86,16 @@ class Declared:
     value: float
     band: float
     because: str = ""
+
+    @classmethod
+    def over(cls, values: Sequence[float], left: float, because: str) -> Declared:
+        """Any of these values at phases of a step, in order; ``left`` is added to the band.
+
+        Between two phases the value changes by no more than between neighbouring ones.
+        """
+        steepest = max(abs(x - y) for x, y in pairwise(values))
+        low, high = min(values), max(values)
+        return cls(0.5 * (high + low), 0.5 * (high - low) + steepest + left, because)
 
 
 def _vectors(told: Sequence[Any], dimension: int) -> Array:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from importlib.metadata import version
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, final
 
@@ -187,11 +186,8 @@ class MujocoEngine(Engine):
         if own_laws and settings["solref"] != "reflect" and rebounds:
             law = contact_law(settings, needs.restitution, needs.friction, dt)
             ratios = [law.rebound_ratio(REBOUND_SPEED, (k + 0.5) / PHASES) for k in range(PHASES)]
-            middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
             because = "spring and damper with force >= 0: the rebound depends on the phase of the step, not on e"
-            # Between two phases the rebound changes by no more than between neighbouring phases.
-            steepest = max(abs(x - y) for x, y in pairwise(ratios))
-            declared["restitution"] = Declared(middle, half + steepest + 1e-12, because)
+            declared["restitution"] = Declared.over(ratios, 1e-12, because)
         return declared
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:

@@ -7,7 +7,6 @@ It reads MJCF, which `adapters.mujoco` writes.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from types import MappingProxyType
 from typing import final
 
@@ -88,9 +87,6 @@ class MotrixSimEngine(CheckedEngine):
         share = settings["erp"]
         if share is None:
             ratios = [rebound(settings["solref"], settings["solimp"], dt, (k + 0.5) / PHASES) for k in range(PHASES)]
-            middle, half = 0.5 * (max(ratios) + min(ratios)), 0.5 * (max(ratios) - min(ratios))
-            # Between two phases the rebound changes by no more than between neighbouring phases.
-            steepest = max(abs(x - y) for x, y in pairwise(ratios))
-            return {"restitution": Declared(middle, half + steepest + OFF, SPRING)}
+            return {"restitution": Declared.over(ratios, OFF, SPRING)}
         half = 0.5 * share  # of an overlap between none and the way of a step
         return {"restitution": Declared(needs.restitution + half, half + self.facts.round_off, OVERLAP)}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from adapters.mujoco.contact_law import Impedance
+
 #: How far the speeds of `rebound` are off, as a share of the speed before: impedance in the first millimetre of an
 #: overlap is up to 1.5e-4 less than its documented curve.
 OFF = 5e-4
@@ -17,18 +19,17 @@ def rebound(solref: Sequence[float], solimp: Sequence[float], dt: float, phase: 
 
         v' = v - d/D (k x + b v') dt,    x' = x + v' dt
 
-    [d: MuJoCo's documentation, modeling: solver parameters, for the power 2 and the middle 0.5; the step: measured]
+    [d: `adapters.mujoco.contact_law.Impedance`; the step: measured]
 
     Parameters
     ----------
     phase
         Overlap at the first step of the contact, in ways of a step.
     """
-    (time, ratio), (least, most, width, *_) = solref, solimp
+    (time, ratio), impedance = solref, Impedance.of(tuple(solimp))
     speed, place = -1.0, -phase * dt
     while place < 0.0:
-        deep = min(1.0, -place / width)
-        share = (least + (most - least) * (2.0 * deep**2 if deep < 0.5 else 1.0 - 2.0 * (1.0 - deep) ** 2)) / most
+        share = impedance(place) / impedance.deep
         stiffness, damping = share / (time * ratio) ** 2, share * 2.0 / time
         push = -stiffness * place - damping * speed
         if push <= 0.0:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 from adapters.engine import Declared
 from adapters.newton.shapes import SPRING_REBOUND
 from adapters.receipts.probes import REBOUND_MASS, REBOUND_SPEED, REBOUND_TIME
@@ -28,6 +26,4 @@ def rebound(stiffness: float, damping: float, dt: float, phase: float) -> float:
 def declared(stiffness: float, damping: float, dt: float, left: float) -> Declared:
     """Rebounds at all phases of a step; ``left`` is the round-off."""
     ratios = [rebound(stiffness, damping, dt, (k + 0.5) / PHASES) for k in range(PHASES)]
-    steepest = max(abs(x - y) for x, y in pairwise(ratios))
-    half = 0.5 * (max(ratios) - min(ratios)) + steepest + left
-    return Declared(0.5 * (max(ratios) + min(ratios)), half, SPRING_REBOUND)
+    return Declared.over(ratios, left, SPRING_REBOUND)
