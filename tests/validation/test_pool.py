@@ -1,6 +1,7 @@
 """What has been computed is handed out, whatever happens to the cells that come after it; workers here are scripted."""
 
 import json
+from dataclasses import replace
 from typing import ClassVar
 
 import pytest
@@ -256,6 +257,15 @@ def test_one_worker_runs_cells_without_kernels_first(compiled):
 def test_all_workers_compile_where_all_cells_need_kernels(compiled):
     log = compiled(list(filter(needs_kernels, MIXED)), 2)
     assert [kind for kind, _ in log[:2]] == ["compile"] * 2
+
+
+def test_parts_of_one_profile_one_after_the_other(compiled):
+    """They share kernels, which two processes side by side would both compile; another profile's part goes first."""
+    slots = [replace(slot, dimension=dim) for slot in MIXED[:2] for dim in (3, 2)]
+    done = {}
+    log = compiled(slots, 4, compiled=lambda part: done.setdefault(part.key[1:], len(Compiler.log)))
+    assert log[:2] == [("compile", [slots[0]]), ("compile", [slots[2]])]
+    assert all(log.index(("compile", [slots[k + 1]])) >= done[slots[k].profile, 3] for k in (0, 2))
 
 
 def test_compilation_once_and_retry_after_failure(compiled):

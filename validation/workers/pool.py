@@ -72,7 +72,7 @@ class _Waiting:
         self._leave = leave
         self._timeouts: Counter[tuple[str, str]] = Counter()
         self._repeated: dict[Slot, str] = {}
-        self._parts = deque(parts)
+        self._parts = [*parts]
         self._held: dict[warming.Key, list[Slot]] = {part.key: [] for part in parts}
         self._ready: dict[str, deque[Slot]] = {}
         for slot in slots:
@@ -90,13 +90,16 @@ class _Waiting:
     def next(self, seat: _Seat, seats: Sequence[_Seat]) -> Slot | warming.Part | None:
         """Take the next work of a free seat: kernels, as long as another seat is left for cells that can run.
 
-        Else a cell of its engine while there are any, then of the engine with the most cells left.
+        Parts of one profile share kernels: side by side, both would compile these. Else a cell of its engine while
+        there are any, then of the engine with the most cells left.
         """
-        compiling = sum(isinstance(other.work, warming.Part) for other in seats)
+        compiling = [other.work.key[:2] for other in seats if isinstance(other.work, warming.Part)]
         while True:
             self._ready = {engine: queue for engine, queue in self._ready.items() if queue}
-            if self._parts and (not self._ready or compiling < len(seats) - 1):
-                return self._parts.popleft()
+            part = next((part for part in self._parts if part.key[:2] not in compiling), None)
+            if part and (not self._ready or len(compiling) < len(seats) - 1):
+                self._parts.remove(part)
+                return part
             if not self._ready:
                 return None
             engine = seat.engine
