@@ -195,7 +195,7 @@ def built(tmp_path_factory):
 
 
 @pytest.mark.long
-def test_the_documentation_builds_with_links_that_lead_somewhere(built):
+def test_build_of_the_documentation_and_its_links(built):
     for page in built.rglob("*.html"):  # links in HTML, which no builder looks at
         for name in re.findall(r'href="((?:\.\./)*\w+\.html)"', page.read_text(encoding="utf-8")):
             assert (page.parent / name).is_file(), (page.name, name)
@@ -216,7 +216,7 @@ CUT = """() => [
 
 @pytest.mark.long
 @pytest.mark.parametrize("width", [400, 1920])
-def test_tables_of_the_documentation_in_a_narrow_and_a_wide_window(browser, built, width):
+def test_tables_in_narrow_and_wide_windows(browser, built, width):
     page = browser.new_page(viewport={"width": width, "height": 900})
     for file in sorted(built.rglob("*.html")):
         if '<table class="table' in file.read_text(encoding="utf-8"):

@@ -158,7 +158,6 @@ def test_the_certificate_says_how_well_the_equations_are_solved(dimension: int) 
     ball = make(floor(dimension), body("ball", dimension, (0.0, 0.5)), mu=0.5, g=9.81, T=0.1)
     column = make(floor(dimension), *boxes, mu=0.5, g=9.81, T=0.1)
     solved, starved = drive(ball, "reference").certificate, drive(column, "classical", iterations=1).certificate
-    assert solved["converged"] is True and solved["residual"] <= 1e-13
     assert solved["certified"] is True and solved["reasons"] == []
     # A fixed number of sweeps promises no solution: nothing is measured but the sweeps and how far bodies were pushed.
     assert starved["worst_sweeps"] == 1 and starved["sweeps"] == 24 and set(starved) == {*UNCERTIFIED}

@@ -75,7 +75,7 @@ CASES = (
 @pytest.mark.few(6)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
-def test_the_grid_finds_what_all_pairs_have(dimension, case):
+def test_pairs_of_the_grid_against_all_pairs(dimension, case):
     rng = np.random.default_rng(CASES.index(case))
     for n in (150, ALL_PAIRS_LIMIT + 1, 100):
         boxes = allocate_boxes(world(dimension, n), n * n)
@@ -84,7 +84,7 @@ def test_the_grid_finds_what_all_pairs_have(dimension, case):
         assert [(key >> 32, key & 0xFFFFFFFF) for key in boxes.candidate[:found].tolist()] == expected(boxes)
 
 
-def test_too_little_room_is_told_and_nothing_is_written_behind_it():
+def test_too_little_room_for_pairs():
     boxes = allocate_boxes(world(2, 100), 40)
     boxes.low[:], boxes.high[:] = -1.0, 1.0
     assert len(expected(boxes)) > 40

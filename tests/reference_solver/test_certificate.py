@@ -74,7 +74,7 @@ def test_the_cone_projection_is_moreaus(normal, size, mu):
 
 @given(st.integers(0, 2**32 - 1))
 @settings(derandomize=True)
-def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
+def test_cone_complementarity_of_coulombs_law(seed):
     """What enumeration finds has no defect, whichever of open, stick and slip it is; a wrong answer has one."""
     random = np.random.default_rng(seed)
     root = random.normal(size=(2, 2))
@@ -90,14 +90,14 @@ def test_coulombs_law_and_the_cone_complementarity_are_the_same(seed):
 
 
 @pytest.mark.parametrize(("dimension", "restitution"), [(2, 0.0), (2, 0.5), (3, 0.0), (3, 0.5)])
-def test_steps_solved_to_round_off_hold(dimension, restitution):
+def test_certificate_of_steps_solved_to_round_off(dimension, restitution):
     certificate = pile(dimension, "fixed_step", restitution=restitution).certificate
     assert certificate["holds"] and certificate["reasons"] == ()
     assert certificate["solves"] > 0
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_the_textbook_leaves_unsolved_is_said(dimension):
+def test_reasons_of_an_unsolved_pile(dimension):
     certificate = pile(dimension, "classical").certificate
     assert not certificate["holds"]
     assert any("natural" in reason for reason in certificate["reasons"])
@@ -106,7 +106,7 @@ def test_what_the_textbook_leaves_unsolved_is_said(dimension):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["fixed_step", "classical"])
-def test_the_works_of_a_run_are_its_kinetic_energy(dimension, profile):
+def test_works_of_a_run_and_its_kinetic_energy(dimension, profile):
     """State to state: what loads, contacts and surfaces did is what the bodies have, flights and impacts included."""
     start = sum(0.5 * (0.3 * i) ** 2 for i in range(4))
     simulation = pile(dimension, profile)
@@ -116,7 +116,7 @@ def test_the_works_of_a_run_are_its_kinetic_energy(dimension, profile):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_belt_does_twice_the_work_that_its_load_keeps(dimension):
+def test_work_of_a_belt_on_a_load(dimension):
     """A box set on a belt of speed V ends with m V^2 / 2; friction turned as much into heat; the belt gave m V^2.
 
     Loads work against the floor in each step.
@@ -204,7 +204,7 @@ class TestPlantedFaults:
         usual = 2.0 / 2.5 if dimension == 2 else 4.0 / 4.0
         assert planted.tally[entries.PUMPED] == pytest.approx(1.5 / (1.5 + usual), rel=1e-12)
 
-    def test_an_overlap_that_another_island_met_before_is_none_of_the_start(self, dimension):
+    def test_later_overlap_after_a_solve_of_other_bodies(self, dimension):
         """The first solve of each island tells what overlaps at the start: of that island alone."""
         planted = Planted(dimension)
         planted.tally[entries.PENETRATION], planted.tally[entries.OPENED] = 1e-3, 1.0
@@ -228,7 +228,7 @@ class TestPlantedFaults:
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["classical", "fixed_step"])
 @pytest.mark.parametrize("speed", [0.0, 1.0])
-def test_a_start_inside_the_floor_is_said_and_not_certified(dimension, profile, speed):
+def test_start_inside_the_floor(dimension, profile, speed):
     """0.2 m deep: certified until it was looked at, as bodies are pushed out by position alone."""
     simulation = simulate(dimension, [floor(dimension), box(dimension, 0.0, 0.3, speed)], profile, 5)
     certificate = simulation.certificate
@@ -237,7 +237,7 @@ def test_a_start_inside_the_floor_is_said_and_not_certified(dimension, profile, 
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_bodies_that_land_later_or_touch_do_not_overlap_at_the_start(dimension):
+def test_overlap_at_the_start_of_bodies_that_land_later_or_touch(dimension):
     """One rests, one lands in a fixed step, which finds it inside; samples certify anew, not the start."""
     bodies = [floor(dimension), box(dimension, 0.0, 0.5), box(dimension, 3.0, 0.6)]
     model = Model(dimension, bodies, gravity(dimension), 0.5, 0.5)
@@ -248,7 +248,7 @@ def test_bodies_that_land_later_or_touch_do_not_overlap_at_the_start(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_coordinates_that_cannot_resolve_a_body_are_not_certified(dimension):
+def test_coordinates_that_do_not_resolve_a_body(dimension):
     """At 1e15 m the last place is an eighth of a metre; at 1e6 m it is 1e-10 m."""
     for x, holds in ((1e15, False), (1e6, True)):
         simulation = simulate(dimension, [floor(dimension), box(dimension, x, 0.5)], "fixed_step", 2)
@@ -258,7 +258,7 @@ def test_coordinates_that_cannot_resolve_a_body_are_not_certified(dimension):
 
 
 @pytest.mark.parametrize("profile", ["fixed_step", "reference"])
-def test_kanes_paradox_is_flagged_and_no_failure(profile):
+def test_kanes_paradox_in_a_certificate(profile):
     """A rod that strikes at its tip may gain energy under Newton's e with friction: the law does it, not the solver.
 
     W of the tip of a rod of half-length 1 and mass 1 is O21; the gain by enumeration of the same law.
@@ -295,7 +295,7 @@ def test_kanes_paradox_is_flagged_and_no_failure(profile):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_shares_do_not_know_the_unit_of_mass(dimension):
+def test_shares_in_another_unit_of_mass(dimension):
     """All masses times a power of two: every share has the same bits, every energy is scaled by it."""
     certificates = []
     for mass in (1.0, 2.0**20):
@@ -308,7 +308,7 @@ def test_shares_do_not_know_the_unit_of_mass(dimension):
 
 
 @pytest.mark.parametrize("shape", [Disc(0.5), Sphere(0.5)])
-def test_a_body_of_a_microgram_is_not_hidden_by_a_megagram(shape):
+def test_fault_of_a_microgram_beside_a_megagram(shape):
     """A scale common to all contacts would not see what the lightest body's contact leaves unsolved."""
     dimension = 2 if isinstance(shape, Disc) else 3
 
@@ -324,7 +324,7 @@ def test_a_body_of_a_microgram_is_not_hidden_by_a_megagram(shape):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_samples_carry_the_certificates_of_their_steps(dimension):
+def test_certificates_of_the_steps_of_samples(dimension):
     bodies = [floor(dimension), *(box(dimension, 0.05 * i, 0.6 + 1.2 * i) for i in range(3))]
     model = Model(dimension, bodies, gravity(dimension), 0.0, 0.5)
     whole, parts = (Simulation(model, Settings.fixed_step(DT)) for _ in range(2))

@@ -251,7 +251,7 @@ ROWS = {
 @pytest.mark.few(6)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", VARIATIONS)
-def test_a_light_ball_caught_between_a_wall_and_a_heavy_one_takes_all_that_moves(name, d):
+def test_light_ball_caught_between_a_wall_and_a_heavy_one(name, d):
     """Newton's law has infinitely many impacts in a finite time; both are at rest at the wall then."""
     found, beyond = judged(COLLAPSE, d, **VARIATIONS[name])
     assert found.holds, found.reasons
@@ -261,14 +261,14 @@ def test_a_light_ball_caught_between_a_wall_and_a_heavy_one_takes_all_that_moves
 @pytest.mark.few(6)
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("name", ROWS)
-def test_two_contacts_are_certified_and_right(name, d):
+def test_certified_rows_with_two_contacts(name, d):
     found, beyond = judged(ROWS[name], d)
     assert found.holds, found.reasons
     assert beyond <= 0.0
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_friction_that_nothing_slips_against_changes_nothing(d):
+def test_friction_of_rows_without_slip(d):
     """What is left of the impacts is summed up, which the audit proves without friction alone."""
     found, beyond = judged(COLLAPSE, d, friction=0.3)
     assert [reason for reason in found.reasons if "summed up" in reason] == list(found.reasons)
@@ -311,20 +311,20 @@ def certified_and_wrong(d, seeds):
 
 
 @pytest.mark.parametrize(("d", "seeds"), [(2, range(6)), (3, range(120, 122))])
-def test_no_row_of_balls_is_certified_and_wrong(d, seeds):
+def test_certified_rows_of_balls_against_the_law(d, seeds):
     """What is refused says why."""
     assert not certified_and_wrong(d, seeds)[1]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("d", "seeds"), [(2, range(120)), (3, range(120, 200))])
-def test_four_of_five_rows_with_two_contacts_are_certified_and_none_is_wrong(d, seeds):
+def test_share_of_rows_with_two_contacts_certified(d, seeds):
     short, wrong = certified_and_wrong(d, seeds)
     assert not wrong
     assert sum(short) >= 0.8 * len(short) and len(short) > 10
 
 
-def test_a_rebound_of_which_a_step_has_hundreds_is_followed():
+def test_hundreds_of_rebounds_in_a_step():
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     ball = Body(Disc(0.1), 1.0, 0.005, (0.0, 0.1001, 0.0))
     simulation = Simulation(Model(2, [floor, ball], (0.0, -9.81), 0.97, 0.0), Settings.reference(1.0 / 30.0))
@@ -333,7 +333,7 @@ def test_a_rebound_of_which_a_step_has_hundreds_is_followed():
 
 
 @pytest.mark.parametrize("e", [0.0725, 0.073, 0.0734])
-def test_what_a_chain_that_ends_has_left_is_struck_within_the_horizon_by_no_other(e):
+def test_horizon_of_a_later_blow_on_the_rest_of_a_chain(e):
     """Of three equal balls with e just above 7 - 4 sqrt 3 impacts end, and leave them parting at less than 1e-11 m/s.
 
     A fourth that comes later strikes them in turn; at round-off they lie, and are struck at once.
@@ -349,7 +349,7 @@ def test_what_a_chain_that_ends_has_left_is_struck_within_the_horizon_by_no_othe
     assert struck - 1e-9 <= found.horizon <= struck + 1.0 / 240.0 + 1e-9
 
 
-def test_a_cycle_in_which_a_pair_would_pull_at_one_of_its_points_is_no_proof():
+def test_cycle_in_which_a_pair_would_pull_at_a_point():
     """Two points of one pair and one of another; the first impact would take -.064 kg m/s at the first point."""
     yields = np.array([[6.06, 1.312, -10.501], [1.312, 0.913, -3.342], [-10.501, -3.342, 20.035]])
     e, pairs = np.array([0.071, 0.071, 0.0475]), np.array([[0, 1], [0, 1], [1, 2]])

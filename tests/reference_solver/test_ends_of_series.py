@@ -47,7 +47,7 @@ def bounced(height, speed, spin, radius, share, e, mu, slope, times):
 
 @pytest.mark.parametrize("rate", [60, 240, 1000])
 @pytest.mark.parametrize("e", [0.3, 0.7, 0.9])
-def test_x_contains_what_friction_at_rebounds_leaves_out_where_a_disc_comes_to_rest(e, rate):
+def test_error_by_friction_at_rebounds_of_a_disc(e, rate):
     """Held, it is rubbed all along; bouncing at its impacts only: up to 1e-11 of its radius apart."""
     radius, share, slope, mu, steps = 0.8, 0.9, 0.1, 1.0, int(0.6 * rate)
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
@@ -61,7 +61,7 @@ def test_x_contains_what_friction_at_rebounds_leaves_out_where_a_disc_comes_to_r
 
 
 @pytest.mark.parametrize("early", [5e-4, 1e-3])
-def test_a_series_that_ends_before_a_step_that_all_runs_share(early):
+def test_series_that_ends_before_a_step_of_all_runs(early):
     """The last rebound leaves a slip of 5e-7 m/s: what takes it out evenly until .5 s would do so in all runs."""
     radius, share, slope, mu, e, ends = 0.32, 0.37, 0.3625, 0.17, 0.39, 0.5
     down = G * math.cos(slope)
@@ -81,7 +81,7 @@ def test_a_series_that_ends_before_a_step_that_all_runs_share(early):
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
 @pytest.mark.parametrize(("d", "yields"), [(2, 3.0), (3, 3.5)])
 @pytest.mark.parametrize(("e", "rate"), [(0.2, 60), (0.5, 240), (0.7, 1000)])
-def test_a_slip_that_a_blow_ends_ends_with_it_however_short_the_series_is(e, rate, d, yields, share):
+def test_slip_that_a_blow_ends_before_a_short_series(e, rate, d, yields, share):
     """A blow of (1 + e) m v takes more slip than one of m v: with that much slip the ball rolls at once, by law."""
     radius, mu = 0.1, 0.6
     v = (1.0 - e) * G / (12.0 * e * rate)  # all rebounds are over in a sixth of a step
@@ -101,7 +101,7 @@ def test_a_slip_that_a_blow_ends_ends_with_it_however_short_the_series_is(e, rat
 
 
 @pytest.mark.parametrize(("e", "part"), [(0.05, 0.05), (0.3, 0.01), (0.3, 0.05), (0.6, 0.02)])
-def test_a_slip_that_a_blow_ends_elsewhere_ends_with_it(e, part):
+def test_slip_that_a_blow_ends_elsewhere(e, part):
     """A ball lands on a block that slides: its blow presses the block on the floor, and stops it at once, by law.
 
     All rebounds are over in a ``part`` of a step; held, they would stop the block as much later.

@@ -120,7 +120,7 @@ def truth(model, accelerations, t):
 @pytest.mark.parametrize("narrower", [0.0, 0.04], ids=["equal", "narrower"])
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize(("d", "kind"), STACKS)
-def test_what_is_flush_slides_as_newton_and_coulomb_say(d, kind, scene, narrower):
+def test_slides_of_flush_bodies_against_newton_and_coulomb(d, kind, scene, narrower):
     """Mirrored, renumbered and far from the origin as well; off by the last places of speeds and coordinates only."""
     model, accelerations = scene(d, kind, narrower)
     expected = truth(model, accelerations, STEPS * DT)
@@ -141,7 +141,7 @@ def test_what_is_flush_slides_as_newton_and_coulomb_say(d, kind, scene, narrower
 @pytest.mark.few(5)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_flush_start_is_certified_beyond_its_first_step(d, scene):
+def test_certificate_of_a_flush_start_beyond_its_first_step(d, scene):
     """The full certificate holds, and a disturbance in the last places does not grow."""
     model, accelerations = scene(d, "box", 0.0)
     certificate = certify(model, Settings.reference(DT), 4)
@@ -153,7 +153,7 @@ def test_a_flush_start_is_certified_beyond_its_first_step(d, scene):
 @pytest.mark.few(5)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_start_that_is_flush_but_for_a_billionth(d, scene):
+def test_start_that_is_flush_but_for_a_billionth(d, scene):
     """What is off by less than is seen, or by little more, moves as what is flush.
 
     But for what slides obliquely in space: loads that stand aside of a centre by s turn the lower book by friction,

@@ -59,7 +59,7 @@ def test_equal_worlds_in_canonical_order_give_equal_bits(profile, space):
 @pytest.mark.few(6)
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("scene", SCENES)
-def test_disturbances_stay_small_up_to_the_horizon(scene, space):
+def test_growth_of_disturbances_up_to_the_horizon(scene, space):
     @settings(CHOSEN, max_examples=4)
     @given(trials(space.dimension))
     def holds(trial):

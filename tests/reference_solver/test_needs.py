@@ -64,7 +64,7 @@ def test_the_full_model_gives_the_same_answer(profile, bodies, restitution, fric
     assert lean.twist == pytest.approx(full.twist, abs=1e-12)
 
 
-def test_a_smooth_lopsided_ball_on_a_floor_keeps_its_angular_momentum():
+def test_angular_momentum_of_a_smooth_lopsided_ball():
     """Nothing turns it: with unequal moments it is the angular momentum that stays, and the spin that does not."""
     upright, moments, spin = (1.0, 0.0, 0.0, 0.0), np.array([0.04, 0.08, 0.1]), np.array([3.0, 1.0, 2.0])
     floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *upright), motion="fixed")

@@ -14,7 +14,7 @@ def half_space(normal, offset=0.0):
     return Body(HalfSpace(normal, offset), motion="fixed", pose=pose)
 
 
-def test_a_ball_with_little_play_never_leaves_its_room():
+def test_ball_between_walls_with_little_play():
     """A hundred metres a second and a centimetre of play: 83 impacts in a step of 1/60 s, each followed."""
     half, speed, play, dt = 0.5, 100.0, 0.01, 1.0 / 60.0
     walls = [half_space((1.0, 0.0), -half - play), half_space((-1.0, 0.0), -half - play)]
@@ -27,7 +27,7 @@ def test_a_ball_with_little_play_never_leaves_its_room():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("count", range(2, 8))
-def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count):
+def test_load_on_the_last_of_a_column(dimension, count):
     """Without gravity only the last has a load: round-off of what passes through the others contradicts nothing."""
     shape, inertia = (Disc(0.5), 0.125) if dimension == 2 else (Sphere(0.5), (0.1,) * 3)
     up = (0.0,) * (dimension - 1)
@@ -44,7 +44,7 @@ def test_loads_on_the_last_of_a_column_pass_through_all_others(dimension, count)
     assert (contacts.impulse * contacts.normal).sum(axis=1) == pytest.approx([10.0 * DT] * count, rel=1e-9)
 
 
-def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
+def test_rest_of_a_sphere_in_a_corner_of_three_planes():
     """Three contacts at once, e = 0."""
     planes = [half_space(tuple(np.eye(3)[k])) for k in range(3)]
     ball = Body(Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.6, 0.7, 0.8, 1.0, 0.0, 0.0, 0.0))
@@ -55,7 +55,7 @@ def test_a_sphere_that_falls_into_a_corner_of_three_planes_rests_there():
 
 
 @pytest.mark.parametrize("free", [False, True])
-def test_a_block_that_slides_past_the_end_of_another_stays_on_it_until_its_centre_is_past(free):
+def test_block_that_slides_past_the_end_of_another(free):
     """Faces stay flush: the corner that leaves hands its contact on to that of the block below."""
     mass, below = 5.0, (0.0, 0.5, 0.0)
     table = (

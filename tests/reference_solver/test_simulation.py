@@ -33,7 +33,7 @@ def test_two_runs_give_the_same_bits(profile):
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy])
-def test_a_copy_goes_on_alone_with_the_same_bits_and_kernels(copied):
+def test_bits_and_kernels_of_a_copy(copied):
     """Laws of pairs that are one number stay one: a table of them has another type, and all kernels would compile."""
     simulation = Simulation(mixed_model(), Settings.classical(DT))
     simulation.advance(5)

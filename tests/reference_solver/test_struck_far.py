@@ -41,7 +41,7 @@ def world(dimension, bodies, restitution, gravity=0.0):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", ["wall", "box", "post"])
 @pytest.mark.parametrize("last", [False, True])
-def test_a_ball_that_is_struck_is_thrown_back_by_what_stands_in_its_way(dimension, kind, last):
+def test_struck_ball_before_an_obstacle(dimension, kind, last):
     """Hit after .01 m at 3 m/s it goes at 6 m/s, meets the obstacle after .06 m more, and comes back for the rest."""
     bodies = [ball(dimension, 0.0, 3.0, mass=1e12), ball(dimension, 0.61)]
     post = obstacle(dimension, kind, 0.61 + RADIUS + 0.06)
@@ -55,7 +55,7 @@ def test_a_ball_that_is_struck_is_thrown_back_by_what_stands_in_its_way(dimensio
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
-def test_what_holds_a_ball_that_is_met_holds_it_still(dimension, order):
+def test_struck_ball_on_a_shelf(dimension, order):
     """A light ball is struck into a third one that rests on a shelf, nobody else's.
 
     Without the shelf it fell by g h^2/2, 1.4 mm: no more than it might have.

@@ -49,7 +49,7 @@ def on_a_plank(space):
 
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
-def test_a_ball_rolls_on_a_plank_that_turns(space):
+def test_ball_that_rolls_on_a_turning_plank(space):
     found = certify(on_a_plank(space), Settings.reference(TIME / 192), 192, 16)
     assert found.holds
     for t, pose, bound in zip(found.t, found.pose[:, 1], found.error, strict=True):
@@ -64,7 +64,7 @@ def test_a_ball_rolls_on_a_plank_that_turns(space):
 
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
-def test_a_ball_that_flies_along_a_plane_is_met_by_it_as_it_turns(space):
+def test_ball_that_flies_along_a_turning_plane(space):
     """Seen from the plane the ball falls with ``2 W v``: it meets it within a step, though it starts on its way off."""
     spin, dt, radius = 5.0, 1.0 / 60.0, 0.01
     start, velocity = np.array([0.0, 0.02]), np.array([20.0, 0.5])

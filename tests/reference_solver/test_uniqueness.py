@@ -10,7 +10,7 @@ from tests.verification.space import SPACES
 DT, G = 1.0 / 240.0, 9.81
 
 
-def test_a_planar_contact_below_the_bound_has_one_answer():
+def test_uniqueness_of_a_planar_contact_below_the_bound():
     """Random W, q and friction up to the bound mu |k_nt| = k_n: never none, never two."""
     rng = np.random.default_rng(66)
     for _ in range(2000):
@@ -40,7 +40,7 @@ def certificate(dimension, bodies, friction):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_separate_round_bodies_and_smooth_boxes_have_one_answer(dimension):
+def test_uniqueness_of_separate_round_bodies_and_smooth_boxes(dimension):
     balls = [round_body(dimension, x) for x in (0.0, 3.0)]
     for bodies, friction in ((balls, 0.4), ([box(dimension, 0.0)], 0.0), (balls[:1], 5.0)):
         found = certificate(dimension, bodies, friction)
@@ -48,13 +48,13 @@ def test_separate_round_bodies_and_smooth_boxes_have_one_answer(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_box_on_several_rough_points_is_not_proven(dimension):
+def test_uniqueness_of_a_box_on_several_rough_points(dimension):
     found = certificate(dimension, [box(dimension, 0.0)], 0.4)
     assert found["unique"] == 0 < found["solves"]
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_ball_in_a_rough_corner_is_not_proven_in_a_smooth_one_it_is(dimension):
+def test_uniqueness_of_a_ball_in_a_rough_and_a_smooth_corner(dimension):
     """It is body B of both contacts: friction of one presses it into the other."""
     wall = SPACES[dimension - 2].wall(-1.0, -0.5)
     for friction, share in ((0.4, 0.0), (0.0, 1.0)):

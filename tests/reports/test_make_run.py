@@ -61,7 +61,7 @@ def test_order_of_answer_bench_and_report(make_run):
     assert lines[-3:-1] == ["report:", "path on stdout"]
 
 
-def test_what_takes_minutes_is_said_before(make_run, tmp_path):
+def test_announcement_of_an_installation(make_run, tmp_path):
     assert not any("installing" in line for line in make_run()[1])
     (tmp_path / "venv" / ".installed-to-run").unlink()
     assert re.fullmatch(r"installing \S+ into \S+: one to five minutes at first", make_run()[1][0])

@@ -278,7 +278,7 @@ def test_worst_of_each_engine_and_family_first(page_source, monkeypatch):
         ("impulse", {}, "impulse ", "not fixed: rebounds at "),
     ],
 )
-def test_sentence_beside_before_and_after_is_of_their_check(page_source, monkeypatch, metric, params, said, left):
+def test_sentence_of_the_check_of_before_and_after(page_source, monkeypatch, metric, params, said, left):
     """The sentence told of the worst check of the run, and the numbers of the check of the search."""
     found = [fix for each in fixing.wrongs(page_source, page_source.answers) for fix in each.fixes]
     assert any(fix.before.startswith(f"{fix.check}: ") for fix in found)  # the run has not the case

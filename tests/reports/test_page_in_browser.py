@@ -413,7 +413,7 @@ def test_no_caption_is_wider_than_what_is_seen_of_its_table(browser, page_file, 
 
 
 @pytest.mark.parametrize("width", [390, 1000, 1200])
-def test_the_table_of_what_is_wrong_fits_the_window(browser, page_file, width):
+def test_width_of_the_table_of_what_is_wrong(browser, page_file, width):
     """It was 1210 px wide in a box of 1160 px."""
     with opened(browser, page_file, width=width) as page:
         page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")

@@ -16,7 +16,7 @@ from validation.running.execution import execute
 COLUMN = Slot("stack", (("n", 10.0),), 2, "reference", "reference", 1 / 60)
 
 
-def test_a_certified_run_is_judged():
+def test_verdict_on_a_certified_run():
     observation = execute(COLUMN)
     assert observation.outcome is Outcome.OK and observation.certificate["certified"] is True
 
@@ -31,7 +31,7 @@ def test_bounce_rest_time_from_its_recorded_contacts():
     assert {row.physics for row in rows_of("run", [found])} == {"pass"}
 
 
-def test_an_uncertified_run_has_no_verdict(monkeypatch):
+def test_verdict_on_an_uncertified_run(monkeypatch):
     """Bodies lighter by a thousandth than the scene says, as the loop of events has them."""
 
     def lighter(model):
@@ -47,7 +47,7 @@ def test_an_uncertified_run_has_no_verdict(monkeypatch):
     assert rows and all(row.physics is None and row.alarming for row in rows)
 
 
-def test_a_run_that_the_loop_refuses_says_why(monkeypatch):
+def test_reason_of_a_run_that_the_loop_refuses(monkeypatch):
     monkeypatch.setattr(loop, "MOST_PIECES", 3)
     observation = execute(Slot("bounce", (("e", 0.5),), 2, "reference", "reference", 1 / 60))
     assert observation.outcome is Outcome.REFUSED and observation.reason.startswith("more than 3 pieces of motion")
@@ -56,7 +56,7 @@ def test_a_run_that_the_loop_refuses_says_why(monkeypatch):
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.long)])
-def test_a_box_on_one_1e5_times_lighter_is_right_and_certified(dimension):
+def test_box_on_one_1e5_times_lighter(dimension):
     asked = {"ratio": 1e5}
     slot = Slot(
         "heavy_on_light", CATALOGUE["heavy_on_light"].minimal(asked), dimension, "reference", "reference", 1 / 240

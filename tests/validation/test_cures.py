@@ -548,7 +548,7 @@ def test_a_scene_in_other_sizes_is_judged_in_its_own_units():
     assert [(check.metric, check.truth, check.bound) for check in small.checks(made, 0.002)] == wanted
 
 
-def test_a_blow_is_also_searched_at_both_ends_of_a_step():
+def test_search_of_a_blow_at_both_ends_of_a_step():
     """MuJoCo's contacts are softer below 1 mm of overlap: a fix of solref alone rebounded there at 0.9 instead of 1."""
     assert len(cures.in_other_size(Slot("pinch", (), 3, "toy", "default", 1 / 240))) == 1
     found = cures.in_other_size(Slot("head_on", (("e", 1.0), ("ratio", 1.0)), 3, "mujoco", "default", 1 / 240))

@@ -41,7 +41,7 @@ def test_kernels_of_whole_cells_compiled_by_first_steps(dimension, monkeypatch, 
         assert compiled() == ready, slot
 
 
-def test_compilation_makes_the_first_steps_of_each_cell(monkeypatch):
+def test_compilation_by_first_steps_of_each_cell(monkeypatch):
     made = []
     run = warming.run
     monkeypatch.setattr(warming, "run", lambda *arguments: made.append(run(*arguments)))
@@ -49,7 +49,7 @@ def test_compilation_makes_the_first_steps_of_each_cell(monkeypatch):
     assert [len(trajectory.t) - 1 for trajectory in made] == [warming.STEPS] * 2
 
 
-def test_compilation_by_other_cells_where_the_engine_refuses_some(monkeypatch):
+def test_compilation_with_refused_cells(monkeypatch):
     asked = []
 
     def first_steps(slot):

@@ -58,7 +58,9 @@ WIDTH = 150
 
 @click.command()
 @AS_JSON
-@click.option("--order", is_flag=True, help="Instead, show how errors fall with the time step: fitted orders.")
+@click.option(
+    "--order", is_flag=True, help="Instead, show how errors of classical and fixed_step fall with the time step."
+)
 @click.option(
     "--self-test", is_flag=True, help="Instead, corrupt results one at a time and see whether the certificate notices."
 )
@@ -74,8 +76,8 @@ def certify(
     """Test the reference solver against its stated accuracy.
 
     Measures every stated error bound, and those of the independent solution that it is compared with. Exits with 1 if
-    one does not hold. With --random, random scenes are solved, certified, and solved again mirrored, moved, with other
-    time steps and so on. A certified result that differs is a defect, and the command exits with 1; refused scenes are
+    one does not hold. With --random, random scenes are solved, certified, and solved again mirrored, moved, to
+    other tolerances and so on. A certified result that differs is a defect, and the command exits with 1; refused scenes are
     listed with the reason.
     """
     console = terminal(stderr=True)
@@ -99,7 +101,7 @@ def certify(
 
 
 def show_orders(console: Console, as_json: bool) -> None:
-    """Print the fitted orders of all schemes and cases; these are observations without bounds."""
+    """Print the fitted orders of all cases; these are observations without bounds."""
     with console.status("halving steps"):
         found = list(orders())
     if as_json:

@@ -62,7 +62,7 @@ def rebound_free(space: Space, profile: str) -> float:
 
 
 def rebound_from_touch(space: Space, profile: str) -> float:
-    """With gravity the ball starts in touch: it then has a step to slow down in if the impact is located, else none.
+    """With gravity the ball starts in touch: by the loop of events it then has a step to slow down in, else none.
 
     A second impact within the step is another quantity, so that only 2 e u / g >= dt is measured.
     """

@@ -57,10 +57,10 @@ class Order:
     order: float | None
 
 
-def fitted(errors: tuple[float, ...], rates: tuple[int, ...] = RATES, floor: float = ROUND_OFF) -> float | None:
-    """Least-squares slope of log error over log step, over the errors above the floor; None of fewer than two."""
-    both = zip(rates, errors, strict=True)
-    kept = [(-math.log(rate), math.log(error)) for rate, error in both if error > floor]
+def fitted(errors: tuple[float, ...]) -> float | None:
+    """Least-squares slope of log error over log step, over the errors above round-off; None of fewer than two."""
+    both = zip(RATES, errors, strict=True)
+    kept = [(-math.log(rate), math.log(error)) for rate, error in both if error > ROUND_OFF]
     if len(kept) < 2:
         return None
     x, y = (np.array(values) for values in zip(*kept, strict=True))

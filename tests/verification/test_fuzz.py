@@ -72,7 +72,7 @@ class TestScenes:
 
 
 class TestVariants:
-    def test_steps_of_a_variant_end_with_the_scene_s_own_at_samples_only(self):
+    def test_common_ends_of_steps_of_a_variant(self):
         assert math.gcd(OFTENER, STRIDE) == 1
 
     @pytest.mark.parametrize("dimension", [2, 3])
@@ -93,7 +93,7 @@ class TestVariants:
         mirrored = variants(drawn)["mirrored"].model.bodies[k].shape.vertices
         assert {(round(x, 12), round(y, 12)) for x, y in mirrored} == corners
 
-    def test_a_restarted_run_has_the_same_samples(self):
+    def test_samples_of_a_restarted_run(self):
         drawn = scene(3, 2)
         samples = drawn.steps // STRIDE
         settings = Settings.reference(1.0 / drawn.rate)
@@ -105,31 +105,31 @@ class TestVariants:
 class TestAttack:
     @pytest.mark.few(6)
     @pytest.mark.parametrize(("kind", "dimension", "seed"), SAMPLE)
-    def test_sampled_scene_is_certified_and_the_same_in_all_variants(self, kind, dimension, seed):
+    def test_certified_scene_in_all_variants(self, kind, dimension, seed):
         found = attack(seed, dimension, kind)
         assert found.certified, found.conditions
         assert found.defects == ()
 
-    def test_discs_at_rest_between_walls_but_for_what_their_impulses_round(self):
+    def test_discs_at_rest_between_walls_but_for_round_off(self):
         """Velocities of 1e-14 m/s end without an impulse."""
         drawn = chain(4, 2)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
         assert certificate.holds, certificate.reasons
 
-    def test_a_difference_of_some_last_places_is_no_defect(self):
+    def test_difference_of_some_last_places(self):
         """Of the run that is restarted: 5.6e-15 m, where both bounds together were a hundredth less."""
         assert attack(20221, 2).defects == ()
 
     @pytest.mark.few(5)
     @pytest.mark.parametrize(("dimension", "seed"), ONCE_REFUSED)
-    def test_short_pieces_obey_cone_sign_and_complementarity(self, dimension, seed):
+    def test_laws_in_short_pieces(self, dimension, seed):
         drawn = scene(seed, dimension)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
         refused = set(conditions(certificate))
         assert "shared" in refused if (dimension, seed) in UNDETERMINED else refused == set()
 
     @pytest.mark.parametrize("dimension", [2, 3])
-    def test_a_variant_that_is_another_world_is_a_defect(self, monkeypatch, dimension):
+    def test_defect_of_a_variant_of_another_world(self, monkeypatch, dimension):
         """Gravity a millionth stronger: each of both runs is certified, and one of them must be wrong."""
 
         def other(drawn):
@@ -165,7 +165,7 @@ class TestAttack:
         assert found.certified and found.defects == ()
         assert list(found.refused_variants) == ["coarse"] and len(found.refused_variants["coarse"]) == 1
 
-    def test_refused_scene_has_its_reason_and_no_answer_to_other_tolerances(self):
+    def test_reason_and_variants_of_a_refused_scene(self):
         """A box comes down, as prescribed, on a disc over the floor: friction of both holds it there."""
         found = attack(13, 2)
         (reason,) = found.conditions

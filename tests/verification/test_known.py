@@ -22,7 +22,7 @@ def test_what_is_certified_of_a_known_motion_is_true(name):
     assert [row for row in gates.kept(name, found) if not row.holds] == []
 
 
-def test_an_error_beyond_x_fails_its_row():
+def test_row_of_an_error_beyond_x():
     near, far, refused = Miss(1e-9, 1e-9, ()), Miss(2e-9, 1e-9, ()), Miss(1.0, 1e-9, ("no",))
     assert gates.beyond("", [near, refused]).holds and not gates.beyond("", [near, far]).holds
     rows = {row.quantity: row.holds for row in gates.kept("planar", [near] * 4 + [refused] * 2)}

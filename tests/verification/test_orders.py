@@ -34,7 +34,7 @@ def test_free_rotation_is_of_second_order_where_steps_are_fixed():
     assert row.order == pytest.approx(2.0, abs=0.05)
 
 
-def test_free_rotation_of_the_loop_does_not_depend_on_when_it_is_looked_at():
+def test_free_rotation_of_the_loop_at_other_steps():
     row = observed("", orders.rotation, SPACES[1], "reference")
     assert max(row.errors) <= 1e-11
     assert max(row.errors) - min(row.errors) <= orders.ROUND_OFF

@@ -58,7 +58,7 @@ def test_what_is_right_is_certified(name):
     assert self_test.seen_by(*self_test.run(self_test.SCENES[name])) == ()
 
 
-def test_there_are_many_corruptions_of_all_families():
+def test_number_and_families_of_corruptions():
     families = [corruption.family for corruption in self_test.CORRUPTIONS]
     assert len(families) >= 40
     assert set(families) == {"law", "input", "detection", "events", "motion", "bookkeeping"}
@@ -98,7 +98,7 @@ class TestWhatWasCertifiedOnce:
         assert {"start", "overlap"} <= refused(planar(floor(), disc(0.0, 0.5), disc(0.9, 0.5)), 10)
 
     @pytest.mark.parametrize("far", [1e10, 1e15])
-    def test_bodies_so_far_out_that_places_are_not_resolved(self, far):
+    def test_bodies_at_coordinates_that_resolve_no_place(self, far):
         assert "resolution" in refused(planar(floor(), disc(far, 0.5, 1.0, 0.0, 0.0)), 10)
 
     def test_a_ball_that_passes_a_wall(self):
@@ -138,7 +138,7 @@ class TestRecords:
         assert "pull" in self.broken(sliding, impulse=-sliding[1].pieces.impulse)
 
     @pytest.mark.parametrize(("units", "pulls"), [(2.0, False), (1e5, True)])
-    def test_a_pull_is_more_than_the_round_off_of_the_largest_impulse_beside_it(self, sliding, units, pulls):
+    def test_pull_within_round_off_of_a_larger_impulse_beside_it(self, sliding, units, pulls):
         impulse = sliding[1].pieces.impulse.copy()
         impulse[0, 1] = -units * np.spacing(impulse[1, 1])  # the first two contacts are those of one piece
         assert sliding[1].pieces.first_contact[1] == 2 and impulse[1, 1] > 0.0
@@ -157,7 +157,7 @@ class TestRecords:
             audit(sliding[0], replace(sliding[1], pieces=None), DT)
 
 
-def test_a_turn_is_integrated_to_round_off():
+def test_integral_of_a_turn():
     """About a principal axis it is known; and energy and the body's angular momentum are kept elsewhere."""
     moments = np.array([[1.0, 2.0, 3.0]])
     spin, length = 5.0, np.array([0.06])
@@ -170,7 +170,7 @@ def test_a_turn_is_integrated_to_round_off():
 
 
 @pytest.mark.parametrize("turn", [0.01, 0.5, 20.0])
-def test_a_turn_of_any_length_is_integrated_to_round_off(turn):
+def test_integral_of_a_turn_of_any_length(turn):
     """Of a rod under an even torque, against DOP853 with steps of its own; and rows do not see each other."""
     random = np.random.default_rng(5)
     moments, q = np.array([[0.01, 1.0, 1.2]]), random.normal(size=(1, 4))
@@ -193,7 +193,7 @@ def test_a_turn_of_any_length_is_integrated_to_round_off(turn):
     assert turned[1] == pytest.approx(q[0], abs=1e-15) and ways[1] == pytest.approx(np.zeros(3), abs=0.0)
 
 
-def test_corners_close_along_the_edge_along_which_they_close_last():
+def test_edge_along_which_corners_close_last():
     """Two edges tie where corners meet, and the gap along either is none; the other one stops more than it may."""
     turn = 0.25 * math.pi
     bodies = [
@@ -207,13 +207,13 @@ def test_corners_close_along_the_edge_along_which_they_close_last():
     assert "choice" not in seen[0] and "choice" in seen[1]
 
 
-def test_a_ball_that_spins_fast_turns_as_it_says():
+def test_turn_of_a_ball_that_spins_fast():
     """A radian and more a step, of unequal moments: integrated in more steps, not refused for the integration."""
     ball = Body(Sphere(0.3), 1.0, (0.03, 0.035, 0.04), (0.0, 0.0, 5.0, *UPRIGHT), (0.0, 0.0, 0.0, 30.0, 20.0, 25.0))
     assert refused(Model(3, [floor(3), ball], (0.0, 0.0, -G), 0.0, 0.0), 10, 1.0 / 30.0) == set()
 
 
-def test_turns_of_what_touches_are_looked_at():
+def test_turns_of_bodies_that_touch():
     """A disc has no corner by which its geometry would tell of its angle."""
     name = "angle of what touches [rad]"
     corruption = next(each for each in self_test.CORRUPTIONS if each.name == name)
@@ -232,7 +232,7 @@ def test_discs_have_one_normal(turn):
 
 
 class TestTruth:
-    def test_what_is_exact_is_certified_to_round_off(self):
+    def test_error_of_an_exact_run(self):
         certificate = certify(planar(floor(), disc(0.0, 1.5), restitution=0.8), Settings.reference(DT), 240)
         assert certificate.holds and certificate.reasons == ()
         assert certificate.error[-1] < 2e-12  # solves leave 1e-13 of 5 m/s, which grows up to fourfold in a second
@@ -240,7 +240,7 @@ class TestTruth:
         assert certificate.horizon == math.inf and certificate.growth[-1] < 10.0
         assert "holds=True" in repr(certificate) and "\n" not in repr(certificate), "no arrays"
 
-    def test_beyond_the_horizon_only_laws_are_certified(self):
+    def test_certificate_beyond_the_horizon(self):
         """A ball in the room between four discs that touch: each bounce spreads a disturbance about twofold."""
         posts = [Body(Disc(1.0), pose=(x, y, 0.0), motion="fixed") for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
         ball = Body(Disc(0.1), 1.0, 0.005, (0.05, 0.02, 0.0), (4.0, 3.0, 0.0))
@@ -252,7 +252,7 @@ class TestTruth:
         assert certificate.error_until(early) < 1e-9
 
     @pytest.mark.parametrize("half, spot, e", [((0.31, 0.27), (0.51, 0.55), 0.45), ((0.34, 0.26), (0.53, 0.18), 0.43)])
-    def test_a_box_that_comes_to_rest_on_its_corner_is_where_the_error_says(self, half, spot, e):
+    def test_error_of_a_box_that_comes_to_rest_on_its_corner(self, half, spot, e):
         """Its series of rebounds ends while it turns: held too soon, it was up to 1.5e-6 m off at dt and dt/2 alike."""
         inertia = (half[0] ** 2 + half[1] ** 2) / 3.0
         box = Body(Box(half), 1.0, round(inertia, 4), (0.0, *spot))
@@ -264,7 +264,7 @@ class TestTruth:
         assert off[-1] < 1e-9
         assert certificate.holds and (off <= certificate.error + 1e-12).all()  # the truth has round-off, too
 
-    def test_what_goes_one_way_and_not_the_other_is_off(self, monkeypatch):
+    def test_error_of_a_solver_that_is_off_in_one_direction(self, monkeypatch):
         """A solver that is off by the same at any step, to the right: its mirrored world is off to the right, too."""
         shift = np.array([1e-6, 0.0, 0.0])
 
@@ -276,7 +276,7 @@ class TestTruth:
         monkeypatch.setattr("reference_solver.certificate.truth.Simulation", Sided)
         assert certify(planar(floor(), disc(0.0, 1.5), restitution=0.8), Settings.reference(DT), 60).error[-1] >= 1e-6
 
-    def test_an_end_of_a_series_counts_with_what_it_may_leave_out(self):
+    def test_error_of_an_end_of_a_series(self):
         """Of a box on its corner, all steps after the last: 1e-11 of its half width, and a hundredth of that a step."""
         box = Body(Box((0.31, 0.27)), 1.0, 0.0563, (0.0, 0.51, 0.55))
         model = planar(floor(), box, restitution=0.45, friction=0.8)
@@ -286,7 +286,7 @@ class TestTruth:
         left_out = 0.27e-11 * (1.0 + (certificate.t[-1] - ends) / DT / 100.0)
         assert len(ends) and certificate.error[-1] > left_out.sum()
 
-    def test_an_end_that_leaves_out_more_than_its_law_allows_counts_with_that(self, monkeypatch):
+    def test_error_of_a_series_ended_too_early(self, monkeypatch):
         """A series that was ended too early is as far off with other steps; the record tells of it."""
         model = planar(floor(), disc(0.0, 1.5), restitution=0.8)
         monkeypatch.setattr(
@@ -297,7 +297,7 @@ class TestTruth:
         assert certificate.error[-1] == pytest.approx(1e-7 + 1e-5 * (60 * DT - 0.1), rel=1e-3)
         assert certificate.error[10] < 1e-9
 
-    def test_what_is_off_only_for_a_while_counts(self):
+    def test_error_of_a_run_that_is_off_for_a_while(self):
         """A box that topples off another's edge: off by 6e-11 m as it falls, and no more once it lies (seed 15)."""
         drawn = scene(15, 2)
         certificate = certify(drawn.model, Settings.reference(1.0 / drawn.rate), drawn.steps, STRIDE)
@@ -306,7 +306,7 @@ class TestTruth:
         off = distance(drawn.model, certificate.pose, truth.record(finer * drawn.steps, finer * STRIDE).pose)
         assert certificate.holds and (off <= certificate.error).all()
 
-    def test_what_solves_leave_of_their_speeds_is_part_of_the_error(self):
+    def test_error_by_speeds_that_solves_leave(self):
         """No run with another step need show it."""
         model = planar(floor(), disc(0.0, 1.5), restitution=1.0)
         certificate = certify(model, Settings.reference(DT), 240)
@@ -327,7 +327,7 @@ class TestTruth:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_a_quaternion_that_is_a_unit_one_but_for_round_off_is_no_jump(seed):
+def test_quaternion_of_unit_length_but_for_round_off(seed):
     """But one that is not what the run begins with is."""
     angle = np.random.default_rng(seed).uniform(0.0, 3.0)
     turn = (math.cos(0.5 * angle), math.sin(0.5 * angle), 0.0, 0.0)
@@ -340,7 +340,7 @@ def test_a_quaternion_that_is_a_unit_one_but_for_round_off_is_no_jump(seed):
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e3])
-def test_energy_from_nowhere_is_seen_without_loads_however_light_bodies_are(size):
+def test_energy_from_nowhere_of_light_bodies_without_loads(size):
     """Without loads it used to be measured against a joule."""
     light = Body(Disc(0.5), 1e-6 * size, 0.125e-6 * size, (0.0, 0.0, 0.0), (0.1, 0.0, 0.0))
     model = Model(2, [light], (0.0, 0.0), 0.0, 0.0)
@@ -352,7 +352,7 @@ def test_energy_from_nowhere_is_seen_without_loads_however_light_bodies_are(size
 
 @pytest.mark.parametrize("mass", [1.0, 1e5])
 @pytest.mark.parametrize(("gap", "lost"), [(2.5e-13, False), (1e-11, False), (1e-9, True)])
-def test_a_load_that_shuts_a_gap_which_counts_as_none_loses_its_work_there_and_no_more(gap, lost, mass):
+def test_work_lost_by_a_load_that_shuts_a_gap_counted_as_none(gap, lost, mass):
     """Of a step's energy a share gap/(g h^2), 1.5e-9 at 2.5e-13 m; as `apart`, up to 1e-9 of a body, 5e-10 m here.
 
     A disc that rests is lowered by ``gap`` in one step, as its velocity at the end of it says, under its load.
@@ -371,7 +371,7 @@ def test_a_load_that_shuts_a_gap_which_counts_as_none_loses_its_work_there_and_n
     assert ("lost" in found) is lost
 
 
-def test_work_of_a_torque_on_a_body_that_tumbles_is_known_to_round_off():
+def test_work_of_a_torque_on_a_tumbling_body():
     """By the mean of its spins at both ends of a step a box gained 1.3e-7 of its energy from nowhere, and void."""
     box = Body(Box((0.226, 0.187, 0.352)), 0.265, (0.0140, 0.0155, 0.0076), (0.0, 0.0, 2.0, *UPRIGHT),
                (0.0, 0.0, 0.0, -1.64, -1.09, -1.16), torque=(-0.029, 0.0, -0.094))  # fmt: skip
@@ -385,7 +385,7 @@ def test_work_of_a_torque_on_a_body_that_tumbles_is_known_to_round_off():
     assert {"gained", "lost", "spin"} & {finding.name for finding in audit(gives, record, dt) if not finding.holds}
 
 
-def test_a_rod_that_torques_spin_up_about_its_own_axis_is_audited():
+def test_rod_spun_up_by_torques_about_its_own_axis():
     """It turns by six radians a step in the end; by Hermite's formula it gained 4e-8 of its energy, and was refused.
 
     A solver's turn that is off is told as well, and so is a torque of another size.
@@ -407,7 +407,7 @@ def test_a_rod_that_torques_spin_up_about_its_own_axis_is_audited():
 
 
 @pytest.mark.parametrize(("height", "met"), [(5e-3, False), (2e-4, True)])
-def test_a_rod_that_turns_by_radians_in_a_step_is_where_it_turns_to(height, met):
+def test_rod_that_turns_by_radians_in_a_step(height, met):
     """It spins about its own axis, and keeps clear of a floor 5 mm below; one that its end dips into it has missed.
 
     By the shorter way from one end of a step to the other it would be .6 of its radius in the former.
@@ -428,7 +428,7 @@ def test_a_rod_that_turns_by_radians_in_a_step_is_where_it_turns_to(height, met)
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("beyond", [1e-8, 1e-4])
-def test_a_corner_that_slides_off_its_face_carries_nothing_there(dimension, beyond):
+def test_corner_that_slides_off_its_face(dimension, beyond):
     """A box slides flat over a table whose end the run knows too late; at rest on it the load stays where it is."""
     half, table, steps, dt = 0.1, 0.5, 10, 1.0 / 240.0
     across = () if dimension == 2 else (0.5,)
@@ -448,7 +448,7 @@ def test_a_corner_that_slides_off_its_face_carries_nothing_there(dimension, beyo
 
 
 @pytest.mark.parametrize(("dimension", "speed"), [(2, 0.37), (2, 5.0), (3, 1.3), (3, 5.0)])
-def test_a_ball_that_rolls_over_the_seam_of_two_boxes(dimension, speed):
+def test_ball_that_rolls_over_the_seam_of_two_boxes(dimension, speed):
     """A corner passes below it: a millionth of a radius before it, the gap is round-off and the normal leans."""
     r, table, across = 0.1, 2.0, (0.5,) * (dimension - 1)
     pose = lambda x, y: (x, y, 0.0) if dimension == 2 else (x, 0.0, y, *UPRIGHT)  # noqa: E731
@@ -471,7 +471,7 @@ def test_a_ball_that_rolls_over_the_seam_of_two_boxes(dimension, speed):
 
 
 @pytest.mark.parametrize("share", [1e-6, 1e-2])
-def test_what_is_left_of_speeds_is_round_off(share):
+def test_corrections_of_more_than_round_off(share):
     """Contacts that stay closed are given impulses of any sign at an instant: of 1e-11 of the momentum there."""
     drawn = scene(20, 2)
     record, dt = (

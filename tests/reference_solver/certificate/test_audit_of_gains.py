@@ -36,7 +36,7 @@ def refused(model, record):
     return {finding.name for finding in audit(model, record, DT) if not finding.holds}
 
 
-def test_a_disc_whose_floor_sinks_is_struck_alone_and_meets_the_floor_after_that():
+def test_disc_struck_while_its_floor_sinks():
     """It parts from the floor as it is struck, which has no part in that; then it is faster than the floor."""
     model = landing(0.25, 0.25)
     record, judged = run(model)
@@ -46,7 +46,7 @@ def test_a_disc_whose_floor_sinks_is_struck_alone_and_meets_the_floor_after_that
     assert refused(model, record) == set()
 
 
-def test_what_parts_is_not_pressed():
+def test_push_on_a_contact_that_parts():
     """The same from the floor's view, whose contact is put into the blow between the discs, without a load and with."""
     floor, light, heavy = landing(0.25, 0.25).bodies
     bodies = [
@@ -69,7 +69,7 @@ def test_what_parts_is_not_pressed():
         assert ("normal" in refused(model, replace(record, pieces=moved))) is (push > 0.0)
 
 
-def test_what_leaves_faster_than_its_law_says_is_refused_all_the_same():
+def test_refusal_of_a_rebound_faster_than_its_law():
     record, _ = run(landing(0.25, 0.25, E + 1e-6))
     assert "normal" in refused(landing(0.25, 0.25), record)
 
@@ -83,14 +83,14 @@ def test_what_leaves_faster_than_its_law_says_is_refused_all_the_same():
         (0.0, 0.25, E, 0.5, True),  # Kane's
     ],
 )
-def test_only_what_rebounds_and_rubs_may_gain(sinks, falls, e, friction, may):
+def test_gains_with_restitution_and_friction_alone(sinks, falls, e, friction, may):
     record, judged = run(landing(sinks, falls, e, friction))
     first = record.pieces.kind == IMPACT
     assert first.any() and energy._may_gain(judged)[first].tolist() == [may] * int(first.sum())
     assert refused(judged.model, record) == set()
 
 
-def test_what_may_not_gain_and_does_is_refused():
+def test_refusal_of_a_gain_without_restitution_and_friction():
     """The heavy disc leaves ten times as fast as it came: no law, and energy from nowhere."""
     model = landing(0.0, 0.25)
     record, _ = run(model)

@@ -16,7 +16,7 @@ G = 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def spun_rod(dt):
+def spun_rod():
     """One step of a thin rod in flight that spins by some radians in it, while a torque and its weight act."""
     r, half, mass = 0.0175, 0.4585, 9.0
     along, across = mass * 0.5 * r * r, mass * (0.25 * r * r + (half + r) ** 2 / 3.0)
@@ -25,7 +25,7 @@ def spun_rod(dt):
     return Model(3, (rod,), (0.0, 0.0, -G), 0.0, 0.0)
 
 
-def test_parts_of_a_piece_are_where_a_run_in_as_many_steps_is():
+def test_parts_of_a_piece_against_a_run_in_as_many_steps():
     """With their velocities, of a cube: equal moments; none turns by more than .1 rad, and they fill the time."""
     dt, inertia = 1.0 / 60.0, (2.0 / 3.0,) * 3
     cube = Body(Box((1.0,) * 3), 1.0, inertia, (0.0, 0.0, 2.0, *UPRIGHT), (0.3, 0.0, 0.0, 150.0, 2.0, -3.0))
@@ -46,13 +46,13 @@ def test_parts_of_a_piece_are_where_a_run_in_as_many_steps_is():
         assert np.abs(here - there).max() < 1e-10 * size, name
 
 
-def test_a_way_that_leaves_its_velocities_by_more_than_forces_bend_it_is_seen():
+def test_way_off_its_velocities_by_more_than_forces_bend_it():
     """A disc goes over a hill .003 rad a step: by 4e-8 m its way bends; 1e-5 m is none of that."""
     scene = self_test.SCENES["disc that slides off a disc"]
     assert "path" in self_test.seen_by(*self_test.handed(self_test.jumped("pose", 0, 1.0))(scene, 1e-5))
 
 
-def test_a_moment_that_is_off_by_a_millionth_in_a_phase_is_seen():
+def test_moment_off_by_a_millionth_in_a_phase():
     """Its body turns by .02 rad in a piece and slides: of the way that the polynomial does not see 1e-8 is left."""
     motion = gates.MOTIONS["box falling on an edge that slides, planar"](np.random.default_rng(0))
     dt = motion.time / 30
@@ -112,7 +112,7 @@ SOUND = {
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_rows_that_turn_without_spin_and_loads_that_carry_nothing_pass(name):
+def test_rows_that_turn_without_spin_and_loads_of_nothing(name):
     """Contacts turn where bodies pass each other without friction, and where they start from rest.
 
     What two bodies in flight together exchange is round-off of a phase, of either sign.
@@ -132,10 +132,10 @@ def test_rows_that_turn_without_spin_and_loads_that_carry_nothing_pass(name):
         ([6e-10, -6e-10, 6e-10, -6e-10], False),
     ],
 )
-def test_energy_is_gained_in_one_piece_or_bit_by_bit(monkeypatch, gains, gained):
+def test_energy_gained_in_one_piece_and_bit_by_bit(monkeypatch, gains, gained):
     """As shares of what there is; what was lost before does not pay for it."""
     dt = 1.0 / 60.0
-    model = spun_rod(dt)
+    model = spun_rod()
     record = Simulation(model, Settings.reference(dt)).record(4, pieces=True)
     run = Run(model, record.pieces, dt)
     nothing, all_gains = np.zeros(len(run.pieces)), np.zeros(len(run.pieces))
@@ -144,7 +144,7 @@ def test_energy_is_gained_in_one_piece_or_bit_by_bit(monkeypatch, gains, gained)
     assert (dict(energy.measured(run))["gained"] > 1e-9) is gained
 
 
-def test_only_what_turns_evenly_is_cut_into_parts():
+def test_parts_of_even_turns_alone():
     """A ball that spins on a smooth floor by .97 rad a step; where forces change nobody can say how it goes."""
     dt = 1.0 / 60.0
     floor = Body(HalfSpace((0.0, 0.0, 1.0)), pose=(0.0, 0.0, 0.0, *UPRIGHT), motion="fixed")
@@ -160,7 +160,7 @@ def test_only_what_turns_evenly_is_cut_into_parts():
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.4, 0.6, 0.75, 0.9])
 @pytest.mark.parametrize("kind", ["grazes", "passes", "sweeps"])
-def test_what_is_met_within_a_step_and_left_again_is_seen(kind, share):
+def test_body_met_and_left_again_within_a_step(kind, share):
     """A large disc grazes a post by a thousandth, a small one flies over one, the end of a rod sweeps one.
 
     At any time of a step: a sixteenth of it is near enough. The post is known to the certificate only.
@@ -198,7 +198,7 @@ LIMITS = {
 }  # fmt: skip
 
 
-def test_limits_are_what_they_were_when_runs_were_attacked():
+def test_limits_with_which_runs_were_attacked():
     assert {name: check.limit for name, check in CHECKS.items()} == {
         name: limit for limit, names in LIMITS.items() for name in names
     }

@@ -52,33 +52,33 @@ class TestTurnsBeside:
             ((0.0, 0.0, 0.3), 0.0),  # one neighbour alone says nothing
         ],
     )
-    def test_the_slower_neighbour_tells_for_the_time_of_the_piece(self, turned, found):
+    def test_slower_neighbour_for_the_time_of_the_piece(self, turned, found):
         beside = turns_beside(run_of([H, 2.0 * H, H]), np.array(turned))
         assert beside == pytest.approx([turned[0], found, turned[2]], abs=1e-12)
 
     @pytest.mark.parametrize("late", [1e-9 * H, 0.5 * H])
-    def test_what_does_not_follow_is_no_neighbour(self, late):
+    def test_neighbours_of_pieces_that_do_not_follow(self, late):
         run = run_of([H, 2.0 * H, H], begin=[0.0, H, 3.0 * H + late])
         assert turns_beside(run, np.array([0.1, 0.0, 0.3])) == pytest.approx([0.1, 0.0, 0.3])
 
-    def test_pieces_far_from_the_start_follow_each_other_but_for_their_round_off(self):
+    def test_neighbours_far_from_the_start_but_for_round_off(self):
         begin = 1e4 + np.array([0.0, H, 3.0 * H])  # a unit in the last place of it is 4e-10 of a step
         run = run_of([H, 2.0 * H, H], begin=begin)
         assert turns_beside(run, np.array([0.1, 0.0, 0.3]))[1] == pytest.approx(0.2)
 
-    def test_points_of_one_pair_say_nothing_of_each_other(self):
+    def test_points_of_one_pair(self):
         turned = np.repeat([0.1, 0.0, 0.3], 2)
         assert turns_beside(run_of([H, 2.0 * H, H], contacts=2), turned) == pytest.approx(turned, abs=0.0)
 
 
-def test_a_normal_turns_no_farther_than_spins_and_what_bodies_pass_each_other_by_take_it():
+def test_turn_of_a_normal_beyond_spins_and_passing():
     """3 rad/s, and 2 m/s past a corner at the ball's own radius of .5 m: 7 rad/s."""
     run = run_of([H, 2.0 * H], twist=(2.0, 0.0, 0.0, 0.0, 0.0, 3.0))
     assert _largest_turn(run, np.arange(2)) == pytest.approx([7.0 * H, 14.0 * H], abs=1e-11)
 
 
 class TestChangesOfForce:
-    def test_the_faster_of_both_neighbours_tells_and_twice_that_is_allowed(self):
+    def test_twice_the_faster_of_both_neighbours(self):
         """2, 2.02, 2.1 N over 1, 2 and 1 steps: .02 and .08 N in 1.5 steps, .08/1.5 a step of 2.02 N."""
         forces = np.array([[0.0, 0.0, f] for f in (2.0, 2.02, 2.1)])
         found = changes_of_force(run_of([H, 2.0 * H, H], forces))
@@ -89,7 +89,7 @@ class TestChangesOfForce:
         found = changes_of_force(run_of([H, H, H], forces))
         assert found[1] == pytest.approx(2.0 * np.hypot(0.6, 0.2), rel=1e-12)
 
-    def test_what_begins_later_tells_nothing(self):
+    def test_neighbour_that_begins_later(self):
         run = run_of([H, H, H], begin=[0.0, H, 2.5 * H])
         assert changes_of_force(run) == pytest.approx([UNKNOWN_CHANGE] * 3)
 
@@ -103,7 +103,7 @@ NOT_SEEN = {
 }
 
 
-def test_corruptions_are_seen_at_a_millionth_but_for_those_that_are_told():
+def test_corruptions_of_a_millionth_but_for_those_not_seen():
     """What a check lets pass is no more than what it has to: ten times as much is seen here."""
     missed = {}
     for trial in self_test.trials((1e-6, 1e-5, 1e-4)):
@@ -115,14 +115,14 @@ def test_corruptions_are_seen_at_a_millionth_but_for_those_that_are_told():
 HILL = self_test.SCENES["disc that slides off a disc"]
 
 
-def test_a_moment_over_a_hill_is_seen_from_where_its_point_is_known_to():
+def test_moment_over_a_hill_off_by_more_than_its_point():
     """Its point goes .003 m in a piece, and its force changes by a hundredth: 1e-4 of the moment are not told."""
     spun = next(each for each in self_test.CORRUPTIONS if each.name == "moment and spin over a hill")
     assert "moment" in self_test.seen_by(*spun.plant(HILL, 2e-4))
 
 
 @pytest.mark.parametrize("share", [1e-3, 1e-2, 0.5])
-def test_friction_over_a_hill_that_is_too_weak_is_seen(share):
+def test_friction_over_a_hill_that_is_too_weak(share):
     """It slips all the way: where normals turn, too, all of mu p_n is against it."""
     weaker = self_test.given(lambda model, size: replace(model, friction=model.friction * (1.0 - size)))
     assert "friction" in self_test.seen_by(*weaker(HILL, share))
@@ -161,7 +161,7 @@ class TestFrictionOfSlipsThatTurn:
         assert refused(*slipping[:3]) == set()
 
     @pytest.mark.parametrize("sign", [-1.0, 1.0])
-    def test_off_its_slip_by_twice_what_that_turns_is_seen(self, slipping, sign):
+    def test_friction_off_its_slip_by_twice_what_that_turns(self, slipping, sign):
         contact, n, pressed, along, impulse = self.parts(slipping)
         off = 2.0 * sign * slipping[3][contact]
         assert 1e-4 < abs(off) < 0.1
@@ -180,7 +180,7 @@ class TestFrictionOfSlipsThatTurn:
             if name == "cone" or more > 2.0 * slipping[3][contact]:
                 assert name in refused(*slipping[:3], impulse=impulse), name
 
-    def test_friction_of_what_is_not_pressed_is_seen(self, slipping):
+    def test_friction_of_a_contact_that_is_not_pressed(self, slipping):
         """Of a ten-thousand-millionth of its speed: what round-off of a phase leaves is a tenth of that."""
         model, record, dt, _ = slipping
         contact, _, _, along, impulse = self.parts(slipping)

@@ -146,7 +146,7 @@ DETERMINED = {
 
 
 @pytest.mark.parametrize("name", UNDETERMINED)
-def test_what_the_laws_leave_open_is_refused_and_says_who_shares_what(name):
+def test_refusal_of_loads_that_the_laws_leave_open(name):
     model, contacts = UNDETERMINED[name][0](), UNDETERMINED[name][1]
     found = certify(model, Settings.reference(DT), 12)
     assert not found.holds and len(found.reasons) == 1
@@ -177,7 +177,7 @@ def shared(model, record):
 
 
 @pytest.mark.parametrize("spin", [1e-9, 1e-7])
-def test_a_spread_too_small_to_matter_goes_into_x(spin):
+def test_spread_too_small_to_matter_in_x(spin):
     """Slips that differ by w r/v in direction: what that moves is in proportion, and certified while it is small."""
     model = spinning(0.4, (1.0, spin, 0.0))
     found = certify(model, Settings.reference(DT), 12)
@@ -215,7 +215,7 @@ def admissible(pick, yaw, v, w, times):
 
 
 @pytest.mark.parametrize(("yaw", "v", "w"), [(0.37, 1.0, 3.0), (0.8, 2.0, 5.0), (0.1, 0.8, -6.0)])
-def test_the_spread_is_that_of_two_motions_that_obey_the_laws(yaw, v, w):
+def test_spread_of_two_motions_that_obey_the_laws(yaw, v, w):
     """Truth: the same box integrated twice, its load at either end of what its corners can share."""
     model = spinning(yaw, (v, w, 0.0))
     record = Simulation(model, Settings.reference(DT)).record(48, pieces=True)
@@ -227,7 +227,7 @@ def test_the_spread_is_that_of_two_motions_that_obey_the_laws(yaw, v, w):
     assert (apart[5:] <= ways[6:]).all() and ways[-1] < 3.0 * apart[-1]
 
 
-def test_the_spread_does_not_hang_on_which_answer_was_recorded():
+def test_spread_from_another_recorded_answer():
     """The same forces on the body, from loads at an end of what is admissible: two of four contacts carry nothing."""
     model = over_a_seam()
     record = Simulation(model, Settings.reference(DT)).record(1, pieces=True)
@@ -245,7 +245,7 @@ def test_the_spread_does_not_hang_on_which_answer_was_recorded():
     assert shared(model, other)[0] == pytest.approx(way, rel=1e-9) and way > 1e-5
 
 
-def test_impulses_of_a_landing_are_shared_in_more_than_one_way():
+def test_shares_of_impulses_of_a_landing():
     model = spinning(0.3, (1.0, 3.0, -1.0), height=0.01)
     record = Simulation(model, Settings.reference(DT)).record(6, pieces=True)
     found = sharing.shared_loads(Run(model, record.pieces, DT))
@@ -254,7 +254,7 @@ def test_impulses_of_a_landing_are_shared_in_more_than_one_way():
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_a_corner_that_an_impact_leaves_without_load_could_carry_as_well(restitution):
+def test_load_of_a_corner_that_an_impact_leaves_without(restitution):
     """The spread of a landing is the same where all four corners are hit and where the record has one that is not."""
     model = spinning(0.3, (1.0, 3.0, -1.0), restitution, 0.01)
     record = Simulation(model, Settings.reference(DT)).record(6, pieces=True)
@@ -308,7 +308,7 @@ def across_a_slot(dimension, angle):
 @pytest.mark.parametrize("share", [0.9, 1.1])
 @pytest.mark.parametrize(("scene", "angle"), [(drawn_out, 0.05), (drawn_out, 0.4), (across_a_slot, 0.6)])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_what_may_be_wedged_or_not_is_certified_for_no_time(dimension, scene, angle, share):
+def test_certificate_of_a_body_that_may_be_wedged(dimension, scene, angle, share):
     """It leaves in the run. With friction above what can hold it, it might as well stay: neither has to be."""
     bodies, threshold = scene(dimension, angle)
     found = certify(world(bodies, share * threshold), Settings.reference(DT), 24)
@@ -319,7 +319,7 @@ def test_what_may_be_wedged_or_not_is_certified_for_no_time(dimension, scene, an
     assert found.unique.startswith("two motions obey the laws from 0 s: bodies ") is (share > 1.0)
 
 
-def test_a_load_without_bound_is_a_spread_without_bound():
+def test_spread_of_a_load_without_bound():
     """A box that fits between a floor and a ceiling: they may squeeze it as hard as they like, and brake it so."""
     ceiling = Body(HalfSpace((0.0, -1.0)), pose=(0.0, 0.2, 0.0), motion="fixed")
     found = certify(
@@ -332,7 +332,7 @@ def test_a_load_without_bound_is_a_spread_without_bound():
     assert np.isinf(found.error[-1])
 
 
-def test_what_is_open_beyond_the_horizon_refuses_nothing():
+def test_loads_open_beyond_the_horizon():
     model = spinning(0.37, (1.0, 3.0, 0.0))
     record = Simulation(model, Settings.reference(DT)).record(12, pieces=True)
     assert not shared_loads(model, record, DT, np.inf)[1].holds
@@ -365,5 +365,5 @@ def test_the_linear_program_agrees_with_another():
     assert 50 < bounded < 300
 
 
-def test_as_much_may_be_left_open_as_bodies_may_overlap():
+def test_loads_open_by_as_much_as_bodies_may_overlap():
     assert CHECKS["shared"].limit == CHECKS["overlap"].limit

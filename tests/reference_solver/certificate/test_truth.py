@@ -38,7 +38,7 @@ def lopsided_ball_between_a_box_and_a_ball():
     return Model(3, bodies, gravity, 0.0, friction)
 
 
-def test_a_smaller_tolerance_gains_digits():
+def test_digits_gained_by_a_smaller_tolerance():
     model = lopsided_ball_between_a_box_and_a_ball()
     ends = []
     for tolerance in (1e-12, 1e-8, 1e-5):
@@ -54,7 +54,7 @@ def test_a_tolerance_below_round_off():
         Settings.reference(0.01, 1e-13)
 
 
-def test_a_run_that_comes_out_otherwise_far_from_the_origin_is_refused(monkeypatch):
+def test_refusal_of_another_outcome_far_from_the_origin(monkeypatch):
     """Gravity a millionth stronger there. Where nothing is, what is left is round-off, and X is what it was."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.7, 0.0), (1.0, -1.0, 3.0))
@@ -100,7 +100,7 @@ def over_the_edge(d, large, r, v, e, way):
         (3, 1.0, 0.02, 10.0, 0.5, 240),
     ],
 )
-def test_a_ball_that_flies_off_an_edge_is_no_further_off_than_x(d, large, r, v, e, rate):
+def test_error_of_a_ball_that_flies_off_an_edge(d, large, r, v, e, rate):
     """Faster than sqrt(g (R + r)) it leaves both at once. What meets within a gap that counts as none is in X."""
     way = 0.61
     model, left = over_the_edge(d, large, r, v, e, way), way / v
@@ -114,7 +114,7 @@ def test_a_ball_that_flies_off_an_edge_is_no_further_off_than_x(d, large, r, v, 
     assert found.error[within].max() < 1e-4 * r
 
 
-def test_what_meets_as_round_off_has_it_is_more_than_other_runs_tell(monkeypatch):
+def test_error_of_bodies_that_meet_by_round_off(monkeypatch):
     """Planted: X without it is too small where a ball flies off an edge."""
     way, v, r, rate = 0.93, 10.0, 0.02, 240
     model, left = over_the_edge(2, 1.0, r, v, 0.5, way), way / v
@@ -126,7 +126,7 @@ def test_what_meets_as_round_off_has_it_is_more_than_other_runs_tell(monkeypatch
 
 
 @pytest.mark.parametrize("shift", [(300.0, -70.0), (1000.0, 1000.0)])
-def test_what_meets_within_a_gap_that_coordinates_round_is_in_x(shift):
+def test_error_of_bodies_that_meet_across_a_rounded_gap(shift):
     """Gaps count as none up to their round-off, which is that of the place."""
     way, v, r, rate = 0.93, 10.0, 0.02, 240
     model, left = Change(2, shift=shift).model(over_the_edge(2, 1.0, r, v, 0.5, way)), way / v
@@ -136,6 +136,6 @@ def test_what_meets_within_a_gap_that_coordinates_round_is_in_x(shift):
     assert not found.holds or (off <= found.error)[found.t < found.horizon].all()
 
 
-def test_a_world_without_free_bodies_is_certified():
+def test_certificate_of_a_world_without_free_bodies():
     still = Body(Disc(0.1), pose=(0.0, 0.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
     assert certify(Model(2, [still], (0.0, 0.0), 0.0, 0.0), Settings.reference(0.01), 5).holds

@@ -13,7 +13,7 @@ DOWN = (0.0, -G)
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
 @pytest.mark.parametrize("mu", [0.1, 0.3])
-def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, mu):
+def test_sliding_box_until_it_stops(build, dt, mu):
     speed = 3.0
     box = build.box(0.0, 0.5, (speed, 0.0, 0.0), half=(0.7, 0.5))
     simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.0, mu)
@@ -23,7 +23,7 @@ def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, mu):
 
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
-def test_a_sliding_disc_rolls_from_the_instant_its_slip_ends(build, dt):
+def test_disc_that_slides_until_it_rolls(build, dt):
     mu, speed, steps = 0.3, 3.0, 400
     ball = build.disc(0.0, 0.5, (speed, 0.0, 0.0))
     simulation = build.simulation([build.floor(), ball], Settings.reference(dt), DOWN, 0.0, mu)
@@ -36,7 +36,7 @@ def test_a_sliding_disc_rolls_from_the_instant_its_slip_ends(build, dt):
 
 
 @pytest.mark.parametrize("spin", [0.0, 3.0, 100.0])
-def test_a_tumbling_box_never_gains_energy_and_comes_to_rest_on_a_face(build, spin):
+def test_energy_and_rest_of_a_tumbling_box(build, spin):
     box = build.box(0.0, 3.0, (0.0, 0.0, spin), angle=0.3)
     simulation = build.simulation([build.floor(), box], Settings.reference(build.dt), DOWN, 0.5, 0.4)
     record = simulation.record(2400)
@@ -49,7 +49,7 @@ def test_a_tumbling_box_never_gains_energy_and_comes_to_rest_on_a_face(build, sp
     assert pose[-1, 1] == pytest.approx(0.5, abs=1e-12)
 
 
-def test_impulses_of_a_step_are_those_of_all_its_sub_steps(build):
+def test_impulses_of_a_step_with_events(build):
     """Momentum is what contacts and weight gave, in every step, also where a step is cut."""
     bodies = [build.floor(), build.box(0.0, 1.2, (1.0, 0.0, 4.0), angle=0.4), build.disc(0.3, 2.6, mass=2.0)]
     simulation = build.simulation(bodies, Settings.reference(build.dt), DOWN, 0.4, 0.5)

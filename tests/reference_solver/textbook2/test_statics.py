@@ -19,7 +19,7 @@ def interface_impulses(record, n):
     return totals
 
 
-def test_column_of_twenty_needs_no_sweeps_once_it_stands(build, fixed_step):
+def test_sweeps_of_a_column_of_twenty_that_stands(build, fixed_step):
     simulation = build.column(20, fixed_step)
     simulation.advance(1)
     first = simulation.certificate["sweeps"]
@@ -84,7 +84,7 @@ def test_box_tips_beyond_its_base_and_not_before(build, reference):
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.5, 0.9])
-def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, fixed_step, depth):
+def test_kinetic_energy_of_a_deep_overlap_pushed_out(build, fixed_step, depth):
     """Two discs overlapping by a share of their radius: projected apart, symmetric, velocity untouched."""
     gap = 1.0 - 0.5 * depth
     simulation = build.simulation([build.disc(0.0, 0.0), build.disc(gap, 0.0)], fixed_step)
@@ -95,7 +95,7 @@ def test_deep_overlap_is_pushed_out_without_kinetic_energy(build, fixed_step, de
     assert simulation.certificate["projected"] == pytest.approx(0.5 * depth, rel=1e-9)
 
 
-def test_overlapping_column_is_separated(build, fixed_step):
+def test_column_that_overlaps_at_the_start(build, fixed_step):
     """Ten boxes each 1 mm into the one below: all gaps close to zero, and the column then stands."""
     boxes = [build.box(0.0, 0.499 + 0.999 * i) for i in range(10)]
     simulation = build.simulation([build.floor(), *boxes], fixed_step, (0.0, -G), 0.0, 0.5)

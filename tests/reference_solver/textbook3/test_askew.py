@@ -20,7 +20,7 @@ def orientation(axes):
 
 @pytest.mark.parametrize("askew", [-1.1, 0.0, 0.6])
 @pytest.mark.parametrize("steps", [5, 60])
-def test_a_capsule_askew_on_a_slope_rolls_across_its_axis(askew, steps):
+def test_capsule_askew_on_a_slope(askew, steps):
     """With k = I/m r^2 about its axis ``a = g sin(slope) cos(askew)/(1 + k)``; what pulls along the axis is held."""
     slope, radius, half, mass, time, start = 0.3, 0.1, 0.4, 2.0, 0.6, 0.5
     k = 0.5

@@ -42,7 +42,7 @@ def energy(simulation):
 
 
 @pytest.mark.parametrize("tilt", [1e-5, 1e-3])
-def test_a_beam_tips_over_a_rim_without_losing_energy_or_events(tilt):
+def test_energy_of_a_beam_that_tips_over_a_rim(tilt):
     """No friction, no impact: energy is kept, and steps of any length agree, which a normal off by the tilt spoils."""
     poses = []
     for rate in (240, 1920):

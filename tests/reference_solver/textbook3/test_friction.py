@@ -54,7 +54,7 @@ def test_friction_is_the_same_in_every_direction(build, reference, shape, headin
     assert simulation.twist[1, :3] == pytest.approx(expected * along, abs=1e-12)
 
 
-def test_a_struck_billiard_ball_follows_a_parabola_and_then_rolls_straight(build, settings):
+def test_parabola_and_roll_of_a_struck_billiard_ball(build, settings):
     """Masse shot (S-C6): the direction of slip stays what it is, so that friction is a constant force."""
     radius, k, mu = 0.5, 0.4, 0.2
     v0, w0 = np.array([3.0, 0.0, 0.0]), np.array([4.0, 6.0, 7.0])

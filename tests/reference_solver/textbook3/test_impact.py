@@ -11,7 +11,7 @@ ROUND_OFF = 1e-14
 
 @pytest.mark.parametrize("profile", ["fixed_step", "reference"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
-def test_gravity_of_the_step_does_not_change_the_rebound(build, dt, profile):
+def test_rebound_under_gravity(build, dt, profile):
     """A fixed step spends its gravity inside the impact; the loop lets it act afterwards."""
     ball = build.sphere((0.0, 0.0, 0.5), (0.0, 0.0, -2.0))
     simulation = build.simulation([build.floor(), ball], getattr(Settings, profile)(dt), (0.0, 0.0, -9.81), 0.8)

@@ -102,7 +102,7 @@ def test_a_sliding_sphere_rolls_from_the_instant_its_slip_ends(build, dt, k):
 
 @pytest.mark.parametrize("dt", [1 / 7, 1 / 60, 1 / 240])
 @pytest.mark.parametrize("turn", [0.0, 0.4])
-def test_a_sliding_box_stops_where_its_energy_is_spent(build, dt, turn):
+def test_sliding_box_until_it_stops(build, dt, turn):
     along = np.array([math.cos(0.3), math.sin(0.3), 0.0])
     box = build.box((0.0, 0.0, 0.25), 3.0 * along, half=(1.0, 0.8, 0.25), turn=(math.cos(turn), 0, 0, math.sin(turn)))
     simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.0, 0.3)
@@ -136,7 +136,7 @@ def test_elastic_collisions_without_friction_keep_energy(build, mechanics, shape
     assert mechanics.kinetic_energy(simulation) == pytest.approx(before, rel=1e-12 if shape == "sphere" else 1e-4)
 
 
-def test_samples_see_every_impact_of_a_step_once(build, mechanics):
+def test_impulses_of_a_step_with_several_impacts(build, mechanics):
     """A ball between floor and ceiling: several impacts in one step; the impulses add up to the change of momentum."""
     ceiling = Body(Box((5.0, 5.0, 0.1)), motion="fixed", pose=(0.0, 0.0, 1.2, 1.0, 0.0, 0.0, 0.0))
     ball = build.sphere((0.0, 0.0, 0.55), (0.0, 0.0, -60.0))
@@ -149,7 +149,7 @@ def test_samples_see_every_impact_of_a_step_once(build, mechanics):
     assert simulation.twist[2, 2] - before == pytest.approx(gained - G / 60, abs=1e-13 * 120)
 
 
-def test_a_box_dropped_on_its_edge_comes_to_rest_flat(build):
+def test_rest_of_a_box_dropped_on_its_edge(build):
     simulation = build.simulation(
         [build.floor(), build.box((0, 0, 1.2), spin=(0, 5.0, 0), turn=(math.cos(0.3), 0, math.sin(0.3), 0))],
         Settings.reference(1 / 240),

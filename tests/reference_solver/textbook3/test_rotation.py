@@ -92,7 +92,7 @@ def test_a_constant_torque_does_not_lower_the_order(mechanics):
     assert last * np.sign(last @ exact) == pytest.approx(exact / np.linalg.norm(exact), abs=1e-10)
 
 
-def test_the_intermediate_axis_flips_when_jacobi_says(mechanics):
+def test_flips_about_the_intermediate_axis(mechanics):
     """Dzhanibekov: I = (1, 2, 3), spin (.01, 1, 0). Here M^2 < 2 E I_2, so that axes 1 and 3 swap roles.
 
     w2 = sqrt((M^2 - 2 E I1) / (I2 (I2 - I1))) sn(tau), tau = (t + t0) sqrt((I2 - I1)(2 E I3 - M^2) / (I1 I2 I3)), and

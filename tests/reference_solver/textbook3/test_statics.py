@@ -22,7 +22,7 @@ def interface_sums(simulation, n):
     return np.array([contacts.impulse[contacts.body_a == i, 2].sum() for i in range(n)])
 
 
-def test_a_column_of_20_is_solved_without_help_from_the_step_before(build, fixed_step):
+def test_column_of_twenty_without_warm_start(build, fixed_step):
     cold = dataclasses.replace(fixed_step, warm_starting=False)
     simulation = build.column(20, cold)
     simulation.advance(3)
@@ -104,7 +104,7 @@ def plane(normal):
     return Body(HalfSpace(normal), motion="fixed", pose=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
 
 
-def test_overlap_goes_without_a_gain_of_speed(build, fixed_step):
+def test_speed_of_boxes_pushed_out_of_an_overlap(build, fixed_step):
     """Two boxes deep in each other and in the floor are pushed apart by position alone."""
     bodies = [build.floor(), build.box((0.0, 0.0, 0.4)), build.box((0.1, 0.0, 1.2))]
     simulation = build.simulation(bodies, fixed_step)

@@ -71,7 +71,7 @@ def test_a_pressed_box_stands_while_what_presses_it_acts_over_the_shared_polygon
 @pytest.mark.parametrize("fixed_first", [True, False])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("velocity", [(0.4, 0.2), (0.4, 0.4), (0.4, 0.0), (-0.4, 0.2)])
-def test_a_corner_that_starts_on_a_corner_carries_on_either_way(fixed_first, sign, velocity):
+def test_corner_that_starts_on_a_corner(fixed_first, sign, velocity):
     """Slides straight on by its friction, whatever the order of the bodies, and mirrored."""
     mu, time, steps = 0.3, 0.1, 12
     v = np.array([sign * velocity[0], velocity[1], 0.0])
@@ -88,7 +88,7 @@ def test_a_corner_that_starts_on_a_corner_carries_on_either_way(fixed_first, sig
     assert end[:3] == pytest.approx(np.array([0.2 * sign, 0.2, 0.02]) + way * v / speed, abs=1e-11)
 
 
-def test_five_boxes_turned_against_each_other_tip_as_one():
+def test_five_boxes_turned_against_each_other():
     """Thirty-four contacts that stick, more rows than 64: a single block on its edge, by an integration."""
     count, half, height, lean = 5, 0.3, 0.4, math.atan(0.3) * 1.15
     turn = [(math.cos(0.25 * (k % 2)), 0.0, 0.0, math.sin(0.25 * (k % 2))) for k in range(count)]

@@ -1,6 +1,6 @@
 """Compare the event loop with the motions whose truth is known (E76).
 
-    python tests/exact/known.py [--only TEXT] [--limit SECONDS]
+    python tests/reference_solver/exact/known.py [--only TEXT] [--limit SECONDS]
 
 prints one line for each motion that the loop does not hold, and the counts. A motion is *held* if it ends as near to
 its truth as the loop's own bound says: twice what a coarser tolerance changes, and what the truth may be off.

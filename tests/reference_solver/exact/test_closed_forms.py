@@ -260,7 +260,7 @@ def test_ball_between_closing_walls(closing, steps):
     assert abs(found.pose[-1, 2, 0] - float(x + v * (end - now))) < SMALL
 
 
-def test_slide_that_closes_with_a_speed_which_is_round_off_beside_it():
+def test_slide_with_a_closing_speed_of_round_off():
     """An edge meets the floor with 2e-10 m/s where the box slides with 2 m/s: no impact without end, and it slides."""
     sliding = box(2, (1.0, 0.25), up(2, 0.25))
     model = Model(2, [ground(2), replace(sliding, twist=(2.0, 1.8e-10, -7.7e-10))], (0.0, -G), 0.0, 0.28)

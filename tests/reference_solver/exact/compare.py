@@ -1,6 +1,6 @@
 """Compare the event loop with the stored answers of the earlier solver.
 
-    python tests/exact/compare.py [FILE] [--only TEXT] [--limit SECONDS]
+    python tests/reference_solver/exact/compare.py [FILE] [--only TEXT] [--limit SECONDS]
 
 prints one line for each world that is not the same, and the counts. *Same* is within X of both, as far as the stored
 certificate holds; *refused* is one sentence of the loop; all else is *different*. Worlds whose certificate does not
