@@ -77,8 +77,8 @@ def certify(
 
     Measures every stated error bound, and those of the independent solution that it is compared with. Exits with 1 if
     one does not hold. With --random, random scenes are solved, certified, and solved again mirrored, moved, to
-    other tolerances and so on. A certified result that differs is a defect, and the command exits with 1; refused scenes are
-    listed with the reason.
+    other tolerances and so on. A certified result that differs is a defect, and the command exits with 1; refused
+    scenes are listed with the reason.
     """
     console = terminal(stderr=True)
     if not console.is_terminal:
