@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from adapters.newton import shapes
-from adapters.newton.shipped import GAP, ROLLING, STOPPED, TORSIONAL
+from adapters.newton.shipped import ROLLING, STOPPED, TORSIONAL
 from adapters.unset import Unset
 
 _SHAPE, _SOLVER = shapes.SHAPE, "SolverXPBD"
@@ -17,7 +17,7 @@ UNSET = (
     Unset("no rebound below [m/s]", "twice the speed that gravity gives in a step", "xpbd/restitution_kernels.py"),
     Unset("angular damping [1/s]", "0", _SOLVER, 0.0),
     Unset("stopped below [m/s]", f"{STOPPED:g}, and spins below as many rad/s", "xpbd/kernels.py, apply_body_deltas"),
-    Unset("contacts from this gap on [m]", f"{GAP:g} of each shape", "ModelBuilder.rigid_gap"),
+    shapes.GAP_UNSET,
     Unset("mass of a cubic metre [kg]", "1000: density", _SHAPE, 1000.0),
     Unset("step [s]", "none: each call has its own", f"{_SOLVER}.step"),
 )

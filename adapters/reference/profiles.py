@@ -84,7 +84,7 @@ KINDS: Mapping[str, Check] = MappingProxyType(
 FORMER: Mapping[str, str] = MappingProxyType(
     {
         "accuracy": "tolerance of profile reference takes its place",
-        "scheme": "the profile says it: reference goes from event to event, classical makes steps",
+        "scheme": "the profile takes its place: reference goes from event to event, classical makes steps",
     }
 )
 PROFILES: Mapping[str, ProfileRule] = MappingProxyType({"classical": classical_profile, "reference": reference_profile})

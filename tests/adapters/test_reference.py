@@ -208,8 +208,8 @@ def test_every_setting_of_the_solver_has_its_reason() -> None:
 @pytest.mark.parametrize(
     ("profile", "text", "said"),
     [
-        ("reference", "scheme=fixed", "reference has no setting 'scheme'; the profile says it: reference goes from "
-         "event to event, classical makes steps; crosscheck describe reference lists all"),
+        ("reference", "scheme=fixed", "reference has no setting 'scheme'; the profile takes its place: reference goes "
+         "from event to event, classical makes steps; crosscheck describe reference lists all"),
         ("classical", "accuracy=1e-9", "reference has no setting 'accuracy'; tolerance of profile reference takes its "
          "place; crosscheck describe reference lists all"),
         ("reference", "residual=1e-9", "residual: is of the steps of profile classical; profile reference has "

@@ -101,7 +101,9 @@ def test_engines_that_know_all_settings_asked_by_default():
         EngineError, match="no installed engine has a setting 'collision_slot'; near it: collision_slop"
     ):
         knowing(replace(request, sets=(("iterations", 3), ("collision_slot", 1))))
-    with pytest.raises(EngineError, match="no installed engine has a setting 'scheme'; the profile says it: reference"):
+    with pytest.raises(
+        EngineError, match="no installed engine has a setting 'scheme'; the profile takes its place: reference"
+    ):
         knowing(replace(request, sets=(("scheme", "located"),)))
     if "mujoco" in names:
         with pytest.raises(

@@ -81,7 +81,7 @@ class KaminoEngine(NewtonFamily):
                 "MaterialManagerConfig, restitution_mix_mode",
             ),
             Quirk(
-                "a step corrects a hundredth of each overlap by a speed, which adds to that of a rebound",
+                "a step corrects a hundredth of each overlap with an additional speed, which a rebound keeps",
                 "unchanged: rebounds are up to e + 0.01",
                 "ConstraintStabilizationConfig, gamma; measured",
             ),
@@ -106,5 +106,7 @@ class KaminoEngine(NewtonFamily):
         if needs.regime != "impact":
             return {}
         half = 0.5 * next(x.value for x in self.settings(profile, needs, dt) if x.name == "recovery")
-        because = "a hundredth of the overlap at a blow is corrected in its step, by a speed that adds to the rebound"
+        because = (
+            "the step of a blow corrects a hundredth of the overlap with an additional speed, which the rebound keeps"
+        )
         return {"restitution": Declared(needs.restitution + half, half + SOLVED, because)}
