@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from adapters.box2d.profiles import PROFILES
 from adapters.box2d.shipped import CHECKED_ON, VELOCITY_THRESHOLD
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
-from adapters.law.single_motions import Chosen, corner_law, rounded_motions, standstill_law
+from adapters.law.single_motions import Chosen, corner_law, rounded_motions, standstills
 from adapters.law.single_precision import Method, Threshold, rounded_law
 from adapters.scene import Scene
 
@@ -59,16 +59,7 @@ def _chosen(profile: str) -> Chosen:
     return of
 
 
-DEVIATIONS += deviations(
-    "box2d",
-    PROFILES,
-    {"far_origin": ("stopping_distance",)},
-    lambda metric, profile: standstill_law(metric, _chosen(profile)),
-    "positions are in single precision: motion of a step below half their spacing (12 cm at 1e6 m) is lost",
-    "b2Math.h, b2Sweep: c is a pair of float32; motion in adapters/law/single_motions.py",
-    CHECKED_ON,
-)
-
+DEVIATIONS += standstills("box2d", PROFILES, "b2Math.h, b2Sweep: c is a pair of float32", CHECKED_ON, _chosen)
 DEVIATIONS += deviations(
     "box2d",
     PROFILES,

@@ -51,7 +51,6 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
 def standstills(
     engine: str,
     profiles: Iterable[str],
-    rows: Mapping[str, Iterable[str]],
     source: str,
     versions: tuple[str, ...],
     chosen: Callable[[str], Chosen] = lambda profile: lambda scene, dt: (1.0, 0.0),
@@ -60,8 +59,6 @@ def standstills(
 
     Parameters
     ----------
-    rows
-        Metrics by scene.
     source
         Where it is seen that the engine computes in single precision.
     chosen
@@ -70,7 +67,7 @@ def standstills(
     return deviations(
         engine,
         profiles,
-        rows,
+        {"far_origin": ("stopping_distance",)},
         lambda metric, profile: standstill_law(metric, chosen(profile)),
         "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         f"{source}; motion in adapters/law/single_motions.py",

@@ -22,6 +22,7 @@ from adapters.isolation.quiet import quiet
 from adapters.mujoco.profiles import SHIPPED
 from adapters.mujoco.releases import Mjcf
 from adapters.mujoco.spec import Spec, has_joint, rotation, start
+from adapters.plain import one_line
 from adapters.readback import free_parts
 from adapters.scene import Scene
 from adapters.scene.drives import velocity_over
@@ -73,7 +74,7 @@ class MotrixSimulation(Copied):
         try:
             self.model: Any = self._world(engine).build()
         except (RuntimeError, ValueError) as error:
-            raise EngineError(f"scene: MotrixSim does not build it: {' '.join(str(error).split())}") from None
+            raise EngineError(f"scene: MotrixSim does not build it: {one_line(error)}") from None
         self.data: Any = engine.SceneData(self.model)
         self.moving = [i for i, body in enumerate(scene.bodies) if has_joint(body)]
         _, velocity = start(scene, dt)
