@@ -41,7 +41,9 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
     said = "as shipped"
     return [
         Setting("solver", "PGS", f"{said}: sweeps over contacts", f"{_OPTION}, solver_type"),
-        Setting("iterations", ITERATIONS, f"{said}: most sweeps", f"{_OPTION}, constraint_solver_iterations"),
+        Setting(
+            "iterations", ITERATIONS, f"{said}: largest number of sweeps", f"{_OPTION}, constraint_solver_iterations"
+        ),
         Setting(
             "tolerance",
             TOLERANCE,
@@ -51,7 +53,12 @@ def default_profile(needs: Needs, dt: float) -> list[Setting]:
         Setting("solref", SOLREF, f"{said}: time constant [s] and damping ratio; no restitution", "MJCF reference"),
         Setting("solimp", SOLIMP, f"{said}: impedance over the overlap", "MJCF reference"),
         Setting("margin", 0.0, f"{said} [m]: a contact begins when bodies overlap", "MJCF reference"),
-        Setting("erp", None, f"{said}: contacts are springs, as MJCF states them", f"{_MODEL}, impedance"),
+        Setting(
+            "erp",
+            None,
+            f"{said}: contacts are springs; with a number they are hard, and a step corrects that share of an overlap",
+            f"{_MODEL}, impedance",
+        ),
     ]
 
 
@@ -61,13 +68,13 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
         "tolerance": Setting(
             "tolerance",
             SOLVED,
-            "sweeps to what single precision resolves; more than 100 make tall columns tremble",
+            "sweeps end at what single precision resolves; more than 100 sweeps make tall columns tremble",
             "measured: columns of 1 to 20 boxes",
         ),
         "solref": Setting(
             "solref",
             (STIFFEST * dt, SOLREF[1]),
-            "the least time constant of the MJCF reference; loads sink in less",
+            "the least time constant of the MJCF reference; bodies sink in less",
             "MJCF reference; measured: columns",
         ),
     }
