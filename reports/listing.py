@@ -24,6 +24,7 @@ from validation.field.measured import facts_of
 from validation.identity import commit, machine
 from validation.posed import resolve
 from validation.running.plan import QUICK_DT
+from validation.running.warming import MARK
 from validation.settings.effects import told_of
 
 
@@ -171,7 +172,7 @@ def _why_unmeasured(name: str) -> str:
     if entry is None or not registry.is_ours(entry):
         return f"{name} is loaded in worker processes only"
     kernels = engine.kernels()
-    if kernels is not None and not any(kernels.glob("warm-*.json")):
+    if kernels is not None and not any(kernels.glob(f"{MARK}*")):
         return f"its kernels are not compiled yet: crosscheck compile --engine {name}"
     return ""
 

@@ -51,6 +51,7 @@ def standstill_law(metric: str, chosen: Chosen) -> Law:
 def standstills(
     engine: str,
     profiles: Iterable[str],
+    rows: Mapping[str, Iterable[str]],
     source: str,
     versions: tuple[str, ...],
     chosen: Callable[[str], Chosen] = lambda profile: lambda scene, dt: (1.0, 0.0),
@@ -59,6 +60,8 @@ def standstills(
 
     Parameters
     ----------
+    rows
+        Metrics by scene.
     source
         Where it is seen that the engine computes in single precision.
     chosen
@@ -67,7 +70,7 @@ def standstills(
     return deviations(
         engine,
         profiles,
-        {"far_origin": ("stopping_distance",)},
+        rows,
         lambda metric, profile: standstill_law(metric, chosen(profile)),
         "positions are in single precision: motion of a step below half their spacing (6 cm at 1e6 m) is lost",
         f"{source}; motion in adapters/law/single_motions.py",

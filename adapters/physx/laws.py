@@ -75,7 +75,9 @@ DEVIATIONS += deviations(
     "measured with 3.0.3; motion in adapters/law/unswept.py and adapters/law/single_precision.py",
     _RELEASES,
 )
-DEVIATIONS += standstills("physx", PROFILES, "PxTransform, built of floats", _RELEASES)
+DEVIATIONS += standstills(
+    "physx", PROFILES, {"far_origin": ("stopping_distance",)}, "PxTransform, built of floats", _RELEASES
+)
 DEVIATIONS += rounded_motions(
     "physx",
     PROFILES,

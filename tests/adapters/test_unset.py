@@ -12,6 +12,7 @@ from adapters.engine_folder import unset_of
 from adapters.unset import FRICTIONS, RADIUS, RESTITUTIONS, Asked, Told, Unset
 from reports import listing, tables
 from reports.command import main
+from validation.running.warming import MARK
 
 #: Ports do what their originals do.
 OURS = [name for name in registry.names() if (told := registry.adapter(name)) and not told.facts.port_of]
@@ -167,7 +168,7 @@ def test_description_without_compiling_kernels(monkeypatch, tmp_path):
     engine = registry.load("reference")
     monkeypatch.setattr(type(engine), "kernels", lambda self: tmp_path)
     assert listing._why_unmeasured("reference").endswith("crosscheck compile --engine reference")
-    (tmp_path / "warm-1.json").write_text("{}")
+    (tmp_path / f"{MARK}1").write_text("{}")
     assert listing._why_unmeasured("reference") == ""
 
 

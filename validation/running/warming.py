@@ -26,6 +26,9 @@ from validation.cells import Slot, prepare, settings_of
 #: that an engine keeps from the step before.
 STEPS = 3
 
+#: How files that say that kernels are compiled begin.
+MARK = "compiled-"
+
 #: Engine, profile with a user's own settings, and dimension: cells in which these are equal call the same kernels.
 Key = tuple[str, str, int]
 
@@ -80,7 +83,7 @@ def missing(slots: Iterable[Slot]) -> list[Part]:
     for key in sorted(cells, key=lambda key: (profiles.index(key[:2]), -key[2])):
         folder = folders[key[0]]
         if folder is not None:
-            mark = folder / f"compiled-{hashlib.sha256(repr(key).encode()).hexdigest()[:12]}"
+            mark = folder / f"{MARK}{hashlib.sha256(repr(key).encode()).hexdigest()[:12]}"
             if not mark.is_file():
                 found.append(Part(key, tuple(cells[key].values()), mark))
     return found

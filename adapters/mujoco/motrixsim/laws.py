@@ -41,7 +41,7 @@ DEVIATIONS += deviations(
     f"{_SOURCE}; band in adapters/law/single_precision.py",
     _RELEASES,
 )
-DEVIATIONS += standstills("motrixsim", PROFILES, _SOURCE, _RELEASES)
+DEVIATIONS += standstills("motrixsim", PROFILES, {"far_origin": ("stopping_distance",)}, _SOURCE, _RELEASES)
 DEVIATIONS += rounded_motions(
     "motrixsim",
     PROFILES,
