@@ -1,7 +1,7 @@
 """How kernels become machine code: what only kernels call is carried to them as it is, and optimised there once.
 
-numba makes machine code of every function by itself, all that it calls included and optimised anew. For kernels of some
-four hundred functions, ten calls deep, this costs several times what compiling does. Here a function that only kernels
+numba makes machine code of every function by itself, all that it calls included and optimised anew. For kernels of
+hundreds of functions, ten calls deep, this costs several times what compiling does. Here a function that only kernels
 call ends as a module of its own that is neither linked, optimised nor translated; a kernel links all modules it needs,
 directly or not, and is optimised as a whole.
 
@@ -50,8 +50,7 @@ NOT_NEEDED = frozenset(
     ]
 )
 #: Objects made between two searches for garbage while a kernel compiles: with Python's own 700 a fifth of the time went
-#: into searches through all that is being compiled (87 s of CPU for the planar located step, 69 s now, 67 s without
-#: any), for .66 GB of memory instead of .55.
+#: into searches through all that is being compiled.
 BETWEEN_COLLECTIONS = 1_000_000
 
 
@@ -201,8 +200,8 @@ def with_lowering(state: Any, lowering: type) -> Any:
 def once_for_all_constants(function: Any) -> Any:
     """Have calls with a constant call the function that is there for variables.
 
-    numba compiles a function anew for every constant that a call hands over: 280 of the 796 functions of the kernels in
-    space, a fourth of the time. What a constant saves at run time LLVM finds by itself where it splices the call.
+    numba compiles a function anew for every constant that a call hands over: a fourth of the
+    time. What a constant saves at run time LLVM finds by itself where it splices the call.
     """
     if hasattr(function, "py_func"):
         resolve = function.get_call_template

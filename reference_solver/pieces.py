@@ -20,23 +20,15 @@ Indices = NDArray[np.int64]
 
 #: What a piece is: a force phase; an impact.
 FORCES, IMPACT = 0, 1
-#: By which scheme: constant acceleration (E19), fifth order, one impulse-level solve, the fixed-step law (E5 to E17),
-#: until two bodies that rock rest on each other, by constant acceleration or where rows turn at impulse level (E22).
-#: CHAIN: an impact that is the sum of all those to come, which have no end (E22). UNORDERED: impacts of several pairs
-#: of bodies at once, of which round-off decides which comes first (E21).
-FROZEN, FIFTH_ORDER, IMPULSE_LEVEL, FIXED, ROCKING, CHAIN, UNORDERED = 0, 1, 2, 3, 4, 5, 6
-
-#: Contacts that there is room for with each body of a piece.
-CONTACTS_PER_BODY = 4
-
-#: Entries of `Journal.used`.
-PIECES, BODIES, CONTACTS, STEPS = 0, 1, 2, 3
+#: By which scheme: constant acceleration (E19), fifth order where rows turn (E35), until two bodies that rock rest on
+#: each other (E22). CHAIN: an impact that is the sum of all those to come, which have no end (E22).
+FROZEN, FIFTH_ORDER, ROCKING, CHAIN = 0, 1, 2, 3
 
 
 class Journal(NamedTuple):
-    """The pieces of a run as rows of arrays."""
+    """The pieces of some steps as rows of arrays."""
 
-    used: Indices  # (4,): see PIECES .. STEPS
+    steps: int
     time: Array  # (p, 2): begin, counted from the start of its step, and length [s]
     label: Indices  # (p, 5): step, kind, scheme, first body row, first contact row
     body: Indices  # (k,): number of the body
@@ -44,25 +36,20 @@ class Journal(NamedTuple):
     after: Array  # (k, P + V)
     name: Indices  # (c, 3): body A, body B, feature
     wrench: Array  # (c, 3 d + M): point [m], normal, impulse on B [N s], its moment about the origin [N m s]; M = 1 | 3
-    pose: Array  # (n, P): as the piece began
-    twist: Array  # (n, V)
 
 
-def allocate_journal(dimension: int, bodies: int, pieces: int) -> Journal:
-    """Return room for about ``pieces`` pieces of ``bodies`` bodies; none of either is switched off."""
+def empty_journal(dimension: int) -> Journal:
+    """Return what no steps leave."""
     p, v, d = POSE_SIZE[dimension], TWIST_SIZE[dimension], dimension
-    rows, contacts, n = pieces * bodies, CONTACTS_PER_BODY * pieces * bodies, bodies if pieces else 0
     return Journal(
-        used=np.zeros(4, np.int64),
-        time=np.zeros((pieces, 2)),
-        label=np.zeros((pieces, 5), np.int64),
-        body=np.zeros(rows, np.int64),
-        before=np.zeros((rows, p + v)),
-        after=np.zeros((rows, p + v)),
-        name=np.zeros((contacts, 3), np.int64),
-        wrench=np.zeros((contacts, 3 * d + v - d)),
-        pose=np.zeros((n, p)),
-        twist=np.zeros((n, v)),
+        steps=0,
+        time=np.zeros((0, 2)),
+        label=np.zeros((0, 5), np.int64),
+        body=np.zeros(0, np.int64),
+        before=np.zeros((0, p + v)),
+        after=np.zeros((0, p + v)),
+        name=np.zeros((0, 3), np.int64),
+        wrench=np.zeros((0, 3 * d + v - d)),
     )
 
 
@@ -124,17 +111,9 @@ class Pieces:
 def pieces_of(journals: list[Journal], dimension: int, dt: float, first_step: int) -> Pieces:
     """Return what consecutive journals hold as one record; steps of ``dt`` [s] are counted from ``first_step``."""
     d, p = dimension, POSE_SIZE[dimension]
-    label = np.concatenate([j.label[: j.used[PIECES]] for j in journals])
-    time = np.concatenate([j.time[: j.used[PIECES]] for j in journals])
-    starts = np.cumsum([[0, 0, 0], *(j.used[[STEPS, BODIES, CONTACTS]] for j in journals)], axis=0)
-    counts = [j.used[PIECES] for j in journals]
-    label[:, [0, 3, 4]] += np.repeat(starts[:-1], counts, axis=0)
-    body, before, after = (
-        np.concatenate([getattr(j, name)[: j.used[BODIES]] for j in journals]) for name in ("body", "before", "after")
-    )
-    name, wrench = (
-        np.concatenate([getattr(j, name)[: j.used[CONTACTS]] for j in journals]) for name in ("name", "wrench")
-    )
+    time, label, body, before, after, name, wrench = map(np.concatenate, list(zip(*journals, strict=True))[1:])
+    starts = np.cumsum([[0, 0, 0], *((j.steps, len(j.body), len(j.name)) for j in journals)], axis=0)
+    label[:, [0, 3, 4]] += np.repeat(starts[:-1], [len(j.time) for j in journals], axis=0)
     step = label[:, 0] + first_step
     return Pieces(
         step=step,

@@ -24,7 +24,7 @@ import numpy as np
 from reference_solver.checks import require_count
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
-from reference_solver.pieces import Journal, allocate_journal, pieces_of
+from reference_solver.pieces import Journal, empty_journal, pieces_of
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
@@ -179,7 +179,7 @@ class Simulation:
             merge(whole, tallies[-1])
         self._world.tally[:] = whole
         parts = parts or [self._world.run(0, stride, contacts)]
-        journals = journals or [allocate_journal(self.model.dimension, len(self.model.bodies), 0)]
+        journals = journals or [empty_journal(self.model.dimension)]
         return joined(parts), tallies[: steps // stride], journals
 
     @property

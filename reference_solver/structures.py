@@ -1,9 +1,8 @@
 """Named tuples of arrays, as kernels see them: one pointer each.
 
-numba passes a named tuple by value, each array of it as some nine numbers. The bodies, rows and rooms of a step are a
-thousand numbers then, taken apart by every caller and put together by whatever is called: seven of ten instructions of
-all kernels did nothing else (1.14 million of the planar located step, .41 million now; 134 s of CPU to compile it on a
-busy machine, 72 s now), and compiled code moved them through the stack at every call. A class under `structure` is laid
+numba passes a named tuple by value, each array of it as some nine numbers. The bodies, rows and rooms of a step are
+hundreds of numbers then, taken apart by every caller and put together by whatever is called: most instructions did
+nothing else, and compiled code moved them through the stack at every call. A class under `structure` is laid
 out in memory once, where it is made, and is one pointer from there on; what it holds is read where it is asked for, and
 what is a structure in it is a pointer into it. Nothing writes to it, as nothing writes to a tuple.
 

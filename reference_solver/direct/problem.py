@@ -9,12 +9,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_solver.model import Array
+from reference_solver.pieces import Indices
 from reference_solver.structures import structure
-
-Indices = NDArray[np.int64]
 
 #: Room for rows of a contact and velocities of a body.
 ROWS, VELOCITIES = 3, 6

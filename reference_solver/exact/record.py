@@ -22,7 +22,7 @@ from reference_solver.exact.forces import Held
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.rows import Contacts, labels, moments
 from reference_solver.model import Array
-from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal, allocate_journal
+from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal, empty_journal
 from reference_solver.records import Contacts as Handed
 
 #: Share of the smallest half width by which ways of a part may differ from cubic polynomials: the audit's limit.
@@ -140,7 +140,7 @@ class Recorder:
     def begin(self, pose: Array, twist: Array) -> None:
         """Begin a record where bodies are."""
         self._state = np.concatenate([pose, twist], axis=1)
-        self._rows: list[tuple[Array | Indices, ...]] = [allocate_journal(self._world.dimension, len(pose), 0)[1:8]]
+        self._rows: list[tuple[Array | Indices, ...]] = [empty_journal(self._world.dimension)[1:]]
         self._bodies = self._contacts = 0
 
     def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
@@ -285,7 +285,6 @@ class Recorder:
         self._contacts += len(name)
 
     def journal(self, first: int, steps: int) -> Journal:
-        """Return what was written of ``steps`` steps from the step ``first`` on, as a journal without room for more."""
+        """Return what was written of ``steps`` steps from the step ``first`` on, as a journal."""
         time, label, *others = (np.concatenate(each) for each in zip(*self._rows, strict=True))
-        none, used = np.zeros((0, 0)), np.array([len(time), self._bodies, self._contacts, steps])
-        return Journal(*(used, time, label - np.array([first, 0, 0, 0, 0]), *others, none, none))
+        return Journal(steps, time, label - np.array([first, 0, 0, 0, 0]), *others)

@@ -8,6 +8,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.needs import Needs
 from reference_solver.settings import Settings
 from reference_solver.structures import structure
+from reference_solver.textbook.noise import ROUND_OFF
 
 SCALAR, BLOCK = 0, 1
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
@@ -40,6 +41,19 @@ class Options(NamedTuple):
 def pushes_along(options: Options) -> bool:
     """Whether positions are corrected in the sweeps of velocities (E16)."""
     return options.solver == SCALAR and options.residual < 0.0 and options.correction == SPLIT
+
+
+@inner_kernel
+def push_speed(gap: float, parting: float, extent: float, options: Options) -> float:
+    """Pseudo-velocity that a contact needs (E16) [m/s], beyond the speed ``parting`` with which it parts by itself.
+
+    A rebound is not pushed as well: that would add energy to a bounce. Within what is allowed a contact may close, but
+    not farther (negative). ``extent``: smaller half width [m], whose round-off asks for nothing.
+    """
+    excess = -(gap + options.dt * max(parting, 0.0)) - options.slop
+    if abs(excess) <= ROUND_OFF * extent:
+        excess = 0.0
+    return (options.beta if excess > 0.0 else 1.0) * excess / options.dt
 
 
 def uses_direct(settings: Settings) -> bool:

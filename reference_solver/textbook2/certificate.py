@@ -1,7 +1,7 @@
 """How good the answer of one contact solve is, measured from what it left behind (E14, E60 to E63).
 
 The measure knows nothing of how the answer was found: it sees velocities before impulses and after, the rows, and
-the impulses. Every contact solve of a step, impact or force phase, opens with `open_solve` and ends with `certify`.
+the impulses. Every contact solve opens with `open_solve` and ends with `certify`.
 """
 
 from __future__ import annotations
@@ -12,26 +12,26 @@ from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
 from reference_solver.tally import (
     CONE,
-    CONTACT_WORK,
-    ENERGY,
     EXCESS,
     LOAD_WORK,
     MOMENTUM,
     NATURAL,
-    NOT_FINITE,
     OPENED,
     PENETRATION,
     PULL,
     RESOLUTION,
-    SOLVES,
-    START_OVERLAP,
-    SURFACE_WORK,
     UNIQUE,
 )
-from reference_solver.textbook.accounting import LAST_PLACE, enter_creation, enter_share
+from reference_solver.textbook.accounting import (
+    LAST_PLACE,
+    begin_certificate,
+    enter_creation,
+    enter_energy,
+    enter_overlap,
+    enter_share,
+)
 from reference_solver.textbook.motion import FREE
 from reference_solver.textbook.options import Options
-from reference_solver.textbook.vectors import are_finite
 from reference_solver.textbook2.columns import (
     ARM_A,
     ARM_B,
@@ -88,9 +88,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
 @kernel
 def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     """Enter how well velocities and impulses solve the contact problem; velocities and impulses are not changed."""
-    tally[SOLVES] += 1.0
-    if not are_finite(bodies.twist):
-        tally[NOT_FINITE] += 1.0
+    if not begin_certificate(bodies.twist, tally):
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
     before, tally[PENETRATION] = tally[PENETRATION], 0.0
@@ -99,14 +97,9 @@ def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
         done, moved, size = row_work(bodies, rows, c)
         work, surface, effort = work + done, surface + moved, effort + size
         restored = restored or rows.real[c, TARGET] > 0.0
-    if tally[OPENED] <= 1.0:
-        tally[START_OVERLAP] = max(tally[START_OVERLAP], tally[PENETRATION])
-    tally[PENETRATION] = max(tally[PENETRATION], before)
-    tally[CONTACT_WORK] += work
-    tally[SURFACE_WORK] += surface
+    enter_overlap(before, tally)
     enter_creation(work, effort, restored, tally)
-    gained, size = kinetic_change(bodies)
-    enter_share(tally, ENERGY, abs(gained - work - surface), effort + size)
+    enter_energy(work, surface, effort, kinetic_change(bodies), tally)
     tally[UNIQUE] += 1.0 if is_unique(bodies, rows, options) else 0.0
     check_momentum(bodies, rows, options, tally)
 

@@ -41,15 +41,22 @@ def facing_edge(bodies: Bodies, i: int, nx: float, ny: float) -> int:
 
 
 @inner_kernel
-def half_space_core(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
-    """Half-space f and core s: the ends of the edge that looks most against the normal, in the order of vertices."""
+def over_half_space(bodies: Bodies, f: int, s: int) -> tuple[float, float, float, float, float]:
+    """Normal of half-space f, way from its centre to that of s, and height of the latter over its face [m]."""
     co, si = bodies.real[f, COS], bodies.real[f, SIN]
     nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
     ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
     dx = bodies.pose[s, 0] - bodies.pose[f, 0]
     dy = bodies.pose[s, 1] - bodies.pose[f, 1]
+    return nx, ny, dx, dy, nx * dx + ny * dy - bodies.real[f, SIZE + 2]
+
+
+@inner_kernel
+def half_space_core(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
+    """Half-space f and core s: the ends of the edge that looks most against the normal, in the order of vertices."""
+    nx, ny, dx, dy, height = over_half_space(bodies, f, s)
     radius = bodies.real[s, ROUNDING]
-    height = nx * dx + ny * dy - bodies.real[f, SIZE + 2] - radius
+    height -= radius
     first = facing_edge(bodies, s, nx, ny)
     last = first + 1
     if last == bodies.kind[s, VERTICES]:

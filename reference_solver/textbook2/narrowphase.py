@@ -15,7 +15,7 @@ from reference_solver.compilation import inner_kernel
 from reference_solver.textbook.motion import share_of_gap
 from reference_solver.textbook2.box_box import box_box
 from reference_solver.textbook2.columns import COS, EXTENT, MOTION, SHAPE, SIN, SIZE
-from reference_solver.textbook2.core_core import core_core, half_space_core
+from reference_solver.textbook2.core_core import core_core, half_space_core, over_half_space
 from reference_solver.textbook2.points import write_point
 from reference_solver.textbook2.state import CAPSULE, DISC, HALF_SPACE, Bodies, Rows
 
@@ -48,13 +48,9 @@ def collide(bodies: Bodies, a: int, b: int, margin: float, ahead: float, rows: R
 @inner_kernel
 def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and disc s: one point under the centre."""
-    co, si = bodies.real[f, COS], bodies.real[f, SIN]
-    nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
-    ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
-    dx = bodies.pose[s, 0] - bodies.pose[f, 0]
-    dy = bodies.pose[s, 1] - bodies.pose[f, 1]
+    nx, ny, dx, dy, height = over_half_space(bodies, f, s)
     radius = bodies.real[s, SIZE]
-    gap = nx * dx + ny * dy - bodies.real[f, SIZE + 2] - radius
+    gap = height - radius
     if gap > reach:
         return 0
     at_f, at_s = (dx - radius * nx, dy - radius * ny), (-radius * nx, -radius * ny)
@@ -65,12 +61,7 @@ def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c:
 @inner_kernel
 def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and box s: the two corners of the face that looks most against the normal."""
-    co, si = bodies.real[f, COS], bodies.real[f, SIN]
-    nx = co * bodies.real[f, SIZE] - si * bodies.real[f, SIZE + 1]
-    ny = si * bodies.real[f, SIZE] + co * bodies.real[f, SIZE + 1]
-    dx = bodies.pose[s, 0] - bodies.pose[f, 0]
-    dy = bodies.pose[s, 1] - bodies.pose[f, 1]
-    height = nx * dx + ny * dy - bodies.real[f, SIZE + 2]
+    nx, ny, dx, dy, height = over_half_space(bodies, f, s)
     cs, ss = bodies.real[s, COS], bodies.real[s, SIN]
     along_x, along_y = nx * cs + ny * ss, ny * cs - nx * ss  # the normal in the box's axes
     found = 0

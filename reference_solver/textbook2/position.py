@@ -5,8 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.tally import PROJECTED
-from reference_solver.textbook.noise import ROUND_OFF
-from reference_solver.textbook.options import BLOCK, SPLIT, Options, pushes_along
+from reference_solver.textbook.options import BLOCK, SPLIT, Options, push_speed, pushes_along
 from reference_solver.textbook2.block import sweep_block_pushes
 from reference_solver.textbook2.columns import EXTENT, GAP, PUSH, PUSH_TARGET, TARGET, A, B
 from reference_solver.textbook2.kinematics import normal_velocity
@@ -41,12 +40,8 @@ def begin_pushes(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> 
     for c in range(rows.counts[CONTACTS]):
         rows.real[c, PUSH] = 0.0
         extent = min(bodies.real[rows.integer[c, A], EXTENT], bodies.real[rows.integer[c, B], EXTENT])
-        # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
         parting = rows.real[c, TARGET] if along else normal_velocity(bodies.twist, rows, c)
-        excess = -(rows.real[c, GAP] + options.dt * max(parting, 0.0)) - options.slop
-        excess = 0.0 if abs(excess) <= ROUND_OFF * extent else excess
-        # Within what is allowed a contact may close, but not farther (negative target).
-        rows.real[c, PUSH_TARGET] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
+        rows.real[c, PUSH_TARGET] = push_speed(rows.real[c, GAP], parting, extent, options)
         largest = max(largest, rows.real[c, PUSH_TARGET])
     if largest > 0.0:
         bodies.pseudo[:] = 0.0

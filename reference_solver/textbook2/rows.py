@@ -50,20 +50,14 @@ from reference_solver.textbook2.state import CONTACTS, Bodies, Pairs, Rows
 def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
     """Fill all rows from the poses and velocities at the start of the step, before forces act."""
     for c in range(rows.counts[CONTACTS]):
-        prepare_row(bodies, pairs, rows, c, options)
+        prepare_masses(bodies, rows, c)
+        a, b = rows.integer[c, A], rows.integer[c, B]
+        for k in range(2):
+            rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
+        rows.real[c, FRICTION] = pairs.friction[a, b]
+        rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
+        set_target(bodies, pairs, rows, c, options)
         set_speed(bodies, rows, c, options)
-
-
-@inner_kernel
-def prepare_row(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
-    """Fill row c but for what its speeds decide (`set_speed`)."""
-    prepare_masses(bodies, rows, c)
-    a, b = rows.integer[c, A], rows.integer[c, B]
-    for k in range(2):
-        rows.real[c, POINT + k] = bodies.pose[a, k] + rows.real[c, ARM_A + k]
-    rows.real[c, FRICTION] = pairs.friction[a, b]
-    rows.real[c, APPROACH] = normal_velocity(bodies.twist, rows, c)
-    set_target(bodies, pairs, rows, c, options)
 
 
 @inner_kernel

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.textbook2.columns import COS, EXTENT, FIRST_VERTEX, ROUNDING, SIN, VERTICES
+from reference_solver.textbook2.columns import COS, EXTENT, FIRST_VERTEX, SIN, VERTICES
 from reference_solver.textbook2.state import Bodies
 
 #: Another axis must be better by this fraction of the smaller half width, so that ties of aligned boxes are
 #: always decided the same way and round-off cannot swap the reference face (and with it the warm start).
 AXIS_ADVANTAGE = 1e-6
-#: The same where bodies are located: what is less is no tilt but round-off, and a normal is exact to it.
+#: The same where a step is solved to round-off: what is less is no tilt but round-off, and a normal is exact to it.
 EXACT_ADVANTAGE = 1e-9
 #: In place of a reference body: the axis is the line through two corners.
 CORNERS = -1
@@ -103,12 +103,7 @@ def separating_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, share:
     Returns the separation [m], the body whose edge is the axis and its number, 0; or `CORNERS` and a corner of a and
     of b. ``share``: of the smaller half width, by which a later axis has to be better.
     """
-    return best_axis(bodies, a, b, dx, dy, share * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]))
-
-
-@inner_kernel
-def best_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, advantage: float) -> tuple[float, int, int, int]:
-    """`separating_axis` where a later axis has to be better by ``advantage`` [m]."""
+    advantage = share * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT])
     best, k = best_edge(bodies, a, b, dx, dy, advantage)
     reference = a
     other, edge = best_edge(bodies, b, a, -dx, -dy, advantage)
@@ -118,15 +113,3 @@ def best_axis(bodies: Bodies, a: int, b: int, dx: float, dy: float, advantage: f
     if apart > best + advantage and apart > 0.0:
         return apart, CORNERS, i, j
     return best, reference, k, 0
-
-
-@inner_kernel
-def distance(bodies: Bodies, a: int, b: int) -> float:
-    """Gap of two bodies with vertices [m]; of overlapping ones minus the least overlap. Below it no point is missed.
-
-    Within a millionth of the smaller half width it may be less than the distance: axes compete by that advantage.
-    """
-    dx = bodies.pose[b, 0] - bodies.pose[a, 0]
-    dy = bodies.pose[b, 1] - bodies.pose[a, 1]
-    separation, _, _, _ = separating_axis(bodies, a, b, dx, dy, AXIS_ADVANTAGE)
-    return separation - bodies.real[a, ROUNDING] - bodies.real[b, ROUNDING]

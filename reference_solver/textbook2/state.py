@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_solver.direct.problem import Problem
 from reference_solver.lanes import LANES, room
@@ -26,6 +25,7 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
+from reference_solver.pieces import Indices
 from reference_solver.shapes import MOST_VERTICES
 from reference_solver.structures import structure
 from reference_solver.textbook.broadphase import Boxes, allocate_boxes
@@ -53,8 +53,6 @@ from reference_solver.textbook2.columns import (
     B,
 )
 from reference_solver.textbook2.pair_modes import LOCAL_COLUMNS, LOCAL_ROWS
-
-Indices = NDArray[np.int64]
 
 #: Shape codes; a pair of different shapes is handled in this order.
 HALF_SPACE, DISC, BOX, CAPSULE, POLYGON = 0, 1, 2, 3, 4

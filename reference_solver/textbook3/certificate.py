@@ -1,7 +1,7 @@
 """How good the answer of one contact solve is, measured from what it left behind (E14, E60 to E63).
 
 The measure knows nothing of how the answer was found: it sees velocities before impulses and after, the manifolds,
-and the impulses. Every contact solve of a step, impact or force phase, opens with `open_solve` and ends with `certify`,
+and the impulses. Every contact solve opens with `open_solve` and ends with `certify`,
 before any body turns.
 """
 
@@ -15,26 +15,26 @@ from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
 from reference_solver.tally import (
     CONE,
-    CONTACT_WORK,
-    ENERGY,
     EXCESS,
     LOAD_WORK,
     MOMENTUM,
     NATURAL,
-    NOT_FINITE,
     OPENED,
     PENETRATION,
     PULL,
     RESOLUTION,
-    SOLVES,
-    START_OVERLAP,
-    SURFACE_WORK,
     UNIQUE,
 )
-from reference_solver.textbook.accounting import LAST_PLACE, enter_creation, enter_share
+from reference_solver.textbook.accounting import (
+    LAST_PLACE,
+    begin_certificate,
+    enter_creation,
+    enter_energy,
+    enter_overlap,
+    enter_share,
+)
 from reference_solver.textbook.motion import FREE
 from reference_solver.textbook.options import Options
-from reference_solver.textbook.vectors import are_finite
 from reference_solver.textbook3.kinematics import (
     add_pressure,
     apply_wrench,
@@ -82,9 +82,7 @@ def open_solve(bodies: Bodies, dt: float, tally: Array) -> None:
 @kernel
 def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array) -> None:
     """Enter how well velocities and impulses solve the contact problem; velocities and impulses are not changed."""
-    tally[SOLVES] += 1.0
-    if not are_finite(bodies.twist):
-        tally[NOT_FINITE] += 1.0
+    if not begin_certificate(bodies.twist, tally):
         return
     work, surface, effort, restored = 0.0, 0.0, 0.0, False
     before, tally[PENETRATION] = tally[PENETRATION], 0.0
@@ -98,14 +96,9 @@ def certify(bodies: Bodies, manifolds: Manifolds, options: Options, tally: Array
             done, moved, size = point_work(bodies, manifolds, m, p, both)
             work, surface, effort = work + done, surface + moved, effort + size
             restored = restored or manifolds.target[m, p] > 0.0
-    if tally[OPENED] <= 1.0:
-        tally[START_OVERLAP] = max(tally[START_OVERLAP], tally[PENETRATION])
-    tally[PENETRATION] = max(tally[PENETRATION], before)
-    tally[CONTACT_WORK] += work
-    tally[SURFACE_WORK] += surface
+    enter_overlap(before, tally)
     enter_creation(work, effort, restored, tally)
-    gained, size = kinetic_change(bodies)
-    enter_share(tally, ENERGY, abs(gained - work - surface), effort + size)
+    enter_energy(work, surface, effort, kinetic_change(bodies), tally)
     tally[UNIQUE] += 1.0 if is_unique(bodies, manifolds) else 0.0
     check_momentum(bodies, manifolds, options, tally)
 

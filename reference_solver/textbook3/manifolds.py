@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from reference_solver.compilation import inner_kernel
-from reference_solver.textbook.broadphase import bodies_of
+from reference_solver.textbook.broadphase import bodies_of, pair_of
 from reference_solver.textbook.noise import TOUCHING
 from reference_solver.textbook.options import BLOCK, Options
 from reference_solver.textbook3.broadphase import find_candidates
@@ -11,7 +11,6 @@ from reference_solver.textbook3.narrowphase import collide
 from reference_solver.textbook3.state import (
     CANDIDATES,
     MANIFOLDS,
-    MOST_BODIES,
     REMEMBERED,
     Bodies,
     Detection,
@@ -56,12 +55,6 @@ def detect(bodies: Bodies, detection: Detection, manifolds: Manifolds, options: 
             m += 1
     detection.found[MANIFOLDS] = m
     return m
-
-
-@inner_kernel
-def pair_key(a: int, b: int) -> int:
-    """Bodies a and b as one integer that sorts like the pair."""
-    return a * MOST_BODIES + b
 
 
 @inner_kernel
@@ -133,7 +126,7 @@ def recall(bodies: Bodies, detection: Detection, manifolds: Manifolds, memory: M
         for p in range(manifolds.points[m]):
             for k in range(3):
                 manifolds.impulse[m, p, k] = 0.0
-        pair = pair_key(manifolds.body_a[m], manifolds.body_b[m])
+        pair = pair_of(manifolds.body_a[m], manifolds.body_b[m])
         while old < detection.found[REMEMBERED] and memory.pair[old] < pair:
             old += 1
         if options.warm_starting and old < detection.found[REMEMBERED] and memory.pair[old] == pair:
@@ -177,7 +170,7 @@ def recall_impulse(manifolds: Manifolds, m: int, p: int, memory: Memory, old: in
 def remember(detection: Detection, manifolds: Manifolds, memory: Memory) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
     for m in range(len(manifolds)):
-        memory.pair[m] = pair_key(manifolds.body_a[m], manifolds.body_b[m])
+        memory.pair[m] = pair_of(manifolds.body_a[m], manifolds.body_b[m])
         memory.points[m] = manifolds.points[m]
         for p in range(manifolds.points[m]):
             memory.feature[m, p] = manifolds.feature[m, p]

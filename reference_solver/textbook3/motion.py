@@ -37,12 +37,7 @@ def quaternion(bodies: Bodies, i: int) -> Quaternion:
 @inner_kernel
 def set_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
     """Store a quaternion, made a unit one, with the rotation matrix and world inertia that belong to it."""
-    put_orientation(bodies, i, normalised(q))
-
-
-@inner_kernel
-def put_orientation(bodies: Bodies, i: int, q: Quaternion) -> None:
-    """Store a unit quaternion, to the bit, with the rotation matrix and world inertia that belong to it."""
+    q = normalised(q)
     for d in range(4):
         bodies.pose[i, 3 + d] = q[d]
     axes_of_quaternion(q, bodies.axes, i)
@@ -117,7 +112,8 @@ def collect_momentum(bodies: Bodies, i: int, before: Vector) -> None:
 def turn_freely(bodies: Bodies, i: int, dt: float) -> None:
     """Turn body i with constant angular momentum for dt, and set the spin that belongs to it (E18)."""
     momentum = row(bodies.angular_momentum, i, 0)
-    set_orientation(bodies, i, split_turn(bodies, i, momentum, dt))
+    local, moments = times_transposed(bodies.axes, i, momentum), row(bodies.moments, i, 0)
+    set_orientation(bodies, i, split_flow(quaternion(bodies, i), local, moments, dt))
     w = spin_of(bodies, i, momentum)
     for d in range(3):
         bodies.twist[i, 3 + d] = w[d]
@@ -129,12 +125,6 @@ def spin_of(bodies: Bodies, i: int, momentum: Vector) -> Vector:
     local = times_transposed(bodies.axes, i, momentum)
     moments = row(bodies.moments, i, 0)
     return times(bodies.axes, i, (local[0] / moments[0], local[1] / moments[1], local[2] / moments[2]))
-
-
-@inner_kernel
-def split_turn(bodies: Bodies, i: int, momentum: Vector, dt: float) -> Quaternion:
-    """Quaternion of body i after dt with constant angular momentum [kg m^2/s], by the splitting E18."""
-    return split_flow(quaternion(bodies, i), times_transposed(bodies.axes, i, momentum), row(bodies.moments, i, 0), dt)
 
 
 @inner_kernel

@@ -5,8 +5,7 @@ from __future__ import annotations
 from reference_solver.compilation import inner_kernel
 from reference_solver.model import Array
 from reference_solver.tally import PROJECTED
-from reference_solver.textbook.noise import ROUND_OFF
-from reference_solver.textbook.options import SPLIT, Options, pushes_along
+from reference_solver.textbook.options import SPLIT, Options, push_speed, pushes_along
 from reference_solver.textbook3.kinematics import relative_twist, velocity_at
 from reference_solver.textbook3.sequential_impulses import sweep_pushes
 from reference_solver.textbook3.state import Bodies, Manifolds
@@ -44,18 +43,11 @@ def begin_pushes(bodies: Bodies, manifolds: Manifolds, options: Options, tally: 
         extent = min(bodies.extent[manifolds.body_a[m]], bodies.extent[manifolds.body_b[m]])
         for p in range(manifolds.points[m]):
             manifolds.push[m, p] = 0.0
-            # A contact that parts by itself (a rebound) is not pushed as well: that would add energy to a bounce.
-            parting = max(manifolds.target[m, p] if along else velocity_at(v, w, manifolds, m, p)[2], 0.0)
-            excess = -(manifolds.gap[m, p] + options.dt * parting) - options.slop
-            if abs(excess) <= ROUND_OFF * extent:
-                excess = 0.0
-            # Within what is allowed a contact may close, but not farther (negative target).
-            manifolds.push_target[m, p] = (options.beta if excess > 0.0 else 1.0) * excess / options.dt
+            parting = manifolds.target[m, p] if along else velocity_at(v, w, manifolds, m, p)[2]
+            manifolds.push_target[m, p] = push_speed(manifolds.gap[m, p], parting, extent, options)
             largest = max(largest, manifolds.push_target[m, p])
     if largest > 0.0:
-        for i in range(len(bodies)):
-            for d in range(6):
-                bodies.pseudo[i, d] = 0.0
+        bodies.pseudo[:] = 0.0
         tally[PROJECTED] = max(tally[PROJECTED], options.dt * largest)
     return largest
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_solver.direct.problem import Problem
 from reference_solver.model import (
@@ -28,21 +27,17 @@ from reference_solver.model import (
     smallest_extent,
 )
 from reference_solver.needs import Needs
+from reference_solver.pieces import Indices
 from reference_solver.structures import structure
 from reference_solver.textbook.broadphase import Boxes, allocate_boxes
 from reference_solver.textbook.motion import MOTION_CODE
 from reference_solver.textbook.options import Options
-
-Indices = NDArray[np.int64]
 
 #: Shape codes, from flat to round; a pair of different shapes is handled in this order.
 HALF_SPACE, BOX, SPHERE, CAPSULE = 0, 1, 2, 3
 
 #: Points per manifold: two rectangles share a polygon of up to eight corners, and each of them can carry load.
 POINTS = 8
-
-#: Most bodies of a world: the numbers of two of them are packed into one key.
-MOST_BODIES = 1 << 31
 
 #: Entries of `Detection.found`: candidates, manifolds remembered of the step before, manifolds.
 CANDIDATES, REMEMBERED, MANIFOLDS = 0, 1, 2
@@ -117,7 +112,7 @@ MANIFOLD = np.dtype(
 #: What is remembered of a manifold until the next step.
 MEMORY = np.dtype(
     [
-        ("pair", "i8"),  # `manifolds.pair_key`, ascending
+        ("pair", "i8"),  # `pair_of` its bodies, ascending
         ("points", "i8"),
         ("feature", "i8", POINTS),
         ("impulse", "f8", (POINTS, 3)),  # world axes, so that a turning contact frame does not turn the impulse

@@ -87,7 +87,7 @@ def test_conveyor_drags_a_box_to_its_own_speed(build, reference):
     assert simulation.twist[1] == pytest.approx([1.5, 0.0, 0.0], abs=1e-12)
 
 
-# In a located step impulses add up over sub-steps, between which normals turn.
+# In the loop of events impulses add up over all that happens in a step, in which normals turn.
 @pytest.mark.parametrize("settings", ["classical", "fixed_step"], indirect=True)
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_friction_stays_in_the_cone_and_contacts_never_pull(build, settings, seed):

@@ -57,7 +57,7 @@ def test_frictionless_collisions_never_gain_energy(build, mechanics, unpushed, r
         assert restitution == 1.0 or after < 0.99 * before
 
 
-# In a located step impulses add up over sub-steps, between which normals turn.
+# In the loop of events impulses add up over all that happens in a step, in which normals turn.
 @pytest.mark.parametrize("settings", ["classical", "fixed_step"], indirect=True)
 def test_every_impulse_has_its_opposite_and_pushes(build, settings):
     simulation = cloud(build, settings, 0.3, 0.4)
