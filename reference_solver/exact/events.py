@@ -49,7 +49,7 @@ class Event:
         At which share of the piece.
     contact
         Number of the contact that it happens to, -1 for none.
-    left
+    ended
         Contacts whose feature ends where the piece begins.
     modes
         By number of contact: modes that end where the piece begins, and what they become.
@@ -58,13 +58,13 @@ class Event:
     kind: Kind
     share: float
     contact: int = -1
-    left: frozenset[tuple[int, ...]] = frozenset()
+    ended: frozenset[tuple[int, ...]] = frozenset()
     modes: tuple[tuple[int, int], ...] = ()
 
     @property
     def at_start(self) -> bool:
         """Whether the piece cannot begin like this."""
-        return bool(self.left or self.modes)
+        return bool(self.ended or self.modes)
 
 
 class Monitors:
@@ -112,10 +112,10 @@ class Monitors:
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
 
 
-def first_event(world: World, piece: Piece, stuck: bool) -> Event:
+def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
     """Return the first event of a piece; where something ends as the piece begins, that alone.
 
-    ``stuck``: whether the last piece was an instant; then what is as near as round-off is not met again.
+    ``after_instant``: whether the piece before was an instant; then what is as near as round-off is not met again.
     """
     event = Event(Kind.LOOK, 1.0)
     if len(piece.held.contacts):
@@ -123,13 +123,13 @@ def first_event(world: World, piece: Piece, stuck: bool) -> Event:
         piece.held.contacts.at_state(piece.start)
     if event.at_start:
         return event
-    share, stopped = next_meeting(world, piece, piece.held.contacts, stuck)
+    share, stopped = next_meeting(world, piece, piece.held.contacts, after_instant)
     return Event(Kind.LOOK if stopped else Kind.MEET, share) if share < event.share else event
 
 
 def _first_end(piece: Piece, monitors: Monitors) -> Event:
     shares = OF_STEP if piece.turns else OF_CONSTANT
-    event, left, modes = Event(Kind.LOOK, 1.0), set(), {}
+    event, ended, modes = Event(Kind.LOOK, 1.0), set(), {}
     before = monitors(shares[0])
     for last, now in pairwise(shares):
         values = monitors(now)
@@ -141,7 +141,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
                 share = last
             else:  # it is at its end from the beginning
                 if kind is Kind.FEATURE:
-                    left.add(tuple(piece.held.contacts.features[k].tolist()))
+                    ended.add(tuple(piece.held.contacts.features[k].tolist()))
                 elif kind is not Kind.SLIDE:
                     modes[k] = OPEN if kind is Kind.LIFT else SLIP
                 else:
@@ -149,8 +149,8 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
                 continue
             if share < event.share:
                 event = Event(kind, share, k)
-        if left or modes:
-            return Event(event.kind, event.share, event.contact, frozenset(left), tuple(modes.items()))
+        if ended or modes:
+            return Event(event.kind, event.share, event.contact, frozenset(ended), tuple(modes.items()))
         if event.kind is not Kind.LOOK:
             return event
         before = values

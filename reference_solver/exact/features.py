@@ -51,12 +51,12 @@ def margins(world: World, place: Array, axes: Array, features: Indices) -> Array
     return out
 
 
-def find(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Indices:
-    """Return the contacts (m, 6) of a state: each place once, without features that are left at once.
+def find(world: World, state: State, ended: frozenset[tuple[int, ...]] = frozenset()) -> Indices:
+    """Return the contacts (m, 6) of a state: each place once, without features that end at once.
 
     Parameters
     ----------
-    left
+    ended
         Contacts whose features are known to end here.
     """
     tol = TOUCH * world.size
@@ -66,7 +66,7 @@ def find(world: World, state: State, left: frozenset[tuple[int, ...]] = frozense
     found = found[:count]
     if not count:
         return found
-    out = np.array([tuple(each) in left for each in found.tolist()])
+    out = np.array([tuple(each) in ended for each in found.tolist()])
     margin = margins(world, state.place, state.axes, found)
     at_end = margin < tol
     if at_end.any():

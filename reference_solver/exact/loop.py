@@ -21,16 +21,20 @@ from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
 from reference_solver.exact.rows import Contacts, touching_contacts
 from reference_solver.exact.series import settling
 from reference_solver.exact.stiff import step
+from reference_solver.model import Array
 
-#: Pieces of a run: some 40 s of CPU. Shorter ones than this share of the world's time are an instant.
-MOST_PIECES, PROGRESS = 20_000, 1e-11
+#: Pieces of a run: some 40 s of CPU.
+MOST_PIECES = 20_000
+#: Length of a piece, as a share of the world's time, up to which it is an instant: what falls from rest moves 1e-22 of
+#: a half width in it.
+PROGRESS = 1e-11
 #: Events that may follow each other within this share of the longest piece. A series of rebounds with e = .95 takes
 #: three hundred to become too low.
 MOST_IN_A_ROW, ROW = 1000, 1e-3
 #: An instant in which impulses do what no forces can (E54), as a share of the world's time: loads make some hundred
 #: times the speed in it that counts as none.
 INSTANT = 4e-10
-#: First step of a motion that turns, as a share of the world's time.
+#: First step of a motion that turns, as a share of the world's time; it is made shorter or longer to the tolerance.
 FIRST_STEP = 0.1
 #: Modes that end while others go on: forces do not jump there.
 GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
@@ -55,23 +59,35 @@ class Loop:
         Error of a step of `Turning`.
     longest
         Longest piece [s]: longer ones would be the same.
+    pieces, steps, events
+        How many there were; steps are the pieces that were made to the tolerance.
+    held
+        Contacts that go on from the piece before, with their forces; None where all is to be found anew.
+    ended
+        Contacts whose feature ends where the next piece begins.
     blows
         What came before the piece that is returned next.
+    step_length
+        Of the next step to the tolerance [s]; 0 where a closed form is tried first.
+    after_instant
+        Whether the piece before was an instant, see `PROGRESS`.
+    counted_from
+        When the last `MOST_IN_A_ROW` events began [s].
     """
 
     world: World
     state: State
     tolerance: float
     longest: float
-    step: float = 0.0
     pieces: int = 0
-    steps: int = 0  # made to the tolerance
+    steps: int = 0
     events: int = 0
-    stuck: bool = False  # whether the piece before was an instant, see `PROGRESS`
+    held: Held | None = None
+    ended: frozenset[tuple[int, ...]] = frozenset()
     blows: list[Blow] = field(default_factory=list)
-    row: float = 0.0  # where a count of pieces in a row began [s]
-    held: Held | None = None  # what goes on from the piece before
-    left: frozenset[tuple[int, ...]] = frozenset()  # contacts at the end of a feature
+    step_length: float = 0.0
+    after_instant: bool = False
+    counted_from: float = 0.0
 
     def next_piece(self) -> tuple[list[Blow], Piece]:
         """Return what strikes bodies now and the motion up to the next event, and move the world to its end.
@@ -82,47 +98,62 @@ class Loop:
             Where the loop has no answer.
         """
         while True:
-            held = self.held or self._found()
+            held = self.held
             if held is None:
-                continue
-            piece = self._piece(held)
-            event = first_event(self.world, piece, self.stuck)
+                contacts = self._find()
+                if self._strike(contacts):
+                    contacts = self._find()
+                    held = settling(self.world, self.state, self._closed(contacts))
+                held = held or self._decide(contacts)
+                if held is None:  # a jam has changed velocities
+                    continue
+            piece = self._move(held)
+            event = first_event(self.world, piece, self.after_instant)
             if event.at_start:
-                self._count(event.kind.value)
-                self.left, self.held = self.left | event.left, self._revised(held, event)
+                self._change_modes(held, event)
                 continue
             piece = self._cut(piece, event)
             check(self.world, piece, self.tolerance)
             blows, self.blows = self.blows, []
-            self.held = self._entered(piece, event)
+            self._enter(piece, event)
             return blows, piece
 
-    def _found(self) -> Held | None:
-        """Find what touches, strike it, and decide forces; None where a jam changed velocities instead."""
-        contacts = touching_contacts(self.world, self.state, self.left)
-        none = no_gap(self.world, self.state.place)
-        blows = strike(self.world, self.state, contacts.chosen(contacts.touch(none)))
-        if blows:
-            struck = blows[-1].after
-            change = np.abs(struck.velocity - self.state.velocity)
-            stops = np.abs(struck.velocity) < np.minimum(
-                NO_SPEED * self.world.speed * self.world.per_length, NO_SHARE * change
-            )
-            velocity = np.where(stops, 0.0, struck.velocity)
-            self.state = replace(struck, velocity=velocity)
-            self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
-            contacts = touching_contacts(self.world, self.state, self.left)
-        if blows and (held := settling(self.world, self.state, contacts.chosen(contacts.touch(none)))):
-            return held
+    def _find(self) -> Contacts:
+        return touching_contacts(self.world, self.state, self.ended)
+
+    def _closed(self, contacts: Contacts) -> Contacts:
+        """Return those whose gaps count as none."""
+        return contacts.chosen(contacts.touch(no_gap(self.world, self.state.place)))
+
+    def _free_acceleration(self) -> Array:
+        """Return accelerations (n, q) without contacts."""
+        return free_acceleration(self.world, self.state.axes, self.state.velocity)
+
+    def _strike(self, contacts: Contacts) -> bool:
+        """Strike what touches and approaches; return whether anything does."""
+        blows = strike(self.world, self.state, self._closed(contacts))
+        if not blows:
+            return False
+        struck = blows[-1].after
+        change = np.abs(struck.velocity - self.state.velocity)
+        stops = np.abs(struck.velocity) < np.minimum(
+            NO_SPEED * self.world.speed * self.world.per_length, NO_SHARE * change
+        )
+        self.state = replace(struck, velocity=np.where(stops, 0.0, struck.velocity))
+        self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
+        return True
+
+    def _decide(self, contacts: Contacts) -> Held | None:
+        """Return which contacts hold, stick and slip; None where no forces exist and a jam changes velocities."""
+        none, still = no_gap(self.world, self.state.place), self.world.still
         speed = contacts.rows.speed[:, 0]  # what approaches and has a gap meets later
-        contacts = contacts.chosen((speed < self.world.still) & (contacts.touch(none) | (speed > -self.world.still)))
-        free = free_acceleration(self.world, self.state.axes, self.state.velocity)
+        contacts = contacts.chosen((speed < still) & (contacts.touch(none) | (speed > -still)))
         try:
-            held = decide(self.world, self.state, contacts, free)
+            held = decide(self.world, self.state, contacts, self._free_acceleration())
         except NoSolution:
             self._jam(contacts)
             return None
-        self.step = 0.0
+        self.step_length = 0.0
         self._project(held)
         return held
 
@@ -139,18 +170,18 @@ class Loop:
         self.state = blow.after
         self._count("a jam")
 
-    def _piece(self, held: Held) -> Piece:
+    def _move(self, held: Held) -> Piece:
         """Return the piece from here on: exact where accelerations are constant, else a step."""
         if held.lasts > 0.0:
             return steady(self.state, held, held.acceleration, held.lasts)
-        if self.step == 0.0:
+        if self.step_length == 0.0:
             piece = constant(self.world, self.state, held, self.longest)
             if piece is not None:
                 return piece
-            self.step = FIRST_STEP * self.world.time
+            self.step_length = FIRST_STEP * self.world.time
         self.steps += 1
         tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
-        piece, self.step = step(self.world, self.state, held, tolerance, min(self.step, self.longest))
+        piece, self.step_length = step(self.world, self.state, held, tolerance, min(self.step_length, self.longest))
         return piece
 
     def _turns_freely(self, held: Held) -> bool:
@@ -170,49 +201,49 @@ class Loop:
             return shorter
         return piece.cut(event.share)
 
-    def _entered(self, piece: Piece, event: Event) -> Held | None:
-        """Move the world to the end of a piece; return the contacts that go on, if forces do not jump there."""
+    def _enter(self, piece: Piece, event: Event) -> None:
+        """Move the world to the end of a piece, and keep its contacts if forces do not jump there."""
         self.pieces += 1
         if self.pieces > MOST_PIECES:
             raise TooManyPieces(count=MOST_PIECES, t=self.state.t)
         self._count(event.kind.value)
-        self.stuck = piece.length <= PROGRESS * self.world.time
-        if not self.stuck:
-            self.left = frozenset()
-        self.state = piece.state(1.0)
+        self.after_instant = piece.length <= PROGRESS * self.world.time
+        if not self.after_instant:
+            self.ended = frozenset()
+        self.state, self.held = piece.state(1.0), None
+        if piece.turns:
+            self._go_on(piece.held, event)
+            return
+        self.step_length = 0.0
         if piece.held.lasts > 0.0 and event.kind is Kind.LOOK:  # rebounds that are summed end where contacts are closed
             self._project(piece.held)
-        if not piece.turns:
-            self.step = 0.0
-            return None
-        held = self._here(piece.held)
-        if event.kind is Kind.LOOK:
-            return None if held.slips_end else held
-        if event.kind in GO_ON:
-            free = free_acceleration(self.world, self.state.axes, self.state.velocity)
-            return changed(held, {event.contact: GO_ON[event.kind]}, free)
-        return None
 
-    def _here(self, held: Held) -> Held:
-        """Return contacts that stay closed, with their forces where the world is now."""
+    def _go_on(self, held: Held, event: Event) -> None:
+        """Keep contacts that stay closed at the end of a step, with their forces there."""
         self._project(held)
-        return held.at(self.state, free_acceleration(self.world, self.state.axes, self.state.velocity))
+        held = held.at(self.state, self._free_acceleration())
+        if event.kind is Kind.LOOK and not held.slips_end:
+            self.held = held
+        elif event.kind in GO_ON:
+            self.held = changed(held, {event.contact: GO_ON[event.kind]}, self._free_acceleration())
 
-    def _revised(self, held: Held, event: Event) -> Held | None:
-        """Return contacts whose modes that end at once have changed; None where all are to be found anew."""
-        if event.left:
-            return None
-        free = free_acceleration(self.world, self.state.axes, self.state.velocity)
+    def _change_modes(self, held: Held, event: Event) -> None:
+        """Change the modes that end as their piece begins; where a feature ends, all is to be found anew."""
+        self._count(event.kind.value)
+        self.ended, self.held = self.ended | event.ended, None
+        if event.ended:
+            return
         modes = dict(event.modes)
-        found = changed(held, modes, free)
-        if found is None and STICK in modes.values():  # no forces hold it, and none let it go
+        self.held = changed(held, modes, self._free_acceleration())
+        if self.held is None and STICK in modes.values():  # no forces hold it, and none let it go
             self._jam(held.contacts)
-            return None
-        return found or changed(held, modes, free, strictly=False)
+        elif self.held is None:
+            self.held = changed(held, modes, self._free_acceleration(), strictly=False)
 
     def _count(self, what: str) -> None:
+        """Count an event, and refuse where time hardly goes on."""
         self.events += 1
         if self.events % MOST_IN_A_ROW == 0:
-            if self.state.t - self.row < ROW * self.longest:
+            if self.state.t - self.counted_from < ROW * self.longest:
                 raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=what)
-            self.row = self.state.t
+            self.counted_from = self.state.t

@@ -55,7 +55,7 @@ def course_of(piece: Piece) -> Course:
     return Course(piece.start.place, piece.start.axes, piece.way, np.ascontiguousarray(spin))
 
 
-def next_meeting(world: World, piece: Piece, contacts: Contacts, stuck: bool) -> tuple[float, bool]:
+def next_meeting(world: World, piece: Piece, contacts: Contacts, after_instant: bool) -> tuple[float, bool]:
     """Return the share of the first meeting in a piece in which contacts stay closed, `NEVER` if there is none.
 
     And whether the search was given up there, and goes on.
@@ -74,7 +74,7 @@ def next_meeting(world: World, piece: Piece, contacts: Contacts, stuck: bool) ->
     round_ = (bodies.points == 1) | (bodies.points == 0)
     edges = ~(round_[:, None] | round_[None, :]) & ~touch if world.dimension == 3 else np.zeros((n, n), np.bool_)
     none = no_gap(world, piece.start.place)
-    if stuck:
+    if after_instant:
         none = np.maximum(none, NOISE * world.size)
     scales = np.array([NOISE * world.size, SLOW * world.speed * piece.length])
     found = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales, none)

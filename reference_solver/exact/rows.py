@@ -189,13 +189,13 @@ def moments(place: Array, force: Array) -> Array:
     return np.stack([place[..., i] * force[..., j] - place[..., j] * force[..., i] for i, j in parts], axis=-1)
 
 
-def touching_contacts(world: World, state: State, left: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
+def touching_contacts(world: World, state: State, ended: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
     """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it.
 
     There bodies meet along the normal along which they close last. Edges that cross count at one place each: where a
     corner leaves a face two begin, which part.
     """
-    features = find(world, state, left)
+    features = find(world, state, ended)
     contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
     crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
     place = contacts.rows.place
