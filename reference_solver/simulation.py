@@ -11,7 +11,7 @@ The loop of events and the textbooks of both dimensions are packages behind one 
         sample).
     world.contacts() -> Contacts     of the last step made
     world.step_problem() -> StepProblem     of the next step, which is not made
-    world.tally                      float64 array over the whole run, indexed by the constants in tally.py
+    world.tally                      of a textbook: float64 array over the whole run, see tally.py
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 from reference_solver.checks import require_count
 from reference_solver.model import Array, Model
 from reference_solver.needs import EVERYTHING, Needs, needs
-from reference_solver.pieces import Journal, empty_journal, pieces_of
+from reference_solver.pieces import Journal, pieces_of
 from reference_solver.records import Contacts, Frames, Record, joined
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
@@ -33,7 +33,7 @@ from reference_solver.tally_summary import columns, summary
 
 
 class World(Protocol):
-    """What `Simulation` asks of the loop and of the textbooks; `recorded` and `is_closed` of the loop alone."""
+    """What `Simulation` asks of both; of the textbooks alone `tally`, of the loop alone `recorded` and `is_closed`."""
 
     pose: Array
     twist: Array
@@ -77,8 +77,8 @@ class Simulation:
     model_everything
         Leave nothing out, whatever the model needs; the answer must be the same (for tests).
     certified
-        Measure how good each contact solve is (`certificate`). A fixed number of sweeps at fixed steps can do without:
-        the motion has the same bits, and a step takes less time. All else is always certified.
+        Measure how good each contact solve of a step is (`certificate`). A fixed number of sweeps can do without: the
+        motion has the same bits, and a step takes less time. Sweeps to a residual are always certified.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class Simulation:
         self.settings = settings
         self.needs: Needs = EVERYTHING if model_everything else needs(model)
         package = import_module(WORLDS[model.dimension] if settings.tolerance is None else EVENT_LOOP)
-        self._certified = certified or settings.residual is not None or settings.tolerance is not None
+        self._certified = certified or settings.residual is not None
         self._world: World = package.World(model, settings, self.needs, self._certified)
         self._steps = 0
 
@@ -129,23 +129,28 @@ class Simulation:
         """Make ``steps`` steps and return the samples at the start and after every ``stride`` steps.
 
         With ``certificates`` every sample tells how good the steps since the one before were; compiled code is then
-        entered once a sample instead of once a run. With ``pieces`` every force phase and every impact is recorded as
-        well, for an audit; the answer has the same bits either way.
+        entered once a sample instead of once a run. With ``pieces`` all that the loop of events does is recorded as
+        well, for an audit. The answer has the same bits either way.
 
         Raises
         ------
         ValueError
-            If ``steps`` is negative or ``stride`` below 1, or pieces are asked of steps.
+            If ``steps`` is negative or ``stride`` below 1, or pieces are asked of steps, or certificates of the loop.
         """
         require_count("steps", steps, 0)
         require_count("stride", stride, 1)
         if pieces and self.settings.tolerance is None:
             raise ValueError("pieces: the loop of events has them; a step of length dt has none")
+        if certificates:
+            self._require_steps()
         first, start_pose, start_twist = self._steps, self.pose, self.twist
         tallies: list[Array] = []
         journals: list[Journal] = []
-        if certificates or pieces:
-            frames, tallies, journals = self._in_parts(steps, stride, contacts, certificates, pieces)
+        if pieces:
+            frames, journal = self._world.recorded(steps, stride, contacts)
+            journals.append(journal)
+        elif certificates:
+            frames, tallies = self._in_parts(steps, stride, contacts)
         else:
             frames = self._world.run(steps, stride, contacts)
         self._steps += steps
@@ -160,27 +165,21 @@ class Simulation:
             pieces=pieces_of(journals, self.model.dimension, self.settings.dt, first) if pieces else None,
         )
 
-    def _in_parts(
-        self, steps: int, stride: int, contacts: bool, certificates: bool, pieces: bool
-    ) -> tuple[Frames, list[Array], list[Journal]]:
-        """Run part by part: each has a journal, and a tally that is then entered in that of the run."""
-        whole, parts, tallies, journals = self._world.tally.copy(), [], [], []
-        part = stride if certificates else max(1, steps)
-        for chunk in [part] * (steps // part) + [steps % part] * (steps % part > 0):
+    def _in_parts(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, list[Array]]:
+        """Run sample by sample: each part has a tally, which is then entered in that of the run."""
+        whole, parts, tallies = self._world.tally.copy(), [], []
+        for chunk in [stride] * (steps // stride) + [steps % stride] * (steps % stride > 0):
             self._world.tally[:] = 0.0
             self._world.tally[OPENED] = whole[OPENED]  # only the first solve of the run is at its start
-            if pieces:
-                frames, journal = self._world.recorded(chunk, stride, contacts)
-                journals.append(journal)
-            else:
-                frames = self._world.run(chunk, stride, contacts)
-            parts.append(frames)
+            parts.append(self._world.run(chunk, stride, contacts))
             tallies.append(self._world.tally.copy())
             merge(whole, tallies[-1])
         self._world.tally[:] = whole
-        parts = parts or [self._world.run(0, stride, contacts)]
-        journals = journals or [empty_journal(self.model.dimension)]
-        return joined(parts), tallies[: steps // stride], journals
+        return joined(parts or [self._world.run(0, stride, contacts)]), tallies[: steps // stride]
+
+    def _require_steps(self) -> None:
+        if self.settings.tolerance is not None:
+            raise ValueError("certificate: of steps; reference_solver.certificate.truth.certify judges the event loop")
 
     @property
     def pose(self) -> Array:
@@ -212,10 +211,12 @@ class Simulation:
 
     @property
     def certificate(self) -> dict[str, Any]:
-        """How well the answers solve their own equations, over the run; without ``certified`` `UNCERTIFIED` alone.
+        """How well answers of steps solve their own equations, over the run; without ``certified`` `UNCERTIFIED` alone.
+
+        Raises ValueError for the event loop, which `certificate.truth.certify` judges.
 
         ``holds``
-            Whether the run may serve as truth: every share below is within its gate (`certificate.GATES`).
+            Whether every share below is within its gate (`tally_summary.GATES`).
         ``reasons``
             What failed, one sentence each.
         ``residual``, ``sweeps``, ``worst_sweeps``, ``converged``
@@ -242,6 +243,7 @@ class Simulation:
         ``direct``, ``factorisations``
             Contact solves that the direct solver finished (E44), and its factorisations in all of them.
         """
+        self._require_steps()
         found = summary(self._world.tally)
         return found if self._certified else {name: found[name] for name in UNCERTIFIED}
 

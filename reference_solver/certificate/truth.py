@@ -24,7 +24,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -82,8 +81,7 @@ class Certificate:
     Parameters
     ----------
     holds
-        Whether it may serve as truth to ``error`` until ``horizon``: every finding, and the solver's own
-        certificate, are within their limits.
+        Whether it may serve as truth to ``error`` until ``horizon``: every finding is within its limit.
     reasons
         What failed, one sentence each; and, where the horizon lies within the run, that only laws are certified
         beyond it, which is no failure.
@@ -115,8 +113,6 @@ class Certificate:
         Largest gap that counts as none where the run is [m].
     grazed
         (s,) way of bodies that meet or pass each other as such a gap decides [m].
-    light
-        What the solver says of itself (`Simulation.certificate`).
     pose
         (s, n, 3 | 7) poses that are certified.
     """
@@ -135,7 +131,6 @@ class Certificate:
     dt: float
     gap: float
     grazed: Array = field(repr=False)
-    light: dict[str, Any] = field(repr=False)
     pose: Array = field(repr=False)
 
     def error_until(self, t: float) -> float:
@@ -206,10 +201,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
     findings = [*audit(model, record, settings.dt), shared]
-    light = run.certificate
-    reasons = [*light["reasons"], *(str(finding) for finding in findings if not finding.holds)]
-    if not light["converged"]:
-        reasons.append("solves were used that had not converged")
+    reasons = [str(finding) for finding in findings if not finding.holds]
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = _error(model, run, record, steps, stride) + round_off
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
@@ -233,7 +225,6 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         settings.dt,
         gap,
         grazed,
-        light,
         record.pose,
     )
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
@@ -249,8 +240,7 @@ def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: st
     t = np.multiply(stride * settings.dt, np.arange(samples + 1), dtype=np.float64)
     none = np.full(samples + 1, np.inf)
     pose = np.full((samples + 1, len(model.bodies), POSE_SIZE[model.dimension]), np.nan)
-    light = Simulation(model, settings).certificate
-    made = (none, none, float("inf"), float("inf"), "", False, none, settings.dt, 0.0, none, light, pose)
+    made = (none, none, float("inf"), float("inf"), "", False, none, settings.dt, 0.0, none, pose)
     return Certificate(False, (why,), (), t, *made)
 
 

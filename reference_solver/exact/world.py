@@ -17,7 +17,6 @@ from reference_solver.pieces import Journal
 from reference_solver.records import Contacts, Frames, joined, joined_contacts
 from reference_solver.settings import Settings
 from reference_solver.step_problem import StepProblem
-from reference_solver.tally import new_tally
 
 #: Longest piece, in units of the world's time.
 LONGEST = 10.0
@@ -39,7 +38,6 @@ class World:
         self._share = 0.0  # of the piece, up to where the world was looked at
         self._parts: list[Part | Blow] = []  # what happened in the last step
         self.pose, self.twist = state.pose, state.velocity.copy()
-        self.tally = new_tally()
 
     def run(self, steps: int, stride: int, contacts: bool) -> Frames:
         """Look at the world after every ``stride`` of ``steps`` steps.

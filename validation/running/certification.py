@@ -20,10 +20,10 @@ def fully_certified(
     """Return ``trajectory`` with the full certificate of its engine entered, where the engine has one.
 
     Entries are ``full`` (from the engine), ``metric_errors``, and the resulting ``certified`` and ``reasons``. Runs
-    that diverged, and those with a moved start, are not judged and keep the light certificate.
+    that diverged, and those with a moved start, are not judged and have none.
     """
     light = trajectory.certificate
-    if slot.ulp or "certified" not in light or trajectory.finish == "diverged":
+    if slot.ulp or trajectory.finish == "diverged":
         return trajectory
     try:
         steps = step_count(prepared.scene.duration, slot.dt)
@@ -36,7 +36,7 @@ def fully_certified(
         entries = {"full": full}
     said = list(light.get("reasons", ()))
     reasons = said + [reason for reason in full["reasons"] if reason not in said]
-    both = {"certified": bool(light["certified"] and full["holds"]), "reasons": reasons}
+    both = {"certified": bool(light.get("certified", True) and full["holds"]), "reasons": reasons}
     return replace(trajectory, certificate={**light, **entries, **both})
 
 

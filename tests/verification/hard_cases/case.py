@@ -24,7 +24,7 @@ OVERLAP = 0.01
 
 @dataclass(frozen=True)
 class Run:
-    """What a verdict is given on: model, settings, samples with contacts, certificate of the run."""
+    """What a verdict is given on: model, settings, samples with contacts, certificate of steps."""
 
     model: Model
     settings: Settings
@@ -123,8 +123,9 @@ class HardCase:
         """Return the run that a verdict is given on."""
         simulation = Simulation(self.model(), settings)
         steps = max(1, round(self.duration / settings.dt))
-        record = simulation.record(steps, self.stride, contacts=True, pieces=settings.tolerance is not None)
-        return Run(simulation.model, settings, record, simulation.certificate)
+        of_loop = settings.tolerance is not None
+        record = simulation.record(steps, self.stride, contacts=True, pieces=of_loop)
+        return Run(simulation.model, settings, record, {} if of_loop else simulation.certificate)
 
     def verdict(self, run: Run) -> Verdict:
         """Return the case's own verdict, or DIVERGED where the run as such is in doubt."""
@@ -137,11 +138,11 @@ def doubts(run: Run, excused: tuple[str, ...] = ()) -> str:
     record, certificate = run.record, run.certificate
     if not (np.isfinite(record.pose).all() and np.isfinite(record.twist).all()):
         return "positions or velocities are not finite"
-    if record.pieces is not None:  # of the loop of events, whose tally is empty
+    if record.pieces is not None:  # of the loop of events, which counts nothing
         broken = [finding for finding in audit(run.model, record, run.settings.dt) if not finding.holds]
         if broken:
             return str(broken[0])
-    for gate in GATES:
+    for gate in GATES if certificate else ():
         if not certificate[gate.name] <= gate.limit:
             return f"{gate.meaning}: {gate.name} {certificate[gate.name]:.2g}, at most {gate.limit:.2g}"
     gain = energy_gain(run)
