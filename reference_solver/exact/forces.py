@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from reference_solver.exact.problem import (
 )
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
+from reference_solver.pieces import Indices
 
 #: Loads and accelerations below this share of the largest are round-off where a mode ends. The largest load counts as
 #: this share of the lightest body's weight at least: contacts that carry nothing have no scale of their own.
@@ -118,13 +120,17 @@ class Held:
         """Return forces (m, d) and accelerations (n, q) where the contacts are now."""
         contacts, answer = self.contacts, self.answer
         forces, acceleration = np.zeros(answer.forces.shape), np.empty(free.shape)
-        if not hasattr(self, "_groups"):
-            groups = contacts.groups
-            self._groups = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
-            self._shared = loads_shared(contacts, answer.forces)
-        held = answer.modes, directions, contacts.friction, answer.forces, self._shared
-        solve_groups(contacts.features, held, contacts.rows, free, self._groups, forces, acceleration)
+        groups, shared = self._groups
+        held = answer.modes, directions, contacts.friction, answer.forces, shared
+        solve_groups(contacts.features, held, contacts.rows, free, groups, forces, acceleration)
         return forces, acceleration
+
+    @cached_property
+    def _groups(self) -> tuple[tuple[Indices, Indices], Array]:
+        """Contacts of all groups and where each begins, and how changes of redundant forces are weighed."""
+        groups = self.contacts.groups
+        ends = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
+        return ends, loads_shared(self.contacts, self.answer.forces)
 
 
 def accelerations(contacts: Contacts, free: Array) -> Array:
@@ -169,7 +175,7 @@ def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: f
     wanted = accelerations(contacts, free) + (contacts.rows.speed.ravel() / lasts if lasts > 0.0 else 0.0)
     if np.abs(wanted).max() < ROUND_OFF * world.weight:
         wanted[:] = 0.0
-    return replace(held_by(contacts, Problem.of(contacts, wanted, directions).solved(state.t), free), lasts=lasts)
+    return replace(held_by(contacts, Problem(contacts, wanted, directions).solved(state.t), free), lasts=lasts)
 
 
 def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:
@@ -192,7 +198,7 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
         if mode == SLIP:
             friction = answer.forces[k, 1:]
             directions[k] = -friction / max(float(np.linalg.norm(friction)), 1e-300)
-    problem = Problem.of(contacts, accelerations(contacts, free), np.where((now == SLIP)[:, None], directions, 0.0))
+    problem = Problem(contacts, accelerations(contacts, free), np.where((now == SLIP)[:, None], directions, 0.0))
     found = problem.with_modes(now, directions, answer.forces)
     if found is None:
         return None

@@ -80,7 +80,7 @@ def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
     wanted = part.rows.speed.copy()
     wanted[:, 0] += rebounds * np.minimum(wanted[:, 0], 0.0)
     try:
-        impulses = Problem.of(part, wanted.ravel()).solved(state.t).forces
+        impulses = Problem(part, wanted.ravel(), np.zeros_like(wanted[:, 1:])).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
     return Blow.of(replace(state, velocity=state.velocity + part.changes(impulses)), part, impulses)
@@ -97,5 +97,5 @@ def jam(world: World, state: State, contacts: Contacts, instant: float) -> Blow:
     contacts.at_state(state)
     free = free_acceleration(world, state.axes, state.velocity)
     wanted = contacts.rows.speed.ravel() + instant * accelerations(contacts, free)
-    impulses = Problem.of(contacts, wanted).solved(state.t).forces
+    impulses = Problem(contacts, wanted, np.zeros_like(contacts.rows.speed[:, 1:])).solved(state.t).forces
     return Blow.of(replace(state, velocity=state.velocity + contacts.changes(impulses)), contacts, impulses)

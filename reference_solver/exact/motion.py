@@ -183,13 +183,17 @@ class Turning:
         n, d = state.place.shape
         self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
 
-    def _rates(self, y: Array) -> Array:
-        """Rates (2 N + m d,) of ways and twists, and of impulses of contacts."""
-        shape, count = self._state.velocity.shape, self._state.velocity.size
-        way, velocity = y[: 2 * count].reshape(2, *shape)
+    def after(self, way: Array, velocity: Array, directions: Array | None = None) -> tuple[Array, Array, Array]:
+        """Return rates of ways, accelerations without contacts and with them (n, q), after ways, with twists (n, q)."""
         write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
         place, axes, rate = self._moved
-        acceleration = self._held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
+        free = free_acceleration(self._world, axes, velocity)
+        return rate, free, self._held.follow(place, axes, velocity, free, directions)
+
+    def _rates(self, y: Array) -> Array:
+        """Rates (2 N + m d,) of ways and twists, and of impulses of contacts."""
+        way, velocity = y[: 2 * self._state.velocity.size].reshape(2, *self._state.velocity.shape)
+        rate, _, acceleration = self.after(way, velocity)
         return np.concatenate([rate.ravel(), acceleration.ravel(), self._held.pushes.ravel()])
 
     def step(self, length: float) -> tuple[Piece, float]:

@@ -14,6 +14,7 @@ stick and slip (`cones`), and the equations of these modes are solved once more,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,12 +77,6 @@ class Problem:
     slips: Array
     size: float = 0.0
 
-    @classmethod
-    def of(cls, contacts: Contacts, free: Array, slips: Array | None = None) -> Problem:
-        """Return the problem of contacts; ``free`` (m d,)."""
-        d = contacts.world.dimension
-        return cls(contacts, free, np.zeros((len(contacts), d - 1)) if slips is None else slips)
-
     def __post_init__(self) -> None:
         # G (m d, N) and M^-1 G' (N, m d).
         self.rows, self.yields = self.contacts.matrices
@@ -103,9 +98,9 @@ class Problem:
         Undecided, Unlawful
             If none are found that obey the laws to `BROKEN`.
         """
-        if parts := self._parts():
-            return self._joined([part.solved(t) for _, part in parts])
-        guess = self.with_modes(*self._held())
+        if self._parts:
+            return self._joined([part.solved(t) for _, part in self._parts])
+        guess = self.with_modes(np.where((self.friction > 0.0) & ~self.slipping, STICK, SLIP), self.slips)
         if guess is not None and self.broken(guess) < NONE:
             return _pressing(guess)
         found = within_cones(self.contacts, self.free, self.slips)
@@ -115,28 +110,22 @@ class Problem:
             raise Unlawful(t=t, share=broken)
         return answer
 
+    @cached_property
     def _parts(self) -> list[tuple[Indices, Problem]]:
-        """Contacts of each group, by their numbers, and their problem: groups share nothing."""
-        if not hasattr(self, "_each"):
-            groups, free = self.contacts.groups, self.free.reshape(len(self.contacts), -1)
-            self._each = [
-                (each, Problem(self.contacts.chosen(each), free[each].ravel(), self.slips[each], self.size))
-                for each in (groups if len(groups) > 1 else [])
-            ]
-        return self._each
+        """Contacts of each group, by their numbers, and their problem: groups share nothing. None of one group."""
+        groups, free = self.contacts.groups, self.free.reshape(len(self.contacts), -1)
+        return [
+            (each, Problem(self.contacts.chosen(each), free[each].ravel(), self.slips[each], self.size))
+            for each in (groups if len(groups) > 1 else [])
+        ]
 
     def _joined(self, answers: list[Answer]) -> Answer:
         """Return answers of all parts as one."""
         whole = nothing(len(self.contacts), self.dimension)
-        for (group, _), answer in zip(self._parts(), answers, strict=True):
+        for (group, _), answer in zip(self._parts, answers, strict=True):
             for each, own in zip(whole, answer, strict=True):
                 each[group] = own
         return whole
-
-    def _held(self) -> tuple[Indices, Array]:
-        """Modes and directions where every contact is held and sticks, but for what slips or has no friction."""
-        sticks = (self.friction > 0.0) & ~self.slipping
-        return np.where(sticks, STICK, SLIP), self.slips
 
     def _shown(self, forces: Array) -> tuple[Indices, Array]:
         """Modes and directions that forces (m, d) show."""
@@ -182,9 +171,9 @@ class Problem:
         """
         if not (modes != OPEN).any():
             return nothing(len(modes), self.dimension)
-        if parts := self._parts():
+        if self._parts:
             answers = []
-            for group, part in parts:
+            for group, part in self._parts:
                 answer = part.with_modes(modes[group], directions[group], None if near is None else near[group])
                 if answer is None:
                     return None

@@ -15,8 +15,7 @@ from scipy.special import roots_jacobi
 
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import Held
-from reference_solver.exact.kernels.motion import write_moved
-from reference_solver.exact.motion import LEAST, LONGER, SAFE, SHORTER, Piece, Turning, free_acceleration
+from reference_solver.exact.motion import LEAST, LONGER, SAFE, SHORTER, Piece, Turning
 from reference_solver.exact.problem import SLIP
 from reference_solver.model import Array
 
@@ -35,27 +34,24 @@ STABLE, CLOSE, MOST = 5.0, 0.03, 20
 
 def step(world: World, state: State, held: Held, tolerance: float, length: float) -> tuple[Piece, float]:
     """Return a piece of at most a length [s] as `Turning.step` does, and the next length."""
-    explicit = Turning(world, state, held, tolerance)
     if world.dimension == 3 and len(held.contacts):
         stiff = Stiff(world, state, held, tolerance)
         # What order 8 could do with the smallest half width's time to fall through.
         smooth = tolerance**0.125 * world.time
         if stiff.rate * smooth > STABLE:
             while stiff.rate * length > SHORTER * STABLE:
-                found = stiff.step(length)
+                found = stiff.implicit_step(length)
                 if found is not None:
                     return found
                 length *= SHORTER
-    return explicit.step(length)
+    return Turning(world, state, held, tolerance).step(length)
 
 
-class Stiff:
+class Stiff(Turning):
     """An implicit step from a state on: at each point the directions of slips are unknown as well."""
 
     def __init__(self, world: World, state: State, held: Held, tolerance: float) -> None:
-        self._world, self._state, self._held, self._tolerance = world, state, held, tolerance
-        n, d = state.place.shape
-        self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
+        super().__init__(world, state, held, tolerance)
         held.contacts.at_state(state)
         self._directions = held.onward(held.contacts)
         rubs = (held.answer.modes == SLIP) & (held.contacts.friction > 0.0)
@@ -68,11 +64,8 @@ class Stiff:
 
     def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, ...]:
         """Rates of ways, accelerations (N,), pushes; of slips, how they turn accelerations, along and across, rows."""
-        write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
-        place, axes, rate = self._moved
-        free = free_acceleration(self._world, axes, velocity)
         held = self._held
-        acceleration, pushes = held.follow(place, axes, velocity, free, directions), held.pushes
+        rate, free, acceleration = self.after(way, velocity, directions)
         turn, across = np.zeros((2, len(self._slips), velocity.size))
         rows = held.contacts.matrices[0].reshape(len(held.contacts), 3, -1)
         slip = np.zeros((len(self._slips), 2))
@@ -82,9 +75,9 @@ class Stiff:
             across[out] = first * rows[k, 2] - second * rows[k, 1]
             speed = held.contacts.rows.speed[k, 1:]
             slip[out] = first * speed[0] + second * speed[1], first * speed[1] - second * speed[0]
-        return rate.ravel().copy(), acceleration.ravel(), pushes, turn, slip, across
+        return rate.ravel().copy(), acceleration.ravel(), held.pushes, turn, slip, across
 
-    def step(self, length: float) -> tuple[Piece, float] | None:
+    def implicit_step(self, length: float) -> tuple[Piece, float] | None:
         """Return a piece of at most a length [s] and the next length; None where the iteration does not converge."""
         start = self._state.velocity
         shape, count, k = start.shape, start.size, len(self._slips)
@@ -130,7 +123,7 @@ class Stiff:
         error = float((length * last * np.minimum(1.0, last / np.maximum(least, 1e-300)) / scale).max())
         factor = min(LONGER, SAFE * error ** (-1.0 / (COUNT + 1))) if error > 0.0 else LONGER
         if error > 1.0:
-            return self.step(length * max(SHORTER, factor))
+            return self.implicit_step(length * max(SHORTER, factor))
         every = np.concatenate([rates, accelerations, pushes.reshape(COUNT, -1)], axis=1)
         out = np.zeros((every.shape[1], COUNT + 1))
         out[:, 1:] = length * (THROUGH @ every).T / (POWERS + 1)

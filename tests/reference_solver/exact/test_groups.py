@@ -51,7 +51,7 @@ def test_forces_of_held_modes():
     held = decide(world, state, contacts, free)
     acceleration = held.follow(state.place, state.axes, state.velocity, free)
     assert np.abs(acceleration - held.acceleration).max() < 1e-12 * G
-    answer = Problem.of(held.contacts, accelerations(held.contacts, free)).with_modes(
+    answer = Problem(held.contacts, accelerations(held.contacts, free), np.zeros((len(held.contacts), 2))).with_modes(
         held.answer.modes, held.answer.directions, held.answer.forces
     )
     assert np.abs(held.forces - answer.forces).max() < 1e-12 * G

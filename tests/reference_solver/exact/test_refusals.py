@@ -96,7 +96,7 @@ def posed(model):
     world, state = world_of(model), start_of(model)
     contacts = touching_contacts(world, state)
     free = free_acceleration(world, state.axes, state.velocity)
-    return Problem.of(contacts, forces.accelerations(contacts, free))
+    return Problem(contacts, forces.accelerations(contacts, free), np.zeros((len(contacts), 1)))
 
 
 def test_solution_that_breaks_a_law(monkeypatch):
