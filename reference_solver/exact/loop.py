@@ -63,15 +63,15 @@ class Loop:
         How many there were; steps are the pieces that were made to the tolerance.
     held
         Contacts that go on from the piece before, with their forces; None where all is to be found anew.
-    ended
+    ended_features
         Contacts whose feature ends where the next piece begins.
     blows
         What came before the piece that is returned next.
-    step_length
+    next_length
         Of the next step to the tolerance [s]; 0 where a closed form is tried first.
     after_instant
         Whether the piece before was an instant, see `PROGRESS`.
-    counted_from
+    row_began
         When the last `MOST_IN_A_ROW` events began [s].
     """
 
@@ -83,11 +83,11 @@ class Loop:
     steps: int = 0
     events: int = 0
     held: Held | None = None
-    ended: frozenset[tuple[int, ...]] = frozenset()
+    ended_features: frozenset[tuple[int, ...]] = frozenset()
     blows: list[Blow] = field(default_factory=list)
-    step_length: float = 0.0
+    next_length: float = 0.0
     after_instant: bool = False
-    counted_from: float = 0.0
+    row_began: float = 0.0
 
     def next_piece(self) -> tuple[list[Blow], Piece]:
         """Return what strikes bodies now and the motion up to the next event, and move the world to its end.
@@ -99,18 +99,16 @@ class Loop:
         """
         while True:
             held = self.held
-            if held is None:
+            if held is None:  # nothing goes on from the piece before
                 contacts = self._find()
-                if self._strike(contacts):
-                    contacts = self._find()
-                    held = settling(self.world, self.state, self._closed(contacts))
-                held = held or self._decide(contacts)
-                if held is None:  # a jam has changed velocities
-                    continue
+                struck = self._strike(contacts)
+                held = self._decide(self._find() if struck else contacts, struck)
+            if held is None:  # a jam has changed velocities
+                continue
             piece = self._move(held)
             event = first_event(self.world, piece, self.after_instant)
             if event.at_start:
-                self._change_modes(held, event)
+                self.held = self._with_modes_ended(held, event)
                 continue
             piece = self._cut(piece, event)
             check(self.world, piece, self.tolerance)
@@ -119,7 +117,7 @@ class Loop:
             return blows, piece
 
     def _find(self) -> Contacts:
-        return touching_contacts(self.world, self.state, self.ended)
+        return touching_contacts(self.world, self.state, self.ended_features)
 
     def _closed(self, contacts: Contacts) -> Contacts:
         """Return those whose gaps count as none."""
@@ -143,8 +141,15 @@ class Loop:
         self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
         return True
 
-    def _decide(self, contacts: Contacts) -> Held | None:
-        """Return which contacts hold, stick and slip; None where no forces exist and a jam changes velocities."""
+    def _decide(self, contacts: Contacts, struck: bool) -> Held | None:
+        """Return which contacts hold, stick and slip; None where no forces exist and a jam changes velocities.
+
+        ``struck``: whether bodies have just been struck; what then rebounds no higher than a gap that is none is held.
+        """
+        if struck:
+            held = settling(self.world, self.state, self._closed(contacts))
+            if held is not None:
+                return held
         none, still = no_gap(self.world, self.state.place), self.world.still
         speed = contacts.rows.speed[:, 0]  # what approaches and has a gap meets later
         contacts = contacts.chosen((speed < still) & (contacts.touch(none) | (speed > -still)))
@@ -153,7 +158,7 @@ class Loop:
         except NoSolution:
             self._jam(contacts)
             return None
-        self.step_length = 0.0
+        self.next_length = 0.0
         self._project(held)
         return held
 
@@ -174,14 +179,14 @@ class Loop:
         """Return the piece from here on: exact where accelerations are constant, else a step."""
         if held.lasts > 0.0:
             return steady(self.state, held, held.acceleration, held.lasts)
-        if self.step_length == 0.0:
+        if self.next_length == 0.0:
             piece = constant(self.world, self.state, held, self.longest)
             if piece is not None:
                 return piece
-            self.step_length = FIRST_STEP * self.world.time
+            self.next_length = FIRST_STEP * self.world.time
         self.steps += 1
         tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
-        piece, self.step_length = step(self.world, self.state, held, tolerance, min(self.step_length, self.longest))
+        piece, self.next_length = step(self.world, self.state, held, tolerance, min(self.next_length, self.longest))
         return piece
 
     def _turns_freely(self, held: Held) -> bool:
@@ -209,41 +214,40 @@ class Loop:
         self._count(event.kind.value)
         self.after_instant = piece.length <= PROGRESS * self.world.time
         if not self.after_instant:
-            self.ended = frozenset()
+            self.ended_features = frozenset()
         self.state, self.held = piece.state(1.0), None
         if piece.turns:
-            self._go_on(piece.held, event)
+            self.held = self._carried_on(piece.held, event)
             return
-        self.step_length = 0.0
+        self.next_length = 0.0
         if piece.held.lasts > 0.0 and event.kind is Kind.LOOK:  # rebounds that are summed end where contacts are closed
             self._project(piece.held)
 
-    def _go_on(self, held: Held, event: Event) -> None:
-        """Keep contacts that stay closed at the end of a step, with their forces there."""
+    def _carried_on(self, held: Held, event: Event) -> Held | None:
+        """Return contacts that stay closed at the end of a step, with their forces there; None where forces jump."""
         self._project(held)
         held = held.at(self.state, self._free_acceleration())
-        if event.kind is Kind.LOOK and not held.slips_end:
-            self.held = held
-        elif event.kind in GO_ON:
-            self.held = changed(held, {event.contact: GO_ON[event.kind]}, self._free_acceleration())
+        if event.kind in GO_ON:
+            return changed(held, {event.contact: GO_ON[event.kind]}, self._free_acceleration())
+        return held if event.kind is Kind.LOOK and not held.slips_end else None
 
-    def _change_modes(self, held: Held, event: Event) -> None:
-        """Change the modes that end as their piece begins; where a feature ends, all is to be found anew."""
+    def _with_modes_ended(self, held: Held, event: Event) -> Held | None:
+        """Return contacts with what ends as their piece begins changed; None where all is to be found anew."""
         self._count(event.kind.value)
-        self.ended, self.held = self.ended | event.ended, None
         if event.ended:
-            return
+            self.ended_features |= event.ended
+            return None
         modes = dict(event.modes)
-        self.held = changed(held, modes, self._free_acceleration())
-        if self.held is None and STICK in modes.values():  # no forces hold it, and none let it go
+        found = changed(held, modes, self._free_acceleration())
+        if found is None and STICK in modes.values():  # no forces hold it, and none let it go
             self._jam(held.contacts)
-        elif self.held is None:
-            self.held = changed(held, modes, self._free_acceleration(), strictly=False)
+            return None
+        return found or changed(held, modes, self._free_acceleration(), strictly=False)
 
     def _count(self, what: str) -> None:
         """Count an event, and refuse where time hardly goes on."""
         self.events += 1
         if self.events % MOST_IN_A_ROW == 0:
-            if self.state.t - self.counted_from < ROW * self.longest:
+            if self.state.t - self.row_began < ROW * self.longest:
                 raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=what)
-            self.counted_from = self.state.t
+            self.row_began = self.state.t

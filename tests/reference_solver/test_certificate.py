@@ -285,10 +285,10 @@ def test_kanes_paradox_in_a_certificate(profile):
     simulation = Simulation(model, getattr(Settings, profile)(DT))
     before = kinetic_energy(simulation)
     simulation.advance(1)
-    certificate = simulation.certificate
     assert gains[sign] > 0.0
     assert kinetic_energy(simulation) - before == pytest.approx(gains[sign], rel=1e-6)  # 1e-7 thick, scaled by levers
     if profile == "fixed_step":  # the loop of events keeps no sums
+        certificate = simulation.certificate
         assert certificate["contact_work"] == pytest.approx(gains[sign], rel=1e-6)
         assert certificate["kane"] == 1 and certificate["created"] > 0.0
         assert certificate["holds"]

@@ -101,7 +101,7 @@ def posed(model):
 
 def test_solution_that_breaks_a_law(monkeypatch):
     """A planted fault: loads that are right, but for a tenth of each."""
-    monkeypatch.setattr(Problem, "_held", lambda self: (np.zeros(1, np.int64), np.zeros((1, 1))))
+    monkeypatch.setattr(Problem, "with_modes", lambda self, *_: None)
     monkeypatch.setattr(
         Problem, "_polished", lambda self, start, t: Answer(np.ones(1, np.int64), start[:, 1:], 0.9 * start)
     )
