@@ -20,6 +20,8 @@ from reference_solver.shapes import smallest_extent
 
 #: Shares of the speed of `World` below which speeds are none, and slips have no direction.
 STILL, SLIPPING = 1e-12, 1e-11
+#: Gaps below this share of the smaller half width of a pair are none.
+NO_GAP = 1e-13
 
 
 class Bodies(NamedTuple):
@@ -167,6 +169,25 @@ class World:
     def slipping(self) -> float:
         """Slips below this have no direction [m/s]."""
         return SLIPPING * self.speed
+
+    @cached_property
+    def no_gap(self) -> Array:
+        """(n, n): what `NO_GAP` makes of the smaller half width of a pair [m]; 0 where neither has any."""
+        least = np.minimum.outer(self.extent, self.extent)
+        return np.where(np.isfinite(least), NO_GAP * least, 0.0)
+
+    @cached_property
+    def pairs(self) -> Indices:
+        """(2, k): numbers of all pairs of which one is free, the smaller one first."""
+        free = self.bodies.free == 1
+        return np.array(np.nonzero(np.triu(free[:, None] | free, 1)))
+
+    @cached_property
+    def mass(self) -> Array:
+        """(f, d + s): masses and principal moments of free bodies [kg], [kg m^2]."""
+        free = self.bodies.free == 1
+        masses = np.repeat(1.0 / self.bodies.inverse_mass[free, None], self.dimension, axis=1)
+        return np.concatenate([masses, self.bodies.moment[free]], axis=1)
 
     @property
     def dimension(self) -> int:

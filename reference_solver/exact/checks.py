@@ -11,7 +11,8 @@ import numpy as np
 from reference_solver.exact.bodies import World
 from reference_solver.exact.motion import Piece
 from reference_solver.exact.refusals import EnergyGrows, Overlap
-from reference_solver.geometry import gap
+from reference_solver.geometry import gap, rotation
+from reference_solver.model import Array
 
 #: Overlap that is refused, as a share of the smallest half width; growth of energy, as a share of what there is; and
 #: how many tolerances of a step either may be, where those are coarse.
@@ -38,13 +39,14 @@ def check(world: World, piece: Piece, tolerance: float) -> None:
 
 
 def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
-    """Return the bodies that are deepest in each other at shares of a piece, the share, and how deep [m]."""
-    bodies, d = world.bodies, world.dimension
+    """Return the bodies that are deepest in each other at shares of a piece, the share, and how deep [m].
+
+    What balls around bodies show to be apart is not looked at: -inf where that is everything.
+    """
     poses, _ = piece.looked_at(np.array(LOOK))
-    place, reach = poses[:, :, :d], bodies.reach + bodies.radius
-    apart = np.linalg.norm(place[:, :, None] - place[:, None], axis=3) - reach[:, None] - reach
-    moves = (bodies.free[:, None] + bodies.free) > 0
-    pairs = np.argwhere(np.triu((apart.min(axis=0) < 0.0) & moves, 1)).tolist()
+    a, b = world.pairs
+    near = (_balls_apart(world, poses) < -0.5 * DEEP * world.size).any(axis=0)
+    pairs = zip(a[near].tolist(), b[near].tolist(), strict=True)
     alike: dict[tuple[object, object], list[tuple[int, int]]] = {}
     for a, b in pairs:
         alike.setdefault((world.shapes[a], world.shapes[b]), []).append((a, b))
@@ -60,6 +62,19 @@ def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
     return found
 
 
+def _balls_apart(world: World, poses: Array) -> Array:
+    """Return how far apart the balls around two bodies are, or a ball and a half-space (k, pairs) at poses [m]."""
+    bodies, (a, b), d = world.bodies, world.pairs, world.dimension
+    place, reach = poses[:, :, :d], bodies.reach + bodies.radius
+    apart = np.linalg.norm(place[:, a] - place[:, b], axis=2) - reach[a] - reach[b]
+    for h in np.flatnonzero(bodies.points == 0):
+        normal = rotation(poses[:, h]) @ bodies.normal[h, 0]
+        above = np.einsum("knp,kp->kn", place - place[:, h, None], normal) - bodies.offset[h, 0] - reach
+        for one, other in ((a, b), (b, a)):
+            apart[:, one == h] = above[:, other[one == h]]
+    return np.asarray(apart)
+
+
 def _is_driven(world: World, piece: Piece) -> bool:
     """Whether a body touches one that moves whatever it meets."""
     touched = np.unique(piece.held.contacts.features[:, :2])
@@ -69,12 +84,9 @@ def _is_driven(world: World, piece: Piece) -> bool:
 
 def energy(world: World, piece: Piece, share: float) -> tuple[float, float]:
     """Return the energy of free bodies at a share, less the work of loads in the piece, and its size [J]."""
-    free, d = world.bodies.free == 1, world.dimension
+    free, mass = world.bodies.free == 1, world.mass
     velocity = (piece.velocity @ share ** np.arange(piece.velocity.shape[2]))[free]
     way = (piece.way @ share ** np.arange(piece.way.shape[2]))[free]
-    mass = np.concatenate(
-        [np.repeat(1.0 / world.bodies.inverse_mass[free, None], d, axis=1), world.bodies.moment[free]], axis=1
-    )
     load = world.bodies.load[free]
     kinetic, work = 0.5 * (mass * velocity**2).sum(), (mass * load * way).sum()
     return float(kinetic - work), float(kinetic + world.size * np.abs(mass * load).sum())

@@ -18,8 +18,8 @@ from reference_solver.pieces import Indices
 #: Features nearer than this share of the smallest half width may touch, and places as near to an end are at it (E8).
 #: A contact that is projected has 1e-15.
 TOUCH = 1e-11
-#: Gaps below this share of the smaller half width of a pair are none, and these units in the last place of coordinates.
-NO_GAP, UNITS = 1e-13, 8.0
+#: Gaps of so many units in the last place of coordinates are none, beside `World.no_gap`.
+UNITS = 8.0
 #: Cores may be this deep in each other along a face that touches; along other faces they are far deeper.
 DEEP = 1e-3
 #: Room for the contacts of a world.
@@ -28,8 +28,7 @@ MOST_CONTACTS = 2048
 
 def no_gap(world: World, place: Array) -> Array:
     """Return the gaps that count as none (n, n) where bodies are (n, d) [m]."""
-    least = np.minimum.outer(world.extent, world.extent)
-    return np.where(np.isfinite(least), NO_GAP * least, 0.0) + UNITS * np.spacing(np.abs(place).max())
+    return world.no_gap + UNITS * np.spacing(np.abs(place).max())
 
 
 def width_of_margins(world: World) -> int:

@@ -37,9 +37,9 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
         If bodies cannot part, or impacts do not end.
     """
     blows: list[Blow] = []
-    if not len(contacts):
+    if not (contacts.at_state(state).rows.speed[:, 0] < -world.still).any():
         return blows
-    known, pair = np.unique(contacts.features[:, :2], axis=0, return_inverse=True)
+    known, pair = np.unique(contacts.features[:, :2] @ (world.shape[0], 1), return_inverse=True)
     stopped, cycle = np.zeros((2, len(known)), bool)  # pairs whose rebounds are over, and those that a cycle strikes
     fastest: list[float] = []
     for count in range(MOST):

@@ -13,7 +13,7 @@ where G a collects the accelerations a of the bodies. A kind of contact tells n,
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -77,19 +77,33 @@ class Contacts:
         (m, 6), see `features`.
     along
         (m, d) tangents that frames take up, in world axes; zeros where any will do.
+    rows
+        Where the contacts were last brought to.
     """
 
     world: World
     features: Indices
     along: Array
-    rows: Rows = field(init=False)
+    rows: Rows
+
+    @classmethod
+    def of(cls, world: World, features: Indices) -> Contacts:
+        """Return contacts with frames of their own, whose rows are to be brought to a state."""
+        d, q = world.dimension, world.shape[1]
+        return cls(world, features, np.zeros((len(features), d)), empty_rows(len(features), d, q))
 
     def __post_init__(self) -> None:
-        d, q = self.world.dimension, self.world.shape[1]
-        self.rows = empty_rows(len(self.features), d, q)
-        a, b = self.features[:, 0], self.features[:, 1]
-        self.friction, self.restitution = self.world.friction[a, b], self.world.restitution[a, b]
         self._matrices: tuple[Array, Array] | None = None
+
+    @cached_property
+    def friction(self) -> Array:
+        """(m,) of the pairs."""
+        return self.world.friction[self.features[:, 0], self.features[:, 1]]
+
+    @cached_property
+    def restitution(self) -> Array:
+        """(m,) of the pairs."""
+        return self.world.restitution[self.features[:, 0], self.features[:, 1]]
 
     def __len__(self) -> int:
         return len(self.features)
@@ -118,9 +132,8 @@ class Contacts:
 
     def chosen(self, which: NDArray[Any]) -> Contacts:
         """Return some of the contacts, by numbers or by a mask, with their rows."""
-        part = Contacts(self.world, self.features[which], self.along[which])
-        part.rows = Rows(*(each[which] for each in self.rows))
-        return part
+        rows = Rows(*(each[which] for each in self.rows))
+        return Contacts(self.world, self.features[which], self.along[which], rows)
 
     def touch(self, none: Array) -> NDArray[np.bool_]:
         """Whether gaps (m,) count as none, of those of all pairs (n, n)."""
@@ -196,7 +209,7 @@ def touching_contacts(world: World, state: State, ended: frozenset[tuple[int, ..
     corner leaves a face two begin, which part.
     """
     features = find(world, state, ended)
-    contacts = Contacts(world, features, np.zeros((len(features), world.dimension))).at_state(state)
+    contacts = Contacts.of(world, features).at_state(state)
     crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
     place = contacts.rows.place
     # At corners of three degrees or more places are off by less than twenty gaps.

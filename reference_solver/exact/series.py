@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference_solver.exact.bodies import State, World
-from reference_solver.exact.features import NO_GAP
+from reference_solver.exact.bodies import NO_GAP, State, World
 from reference_solver.exact.forces import Held, accelerations, decide
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.refusals import Refused

@@ -58,7 +58,7 @@ def after(state, acceleration, t):
 def test_rates_of_gap_and_slip_against_finite_differences(name, seed):
     d, first, second, feature_a, feature_b = PAIRS[name]
     world, state, rng = moving(d, (first, second), seed)
-    contacts = Contacts(world, np.array([[0, 1, *feature_a, *feature_b]]), np.zeros((1, d)))
+    contacts = Contacts.of(world, np.array([[0, 1, *feature_a, *feature_b]]))
     acceleration = rng.uniform(-1.0, 1.0, state.velocity.shape)
     rows = contacts.at_state(state).rows
     speed, rate = rows.speed[0].copy(), rows.rate[0] + contacts.matrices[0] @ acceleration.ravel()
