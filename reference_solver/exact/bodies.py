@@ -110,6 +110,12 @@ class State:
         """(n, 3 + q | 7 + q): pose and twist."""
         return np.concatenate([self.place, self.orientation, self.velocity], axis=1)
 
+    def moving(self, velocity: Array) -> State:
+        """Return the same places with other twists (n, d + s)."""
+        found = State(self.t, self.place, self.orientation, velocity)
+        found._axes = self._axes
+        return found
+
     def moved(self, way: Array) -> State:
         """Return the state after displacements and turns (n, d + s)."""
         d = self.place.shape[1]

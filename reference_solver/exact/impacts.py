@@ -83,7 +83,7 @@ def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
         impulses = Problem(part, wanted.ravel(), np.zeros_like(wanted[:, 1:])).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
-    return Blow.of(replace(state, velocity=state.velocity + part.changes(impulses)), part, impulses)
+    return Blow.of(state.moving(state.velocity + part.changes(impulses)), part, impulses)
 
 
 def jam(world: World, state: State, contacts: Contacts, instant: float) -> Blow:
@@ -98,4 +98,4 @@ def jam(world: World, state: State, contacts: Contacts, instant: float) -> Blow:
     free = free_acceleration(world, state.axes, state.velocity)
     wanted = contacts.rows.speed.ravel() + instant * accelerations(contacts, free)
     impulses = Problem(contacts, wanted, np.zeros_like(contacts.rows.speed[:, 1:])).solved(state.t).forces
-    return Blow.of(replace(state, velocity=state.velocity + contacts.changes(impulses)), contacts, impulses)
+    return Blow.of(state.moving(state.velocity + contacts.changes(impulses)), contacts, impulses)

@@ -137,7 +137,7 @@ class Loop:
         stops = np.abs(struck.velocity) < np.minimum(
             NO_SPEED * self.world.speed * self.world.per_length, NO_SHARE * change
         )
-        self.state = replace(struck, velocity=np.where(stops, 0.0, struck.velocity))
+        self.state = struck.moving(np.where(stops, 0.0, struck.velocity))
         self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
         return True
 

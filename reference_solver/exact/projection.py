@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     if np.abs(speed).max() <= NO_BLOW * world.speed:
         return state, None
     impulses = _least(contacts, keeps, -speed).reshape(-1, d)
-    after = replace(state, velocity=state.velocity + contacts.changes(impulses))
+    after = state.moving(state.velocity + contacts.changes(impulses))
     blow = Blow.of(after, contacts, impulses, ROCKING)
     contacts.at_state(after)
     return after, blow
