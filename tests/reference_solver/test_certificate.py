@@ -166,12 +166,12 @@ class TestPlantedFaults:
         planted = Planted(dimension)
         assert planted.exceeded() == set() and reasons(planted.tally) == ()
 
-    def test_a_velocity_that_impulses_do_not_explain(self, dimension):
+    def test_velocity_without_impulses(self, dimension):
         planted = Planted(dimension)
         planted.bodies.twist[1, 0] += 1e-8 * G * DT
         assert "momentum" in planted.exceeded()
 
-    def test_a_spin_that_impulses_do_not_explain(self, dimension):
+    def test_spin_without_impulses(self, dimension):
         planted = Planted(dimension)
         planted.bodies.twist[1, -1] += 1e-8
         assert "momentum" in planted.exceeded()
@@ -237,7 +237,7 @@ def test_start_inside_the_floor(dimension, profile, speed):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_overlap_at_the_start_of_bodies_that_land_later_or_touch(dimension):
+def test_overlap_at_the_start_and_bodies_that_land_later(dimension):
     """One rests, one lands in a fixed step, which finds it inside; samples certify anew, not the start."""
     bodies = [floor(dimension), box(dimension, 0.0, 0.5), box(dimension, 3.0, 0.6)]
     model = Model(dimension, bodies, gravity(dimension), 0.5, 0.5)
@@ -248,7 +248,7 @@ def test_overlap_at_the_start_of_bodies_that_land_later_or_touch(dimension):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_coordinates_that_do_not_resolve_a_body(dimension):
+def test_body_at_unresolved_coordinates(dimension):
     """At 1e15 m the last place is an eighth of a metre; at 1e6 m it is 1e-10 m."""
     for x, holds in ((1e15, False), (1e6, True)):
         simulation = simulate(dimension, [floor(dimension), box(dimension, x, 0.5)], "fixed_step", 2)

@@ -28,7 +28,7 @@ def run(code, folder=None, **environment):
     ).stdout.strip()
 
 
-def test_the_cache_folder_is_named_after_the_sources():
+def test_name_of_the_cache_folder():
     assert compilation.CACHE_FOLDER is None or compilation.source_hash() in compilation.CACHE_FOLDER.name
 
 
@@ -43,7 +43,7 @@ def test_the_cache_folder_is_named_after_the_sources():
         ("geometry.py", False),
     ],
 )
-def test_the_hash_covers_every_source_in_which_kernels_can_stand(tmp_path, monkeypatch, file, covered):
+def test_sources_in_the_hash_of_kernels(tmp_path, monkeypatch, file, covered):
     source = tmp_path / file
     source.parent.mkdir(parents=True, exist_ok=True)
     source.write_text("x = 1")
@@ -53,14 +53,14 @@ def test_the_hash_covers_every_source_in_which_kernels_can_stand(tmp_path, monke
     assert (compilation.source_hash() != before) == covered
 
 
-def test_another_python_has_a_folder_of_its_own(monkeypatch):
+def test_cache_folder_of_another_python(monkeypatch):
     """A mark in the folder says that kernels are compiled: it is true of one Python only."""
     before = compilation.source_hash()
     monkeypatch.setattr(sys.implementation, "cache_tag", "cpython-399")
     assert compilation.source_hash() != before
 
 
-def test_what_the_hash_leaves_out_compiles_nothing():
+def test_kernels_outside_the_hash():
     """An edit there would leave machine code of what stood there before.
 
     The event loop has folders of its own. Its entry to the direct solver calls nothing else, and numba itself notices
@@ -76,14 +76,14 @@ def test_what_the_hash_leaves_out_compiles_nothing():
             assert "reference_solver.compilation" not in text, path
 
 
-def test_an_unusable_cache_folder_means_no_cache_and_no_failure(tmp_path):
+def test_unusable_cache_folder(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     code = "import reference_solver, reference_solver.compilation as c; print(c.CACHE_FOLDER)"
     assert run(code, NUMBA_CACHE_DIR=str(blocked)) == "None"
 
 
-def test_another_checkout_of_the_same_sources_finds_the_machine_code(tmp_path):
+def test_machine_code_of_another_checkout(tmp_path):
     code = (
         "import reference_solver.coulomb as c; print(c.__file__);"
         "print(c.into_cone(1.0, 2.0, 0.5), sum(c.into_cone.stats.cache_hits.values()))"
@@ -102,7 +102,7 @@ def test_another_checkout_of_the_same_sources_finds_the_machine_code(tmp_path):
     assert answers[0][:-1] == answers[1][:-1]
 
 
-def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
+def test_numba_settings_of_the_caller(tmp_path):
     code = (
         "from numba.core import config; kept = lambda: (config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES);"
         "before = kept(); import reference_solver.textbook2; print(kept() == before)"
@@ -110,7 +110,7 @@ def test_numba_settings_of_the_caller_are_left_alone(tmp_path):
     assert run(code, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1") == "True"
 
 
-def test_the_solver_imports_nothing_of_the_rest():
+def test_imports_of_the_solver():
     rest = {"adapters", "validation", "reports"}
     code = f"import sys, reference_solver.textbook2; print({rest} & {{name.split('.')[0] for name in sys.modules}})"
     assert run(code, NUMBA_DISABLE_JIT="1") == "set()"

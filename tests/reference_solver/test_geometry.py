@@ -126,7 +126,7 @@ def test_another_library_agrees(pair):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_half_space_and_the_lowest_point(d):
+def test_distance_of_a_half_space_and_the_lowest_point(d):
     normal = np.arange(1.0, d + 1.0)
     plane = HalfSpace(tuple(normal / np.linalg.norm(normal)), 0.3)
     for shape in PLANAR if d == 2 else SPATIAL:
@@ -152,7 +152,7 @@ def test_order_and_place_do_not_matter():
     assert moved == pytest.approx(there.gap, abs=4e-10)  # poses themselves are rounded to 2^-33 m there
 
 
-def test_one_pose_gives_a_number_and_shapes_of_two_dimensions_are_refused():
+def test_distance_at_one_pose_and_shapes_of_two_dimensions():
     assert gap(Disc(0.5), (0, 0, 0), Box((1.0, 0.5)), (2, 0, 0)) == 0.5
     assert isinstance(gap(Disc(0.5), (0, 0, 0), Disc(0.5), (2, 0, 0)), float)
     assert reach(Box((3.0, 4.0))) == 5.0 and reach(HalfSpace((0.0, 1.0))) == math.inf
@@ -167,7 +167,7 @@ def test_one_pose_gives_a_number_and_shapes_of_two_dimensions_are_refused():
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("other", [Disc(0.05), Capsule(0.3, 0.05)])
-def test_what_lies_on_the_line_of_a_capsule_is_as_far_as_its_end(d, other):
+def test_distance_on_the_line_of_a_capsule(d, other):
     """Square to the line both are apart by round-off, of either sign: that is no overlap of the cores."""
     a = Capsule(0.5, 0.1)
     half = other.half_length if isinstance(other, Capsule) else 0.0

@@ -161,7 +161,7 @@ def missed(problem, impulse):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("method", METHODS)
-def test_an_independent_library_finds_the_same_answer(pinocchio, dimension, case, method):
+def test_answer_of_an_independent_library(pinocchio, dimension, case, method):
     if (method, case, dimension) == STOPS_EARLY:
         pytest.skip("Pinocchio's Gauss-Seidel stops after one sweep and solves nothing")
     simulation = CASES[case](dimension)
@@ -186,7 +186,7 @@ def test_a_wrong_friction_would_be_seen(pinocchio):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_heap_with_much_friction_has_several_answers(pinocchio, dimension):
+def test_answers_of_a_heap_with_much_friction(pinocchio, dimension):
     """Coulomb's law in coupled contacts need not have one solution: here two programs find two, both to round-off.
 
     What a certificate can say is that an answer is *a* solution. Where there are several, no comparison of velocities

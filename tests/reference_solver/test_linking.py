@@ -40,7 +40,7 @@ def trunk(x):
     return with_a_call_that_is_optimised_away(x) + bough(x)
 
 
-def test_a_function_that_is_first_asked_for_late_is_linked():
+def test_linking_of_a_function_asked_for_late():
     """A linker takes only what was asked for before: callers must come first, however deep they stand."""
     assert trunk(1.0) == 1.0 + 2.0 * 2.0 + 3.0
 
@@ -66,7 +66,7 @@ def test_loops_are_neither_unrolled_nor_vectorised():
     assert code.count(" fadd ") == 1 and " fadd double " in code
 
 
-def test_a_kernel_that_compiles_leaves_the_garbage_collector_as_it_was():
+def test_garbage_collector_after_a_compilation():
     before = gc.get_threshold()
 
     @kernel
@@ -83,7 +83,7 @@ def test_a_kernel_that_compiles_leaves_the_garbage_collector_as_it_was():
         gc.set_threshold(*before)
 
 
-def test_passes_that_are_left_out_are_passes_of_numba():
+def test_names_of_passes_left_out():
     """A release that calls them otherwise would run them again, and nobody would see it."""
     from numba.core import compiler
 

@@ -46,7 +46,7 @@ def test_relation_holds_on_every_scene(relation, profile, space):
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("profile", ["classical", "reference"])
-def test_equal_worlds_in_canonical_order_give_equal_bits(profile, space):
+def test_bits_of_equal_worlds_in_canonical_order(profile, space):
     @CHOSEN
     @given(trials(space.dimension))
     def holds(trial):
@@ -83,7 +83,7 @@ def test_relations_see_what_breaks_them():
         assert np.abs(new.twist - change.twist(old.twist)).max() > 100.0 * metamorphic.bound(change, 60)
 
 
-def test_a_boost_that_is_left_off_the_floor_is_noticed():
+def test_fault_of_a_boost_without_the_floor():
     space = SPACES[0]
     model = SCENES["incline"].build(space, Numbers())
     change = Change(2, boost=(3.0, 0.0))
@@ -92,7 +92,7 @@ def test_a_boost_that_is_left_off_the_floor_is_noticed():
 
 
 @pytest.mark.parametrize("index", range(4))
-def test_quarter_turns_in_space_are_the_rotations_of_their_matrix(index):
+def test_quarter_turns_in_space_by_their_matrix(index):
     axes, signs = metamorphic.TURNS[3][index]
     change = Change(3, axes=axes, signs=signs)
     q = quaternion(change.matrix)
@@ -102,7 +102,7 @@ def test_quarter_turns_in_space_are_the_rotations_of_their_matrix(index):
         assert back[1:] == pytest.approx(change.polar(vector), abs=1e-15)
 
 
-def test_canonical_order_does_not_depend_on_numbers():
+def test_canonical_order_of_a_renumbered_world():
     model = SCENES["stack"].build(SPACES[0], Numbers())
     sorted_bodies = permuted(model, canonical_order(model)).bodies
     for order in ([3, 2, 1, 0], [1, 3, 0, 2]):

@@ -53,7 +53,7 @@ STANDING = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         (lambda: Model(2, [FLOOR, BALL], (0.0, 0.0), 0.0, [[0.0, 1.0], [0.0, 0.0]]), "friction"),
     ],
 )
-def test_bad_models_are_refused_naming_the_field(make, field):
+def test_refusal_of_bad_models_by_field(make, field):
     with pytest.raises(ValueError, match=f"^{field}: ") as caught:
         make()
     assert "\n" not in str(caught.value)
@@ -77,26 +77,26 @@ def test_bad_models_are_refused_naming_the_field(make, field):
         {"margin": 0.5},
     ],
 )
-def test_bad_settings_are_refused_naming_the_field(wrong):
+def test_refusal_of_bad_settings_by_field(wrong):
     field = next(iter(wrong))
     with pytest.raises(ValueError, match=f"^{field}: "):
         Settings(**({"dt": 0.01} | wrong))
 
 
-def test_restitution_outside_0_to_1_is_clamped_with_a_warning():
+def test_restitution_outside_0_to_1():
     with pytest.warns(UserWarning, match="restitution"):
         model = Model(2, [FLOOR, BALL], (0.0, 0.0), [[0.0, 1.2], [1.2, -0.5]], 0.0)
     assert model.restitution.tolist() == [[0.0, 1.0], [1.0, 0.0]]
 
 
-def test_a_model_does_not_change_when_the_callers_array_does():
+def test_model_after_a_change_of_the_caller_s_array():
     table = np.full((2, 2), 0.5)
     model = Model(2, [FLOOR, BALL], (0.0, 0.0), table, table)
     table[:] = 0.0
     assert model.restitution[0, 1] == model.friction[0, 1] == 0.5
 
 
-def test_nearly_unit_quaternions_and_normals_are_normalised():
+def test_normalisation_of_nearly_unit_quaternions_and_normals():
     body = Body(Sphere(1.0), 1.0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0 + 1e-9, 0.0, 0.0, 0.0))
     assert body.pose[3] == 1.0
     assert HalfSpace((0.6, 0.8 + 1e-9)).normal == pytest.approx((0.6, 0.8), abs=1e-8)
@@ -110,13 +110,13 @@ def test_step_counts_are_checked(steps):
 
 
 @pytest.mark.parametrize("moments", [(1.0, 1.0, 2.0), (0.083333, 0.083333, 0.166667), (1.0, 1.0, 1e-12)])
-def test_a_plate_and_a_rod_have_moments(moments):
+def test_moments_of_a_plate_and_a_rod(moments):
     """Flat: the largest is the sum of the others; thin: one is nearly nothing."""
     assert Body(Sphere(1.0), 1.0, moments, STANDING).inertia == moments
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_pair_values_that_are_one_number_take_no_room_per_pair(dimension):
+def test_room_of_pair_values_that_are_one_number(dimension):
     """1e5 bodies have 1e10 pairs: 80 GB a table. 2-D: a model of that many is made and stepped."""
     count = 100_000
     if dimension == 2:
@@ -134,7 +134,7 @@ def test_pair_values_that_are_one_number_take_no_room_per_pair(dimension):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_pair_tables_of_kernels_have_one_layout(n):
+def test_layout_of_pair_tables(n):
     """Another layout would be another type, and all kernels compiled anew for it."""
     values = np.arange(float(n * n)).reshape(n, n)
     for table in (values, np.broadcast_to(0.5, (n, n))):

@@ -36,7 +36,7 @@ def many(count):
         (many(70), 0.5, 0.3, ()),
     ],
 )
-def test_left_out_names_what_the_model_cannot_show(bodies, restitution, friction, left_out):
+def test_names_of_parts_left_out(bodies, restitution, friction, left_out):
     model = Model(2, bodies, (0.0, -9.81), restitution, friction)
     assert Simulation(model, Settings.classical(DT)).left_out == left_out
 
@@ -53,7 +53,7 @@ def test_left_out_names_what_the_model_cannot_show(bodies, restitution, friction
     ],
     ids=["bouncing discs", "spinning discs", "smooth boxes", "boxes", "crowd"],
 )
-def test_the_full_model_gives_the_same_answer(profile, bodies, restitution, friction):
+def test_answer_of_the_full_model(profile, bodies, restitution, friction):
     model = Model(2, bodies, (0.0, -9.81), restitution, friction)
     lean, full = (Simulation(model, profile(DT), model_everything=flag) for flag in (False, True))
     for simulation in (lean, full):
@@ -77,7 +77,7 @@ def test_angular_momentum_of_a_smooth_lopsided_ball():
     assert simulation.pose[1, :3] == pytest.approx([0.15, 0.0, 0.5], abs=1e-14)
 
 
-def test_sort_and_sweep_finds_the_pairs_that_testing_all_finds():
+def test_pairs_of_sort_and_sweep_against_all_pairs():
     """The same 60 bodies with and without broadphase: the same contacts, bit for bit."""
     model = Model(2, many(60), (0.0, -9.81), 0.3, 0.4)
     plain = Simulation(model, Settings.classical(DT))

@@ -45,14 +45,14 @@ sys.exit(status)
     ],
     ids=["structures, a matrix", "the direct solver"],
 )
-def test_tests_of_the_solver_pass_on_a_release_that_nobody_tried(tests):
+def test_solver_on_an_untried_release(tests):
     paths = [f"tests/reference_solver/{name}" for name in tests]
     done = subprocess.run([sys.executable, "-c", PLAIN, *paths], cwd=ROOT, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"\d\d passed", done.stdout)
 
 
-def test_the_project_states_the_releases_that_were_tried():
+def test_releases_stated_by_the_project():
     said = re.search(r"# Tried: numba (.+?)[;.] ", (ROOT / "pyproject.toml").read_text())
     assert said and tuple(said[1].split(", ")) == TRIED
     pinned = re.search(r"^numba==(.+)$", (ROOT / "constraints.txt").read_text(), re.MULTILINE)

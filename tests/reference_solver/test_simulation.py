@@ -47,7 +47,7 @@ def test_bits_and_kernels_of_a_copy(copied):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_one_call_and_many_calls_give_the_same_bits(profile):
+def test_bits_of_one_call_and_many_calls(profile):
     whole = Simulation(mixed_model(), profile(DT)).record(60, stride=3, contacts=True)
     steps = Simulation(mixed_model(), profile(DT))
     for sample in range(1, 21):
@@ -58,7 +58,7 @@ def test_one_call_and_many_calls_give_the_same_bits(profile):
     assert steps.time == whole.t[-1]
 
 
-def test_record_starts_with_the_state_before_the_first_step():
+def test_first_state_of_a_record():
     simulation = Simulation(mixed_model(), Settings.classical(DT))
     simulation.advance(5)
     record = simulation.record(10, stride=4)
@@ -82,7 +82,7 @@ def test_contact_buffers_grow_as_needed():
         assert (np.diff(key * 64 + record.contacts.feature[rows]) > 0).all()
 
 
-def test_what_is_handed_out_is_a_copy():
+def test_copies_handed_out():
     simulation = Simulation(mixed_model(), Settings.classical(DT))
     simulation.pose[:] = 7.0
     simulation.twist[:] = 7.0
@@ -90,7 +90,7 @@ def test_what_is_handed_out_is_a_copy():
     assert simulation.twist[0, 0] == 0.0
 
 
-def test_prescribed_bodies_keep_their_twist_whatever_they_meet():
+def test_twist_of_prescribed_bodies():
     wall = Body(Box((0.1, 1.0)), pose=(0.0, 0.0, 0.0), twist=(2.0, 0.0, 0.5), motion="prescribed")
     ball = Body(Disc(0.2), 5.0, 0.1, (0.5, 0.0, 0.0), (-3.0, 0.0, 0.0))
     simulation = Simulation(Model(2, [wall, ball], (0.0, 0.0), 0.5, 0.5), Settings.reference(DT))
@@ -100,7 +100,7 @@ def test_prescribed_bodies_keep_their_twist_whatever_they_meet():
     assert simulation.twist[1, 0] > 2.0
 
 
-def test_a_free_body_falls_as_semi_implicit_euler_says():
+def test_fall_of_a_free_body_by_semi_implicit_euler():
     """x_n = x_0 + v_0 t + g t (t + h)/2, v exact; force and torque alike."""
     body = Body(Disc(0.5), 2.0, 0.25, (1.0, 2.0, 0.3), (0.5, -1.0, 2.0), force=(3.0, 1.0), torque=-0.5)
     simulation = Simulation(Model(2, [body], (0.0, -9.81), 0.0, 0.0), Settings.classical(DT))
@@ -112,7 +112,7 @@ def test_a_free_body_falls_as_semi_implicit_euler_says():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_world_without_a_free_body_runs(dimension):
+def test_world_without_a_free_body(dimension):
     normal = (0.0,) * (dimension - 1) + (1.0,)
     pose, twist = ((0.0,) * 3, (0.0,) * 3) if dimension == 2 else ((0.0,) * 3 + (1.0,) + (0.0,) * 3, (0.0,) * 6)
     load = (0.0,) * dimension

@@ -17,7 +17,7 @@ def pyramid(rows, gap):
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("rate", [60, 240])
-def test_a_column_of_ten_stands_for_a_minute(space, rate):
+def test_minute_of_a_column_of_ten(space, rate):
     """Within .1 m sideways, a tenth of a box. In one order of corners it falls."""
     simulation = space.simulation(space.column([1.0] * 10), Settings.classical(1.0 / rate), G, 0.0, 0.5)
     start = simulation.pose
@@ -37,7 +37,7 @@ def test_a_pyramid_comes_to_rest(rate, gap):
     assert float(np.abs(simulation.twist).max()) < 1e-12
 
 
-def test_without_the_slop_a_pyramid_does_not_come_to_rest():
+def test_pyramid_without_slop():
     """What the test before rests on: with half of what weight closes in a step corners part and are pushed for ever."""
     simulation = Simulation(pyramid(13, 0.1), Settings.classical(1.0 / 240, pull=0.25 * G))
     simulation.advance(2400)

@@ -32,7 +32,7 @@ def in_frame(problem, contacts):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_impulses_of_a_step_have_their_velocities_by_the_matrices(dimension, restitution):
+def test_velocities_of_a_step_by_its_matrices(dimension, restitution):
     """u = W p + q with the step's own impulses is what the bodies then do, whether or not p solves the problem."""
     simulation = pile(dimension, restitution)
     problem = simulation.step_problem()
@@ -85,13 +85,13 @@ def test_a_file_gives_the_problem_back(dimension, tmp_path):
         assert (getattr(again, name) == getattr(problem, name)).all()
 
 
-def test_a_file_that_lacks_an_entry_is_refused(tmp_path):
+def test_refusal_of_a_file_that_lacks_an_entry(tmp_path):
     np.savez(tmp_path / "part.npz", W=np.eye(2), q=np.zeros(2), spacedim=2, numberOfContacts=1)
     with pytest.raises(ValueError, match="mu"):
         StepProblem.load(tmp_path / "part.npz")
 
 
-def test_a_problem_that_does_not_fit_is_refused():
+def test_refusal_of_a_problem_that_does_not_fit():
     frame, index = np.eye(2)[None], np.zeros(1, np.int64)
     with pytest.raises(ValueError, match="free"):
         StepProblem(np.eye(2), np.zeros(3), np.zeros(1), frame, index, index)
@@ -100,7 +100,7 @@ def test_a_problem_that_does_not_fit_is_refused():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_more_contacts_than_there_is_room_for_are_all_exported(dimension):
+def test_export_of_more_contacts_than_room(dimension):
     """Arrays that are too small grow in the copy only. 8 n + 64 planar rows, 4 n + 16 manifolds at the start."""
     simulation = pile(dimension)
     full = simulation.step_problem()
@@ -120,7 +120,7 @@ def full_scratch(simulation):
     return simulation._world._rows.local.copy()
 
 
-def test_enumeration_says_whether_a_problem_has_one_solution():
+def test_enumeration_of_one_solution():
     """A resting box has one velocity, whatever its redundant corners carry; the numbers of solutions are O9's."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     box = Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, 0.5, 0.0))
@@ -150,7 +150,7 @@ def missed(problem, impulse):
 
 
 @pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 3), (2, 1)])
-def test_the_solver_finds_one_of_the_solutions_that_enumeration_finds(seed, count):
+def test_answer_of_the_solver_against_enumeration(seed, count):
     """Coulomb's law in coupled contacts may have several solutions: of 120 such triples 5 have, at mu = 0.5."""
     simulation = three_discs(seed, 0.5)
     problem = simulation.step_problem()
@@ -165,7 +165,7 @@ def test_the_solver_finds_one_of_the_solutions_that_enumeration_finds(seed, coun
 
 
 @pytest.mark.parametrize("seed", [15, 17])
-def test_two_solutions_may_be_the_ends_of_a_continuum(seed):
+def test_continuum_between_two_solutions(seed):
     """Discs that jam: everything between the two solutions found is one as well, and the solver's lies among them."""
     simulation = three_discs(seed, 0.5)
     problem = simulation.step_problem()
@@ -186,7 +186,7 @@ def test_enumeration_is_planar():
         pile(3).step_problem().solutions()
 
 
-def test_a_world_without_contacts_has_an_empty_problem():
+def test_problem_of_a_world_without_contacts():
     disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 5.0, 0.0))
     simulation = Simulation(Model(2, [disc], (0.0, -G), 0.0, 0.5), Settings.fixed_step(DT))
     assert simulation.step_problem().contacts == 0

@@ -83,20 +83,20 @@ def test_fields_are_those_of_the_tuple(flag):
     assert weighed(outer, places) == 1000.0 * mine + (7.0 + 1.5) + 2.0 + 32.0 + 3
 
 
-def test_arrays_are_written_to_where_they_are():
+def test_arrays_written_in_place():
     outer, _ = an_outer()
     wrote(outer)
     assert outer.inner.places.tolist() == [7.0, 2.0, 4.0, 8.0] and outer.rows.tolist() == [0.0, 1.0, 8.0]
 
 
-def test_what_is_made_anew_is_not_what_was_made_before():
+def test_structure_made_anew():
     _, places = an_outer()
     turns = [(-0.5 + 1.0 + 1), (-1.0 + 3.0 + 2), (1.5 + 7.0 + 3)]
     found = 100.0 * turns[0] + 10.0 * turns[1] + turns[2]
     assert remade(places) == found + 0.5 + 0.25
 
 
-def test_a_structure_is_a_named_tuple_to_python():
+def test_structure_as_a_named_tuple():
     outer, _ = an_outer()
     count, inner, rows, pair = outer
     assert (
@@ -109,7 +109,7 @@ def test_a_structure_is_a_named_tuple_to_python():
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT) or not KNOWN, reason="structures are named tuples to numba as well")
-def test_kernels_are_handed_one_pointer_for_each():
+def test_pointers_handed_to_kernels():
     from numba.core import types
     from numba.core.registry import cpu_target
 
@@ -124,7 +124,7 @@ def test_kernels_are_handed_one_pointer_for_each():
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: nothing is compiled")
-def test_members_of_other_types_are_another_type():
+def test_type_of_a_structure_with_other_members():
     outer, places = an_outer()
     weighed(outer, places)
     before = len(weighed.signatures)
@@ -133,7 +133,7 @@ def test_members_of_other_types_are_another_type():
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: nothing is compiled")
-def test_a_member_that_is_none_of_its_type_is_refused():
+def test_refusal_of_a_member_of_another_type():
     outer, places = an_outer()
     weighed(outer, places)
     with pytest.raises(Exception, match=r"(?i)type|determine"):

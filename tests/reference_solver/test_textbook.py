@@ -105,7 +105,7 @@ def test_overhanging_box_at_the_edge_of_its_support(space, reference, motion, of
 
 
 @pytest.mark.parametrize("correction", ["baumgarte", "split", "none"])
-def test_baumgarte_injects_beta_delta_over_dt_and_split_impulse_nothing(space, classical, correction):
+def test_speed_injected_by_baumgarte_and_split_impulse(space, classical, correction):
     overlap, beta = 0.01, 0.2
     settings = dataclasses.replace(classical, position_correction=correction, slop=0.0, beta=beta)
     simulation = space.simulation([space.floor(), space.ball(0.0, 0.5 - overlap)], settings)

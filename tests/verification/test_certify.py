@@ -50,7 +50,7 @@ def test_exception_in_a_part_as_a_failed_gate(monkeypatch):
     assert "no answer" in broken.case
 
 
-def test_parts_run_in_processes_and_come_back_by_name():
+def test_parts_of_two_processes_by_name():
     from rich.console import Console
 
     assert command.side_by_side(len, ("a", "bc", "def"), Console(stderr=True)) == {"a": 1, "bc": 2, "def": 3}
@@ -102,7 +102,7 @@ def test_self_test_detections_by_corruption_and_size(monkeypatch):
     assert f"2 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr and "missed:" not in result.stderr
 
 
-def test_self_test_fails_below_the_detection_limit(monkeypatch):
+def test_failed_self_test_below_its_share(monkeypatch):
     result = planted(monkeypatch, {("friction", JUDGED)}, [])
     assert result.exit_code == 1 and result.stdout == ""
     assert f"1 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr

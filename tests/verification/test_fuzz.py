@@ -34,7 +34,7 @@ SAMPLE = [
 
 class TestScenes:
     @pytest.mark.parametrize("dimension", [2, 3])
-    def test_no_bodies_overlap_at_the_start_and_what_is_laid_down_touches(self, dimension):
+    def test_overlap_and_touch_at_the_start(self, dimension):
         touching = 0
         for seed in range(60):
             bodies = scene(seed, dimension).model.bodies
@@ -48,7 +48,7 @@ class TestScenes:
         assert touching >= 10
 
     @pytest.mark.parametrize("dimension", [2, 3])
-    def test_a_seed_is_a_world_and_the_worlds_differ(self, dimension):
+    def test_worlds_by_seed(self, dimension):
         drawn = [scene(seed, dimension) for seed in range(40)]
         again = scene(7, dimension)
         assert again.model.bodies == drawn[7].model.bodies and again.rate == drawn[7].rate
@@ -58,7 +58,7 @@ class TestScenes:
         assert all(each.steps % STRIDE == 0 for each in drawn)
 
     @pytest.mark.parametrize("dimension", [2, 3])
-    def test_rows_in_which_impacts_accumulate_start_apart_and_run_into_one_another(self, dimension):
+    def test_start_of_rows_with_accumulating_impacts(self, dimension):
         free, shapes = [], set()
         for seed in range(40):
             bodies = chain(seed, dimension).model.bodies
@@ -143,7 +143,7 @@ class TestAttack:
         (name, t, apart, allowed), = found.defects  # fmt: skip
         assert name == "stronger" and t > 0.0 and apart > allowed > 0.0
 
-    def test_a_variant_that_is_refused_is_no_defect_but_told(self, monkeypatch):
+    def test_refused_variant(self, monkeypatch):
         """Fixed steps are no truth: they differ, and their own certificate says so."""
 
         class Coarse(Variant):

@@ -38,7 +38,7 @@ def test_scenes_that_agree_pass(monkeypatch):
     assert "half below 0.5" in result.stderr
 
 
-def test_both_dimensions_are_asked_where_none_is_named(monkeypatch):
+def test_dimensions_by_default(monkeypatch):
     _, asked = certify(monkeypatch, flags=())
     assert asked == [(seed, d) for d in (2, 3) for seed in (5, 6, 7)]
 
@@ -89,7 +89,7 @@ def serve_badly(connection):
 
 @pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="children are guarded by a fork")
-def test_hanging_or_crashing_scene_stops_no_other(monkeypatch):
+def test_scenes_beside_a_hanging_or_crashing_one(monkeypatch):
     monkeypatch.setattr(fuzzing, "serve", serve_badly)
     found = {each["seed"]: each for each in fuzzing.attacked([(1, 2), (2, 2), (0, 2), (3, 3)], limit=20.0)}
     assert "no answer after" in found[1]["broken"] and "exit code 3" in found[2]["broken"]

@@ -95,7 +95,7 @@ def test_gate_holds(call):
     assert [row for row in rows if not row.holds] == []
 
 
-def test_each_part_yields_what_its_functions_yield():
+def test_rows_of_each_part():
     names = {row.quantity for row in rotation.gates()}
     assert names == {
         "free rotation: observed order",
@@ -105,7 +105,7 @@ def test_each_part_yields_what_its_functions_yield():
     }
 
 
-def test_a_gate_from_below_is_failed_by_what_is_too_small_and_by_what_is_no_number():
+def test_gate_from_below_by_a_small_value_and_no_number():
     assert Gate.at_least("", "", 2.0, 1.9, "").holds
     assert not Gate.at_least("", "", 1.8, 1.9, "").holds
     assert not Gate.at_least("", "", float("nan"), 1.9, "").holds

@@ -16,7 +16,7 @@ from tests.verification.space import SPACES
 
 @pytest.mark.few(3)
 @pytest.mark.parametrize("name", gates.MOTIONS)
-def test_what_is_certified_of_a_known_motion_is_true(name):
+def test_certified_known_motions(name):
     found = gates.misses(name, 3)
     assert gates.beyond(name, found).holds
     assert [row for row in gates.kept(name, found) if not row.holds] == []
@@ -31,7 +31,7 @@ def test_row_of_an_error_beyond_x():
 
 
 @pytest.mark.parametrize("name", ["board on rollers, planar", "ball on a turntable", "box on three corners at once"])
-def test_a_truth_that_is_off_by_a_millionth_of_a_metre_is_missed(name):
+def test_truth_off_by_a_micrometre(name):
     motion = gates.MOTIONS[name](np.random.default_rng(0))
     wrong = motion.truth.copy()
     wrong[0] += 1e-6
@@ -39,7 +39,7 @@ def test_a_truth_that_is_off_by_a_millionth_of_a_metre_is_missed(name):
     assert found.refused == () and not gates.beyond(name, [found]).holds
 
 
-def test_a_turn_counts_at_the_reach_of_the_body():
+def test_turn_at_the_reach_of_a_body():
     motion = planar.wedge(SPACES[0], np.random.default_rng(1))
     wrong = motion.truth.copy()
     wrong[2] += 1e-5
@@ -49,7 +49,7 @@ def test_a_turn_counts_at_the_reach_of_the_body():
 
 @pytest.mark.few(3)
 @pytest.mark.parametrize("name", gates.MOTIONS)
-def test_nothing_overlaps_at_the_start_and_the_truth_overlaps_nothing(name):
+def test_overlap_at_the_start_and_in_the_truth(name):
     for seed in range(3):
         motion = gates.MOTIONS[name](np.random.default_rng(seed))
         bodies, truths = motion.model.bodies, np.atleast_2d(motion.truth)
@@ -73,39 +73,39 @@ def test_a_lopsided_ball_keeps_its_energy():
     assert np.linalg.norm(motion.truth[:2] - straight) > 1e-4
 
 
-def test_the_integrator_is_of_fourth_order_and_stops_where_it_is_told():
+def test_order_and_stop_of_the_integrator():
     end, left = integrated(lambda s: np.array([s[1], -s[0]]), np.array([1.0, 0.0]), 1.0)
     assert left == 0.0 and np.allclose(end, [math.cos(1.0), -math.sin(1.0)], rtol=0.0, atol=1e-13)
     end, left = integrated(lambda s: np.array([s[1], -s[0]]), np.array([1.0, 0.0]), 3.0, lambda s: s[0])
     assert 3.0 - left == pytest.approx(0.5 * math.pi, abs=1e-12)
 
 
-def test_no_set_of_corners_fits_what_pulls_and_pushes_at_once():
+def test_corners_pulled_and_pushed_at_once():
     with pytest.raises(ValueError, match="contacts"):
         complementary(np.array([[-1.0]]), np.array([-1.0]))
 
 
-def test_a_box_slides_on_over_the_corner_of_a_table():
+def test_box_sliding_over_the_corner_of_a_table():
     """Corners of its base leave the table, and that of the table leaves its base: pressed polygons of up to six."""
     found = [miss(edges.slides_over_a_corner(np.random.default_rng(seed)), 30) for seed in range(6, 14)]
     assert [each.refused for each in found] == [()] * len(found)
     assert max(each.off for each in found) < 1e-11
 
 
-def test_a_box_that_spins_on_a_light_one_slows_down_as_on_a_floor():
+def test_box_that_spins_on_a_light_one():
     boxes = [(0.47, 0.46, 0.08), (0.09, 0.19, 0.11)]
     numbers = np.array([[0.01, 44.0], [0.6, 0.2], [5.0, -6.7], [0.95, -0.27]])
     found = miss(rubbing.spun_down(boxes, *numbers, 0.2), 15)
     assert found.off < 1e-9
 
 
-def test_layers_stop_and_go_along_with_each_other():
+def test_layers_that_stop_together():
     """A slab on one that is as heavy, on a smooth floor: both end with half of its speed."""
     ways = rubbing.layers([1.0, 1.0], [1e-12, 2.0], [0.0, 4.0], 2.0)
     assert ways == pytest.approx([1.0 + 2.0, 3.0 + 2.0], abs=1e-9)  # relative slip ends after 1 s
 
 
-def test_a_ball_whose_rebounds_end_has_bounced_for_as_long_as_their_series_says():
+def test_time_of_a_ball_s_rebounds_by_their_series():
     """Frictionless, level: rest after sqrt(2 h/g) (1 + e)/(1 - e) (O16), and its blows are as many as fit."""
     e, height, radius = 0.5, 0.4, 0.1
     world = blows.Flight(np.array([[0.0, 1.0, 0.0]]), radius, np.array([0.0, -10.0]), e, 0.0)
@@ -116,7 +116,7 @@ def test_a_ball_whose_rebounds_end_has_bounced_for_as_long_as_their_series_says(
     assert count == math.ceil(math.log(blows.LAST / impact) / math.log(e))
 
 
-def test_a_smooth_ball_leaves_an_edge_where_its_weight_no_longer_bends_its_path():
+def test_smooth_ball_that_leaves_an_edge():
     """cos(theta) = 2/3 + v^2/(3 g r): energy, and a load of zero."""
     radius, v = 0.3, 0.2
     world = edges.Rolling(np.array([1.0, 1.0, 1.0]), radius, np.array([0.0, 0.0, -10.0]), 0.0, False)
@@ -139,7 +139,7 @@ def test_series_of_rebounds_in_the_noise_of_its_gap(space, seed):
     assert (pieces.kind == IMPACT).sum() <= 2 * math.log(1e7) / -math.log(motion.model.restitution[0, 1])
 
 
-def test_a_box_that_rebounds_on_a_corner_keeps_what_its_law_keeps():
+def test_box_that_rebounds_on_a_corner():
     """Smooth: the spin about the corner that is struck, and e of its speed; flights keep energy."""
     box = corners.Box((0.2, 0.4), 0.0)
     state = np.array([-0.8, 3.0, 0.0, 2.0, box.lever(-0.8)[1], -1.5])

@@ -10,11 +10,11 @@ from tests.verification.space import SPACES
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 1.5])
-def test_the_fit_returns_the_power_of_a_power_law(power):
+def test_fit_of_a_power_law(power):
     assert fitted(tuple(0.3 * rate**-power for rate in RATES)) == pytest.approx(power, abs=1e-12)
 
 
-def test_round_off_has_no_order_and_does_not_spoil_one():
+def test_order_in_round_off():
     assert fitted((1e-13, 3e-14, 0.0, 2e-13, 1e-14)) is None
     errors = tuple(1e-7 * (60 / rate) ** 4 for rate in RATES)  # the last is 1.5e-12
     assert fitted((*errors[:4], 1e-13)) == pytest.approx(4.0, abs=1e-12)
@@ -22,14 +22,14 @@ def test_round_off_has_no_order_and_does_not_spoil_one():
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.name)
 @pytest.mark.parametrize("case", CASES)
-def test_classical_is_of_first_order_in_every_case(case, space):
+def test_order_of_classical(case, space):
     """Semi-implicit Euler (E17) and events found up to a step late."""
     row = observed(case, CASES[case], space, "classical")
     # the largest of 16 phases scatters by up to one in 16 about its supremum at each step
     assert row.order == pytest.approx(1.0, abs=0.12)
 
 
-def test_free_rotation_is_of_second_order_where_steps_are_fixed():
+def test_order_of_free_rotation_in_fixed_steps():
     row = observed("", orders.rotation, SPACES[1], "classical")
     assert row.order == pytest.approx(2.0, abs=0.05)
 
@@ -40,14 +40,14 @@ def test_free_rotation_of_the_loop_at_other_steps():
     assert max(row.errors) - min(row.errors) <= orders.ROUND_OFF
 
 
-def test_a_flight_errs_by_half_of_g_t_dt():
+def test_error_of_a_flight():
     """Semi-implicit Euler falls g t dt / 2 too far, whatever the start."""
     row = observed("", orders.flight, SPACES[0], "classical")
     for rate, error in zip(row.rates, row.errors, strict=True):
         assert error == pytest.approx(0.5 * orders.GRAVITY / rate, rel=1e-10)
 
 
-def test_a_bouncing_ball_is_where_its_flights_say():
+def test_place_of_a_bouncing_ball_by_its_flights():
     """A flight that lasts exactly until t: on the floor at the end of each bounce, at the apex between."""
     fall = math.sqrt(2.0 / orders.GRAVITY)
     assert orders.bounced(1.0, 0.8, 0.5 * fall) == pytest.approx(0.75, abs=1e-15)
@@ -55,7 +55,7 @@ def test_a_bouncing_ball_is_where_its_flights_say():
     assert orders.bounced(1.0, 0.8, fall * (1.0 + 1.6 + 0.64)) == pytest.approx(0.8**4, abs=1e-14)
 
 
-def test_the_angle_on_the_hill_keeps_the_energy():
+def test_energy_of_the_angle_on_the_hill():
     """Rolling from rest: (1 + k) v^2 / 2 = g (R + r)(cos x0 - cos x); the time integral of dx/v returns the time."""
     end = orders.hill_angle(2, 0.2)
     rate = orders.GRAVITY / (1.5 * 2.5)

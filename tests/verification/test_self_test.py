@@ -10,7 +10,7 @@ from tests.verification.self_test import JUDGED, PROMISED, SIZES, Corruption, Tr
 
 
 @pytest.mark.parametrize(("missed", "status"), [(0, 0), (1, 0), (2, 1), (20, 1)])
-def test_share_of_exactly_the_promised_amount_passes(monkeypatch, missed, status):
+def test_share_of_exactly_the_promised_amount(monkeypatch, missed, status):
     assert PROMISED * 20 == 19.0
     planted = [Corruption("law", f"c{k}", "block", lambda *given: given) for k in range(20)]
     made = [Trial(each, size, ("gap",) if k >= missed else ()) for k, each in enumerate(planted) for size in SIZES]

@@ -82,7 +82,7 @@ def test_rods_with_two_answers_and_with_one(kind):
     assert min(counts.values()) == 15
 
 
-def test_rods_with_two_answers_are_certified_for_no_time():
+def test_certified_time_of_rods_with_two_answers():
     """One of each kind; the reason and the verdict in one line say from when, and who may do what."""
     for kind in ("struck", "slides", "rests"):
         model = next(drawn[1] for seed in range(4000) if (drawn := ladder(seed, kind)) and drawn[0] > 1)
@@ -104,7 +104,7 @@ FRAMES = [(0.0, 1e-6, 0.0), (0.0, 1.0, 0.0), (0.5, 0.0, 0.0), (-3.0, 20.0, 0.0)]
 
 
 @pytest.mark.parametrize("twist", [None, *FRAMES])
-def test_a_slot_that_moves_wedges_a_rod_as_one_at_rest(twist):
+def test_rod_wedged_in_a_moving_slot(twist):
     model = slot(motion="fixed") if twist is None else slot(motion="prescribed", twist=twist)
     assert searched(model, 4).begin == 0.0
     assert np.isinf(searched(replace(model, friction=0.1), 4).begin)
@@ -112,7 +112,7 @@ def test_a_slot_that_moves_wedges_a_rod_as_one_at_rest(twist):
 
 @pytest.mark.parametrize("frame", [(0.0, 0.0), (-3.0, 20.0)])
 @pytest.mark.parametrize("spin", [-2.0, 0.5])
-def test_a_slot_that_turns_wedges_a_rod(spin, frame):
+def test_rod_wedged_in_a_turning_slot(spin, frame):
     """About a point 1.5 m up the slot: forces within the cones hold the rod on its circle, or none press it."""
     half, up = HALF * math.cos(0.2) + RADIUS, 1.5
     twist = (*frame, spin)
@@ -127,7 +127,7 @@ def test_a_slot_that_turns_wedges_a_rod(spin, frame):
 @pytest.mark.parametrize(
     ("angle", "mu", "v", "w"), [(0.9, 3.0, 1.0, 4.0), (0.9, 2.0, 1.0, 5.0), (1.0, 1.6, 2.0, 5.0), (1.05, 1.5, 2.0, 5.0)]
 )
-def test_a_sliding_end_that_lifts_off_or_jams(angle, mu, v, w):
+def test_sliding_end_that_lifts_off_or_jams(angle, mu, v, w):
     """Painleve: nothing touches and it flies, or friction presses it down so that it jams."""
     r = 1e-3
     x, y = math.cos(angle), -math.sin(angle) - r
@@ -175,7 +175,7 @@ def test_discs_that_stop_spinning_at_one_of_several_walls():
     assert len(found) > 8 and not any(found)
 
 
-def test_a_random_scene_whose_blow_has_three_answers():
+def test_random_scene_with_three_answers_to_a_blow():
     drawn = scene(79, 2)
     found = searched(drawn.model, drawn.steps, 1.0 / drawn.rate)
     assert found.begin == pytest.approx(0.06605546, abs=1e-8)
@@ -272,7 +272,7 @@ def test_contacts_that_differ_in_their_second_tangent(second):
     assert module._agree(problem, closed, sticks, slip[None])[0] == (second > 0.0)
 
 
-def test_what_has_too_many_contacts_says_so():
+def test_refusal_of_too_many_contacts():
     """A pile of ten boxes: their modes are more than can be tried, and the verdict in one line tells."""
     boxes = [Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, 0.5 + k, 0.0)) for k in range(10)]
     found = certify(Model(2, [FLOOR, *boxes], (0.0, -G), 0.0, 0.5), Settings.reference(DT), 6)
@@ -295,7 +295,7 @@ ROLLING = {
 
 
 @pytest.mark.parametrize("name", ROLLING)
-def test_accelerations_without_loads_are_those_of_the_gap(name):
+def test_accelerations_without_loads(name):
     """Truth: the second difference of distances between bodies that keep their velocities."""
     fixed, shape, pose, twist = ROLLING[name]
     if name == "triangle on a plane":
@@ -311,7 +311,7 @@ def test_accelerations_without_loads_are_those_of_the_gap(name):
     assert found == pytest.approx((gaps[0] - 2.0 * gaps[1] + gaps[2]) / h**2, abs=1e-5)
 
 
-def test_answers_do_not_hang_on_the_observer():
+def test_answers_by_observer():
     drawn = next(d[1] for seed in range(4000) if (d := ladder(seed, "struck")) and d[0] > 1)
     for change in (
         Change(2, boost=(1.7, -0.6)),

@@ -83,7 +83,7 @@ def test_every_check_can_fail():
 
 
 class TestWhatWasCertifiedOnce:
-    def test_a_disc_between_a_floor_and_a_ceiling_that_comes_down(self):
+    def test_disc_under_a_falling_ceiling(self):
         """No motion obeys all laws."""
         ceiling = Body(HalfSpace((0.0, -1.0)), pose=(0.0, 1.2, 0.0), twist=(0.0, -0.3, 0.0), motion="prescribed")
         certificate = certify(planar(floor(), ceiling, disc(0.0, 0.5)), Settings.reference(DT), 200)
@@ -144,7 +144,7 @@ class TestRecords:
         assert sliding[1].pieces.first_contact[1] == 2 and impulse[1, 1] > 0.0
         assert ("pull" in self.broken(sliding, impulse=impulse)) is pulls
 
-    def test_a_contact_on_a_body_that_its_piece_does_not_hold(self, sliding):
+    def test_contact_on_a_body_outside_its_piece(self, sliding):
         body = sliding[1].pieces.body.copy()
         body[1] = 0
         assert "unknown" in self.broken(sliding, body=body)

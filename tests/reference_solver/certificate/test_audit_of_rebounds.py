@@ -18,13 +18,13 @@ def refused(model, record, dt):
 
 
 @pytest.mark.parametrize("scene", ["disc that bounces", "sphere that bounces"])
-def test_a_blow_that_does_not_rebound_at_all_is_no_soft_one(scene):
+def test_blow_without_any_rebound(scene):
     """It comes down far faster than what loads do in two steps: only slower ones may be held."""
     dead = self_test.given(lambda model, _: replace(model, restitution=0.0 * model.restitution))
     assert "normal" in self_test.seen_by(*dead(self_test.SCENES[scene], 0.0))
 
 
-def test_what_is_pressed_in_a_phase_does_not_part_as_it_begins():
+def test_parting_at_the_begin_of_a_pressed_phase():
     """By a millionth of a metre a second."""
     motion = gates.MOTIONS["ball slipping along a groove"](np.random.default_rng(0))
     dt = motion.time / 40
@@ -39,7 +39,7 @@ def test_what_is_pressed_in_a_phase_does_not_part_as_it_begins():
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, -0.6])
-def test_corners_that_meet_have_normals_of_edges_only(angle):
+def test_normals_of_corners_that_meet(angle):
     """Along many directions corners that touch are as far apart; the law knows those of edges, at 45 degrees."""
     turn = 0.25 * math.pi
     bodies = [

@@ -103,7 +103,7 @@ NOT_SEEN = {
 }
 
 
-def test_corruptions_of_a_millionth_but_for_those_not_seen():
+def test_corruptions_of_a_millionth():
     """What a check lets pass is no more than what it has to: ten times as much is seen here."""
     missed = {}
     for trial in self_test.trials((1e-6, 1e-5, 1e-4)):
@@ -115,7 +115,7 @@ def test_corruptions_of_a_millionth_but_for_those_not_seen():
 HILL = self_test.SCENES["disc that slides off a disc"]
 
 
-def test_moment_over_a_hill_off_by_more_than_its_point():
+def test_moment_off_its_point_over_a_hill():
     """Its point goes .003 m in a piece, and its force changes by a hundredth: 1e-4 of the moment are not told."""
     spun = next(each for each in self_test.CORRUPTIONS if each.name == "moment and spin over a hill")
     assert "moment" in self_test.seen_by(*spun.plant(HILL, 2e-4))
@@ -169,7 +169,7 @@ class TestFrictionOfSlipsThatTurn:
         assert "friction" in refused(*slipping[:3], impulse=impulse)
 
     @pytest.mark.parametrize("more", [1e-5, 2e-2])
-    def test_too_strong_or_too_weak_is_seen(self, slipping, more):
+    def test_friction_too_strong_or_too_weak(self, slipping, more):
         """On a plane nothing is unknown but what stages leave, 1e-8, and by how much a mean of directions is shorter.
 
         That is a 24th of the square of the turn, of what is too strong; and the turn itself, of what is too weak.

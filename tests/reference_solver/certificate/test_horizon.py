@@ -36,7 +36,7 @@ def way_aside(t):
     return np.array(ways)
 
 
-def test_the_horizon_is_where_a_known_growth_is_a_thousandfold(monkeypatch):
+def test_horizon_by_a_known_growth(monkeypatch):
     """Over the way of free flight in all of the run, of both parts of the disturbance."""
     steps = 1200
     model, t = between_two_discs(), np.arange(steps + 1) * DT
@@ -92,7 +92,7 @@ def decided(model, time):
 
 
 @pytest.mark.parametrize("e", [0.5, 1.0])
-def test_a_row_with_a_gap_that_counts_as_none_ends_the_horizon(e):
+def test_horizon_of_a_row_with_a_negligible_gap(e):
     """It is given the velocities of a row that touches; with a gap of 1e-9 m, those of impacts in turn."""
     for gap in (1e-15, 1e-14, 1e-13):
         assert decided(row(gap, e), 0.4) == pytest.approx(0.25)
@@ -100,7 +100,7 @@ def test_a_row_with_a_gap_that_counts_as_none_ends_the_horizon(e):
         assert decided(row(gap, e), 0.4) is None
 
 
-def test_a_row_that_a_load_presses_together_has_no_gap():
+def test_gap_of_a_row_pressed_together():
     """A wall stands behind it, and a force presses it there."""
     model = row(1e-13, 0.0)
     wall = Body(HalfSpace((-1.0, 0.0)), pose=(0.7 + 1e-13, 0.0, 0.0), motion="fixed")
@@ -108,7 +108,7 @@ def test_a_row_that_a_load_presses_together_has_no_gap():
     assert decided(Model(2, [*pressed, wall], (0.0, 0.0), 0.0, 0.0), 0.4) is None
 
 
-def test_impacts_that_do_not_feel_each_other_have_no_order():
+def test_order_of_independent_impacts():
     """Two balls come down on a floor at once, each on its own."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     balls = [Body(Disc(0.1), 1.0, 0.005, (x, 0.2, 0.0)) for x in (0.0, 1.0)]

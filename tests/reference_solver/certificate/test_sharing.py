@@ -156,7 +156,7 @@ def test_refusal_of_loads_that_the_laws_leave_open(name):
 
 
 @pytest.mark.parametrize("name", DETERMINED)
-def test_redundant_loads_of_one_motion_are_certified(name):
+def test_certificate_of_redundant_loads_of_one_motion(name):
     model = DETERMINED[name]()
     found = certify(model, Settings.reference(DT), 12)
     assert found.holds, found.reasons

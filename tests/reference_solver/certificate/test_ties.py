@@ -54,7 +54,7 @@ def test_the_law_s_own_normal_passes(scene):
     assert failed(*scene()) == set()
 
 
-def test_a_normal_between_those_of_two_faces_is_none_of_the_law():
+def test_normal_between_those_of_two_faces():
     """It parts both bodies as far as they are apart, and is neither a face's nor square to an edge of each."""
     model, record = landed()
     normal = np.array([0.1, 0.0, 1.0]) / math.sqrt(1.01)
@@ -68,14 +68,14 @@ def test_a_normal_between_those_of_two_faces_is_none_of_the_law():
     assert "direction" in failed(model, record, normal)
 
 
-def test_of_faces_that_tie_the_one_is_taken_along_which_bodies_close_last():
+def test_choice_between_faces_that_tie():
     """Along the side they close at .3 m/s, along the top at 1: the top may not be taken."""
     model, record = met()
     assert "choice" in failed(model, record, (0.0, 0.0, 1.0))
     assert "choice" not in failed(model, record, (1.0, 0.0, 0.0))
 
 
-def test_partings_of_boxes_are_six_faces_and_nine_products_both_ways():
+def test_partings_of_boxes():
     model, _ = landed()
     table, box = model.bodies
     known = partings(table.shape, np.array([table.pose]), box.shape, np.array([box.pose]))

@@ -29,7 +29,7 @@ def envelope(problem):
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_order_is_a_permutation_and_its_envelope_holds_every_block(direct, seed, dimension):
+def test_permutation_and_envelope_of_an_order(direct, seed, dimension):
     pairs = graph(seed, 15, 0.12)
     problem = direct.touching(pairs, 15, dimension)
     assert direct.order(problem)
@@ -69,7 +69,7 @@ def test_a_singular_matrix_is_reported(direct):
 
 
 @pytest.mark.parametrize("n", [2, 20, 200])
-def test_a_column_has_a_matrix_as_wide_as_two_bodies(direct, n):
+def test_matrix_width_of_a_column(direct, n):
     """Whatever numbers its bodies carry: the envelope is 3 rows of 3 + 4 + 5 entries per body (planar), and no more."""
     rng = np.random.default_rng(n)
     names = rng.permutation(n)
@@ -79,7 +79,7 @@ def test_a_column_has_a_matrix_as_wide_as_two_bodies(direct, n):
     assert envelope(problem) == (n - 1) * (3 + 4 + 5) + 3
 
 
-def test_a_body_that_touches_all_others_costs_one_row(direct):
+def test_rows_of_a_body_that_touches_all_others(direct):
     """A tray with 50 things on it: an envelope linear in their number, where a band would be quadratic."""
     n = 51
     problem = direct.touching([(0, i) for i in range(1, n)], n)

@@ -58,7 +58,7 @@ def test_redundant_points_share_one_force(direct, points):
 
 
 @pytest.mark.parametrize("ratio", [1e-6, 1e-9, 1e-12])
-def test_points_out_of_line_leave_the_load_to_the_highest(direct, ratio):
+def test_load_of_points_out_of_line(direct, ratio):
     """Three points on a rigid block, the middle one a little higher: it carries all, however little that is.
 
     While all three are pressed, rounds move load at a pace that goes with the ratio; their number must not go with its
@@ -86,7 +86,7 @@ def test_a_worse_answer_is_not_taken(direct):
 @pytest.mark.parametrize("target", [-1e-3, 1e-3, 1.0])
 @pytest.mark.parametrize("slide", [-5.0, 5.0])
 @pytest.mark.parametrize("spin", [-3.0, 0.0, 3.0])
-def test_painleve_rod_gets_one_of_its_answers(direct, target, slide, spin):
+def test_answer_of_a_painleve_rod(direct, target, slide, spin):
     """A rod at 0.8 rad, mu = 2.5, beyond Painleve's threshold of 1.64: impulses have one or three answers there."""
     angle, mu = 0.8, 2.5
     jacobians = np.zeros((1, 2, 2, 3))
@@ -102,7 +102,7 @@ def test_painleve_rod_gets_one_of_its_answers(direct, target, slide, spin):
     assert min(np.abs(velocity - solution.velocity[0]).max() for solution in solutions) <= 1e-11
 
 
-def test_a_fresh_start_forgets_the_impulses_and_nothing_else(direct):
+def test_state_after_a_fresh_start(direct):
     """From wrong impulses: the same velocities, and without a factorisation to spend those impulses stay the best."""
     twists = []
     for spoilt in (False, True):

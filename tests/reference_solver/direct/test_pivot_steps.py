@@ -60,7 +60,7 @@ def hard(direct, seed):
     return problem
 
 
-def test_pivots_that_end_nowhere_leave_the_answer_of_rounds(direct):
+def test_answer_without_a_pivot_that_ends(direct):
     """With the impulses that have its residual: a larger one is not taken, in whichever search."""
     kept = 0
     for seed in range(8):

@@ -86,7 +86,7 @@ def test_where_rounds_stand_still_pivots_end(direct, budget):
     assert problem.size[FACTORISATIONS] == alone.size[FACTORISATIONS] >= budget
 
 
-def test_problems_that_are_not_for_pivots_are_left_alone(direct):
+def test_problems_without_pivots(direct):
     """In space, and of more contacts than there is room for: impulses are zero, as `withdraw` left them."""
     for problem in (direct.random(1, 3, dimension=3), direct.pressed_block(PIVOTED_CONTACTS + 1)):
         assert direct.pivots(problem, 0) == np.inf

@@ -26,7 +26,7 @@ def test_store_has_every_kind_of_world():
 
 
 @pytest.mark.parametrize("key", CHOSEN)
-def test_random_world_is_the_same_within_both_bounds(key):
+def test_random_worlds_within_both_bounds(key):
     assert compared(ANSWERS[key], LIMIT).word in ("same", "unknown", "refused by both")
 
 
@@ -44,7 +44,7 @@ def test_certificate_of_small_gaps_and_low_rebounds(seed):
 
 @pytest.mark.long
 @pytest.mark.parametrize("key", [key for key in ANSWERS if key.startswith("standard")])
-def test_cell_of_the_standard_suite_is_the_same_or_refused(key):
+def test_cells_of_the_standard_suite(key):
     assert compared(ANSWERS[key], LIMIT).word != "different"
 
 
@@ -56,7 +56,7 @@ def test_slip_in_space_that_begins_or_ends_stiffly(monkeypatch, seed):
 
 
 @pytest.mark.parametrize("key", ["fuzz3 28", "chains3 59"])
-def test_contacts_that_sweeps_over_them_do_not_solve(key):
+def test_contacts_beyond_sweeps(key):
     assert compared(ANSWERS[key], LIMIT).word == "same"
 
 

@@ -117,7 +117,7 @@ def test_rest_of_a_stack_to_the_bit(d):
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("ratio", [0.5, 1.5])
-def test_ball_on_a_slope_rolls_or_slips(d, ratio):
+def test_ball_on_a_slope_by_friction(d, ratio):
     """Without slip if tan(lean) <= (1 + m r^2 / I) mu."""
     lean, share = 0.3, 0.5 if d == 2 else 0.4
     mu = ratio * math.tan(lean) / (1.0 + 1.0 / share)
@@ -146,7 +146,7 @@ def test_collision_count_of_two_balls_and_a_wall_as_pi(d):
     assert abs(velocity[-1, 0] + 10.0 * math.sin(turned)) < SMALL
 
 
-def test_box_tips_over_its_corner_without_slip():
+def test_box_tipping_over_its_corner_without_slip():
     """Energy of the turn about the corner: I_c w^2 / 2 + m g y = constant, the corner at rest."""
     half, tilt = (0.3, 0.6), 0.5  # beyond the balance, at atan(1/2)
     c, s = math.cos(tilt), math.sin(tilt)
@@ -235,7 +235,7 @@ def test_disc_thrown_into_a_wedge_that_friction_closes(e, speed):
     assert np.abs(found.twist[1:, 2]).max() < SMALL
 
 
-def test_boxes_of_one_height_meet_on_a_floor():
+def test_boxes_of_one_height_on_a_floor():
     """Their corners run along each other's sides until their faces meet; both have gaps of zero there."""
     left, right = box(2, (0.25, 0.25), (0.0, 0.25), (1.0, 0.0)), box(2, (0.25, 0.25), (0.6, 0.25), (0.0, 0.0))
     found = record(Model(2, [ground(2), left, right], (0.0, -G), 1.0, 0.0), 0.5)

@@ -34,7 +34,7 @@ def test_groups_of_contacts_on_one_floor():
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.5])
-def test_forces_of_groups_are_those_of_all_at_once(monkeypatch, spin):
+def test_forces_of_groups_against_all_at_once(monkeypatch, spin):
     world, state, contacts = rods_and_a_stack(spin)
     free = free_acceleration(world, state.axes, state.velocity)
     apart = decide(world, state, contacts, free)

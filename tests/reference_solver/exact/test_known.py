@@ -13,6 +13,6 @@ ALL = [pytest.param(name, marks=() if name == LOOKED_AT else pytest.mark.long) f
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_known_motion_held_within_the_bound_or_refused(name, seed):
+def test_known_motions_within_their_bound(name, seed):
     word, said = held(MOTIONS[name](np.random.default_rng(seed)))
     assert word == "held" or (word == "refused" and name != LOOKED_AT), said

@@ -26,20 +26,20 @@ def looked_at(dt, *parts):
 
 
 @pytest.mark.parametrize("parts", [(240,), (1,) * 240, (7, 100, 133)])
-def test_run_in_parts_has_the_bits_of_the_whole(parts):
+def test_bits_of_a_run_in_parts(parts):
     whole, parted = looked_at(1 / 240, 240), looked_at(1 / 240, *parts)
     assert np.array_equal(whole[0], parted[0]) and np.array_equal(whole[1], parted[1])
 
 
 @pytest.mark.parametrize("steps", [1, 4, 1024])
-def test_run_with_another_dt_has_the_same_bits(steps):
+def test_bits_of_a_run_with_another_dt(steps):
     """One second in steps that are powers of two, so that the time of the end has no round-off."""
     pose, twist = looked_at(1 / steps, steps)
     truth = looked_at(1 / 64, 64)
     assert np.array_equal(pose, truth[0]) and np.array_equal(twist, truth[1])
 
 
-def test_copy_goes_on_with_the_same_bits():
+def test_bits_of_a_copy():
     simulation = Simulation(falling_box_and_disc(), Settings.reference(1 / 240))
     simulation.advance(100)
     other = copy.copy(simulation)

@@ -224,7 +224,7 @@ def rod(spin, friction):
     return planar(body, friction=friction)
 
 
-def test_one_motion_where_sliding_is_not_possible():
+def test_single_motion_without_sliding():
     """Beyond a friction of (i^2 + a^2)/(a b) = 1.34 an impulse stops the end, and no forces would hold it up."""
     found = certify(rod(0.0, 1.6), Settings.reference(DT), 12)
     assert found.holds and not found.several and not found.unique, found.reasons

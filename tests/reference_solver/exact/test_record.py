@@ -21,7 +21,7 @@ def hashed(*arrays):
 
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("seed", range(3))
-def test_random_splits_have_the_bits_of_the_whole(key, seed):
+def test_bits_of_random_splits(key, seed):
     """Whatever parts a run is made in, recorded or not, on a copy or not."""
     world, random = world_of(key), np.random.default_rng(seed)
     steps = world.samples * world.stride
@@ -40,7 +40,7 @@ def test_random_splits_have_the_bits_of_the_whole(key, seed):
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_record_in_parts_has_the_pieces_of_the_whole(key):
+def test_pieces_of_a_record_in_parts(key):
     world = world_of(key)
     steps = world.samples * world.stride
     whole = Simulation(world.model, Settings.reference(world.dt)).record(steps, pieces=True)
@@ -51,7 +51,7 @@ def test_record_in_parts_has_the_pieces_of_the_whole(key):
         assert np.array_equal(joined, getattr(whole.pieces, name)), name
 
 
-def test_contacts_carry_the_weight_of_a_step():
+def test_weight_of_a_step_on_contacts():
     """Two boxes that rest on each other: corners carry their weights, and friction nothing."""
     bodies = [Body(Box((0.5, 0.5)), 2.0, 1 / 3, (0.0, 0.5 + i, 0.0)) for i in range(2)]
     model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), *bodies], (0.0, -G), 0.0, 0.5)

@@ -39,7 +39,7 @@ def test_overlap_at_the_start():
         advance([FLOOR, Body(Box((0.5, 0.5)), 1.0, 0.2, (0.0, 0.4, 0.0))])
 
 
-def test_edges_in_space_whose_meeting_is_missed(monkeypatch):
+def test_missed_meeting_of_edges_in_space(monkeypatch):
     """A bar falls across another, edge on edge: no corner of either comes near the other."""
     side, half = np.sin(np.pi / 8), np.cos(np.pi / 8)
     shape = Box((0.5, 0.1, 0.1))
@@ -53,7 +53,7 @@ def test_edges_in_space_whose_meeting_is_missed(monkeypatch):
         Simulation(model, Settings.reference(1 / 240)).advance(120)
 
 
-def test_impacts_of_an_instant_that_do_not_end(monkeypatch):
+def test_endless_impacts_of_an_instant(monkeypatch):
     monkeypatch.setattr(impacts, "MOST", 1)
     with pytest.raises(refusals.TooManyImpacts, match="more than 1 impacts"):
         advance([FLOOR, ball(1.0)], e=1.0)
@@ -127,7 +127,7 @@ def test_neither_forces_nor_impulses(monkeypatch):
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.5])
-def test_friction_in_space_that_newton_does_not_find(mu, monkeypatch):
+def test_friction_in_space_without_convergence(mu, monkeypatch):
     """A ball on the ground, of which friction takes 3.5 as much as of a point: sweeps find what sticks and slips."""
     monkeypatch.setattr(cones, "solve", lambda *_: 1.0)
     ball_on_floor = Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0))
@@ -137,7 +137,7 @@ def test_friction_in_space_that_newton_does_not_find(mu, monkeypatch):
     assert found == pytest.approx([G, -0.6 * rubs, -0.8 * rubs], abs=1e-14)
 
 
-def test_friction_in_space_that_is_not_found(monkeypatch):
+def test_friction_in_space_without_a_solution(monkeypatch):
     """Rounds that end far from a solution, and sweeps that may take no time."""
     monkeypatch.setattr(cones, "solve", lambda *_: 1.0)
     monkeypatch.setattr(cones, "PRODUCTS", 0)

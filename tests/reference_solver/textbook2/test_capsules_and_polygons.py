@@ -66,7 +66,7 @@ pairs = st.tuples(st.sampled_from(sorted(SHAPES)), st.sampled_from(["capsule", "
 
 @given(pairs, st.booleans(), numbers, numbers, numbers, numbers)
 @hypothesis_settings(derandomize=True)
-def test_contacts_lie_along_the_axis_of_least_overlap(pair, swapped, x, y, angle_a, angle_b):
+def test_contacts_along_the_axis_of_least_overlap(pair, swapped, x, y, angle_a, angle_b):
     """No direction separates better than the normal; the least gap is the separation along it.
 
     Bodies that overlap only in their rounding are as far apart as their cores less the radii, and no direction
@@ -99,7 +99,7 @@ def test_contacts_lie_along_the_axis_of_least_overlap(pair, swapped, x, y, angle
 
 @given(st.sampled_from(["capsule", "triangle", "hexagon"]), numbers, numbers)
 @hypothesis_settings(derandomize=True)
-def test_half_space_touches_the_ends_of_the_facing_edge(name, angle, tilt):
+def test_contacts_of_a_half_space_and_a_facing_edge(name, angle, tilt):
     normal = turned(tilt, [[0.0, 1.0]])[0]
     plane = Body(HalfSpace(tuple(normal), 0.25), motion="fixed")
     vertices, radius = core(SHAPES[name])
@@ -138,7 +138,7 @@ def test_capsules_of_length_04_and_radius_025(place, normal, points):
     assert sorted(contacts.point[:, 0]) == pytest.approx(points, abs=1e-15)
 
 
-def test_features_stay_while_a_triangle_rocks_and_the_world_turns():
+def test_features_of_a_rocking_triangle_in_a_turning_world():
     names = set()
     for rock in (-1e-3, -1e-6, 0.0, 1e-6, 1e-3):
         for turn in (0.0, 1.0, 2.5):
@@ -151,7 +151,7 @@ def test_features_stay_while_a_triangle_rocks_and_the_world_turns():
 
 
 @pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
-def test_a_polygon_with_a_boxs_vertices_moves_like_the_box(profile):
+def test_motion_of_a_polygon_with_a_box_s_vertices(profile):
     """Boxes and polygons have different detection; six bodies tumble into a heap before chaos tells them apart."""
 
     def heap(shape):
@@ -170,7 +170,7 @@ def test_a_polygon_with_a_boxs_vertices_moves_like_the_box(profile):
 @pytest.mark.parametrize(
     "shape", [Capsule(0.4, 0.2), Polygon.about_centroid(HEXAGON), Polygon.about_centroid(TRIANGLE)]
 )
-def test_resting_on_a_floor_carries_the_weight_and_does_not_creep(shape):
+def test_weight_and_creep_of_a_body_at_rest(shape):
     vertices, radius = core(shape)
     angle = 0.0
     if isinstance(shape, Polygon):  # lay the first edge down
@@ -185,7 +185,7 @@ def test_resting_on_a_floor_carries_the_weight_and_does_not_creep(shape):
     assert simulation.pose[1] == pytest.approx([0.0, height, angle], abs=1e-12)
 
 
-def test_a_capsule_falling_over_its_round_end_keeps_its_energy():
+def test_energy_of_a_capsule_falling_over_its_end():
     """Leaning on a smooth floor it falls: its centre goes straight down, and what it loses in height it gains."""
     start = 0.2 + 0.4 * math.sin(math.pi / 2.0 - 0.1)
     capsule = Body(Capsule(0.4, 0.2), 1.0, 0.1, (0.0, start, math.pi / 2.0 - 0.1))

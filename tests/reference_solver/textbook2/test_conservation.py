@@ -41,7 +41,7 @@ def test_free_collisions_keep_momentum(build, settings, shapes, restitution):
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_frictionless_collisions_lose_energy_as_restitution_says(build, reference, e):
+def test_energy_lost_in_frictionless_collisions(build, reference, e):
     """One impact: dT = -(1 - e^2) m_eff v_rel^2 / 2."""
     a, b = build.disc(-0.5, 0.0, (3.0, 1.0, 2.0), mass=2.0), build.disc(0.5, 0.0, (-1.0, -4.0, 0.0), mass=5.0)
     simulation = build.simulation([a, b], reference, restitution=e)

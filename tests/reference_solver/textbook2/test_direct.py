@@ -26,7 +26,7 @@ def pile(build, seed, settings, bodies=14):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_piles_of_tilted_bodies_are_solved_in_every_step(build, fixed_step, seed):
+def test_piles_of_tilted_bodies(build, fixed_step, seed):
     """Sweeps alone leave a quarter of the steps of such piles unsolved after 4000 of them."""
     simulation = pile(build, seed, fixed_step)
     simulation.advance(500)
@@ -36,7 +36,7 @@ def test_piles_of_tilted_bodies_are_solved_in_every_step(build, fixed_step, seed
     assert not [reason for reason in certificate["reasons"] if "overlap" not in reason]  # some overlap at the start
 
 
-def test_a_pile_falls_the_same_way_twice(build, fixed_step):
+def test_bits_of_a_pile_run_twice(build, fixed_step):
     """Neither start values nor the memory of an earlier run enter: equal bits."""
     poses = []
     for _ in range(2):
@@ -64,7 +64,7 @@ def test_room_grows_with_the_contacts(build, fixed_step):
     assert simulation.certificate["converged"]
 
 
-def test_slab_on_many_columns_shares_its_weight(build, fixed_step):
+def test_weight_of_a_slab_on_many_columns(build, fixed_step):
     """A body that touches 20 others: a dense row of the matrix, and sums of forces that must balance."""
     n, mass = 20, 30.0
     posts = [build.box(0.5 * i, 0.5, half=(0.1, 0.5)) for i in range(n)]

@@ -39,7 +39,7 @@ def test_disc_on_a_tilted_half_space(touch, angle, gap):
     assert found.point[0] == pytest.approx(centre - 0.5 * normal, abs=1e-15)
 
 
-def test_the_pose_of_a_half_space_turns_and_moves_it(touch, build):
+def test_half_space_moved_by_its_pose(touch, build):
     """A floor turned by 90 degrees and moved to x = -1 is a wall whose free side looks to -x."""
     wall = Body(HalfSpace((0.0, 1.0), 0.25), pose=(-1.0, 5.0, math.pi / 2.0), motion="fixed")
     found = touch(wall, build.disc(-1.75, 0.0))
@@ -61,7 +61,7 @@ def test_flat_box_touches_with_two_corners(touch, build, angle, quarter):
     assert len(set(found.feature.tolist())) == 2
 
 
-def test_tilted_box_touches_with_one_corner_and_keeps_its_number_while_it_turns(touch, build):
+def test_number_of_a_turning_box_s_corner(touch, build):
     """Corner (-, -) of the box stays the same contact on both sides of 45 degrees."""
     numbers = set()
     for angle in (0.2, 0.7, math.pi / 4.0, 0.9, 1.3):
@@ -74,7 +74,7 @@ def test_tilted_box_touches_with_one_corner_and_keeps_its_number_while_it_turns(
 
 
 @pytest.mark.parametrize("gap", [-0.1, 0.0])
-def test_contact_point_of_free_discs_lies_midway_and_of_a_fixed_one_on_the_free_surface(touch, build, gap):
+def test_contact_point_of_free_and_fixed_discs(touch, build, gap):
     direction = turned(0.7, 1.0, 0.0)
     for motion, reach in (("free", 0.5 + gap / 2.0), ("fixed", 0.5 + gap)):
         small = Body(Disc(0.25), 1.0, 0.1, (*(direction * (0.75 + gap)), 0.0))
@@ -116,7 +116,7 @@ def test_disc_against_box_from_outside_corner_and_inside(touch, build, order, pl
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
 @pytest.mark.parametrize("side", [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-def test_faces_of_two_boxes_touch_over_their_common_width(touch, build, angle, side):
+def test_contacts_of_faces_over_their_common_width(touch, build, angle, side):
     """Unit boxes side by side, shifted by 0.3 along the face: two points 0.7 apart."""
     shift = np.array([side[1], side[0]]) * 0.3
     offset = turned(angle, *(np.array(side) * (1.0 - 1e-3) + shift))
@@ -128,7 +128,7 @@ def test_faces_of_two_boxes_touch_over_their_common_width(touch, build, angle, s
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.7, math.pi / 4.0, 1.4])
-def test_corner_of_a_turned_box_touches_a_face_at_one_point(touch, build, angle):
+def test_contact_of_a_turned_box_s_corner(touch, build, angle):
     corner = min((turned(angle, x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)), key=lambda point: point[1])
     top = build.box(0.2 - corner[0], 0.5 - corner[1] - 1e-3, angle=angle)
     found = touch(build.box(0.0, 0.0, motion="fixed"), top)
@@ -138,13 +138,13 @@ def test_corner_of_a_turned_box_touches_a_face_at_one_point(touch, build, angle)
     assert found.point[0] == pytest.approx([0.2, 0.499], abs=1e-14)
 
 
-def test_boxes_that_miss_each_other_diagonally_do_not_touch(touch, build):
+def test_boxes_that_miss_each_other_diagonally(touch, build):
     """Bounding boxes overlap, bodies do not."""
     found = touch(build.box(0.0, 0.0, angle=math.pi / 4.0), build.box(1.1, 1.1, angle=math.pi / 4.0))
     assert len(found) == 0
 
 
-def test_contacts_do_not_depend_on_where_the_origin_is(touch, build):
+def test_contacts_about_another_origin(touch, build):
     """Shifted by powers of two no coordinate is rounded: the same bits."""
     for dx, dy in ((1024.0, -512.0), (2.0**20, 2.0**19)):
         here = touch(build.box(0.0, 0.0), build.box(0.25, 0.9375, angle=0.5))
@@ -154,6 +154,6 @@ def test_contacts_do_not_depend_on_where_the_origin_is(touch, build):
         assert (here.normal == there.normal).all()
 
 
-def test_fixed_bodies_do_not_touch_each_other(touch, build):
+def test_contacts_between_fixed_bodies(touch, build):
     found = touch(build.floor(), build.box(0.0, 0.4, motion="fixed"), build.disc(0.0, 1.4))
     assert (found.body_b == 2).all()

@@ -18,7 +18,7 @@ EPS = np.finfo(float).eps
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 960])
 @pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
-def test_rebound_ratio_is_e_at_any_speed_phase_and_gravity(build, profile, dt):
+def test_rebound_by_speed_phase_and_gravity(build, profile, dt):
     for e, v, phase, g in itertools.product(
         (0.2, 0.5, 0.8, 0.95, 1.0), (1e-3, 0.1, 1.0, 6.0, 50.0, 1e3), (0.0, 0.3, 0.7), (0.0, 9.81)
     ):
@@ -32,7 +32,7 @@ def test_rebound_ratio_is_e_at_any_speed_phase_and_gravity(build, profile, dt):
         assert abs(speed[hit] + e * before) <= 4 * EPS * max(abs(before), g * dt), (e, v, phase, g)
 
 
-def test_inelastic_impact_leaves_no_speed_and_no_overlap(build, settings):
+def test_speed_and_overlap_after_an_inelastic_impact(build, settings):
     simulation = build.simulation([build.floor(), build.disc(0.0, 0.5015, (0.0, -3.0, 0.0))], settings)
     simulation.advance(200)
     assert abs(simulation.twist[1, 1]) <= 1e-15
@@ -42,7 +42,7 @@ def test_inelastic_impact_leaves_no_speed_and_no_overlap(build, settings):
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("e", [0.2, 0.5, 0.8, 1.0])
-def test_flat_box_rebounds_by_e_without_spin(build, fixed_step, e, friction):
+def test_rebound_of_a_flat_box(build, fixed_step, e, friction):
     simulation = build.simulation(
         [build.floor(), build.box(0.0, 0.5, (0.0, -3.0, 0.0))], fixed_step, (0.0, -9.81), e, friction
     )
@@ -55,7 +55,7 @@ def test_flat_box_rebounds_by_e_without_spin(build, fixed_step, e, friction):
     [(1.0, 10.0, 0.5, 0.5), (3.0, 0.0, 0.1, 0.5), (1.0, 0.0, 0.5, 0.0), (2.0, -4.0, 0.05, 1.0), (1.0, 30.0, 0.2, 0.8)],
 )
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_oblique_disc_sticks_or_slips_as_coulomb_says(build, settings, vt, spin, mu, e, side):
+def test_oblique_disc_by_coulomb(build, settings, vt, spin, mu, e, side):
     """Scene S-A7: with k = I/(m R^2) = 1/2 a disc sticks iff |u| k/(1 + k) <= mu (1 + e) v_n, u = v_t + omega R."""
     vn, radius, k = 2.0, 0.5, 0.5
     vt, spin = side * vt, side * spin
@@ -93,7 +93,7 @@ def test_off_centre_strike_on_a_free_rod(build, settings, offset, e):
 
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 1e3, 1e6])
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_two_discs_exchange_momentum_as_in_one_dimension(build, settings, ratio, e):
+def test_momentum_of_two_discs_on_one_line(build, settings, ratio, e):
     v1, v2 = 2.0, -1.0
     bodies = [build.disc(-0.5, 0.0, (v1, 0.0, 0.0)), build.disc(0.5, 0.0, (v2, 0.0, 0.0), mass=ratio)]
     simulation = build.simulation(bodies, settings, restitution=e)
@@ -103,7 +103,7 @@ def test_two_discs_exchange_momentum_as_in_one_dimension(build, settings, ratio,
     assert simulation.twist[:, 0] == pytest.approx(expected, abs=8 * EPS * 3.0)
 
 
-def test_three_balls_in_a_row_follow_the_simultaneous_law(build, reference):
+def test_three_balls_in_a_row_by_the_simultaneous_law(build, reference):
     """Law N-SIM: v1 = (1 - 2 e)/3, v2 = v3 = (1 + e)/3 (scene S-B1)."""
     for e in (0.0, 0.4, 1.0):
         bodies = [build.disc(float(i), 0.0, (1.0 if i == 0 else 0.0, 0.0, 0.0)) for i in range(3)]
@@ -126,7 +126,7 @@ def test_apexes_never_rise_at_e_1(build, settings):
 
 
 @pytest.mark.parametrize("e", [0.5, 0.8])
-def test_a_bouncing_disc_comes_to_rest_when_the_geometric_series_ends(build, settings, e):
+def test_rest_of_a_bouncing_disc_by_its_series(build, settings, e):
     """t = sqrt(2 h / g) (1 + e)/(1 - e), mean over 16 phases of the first impact.
 
     Each of N = ln(v / 2 g dt)/ln(1/e) bounces is found up to a step late, and the tail below 2 g dt lasts 4 dt/(1 - e).

@@ -26,7 +26,7 @@ def leaning(build):
     ]
 
 
-def test_warm_starting_does_not_change_the_converged_answer(build, fixed_step):
+def test_converged_answer_with_warm_starting(build, fixed_step):
     results = []
     for warm in (True, False):
         simulation = build.simulation(leaning(build), replace(fixed_step, warm_starting=warm), (0.0, -G), 0.0, 0.3)
@@ -40,7 +40,7 @@ def test_warm_starting_does_not_change_the_converged_answer(build, fixed_step):
     assert efforts[0] < efforts[1]
 
 
-def test_scalar_rows_and_blocks_converge_to_the_same_answer(build, fixed_step):
+def test_answer_of_scalar_rows_and_blocks(build, fixed_step):
     twists = []
     for solver in ("scalar", "block"):
         settings = replace(fixed_step, solver=solver, relaxation=1.0)
@@ -52,7 +52,7 @@ def test_scalar_rows_and_blocks_converge_to_the_same_answer(build, fixed_step):
     assert twists[0] == pytest.approx(twists[1], abs=1e-9)
 
 
-def test_the_residual_is_a_certificate_of_the_error(build):
+def test_error_by_its_residual(build):
     """Stopping earlier leaves a larger error, and none larger than the condition of the column allows."""
     n, errors = 10, []
     for residual in (1e-4, 1e-7, 1e-10, 1e-13):
@@ -77,14 +77,14 @@ def test_an_unreached_residual_is_reported(build):
     assert certificate["sweeps"] == 15
 
 
-def test_a_fixed_number_of_sweeps_is_kept_exactly(build):
+def test_fixed_number_of_sweeps(build):
     simulation = build.column(3, Settings.classical(build.dt, 7))
     simulation.advance(11)
     assert simulation.certificate["sweeps"] == 77
     assert simulation.certificate["converged"] is True
 
 
-def test_relaxation_changes_the_path_and_not_the_answer(build, fixed_step):
+def test_answer_by_relaxation(build, fixed_step):
     answers = []
     for relaxation in (1.0, 1.5, 1.8, None):
         simulation = build.column(6, replace(fixed_step, relaxation=relaxation))
@@ -102,7 +102,7 @@ def velocities_of_one_block(build, settings, box, friction, restitution):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_two_point_block_solves_the_contact_problem(build, fixed_step, seed):
+def test_contact_problem_of_a_two_point_block(build, fixed_step, seed):
     """Random flat impacts of a box: signs, cone, complementarity and maximal dissipation, checked from outside."""
     rng = np.random.default_rng(seed)
     half = (rng.uniform(0.2, 1.0), rng.uniform(0.2, 1.0))
@@ -126,7 +126,7 @@ def test_a_two_point_block_solves_the_contact_problem(build, fixed_step, seed):
         assert abs(speed[0]) <= scale or tangent == pytest.approx(-math.copysign(mu * normal, speed[0]), abs=scale)
 
 
-def test_block_modes_agree_with_enumeration_of_all_sixteen(build, fixed_step):
+def test_block_modes_against_enumeration_of_sixteen(build, fixed_step):
     """An independent least-squares enumeration of open, stick, slip+, slip- at both points finds the same motion."""
     found_modes = set()
     for seed in range(30):
@@ -175,7 +175,7 @@ def solve_mode(w, q, mu, modes):
     return p
 
 
-def test_two_points_of_a_face_that_stick_share_their_friction_by_what_they_may_carry():
+def test_friction_shared_by_two_sticking_points_of_a_face():
     """A box of 1 kg over a floor, off its middle: J^T p takes all its velocity, p_n by moments about either point."""
     solve, local = from_python(pair_modes.solve_modes), np.zeros((LOCAL_ROWS, LOCAL_COLUMNS))
     left, right, height, moment = 0.2, 0.5, 0.4, 0.13

@@ -45,7 +45,7 @@ def test_column_stands_at_other_steps(build, dt):
     assert interface_impulses(record, 10)[-1] / (G * dt * np.arange(10, 0, -1)) == pytest.approx(1.0, abs=1e-10)
 
 
-def test_disc_in_a_wedge_presses_by_half_its_weight_over_cos(build, reference):
+def test_load_of_a_disc_in_a_wedge(build, reference):
     """Walls at alpha from the horizontal, no friction: N = m g / (2 cos alpha) each (scene S-D7)."""
     from reference_solver import Body, HalfSpace
 
@@ -71,7 +71,7 @@ def test_corner_loads_of_a_box_on_an_incline(build, reference):
     assert contacts.impulse[order, 1] == pytest.approx(expected, rel=1e-10)
 
 
-def test_box_tips_beyond_its_base_and_not_before(build, reference):
+def test_box_with_its_centre_within_and_beyond_its_base(build, reference):
     """With friction to hold it, a box b x h tips iff tan(theta) > b / h (scene S-C11)."""
     half = (0.3, 0.6)
     for ratio, tips in ((0.98, False), (1.02, True)):

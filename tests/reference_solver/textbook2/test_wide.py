@@ -70,7 +70,7 @@ def narrow(model, settings, certified):
     ],
     ids=["discs", "three shapes", "boxes with Baumgarte", "no correction", "no friction", "wall"],
 )
-def test_bits_are_those_of_one_manifold_after_the_other(model, changes, certified):
+def test_bits_of_manifolds_in_turn(model, changes, certified):
     settings = replace(Settings.classical(DT), **changes)
     wide, plain = Simulation(model, settings, certified=certified), narrow(model, settings, certified)
     blocks = 0
@@ -85,7 +85,7 @@ def test_bits_are_those_of_one_manifold_after_the_other(model, changes, certifie
     assert blocks > 0  # it was used
 
 
-def test_manifolds_of_a_block_share_no_free_body_and_keep_their_order():
+def test_bodies_and_order_of_manifolds_in_a_block():
     simulation = Simulation(heap(6), Settings.classical(DT), certified=False)
     simulation.advance(150)
     rows, kind = simulation._world._rows, simulation._world._bodies.kind
@@ -106,7 +106,7 @@ def test_manifolds_of_a_block_share_no_free_body_and_keep_their_order():
         assert met == sorted(set(met))
 
 
-def test_small_scenes_and_solves_to_a_residual_have_no_room_for_it():
+def test_room_of_small_scenes_and_solves_to_a_residual():
     small = Simulation(wall(4), Settings.classical(DT))
     exact = Simulation(wall(13), Settings.fixed_step(DT))
     assert all(len(each._world._rows.wide.order) == 0 for each in (small, exact))

@@ -78,7 +78,7 @@ SHAPES = {"sphere": Sphere(0.3), "capsule": Capsule(0.5, 0.25), "box": Box((0.5,
 
 @given(st.sampled_from(sorted(SHAPES)), st.booleans(), st.tuples(numbers, numbers, numbers), turns, turns)
 @hypothesis_settings(derandomize=True)
-def test_contacts_lie_along_the_axis_of_least_overlap(name, swapped, place, turn_a, turn_b):
+def test_contacts_along_the_axis_of_least_overlap(name, swapped, place, turn_a, turn_b):
     """The gap is the separation along the normal, and no direction separates better.
 
     A pair of edges must win by 1e-3 of the smaller half width, and only where the cores overlap.
@@ -107,7 +107,7 @@ def test_contacts_lie_along_the_axis_of_least_overlap(name, swapped, place, turn
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-4, 5e-3])
-def test_a_capsule_along_a_face_touches_with_both_ends_or_one(tilt):
+def test_contacts_of_a_capsule_along_a_face(tilt):
     turn = (math.cos(0.5 * tilt), 0.0, math.sin(0.5 * tilt), 0.0)  # the +x end goes down
     centre = (0.1, 0.2, 0.4 + 0.25 + 0.4 * math.sin(tilt) - 1e-4)
     contacts = touch(body(Box((0.9, 0.9, 0.4)), (0.0,) * 3, motion="fixed"), body(Capsule(0.4, 0.25), centre, turn))
@@ -117,7 +117,7 @@ def test_a_capsule_along_a_face_touches_with_both_ends_or_one(tilt):
     assert contacts.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(expected), 1)), abs=1e-15)
 
 
-def test_a_capsule_along_an_edge_of_a_box_touches_with_two_points():
+def test_contacts_of_a_capsule_along_an_edge():
     out = np.array([0.0, 0.6, 0.8])
     box, capsule = (
         body(Box((0.3, 0.5, 0.4)), (0.0,) * 3),
@@ -129,7 +129,7 @@ def test_a_capsule_along_an_edge_of_a_box_touches_with_two_points():
     assert sorted(contacts.point[:, 0]) == pytest.approx([-0.3, 0.3], abs=1e-15)
 
 
-def test_parallel_capsules_share_a_line_and_crossed_ones_a_point():
+def test_contacts_of_parallel_and_crossed_capsules():
     first = body(Capsule(0.5, 0.2), (0.0, 0.0, 0.0))
     beside = touch(first, body(Capsule(0.4, 0.2), (0.3, 0.399, 0.0)))
     assert sorted(beside.point[:, 0]) == pytest.approx([-0.1, 0.5], abs=1e-15)
@@ -152,7 +152,7 @@ def test_a_resting_capsule_carries_its_weight(turn):
     assert simulation.pose[1, :3] == pytest.approx([0.0, 0.0, height], abs=1e-12)
 
 
-def test_a_capsule_released_sliding_rolls_at_the_speed_of_its_inertia():
+def test_rolling_speed_of_a_capsule_released_sliding():
     """Across its axis a capsule is a disc: v = v0 / (1 + k), k = I / (m r^2) about the axis."""
     moments = (0.02, 0.1, 0.1)
     capsule = Body(Capsule(0.4, 0.2), 1.0, moments, (0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))

@@ -62,7 +62,7 @@ places = st.tuples(numbers, numbers, numbers)
 
 @example((0.5, 0.38, 0.7), (0.47, 1.0, 1.0), (-0.188, 0.0, 0.98), (0.0, 0.5, 0.625, 0.0), (0.375, 0.0, 0.367, 0.0))
 @given(halves, halves, places, turns, turns)
-def test_box_contacts_appear_along_the_axis_of_least_overlap(half_a, half_b, place, turn_a, turn_b):
+def test_box_contacts_along_the_axis_of_least_overlap(half_a, half_b, place, turn_a, turn_b):
     a, b = (half_a, (0.1, -0.2, 0.3), turn_a), (half_b, np.multiply(place, 1.5), turn_b)
     gaps, _ = separations(a, b)
     best, extent = gaps.max(), min(*half_a, *half_b)
@@ -110,7 +110,7 @@ def test_contacts_move_with_the_bodies(half_a, half_b, place, turn_a, turn_b, mo
 
 
 @given(halves, halves, places, turns, turns)
-def test_exchanging_the_bodies_turns_the_normal_round(half_a, half_b, place, turn_a, turn_b):
+def test_normal_of_exchanged_bodies(half_a, half_b, place, turn_a, turn_b):
     gaps, _ = separations((half_a, (0.0, 0.0, 0.0), turn_a), (half_b, place, turn_b))
     assume(distinct(gaps, min(*half_a, *half_b)))
     one, other = body(Box(half_a), (0.0, 0.0, 0.0), turn_a), body(Box(half_b), place, turn_b)
@@ -142,7 +142,7 @@ def product(p, q):
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.2, 0.0), (0.3, -0.4), (0.999, 0.999)])
-def test_aligned_boxes_touch_on_the_rectangle_they_share(shift):
+def test_contacts_of_aligned_boxes(shift):
     contacts = touch(body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.0)), body(Box((0.5, 0.5, 0.5)), (*shift, 0.9999)))
     low, high = np.maximum(-0.5, np.array(shift) - 0.5), np.minimum(0.5, np.array(shift) + 0.5)
     expected = sorted(itertools.product(*zip(low, high, strict=True)))
@@ -152,7 +152,7 @@ def test_aligned_boxes_touch_on_the_rectangle_they_share(shift):
 
 
 @pytest.mark.parametrize(("settings", "kept"), [(SETTINGS, 8), (Settings.classical(0.01), 4)])
-def test_a_square_turned_by_45_degrees_keeps_the_corners_that_are_shared(settings, kept):
+def test_contacts_of_squares_turned_by_45_degrees(settings, kept):
     """All vertices of the octagon that both squares share; in the textbook's step four of them, about its centre."""
     turn = (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
     a, b = body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.0)), body(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.999), turn)
@@ -180,7 +180,7 @@ def test_crossed_edges_touch_where_they_cross():
 
 @given(places, turns, st.tuples(numbers, numbers, numbers).filter(lambda v: math.hypot(*v) > 0.1))
 @example((0.0, 0.0, 0.0), (-0.007, 0.924, 0.522, 0.0), (-0.317, -1.0, -0.383))  # half of the face is flat, half is not
-def test_a_box_touches_a_half_space_with_its_lowest_corners(place, turn, normal):
+def test_contacts_of_a_box_and_a_half_space(place, turn, normal):
     """Corners, their own gaps; those nearly as high as the middle of all are led back to its height (`FLAT`)."""
     half = (0.5, 0.3, 0.2)
     n = np.asarray(normal) / np.linalg.norm(normal)
@@ -203,7 +203,7 @@ def test_a_box_touches_a_half_space_with_its_lowest_corners(place, turn, normal)
 
 
 @given(places, turns)
-def test_a_sphere_touches_the_nearest_point_of_a_box(place, turn):
+def test_contact_of_a_sphere_and_a_box(place, turn):
     half, radius = np.array([0.5, 0.3, 0.2]), 0.25
     contacts = touch(body(Box(tuple(half)), (0.0, 0.0, 0.0), turn), body(Sphere(radius), place))
     local = matrix(turn).T @ place
@@ -221,7 +221,7 @@ def test_a_sphere_touches_the_nearest_point_of_a_box(place, turn):
             assert contacts.normal[0] == pytest.approx(matrix(turn) @ (local - nearest) / distance, abs=1e-9)
 
 
-def test_spheres_touch_on_the_line_of_centres_midway():
+def test_contact_of_spheres():
     along = np.array([1.0, 2.0, -2.0]) / 3.0
     contacts = touch(body(Sphere(0.5), (0.0, 0.0, 0.0)), body(Sphere(0.3), 0.79 * along))
     assert contacts.gap[0] == pytest.approx(-0.01, abs=1e-15)
@@ -229,7 +229,7 @@ def test_spheres_touch_on_the_line_of_centres_midway():
     assert contacts.point[0] == pytest.approx(0.495 * along, abs=1e-15)
 
 
-def test_contacts_come_sorted_by_bodies_and_features():
+def test_order_of_contacts_by_bodies_and_features():
     bodies = [body(Box((0.5, 0.5, 0.5)), (x, 0.3 * x, z)) for z in (0.0, 0.999) for x in (0.0, 0.999, 1.998)]
     contacts = touch(*bodies)
     keys = list(zip(contacts.body_a, contacts.body_b, contacts.feature, strict=True))
@@ -237,7 +237,7 @@ def test_contacts_come_sorted_by_bodies_and_features():
     assert (contacts.body_a < contacts.body_b).all()
 
 
-def test_many_bodies_collide_the_same_with_and_without_sorting():
+def test_collisions_with_and_without_sorting():
     """Beyond 64 bodies candidates come from sort and sweep; every pair of a lattice must still be found."""
     lattice = [body(Sphere(0.5), (x, y, z)) for x in range(5) for y in range(5) for z in range(5)]
     contacts = touch(*lattice)

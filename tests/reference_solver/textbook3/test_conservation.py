@@ -30,7 +30,7 @@ def cloud(build, settings, restitution, friction, seed=3):
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_free_collisions_keep_momentum_and_angular_momentum(build, mechanics, unpushed, friction):
+def test_momentum_in_free_collisions(build, mechanics, unpushed, friction):
     simulation = cloud(build, unpushed, 0.6, friction)
     momentum, angular = mechanics.momentum(simulation), mechanics.angular_momentum(simulation)
     contacts = 0
@@ -59,7 +59,7 @@ def test_frictionless_collisions_never_gain_energy(build, mechanics, unpushed, r
 
 # In the loop of events impulses add up over all that happens in a step, in which normals turn.
 @pytest.mark.parametrize("settings", ["classical", "fixed_step"], indirect=True)
-def test_every_impulse_has_its_opposite_and_pushes(build, settings):
+def test_opposite_and_push_of_impulses(build, settings):
     simulation = cloud(build, settings, 0.3, 0.4)
     for _ in range(120):
         simulation.advance(1)

@@ -31,7 +31,7 @@ def pile(build, seed, settings, bodies=8):
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_piles_of_tilted_bodies_are_solved_in_every_step(build, fixed_step, seed):
+def test_piles_of_tilted_bodies(build, fixed_step, seed):
     simulation = pile(build, seed, fixed_step)
     simulation.advance(300)
     certificate = simulation.certificate

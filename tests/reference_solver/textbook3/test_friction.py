@@ -23,7 +23,7 @@ def incline(build, settings, ratio, body, heading=0.0):
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.9, 0.99, 0.999])
-def test_a_box_below_the_limit_does_not_creep(build, reference, ratio):
+def test_creep_of_a_box_below_the_friction_limit(build, reference, ratio):
     simulation, _ = incline(build, reference, ratio, build.box((0.0, 0.0, 0.5)), heading=0.7)
     simulation.advance(1000)
     assert np.abs(simulation.twist[1]).max() <= 1e-14
@@ -31,7 +31,7 @@ def test_a_box_below_the_limit_does_not_creep(build, reference, ratio):
 
 
 @pytest.mark.parametrize("ratio", [1.001, 1.01, 1.1, 2.0])
-def test_a_box_above_the_limit_accelerates_downhill_by_the_difference(build, reference, ratio):
+def test_box_above_the_friction_limit(build, reference, ratio):
     simulation, slope = incline(build, reference, ratio, build.box((0.0, 0.0, 0.5)), heading=0.7)
     simulation.advance(240)
     expected = G * (math.sin(slope) - MU * math.cos(slope))  # m/s after 1 s
@@ -43,7 +43,7 @@ def test_a_box_above_the_limit_accelerates_downhill_by_the_difference(build, ref
 
 @pytest.mark.parametrize("heading", np.radians([0.0, 15.0, 30.0, 45.0, 77.0, 90.0]))
 @pytest.mark.parametrize("shape", ["box", "sphere"])
-def test_friction_is_the_same_in_every_direction(build, reference, shape, heading):
+def test_friction_by_direction(build, reference, shape, heading):
     """Straight line and deceleration mu g; a pyramid of two axes would give up to sqrt(2) and turn the path."""
     along = np.array([math.cos(heading), math.sin(heading), 0.0])
     body = getattr(build, shape)((0.0, 0.0, 0.5), 5.0 * along)
@@ -78,7 +78,7 @@ def test_parabola_and_roll_of_a_struck_billiard_ball(build, settings):
 
 @pytest.mark.parametrize(("k", "share"), [(2 / 5, 5 / 7), (2 / 3, 3 / 5)])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 700])
-def test_sliding_becomes_rolling_at_the_speed_of_conserved_angular_momentum(build, k, share, dt):
+def test_rolling_speed_by_angular_momentum(build, k, share, dt):
     """About the contact line the angular momentum is conserved, hence the exact end speed at any step."""
     ball = build.sphere((0.0, 0.0, 0.5), (3.0, 4.0, 0.0), k=k)
     simulation = build.simulation([build.floor(), ball], Settings.reference(dt), (0.0, 0.0, -G), friction=MU)
@@ -87,7 +87,7 @@ def test_sliding_becomes_rolling_at_the_speed_of_conserved_angular_momentum(buil
     assert simulation.twist[1, 3:] == pytest.approx(np.array([-4.0, 3.0, 0.0]) * share / 0.5, abs=1e-12)
 
 
-def test_a_turning_box_brakes_its_spin_by_friction_of_its_corners(build, reference):
+def test_spin_of_a_box_braked_by_its_corners(build, reference):
     """Four corners at distance rho, each loaded m g / 4: torque mu m g rho against the spin, none against v = 0."""
     box = build.box((0.0, 0.0, 0.25), spin=(0.0, 0.0, 8.0), half=(0.5, 0.5, 0.25))
     simulation = build.simulation([build.floor(), box], reference, (0.0, 0.0, -G), friction=MU)
@@ -112,7 +112,7 @@ def upper(k):
 
 
 @given(collision_matrices(), st.tuples(components, components, components), st.floats(0.0, 1.5))
-def test_the_impulse_of_one_contact_obeys_signorini_and_coulomb(k, q, mu):
+def test_impulse_of_one_contact_by_signorini_and_coulomb(k, q, mu):
     """Whichever branch found the impulse, it must fulfil the law.
 
     Well-posed: k_nn > mu |k_nt|; other contacts may have none (Painleve) and are not drawn.
@@ -131,7 +131,7 @@ def test_the_impulse_of_one_contact_obeys_signorini_and_coulomb(k, q, mu):
 
 
 @given(collision_matrices(), st.tuples(components, components), st.floats(1e-3, 2.0))
-def test_disc_friction_dissipates_more_than_any_other_impulse_of_the_disc(k, g, radius):
+def test_dissipation_of_friction_against_other_impulses(k, g, radius):
     def cost(p):
         return 0.5 * p @ k[:2, :2] @ p + p @ np.array(g)
 

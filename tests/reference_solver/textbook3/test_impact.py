@@ -30,7 +30,7 @@ SLIDES = [
 
 
 @pytest.mark.parametrize(("velocity", "spin", "mu", "sticks"), SLIDES)
-def test_an_oblique_spinning_sphere_obeys_coulomb_at_impact(build, settings, velocity, spin, mu, sticks):
+def test_oblique_spinning_sphere_by_coulomb(build, settings, velocity, spin, mu, sticks):
     m, radius, k, e = 0.7, 0.5, 0.4, 0.8
     ball = build.sphere((0.0, 0.0, radius), velocity, spin, radius, m, k)
     simulation = build.simulation([build.floor(), ball], settings, restitution=e, friction=mu)
@@ -49,7 +49,7 @@ def test_an_oblique_spinning_sphere_obeys_coulomb_at_impact(build, settings, vel
 
 
 @pytest.mark.parametrize("profile", [Settings.classical, Settings.fixed_step])
-def test_a_strike_off_centre_turns_a_body_by_its_whole_inertia_tensor(build, mechanics, profile):
+def test_spin_by_a_strike_off_centre(build, mechanics, profile):
     """A small sphere hits the top face of a turned box with three different moments (S-A5).
 
     The step is 1 us, so that free rotation after the impact changes the energy by less than round-off.
@@ -76,7 +76,7 @@ def test_a_strike_off_centre_turns_a_body_by_its_whole_inertia_tensor(build, mec
     assert mechanics.kinetic_energy(simulation) == pytest.approx(0.5 * 0.5 * speed**2 - lost, rel=1e-13)
 
 
-def test_head_on_spheres_exchange_velocities_when_elastic(build, settings):
+def test_velocities_of_elastic_spheres_head_on(build, settings):
     direction = np.array([2.0, -1.0, 2.0]) / 3.0
     bodies = [build.sphere(-0.5 * direction, direction), build.sphere(0.5 * direction, (0.0, 0.0, 0.0))]
     simulation = build.simulation(bodies, settings, restitution=1.0)
@@ -84,7 +84,7 @@ def test_head_on_spheres_exchange_velocities_when_elastic(build, settings):
     assert simulation.twist[:, :3] == pytest.approx(np.array([np.zeros(3), direction]), abs=ROUND_OFF)
 
 
-def test_a_prescribed_wall_hands_on_its_speed(build, settings):
+def test_rebound_from_a_prescribed_wall(build, settings):
     """Against a wall moving at V the law holds for relative velocities: v+ = V + e (V - v-)."""
     wall = build.floor(motion="prescribed", twist=(0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
     ball = build.sphere((0.0, 0.0, 0.5), (0.0, 0.0, -3.0))

@@ -47,7 +47,7 @@ def after_a_step(build, e, speed, dt, phase):
 
 
 @pytest.mark.parametrize("e, speed, dt, phase", [fall for fall in FALLS if bounces_once(*fall)])
-def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, e, speed, dt, phase):
+def test_rebound_speed_of_a_sphere(build, e, speed, dt, phase):
     """It starts where it reaches the floor after a share of the step; what counts is the impulse of the impact."""
     simulation = after_a_step(build, e, speed, dt, phase)
     _, _, early, speed = falling(speed, dt, phase)
@@ -60,7 +60,7 @@ def test_a_sphere_rebounds_with_e_times_its_impact_speed(build, e, speed, dt, ph
 
 
 @pytest.mark.parametrize("e, speed, dt, phase", [fall for fall in FALLS if not bounces_once(*fall)])
-def test_a_sphere_that_bounces_more_than_once_in_a_step_gains_no_energy_and_stays_above(build, e, speed, dt, phase):
+def test_energy_of_a_sphere_with_several_bounces_a_step(build, e, speed, dt, phase):
     simulation = after_a_step(build, e, speed, dt, phase)
     place, start, _, _ = falling(speed, dt, phase)
     before = 0.5 * start**2 + G * (place - 0.5)
@@ -72,7 +72,7 @@ def test_a_sphere_that_bounces_more_than_once_in_a_step_gains_no_energy_and_stay
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("half", [(0.5, 0.5, 0.5), (1.0, 0.3, 0.2)])
 @pytest.mark.parametrize("height", [0.0, 1e-3, 0.02])
-def test_a_flat_box_rebounds_on_four_points_without_turning(build, half, friction, height):
+def test_rebound_of_a_flat_box_on_four_points(build, half, friction, height):
     box = build.box((0.0, 0.0, half[2] + height), (0.0, 0.0, -3.0), half=half, turn=(0.9, 0.0, 0.0, 0.3))
     dt = 1 / 60
     simulation = build.simulation([build.floor(), box], Settings.reference(dt), DOWN, 0.5, friction)
@@ -86,7 +86,7 @@ def test_a_flat_box_rebounds_on_four_points_without_turning(build, half, frictio
 
 @pytest.mark.parametrize("dt", [1 / 7, 1 / 60, 1 / 240])
 @pytest.mark.parametrize("k", [2 / 5, 2 / 3])
-def test_a_sliding_sphere_rolls_from_the_instant_its_slip_ends(build, dt, k):
+def test_sphere_that_slides_until_it_rolls(build, dt, k):
     """Speed v0/(1 + k) and place after the slide of 2 k v0/(...): time to roll k v0 / ((1 + k) mu g), oblique."""
     along = np.array([math.cos(0.7), math.sin(0.7), 0.0])
     v0, mu, steps = 3.0, 0.3, math.ceil(2.0 / dt)
@@ -162,7 +162,7 @@ def test_rest_of_a_box_dropped_on_its_edge(build):
     assert np.abs(simulation.twist[1]).max() <= 1e-9
 
 
-def test_a_ball_rolling_over_a_sphere_keeps_angular_momentum(build, mechanics):
+def test_angular_momentum_of_a_ball_rolling_over_a_sphere(build, mechanics):
     """Curved contact under spin: positions that follow the last velocity keep x cross m v of both."""
     a = build.sphere((0.0, 0.0, 0.0), spin=(0.0, 3.0, 0.0))
     b = build.sphere((0.0, 0.0, 1.0), (0.5, 0.0, -0.2), (0.0, -1.0, 0.0), mass=2.0)

@@ -60,7 +60,7 @@ def slips_by_search(k, q, mu, directions=200_001):
     return found
 
 
-def test_the_answer_is_one_that_a_search_of_the_circle_finds():
+def test_answer_against_a_search_of_the_circle():
     random, slipped = np.random.default_rng(5), 0
     for _ in range(60):
         k, q, mu = problem(random, 100.0)
@@ -76,7 +76,7 @@ def test_the_answer_is_one_that_a_search_of_the_circle_finds():
     assert slipped >= 20
 
 
-def test_roots_that_stand_close_together_are_told_apart():
+def test_roots_close_together():
     """The only admissible root has a neighbour at 0.15 rad: a scan of the circle in 32 steps sees neither of them."""
     k = np.array([[0.1185, 0.1558, 0.2659], [0.1558, 0.2366, 0.3853], [0.2659, 0.3853, 0.6658]])
     q, mu = np.array([1.8565, 0.1499, -2.1741]), 1.61
@@ -87,7 +87,7 @@ def test_roots_that_stand_close_together_are_told_apart():
 
 
 @pytest.mark.parametrize("mu", [0.3, 1.0, 2.0])
-def test_on_the_edge_of_the_cone_stick_and_slip_agree(mu):
+def test_stick_and_slip_on_the_edge_of_the_cone(mu):
     """q is chosen so that sticking needs exactly mu p_n, up to round-off on either side: nothing jumps."""
     random, asked = np.random.default_rng(3), 0
     for _ in range(200):

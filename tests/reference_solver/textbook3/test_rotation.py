@@ -49,7 +49,7 @@ def angle_between(p, q):
     return 2.0 * math.sqrt(max(2.0 - 2.0 * abs(np.dot(p / np.linalg.norm(p), q / np.linalg.norm(q))), 0.0))
 
 
-def test_orientation_converges_with_second_order_where_steps_are_fixed():
+def test_order_of_orientation_in_fixed_steps():
     spin, end = np.array([0.05, 3.0, 0.02]), 10.0
     exact = exact_orientation(spin, end)
     errors = []
@@ -63,7 +63,7 @@ def test_orientation_converges_with_second_order_where_steps_are_fixed():
 
 @pytest.mark.parametrize("rate", [30, 240])
 @pytest.mark.parametrize("spin", [(0.05, 3.0, 0.02), (1.0, -2.0, 3.0), (20.0, 5.0, -9.0)], ids=["slow", "all", "fast"])
-def test_a_tumbling_flight_is_exact_to_round_off_and_keeps_its_energy(mechanics, spin, rate):
+def test_path_and_energy_of_a_tumbling_flight(mechanics, spin, rate):
     """DOP853 at 1e-13 errs by 1e-12 of the turn, some 40 rad at most; the splitting composed to order 8 by less."""
     spin = np.array(spin)
     exact = exact_orientation(spin, 2.0)[:4]
@@ -75,7 +75,7 @@ def test_a_tumbling_flight_is_exact_to_round_off_and_keeps_its_energy(mechanics,
     assert np.ptp(energy) <= 1e-12 * energy[0]
 
 
-def test_a_constant_torque_does_not_lower_the_order(mechanics):
+def test_order_under_a_constant_torque(mechanics):
     spin, torque = np.array([0.3, 2.0, -0.5]), np.array([0.5, -1.0, 2.0])
 
     def rate(_, state):
@@ -117,7 +117,7 @@ def test_flips_about_the_intermediate_axis(mechanics):
     assert min(np.array(in_body)[:, 1]) < -0.99  # it did flip
 
 
-def test_equal_moments_turn_with_constant_spin_exactly():
+def test_rotation_with_equal_moments():
     spin = np.array([1.0, -2.0, 0.5])
     simulation = tumbling(spin, 1 / 240, moments=(0.7, 0.7, 0.7))
     simulation.advance(2400)
@@ -127,13 +127,13 @@ def test_equal_moments_turn_with_constant_spin_exactly():
     assert angle_between(simulation.pose[0, 3:], expected) <= 1e-7  # acos of round-off near 1 is sqrt(eps)
 
 
-def test_a_constant_torque_about_a_principal_axis_spins_a_body_up_evenly():
+def test_spin_by_a_torque_about_a_principal_axis():
     simulation = tumbling((0.0, 0.0, 0.0), 1 / 240, torque=(0.0, 0.0, 6.0))
     simulation.advance(240)
     assert simulation.twist[0] == pytest.approx([0, 0, 0, 0, 0, 2.0], abs=1e-12)
 
 
-def test_contacts_and_free_rotation_share_one_angular_momentum(build, mechanics, settings):
+def test_angular_momentum_of_contacts_and_free_rotation(build, mechanics, settings):
     """Two tumbling boxes of unequal moments that collide keep their total angular momentum to round-off."""
     half = (0.7, 0.4, 0.2)
     a = build.box((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 2.0, 0.5), half, 1.0, (0.9, 0.1, 0.2, -0.3))

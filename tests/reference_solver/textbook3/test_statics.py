@@ -31,7 +31,7 @@ def test_column_of_twenty_without_warm_start(build, fixed_step):
     assert simulation.certificate["worst_sweeps"] <= 2000  # plain Gauss-Seidel would need 373 a decimal digit
 
 
-def test_four_corners_share_a_load_off_centre_by_its_moment(build, reference):
+def test_load_off_centre_on_four_corners(build, reference):
     """A box pressed by 30 N and tilted by 3 N m: the corners' resultant must balance both, whatever their split."""
     box = build.box((0.0, 0.0, 0.25), half=(0.5, 0.4, 0.25), force=(4.0, 3.0, -30.0), torque=(2.0, -3.0, 1.0))
     simulation = build.simulation([build.floor(), box], reference, (0.0, 0.0, -G), friction=0.5)
@@ -46,7 +46,7 @@ def test_four_corners_share_a_load_off_centre_by_its_moment(build, reference):
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, math.pi / 4])
-def test_a_ball_in_a_corner_of_three_planes_loads_each_by_geometry(build, reference, direction):
+def test_loads_of_a_ball_in_a_corner_of_three_planes(build, reference, direction):
     """Three mutually normal planes around the vertical, mu = 0: each carries m g / sqrt(3)."""
     c, s = math.cos(direction), math.sin(direction)
     bodies = []
@@ -88,7 +88,7 @@ def recalled(remembered, found):
     return manifolds.impulse[0, : len(found), 2].tolist()
 
 
-def test_points_start_from_the_impulses_of_their_feature_then_of_the_nearest_place():
+def test_first_impulses_by_feature_and_place():
     before = [(5, -0.5, 1.0), (6, 0.5, 2.0), (7, 0.0, 4.0)]
     assert recalled(before, [(5, -0.5), (6, 0.5), (7, 0.0)]) == [1.0, 2.0, 4.0]
     assert recalled(before, [(6, -0.5), (5, 0.5)]) == [2.0, 1.0]  # the feature counts first

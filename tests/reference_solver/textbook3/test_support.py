@@ -29,7 +29,7 @@ def moved(lower, upper, place, yaw, torque=(0.0, 0.0, 0.0)):
 
 @pytest.mark.parametrize("yaw", [0.4, math.pi / 4])
 @pytest.mark.parametrize("lower", [(0.5, 0.5, 0.1), (0.62, 0.4, 0.1)])
-def test_a_box_stands_up_to_each_corner_of_what_it_shares_with_the_box_below(yaw, lower):
+def test_box_at_corners_of_a_shared_face(yaw, lower):
     """Its weight acts at its middle: inside the polygon it stands, outside it tips.
 
     The lower box is put so that the middle of the upper one lies a little to either side of each corner in turn.
@@ -52,7 +52,7 @@ def test_a_box_stands_up_to_each_corner_of_what_it_shares_with_the_box_below(yaw
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_pressed_box_stands_while_what_presses_it_acts_over_the_shared_polygon(seed):
+def test_pressed_box_over_a_shared_polygon(seed):
     """Polygons of four to eight corners; a torque moves the point at which the floor must answer to either side."""
     rng = np.random.default_rng(seed)
     lower, upper = (*rng.uniform(0.4, 0.6, 2), 0.1), (*rng.uniform(0.4, 0.6, 2), 0.2)

@@ -51,7 +51,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_lifted_planar_scene_moves_as_in_the_plane(scene, steps=360):
+def test_lifted_planar_scene_against_the_plane(scene, steps=360):
     bodies, restitution, friction, tolerance = SCENES[scene]
     bodies = [floor(), *bodies]
     settings = Settings.reference(1 / 240)
@@ -84,7 +84,7 @@ def heap(friction, restitution=0.5):
 
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_what_is_left_out_would_not_have_changed_the_answer(friction, restitution):
+def test_answer_without_parts_left_out(friction, restitution):
     """Whole records agree: frictionless spheres without angular terms, no restitution rows, no sorting."""
     model = heap(friction, restitution)
     lean = Simulation(model, Settings.reference(1 / 240))
@@ -96,14 +96,14 @@ def test_what_is_left_out_would_not_have_changed_the_answer(friction, restitutio
     assert np.abs(one.pose[:20] - other.pose[:20]).max() <= 1e-12
 
 
-def test_frictionless_spheres_keep_their_spin_and_go_on_turning():
+def test_spin_of_frictionless_spheres():
     simulation = Simulation(heap(0.0), Settings.classical(1 / 240))
     simulation.advance(240)
     assert (simulation.twist[1, 3:] == [0.0, 0.0, 1.0]).all()
     assert simulation.pose[1, 3:] == pytest.approx([math.cos(0.5), 0.0, 0.0, math.sin(0.5)], abs=1e-13)
 
 
-def test_two_runs_give_the_same_bits_however_they_are_cut():
+def test_bits_of_runs_cut_differently():
     whole = Simulation(heap(0.4), Settings.reference(1 / 240))
     record = whole.record(200, stride=10, contacts=True)
     cut = Simulation(heap(0.4), Settings.reference(1 / 240))
@@ -116,7 +116,7 @@ def test_two_runs_give_the_same_bits_however_they_are_cut():
     assert last.impulse.tobytes() == record.contacts.impulse[span].tobytes()
 
 
-def test_arrays_grow_when_contacts_outnumber_the_first_guess():
+def test_arrays_with_more_contacts_than_guessed():
     """A dense clump of 40 spheres has more pairs than the 4 n + 16 manifolds that are first made room for."""
     rng = np.random.default_rng(1)
     bodies = [sphere(tuple(rng.uniform(-0.5, 0.5, 3))) for _ in range(40)]

@@ -26,7 +26,7 @@ def oracle(*bodies, e=1.0, mu=0.0, gravity=0.0, law="N-SEQ"):
 
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize("mu", [0.0, 0.6])
-def test_a_box_dropped_flat_rebounds_flat_when_both_corners_count_together(e, mu):
+def test_box_dropped_flat_with_corners_together(e, mu):
     square = Body(Box((0.5, 0.5)), mass=2.0, inertia=1.0 / 3.0, pose=(0.0, 2.0, 0.0), twist=(0.0, -3.0, 0.0))
     run = oracle(FLOOR, square, e=e, mu=mu, law="N-SIM")
     run.advance(run.next_event())
@@ -34,7 +34,7 @@ def test_a_box_dropped_flat_rebounds_flat_when_both_corners_count_together(e, mu
     assert len(run.events) == 2
 
 
-def test_one_corner_after_the_other_ends_differently():
+def test_order_of_corner_impacts():
     square = Body(Box((0.5, 0.5)), mass=2.0, inertia=1.0 / 3.0, pose=(0.0, 2.0, 0.0), twist=(0.0, -3.0, 0.0))
     run = oracle(FLOOR, square, e=0.5)
     run.advance(1.01 * run.next_event())
@@ -42,7 +42,7 @@ def test_one_corner_after_the_other_ends_differently():
     assert abs(run.twist[1, 2]) > 0.1
 
 
-def test_a_flat_box_bounces_to_rest_in_time_and_stays():
+def test_time_and_rest_of_a_bouncing_flat_box():
     e, height = 0.5, 1.0
     square = Body(Box((0.5, 0.25)), mass=2.0, inertia=1.0, pose=(0.0, 0.25 + height, 0.0))
     run = oracle(FLOOR, square, e=e, mu=0.4, gravity=G, law="N-SIM")
@@ -54,7 +54,7 @@ def test_a_flat_box_bounces_to_rest_in_time_and_stays():
 
 @pytest.mark.parametrize("angle", [0.2, 0.7, 1.2])
 @pytest.mark.parametrize("e", [0.3, 1.0])
-def test_a_tilted_rod_turns_as_its_lever_says(angle, e):
+def test_spin_of_a_tilted_rod_by_its_lever(angle, e):
     v, mass, half = 2.0, 1.5, 1.0
     run = oracle(FLOOR, rod(y=3.0, angle=-angle, vy=-v, mass=mass), e=e)
     run.advance(run.next_event())
@@ -66,7 +66,7 @@ def test_a_tilted_rod_turns_as_its_lever_says(angle, e):
         assert run.energy() == pytest.approx(0.5 * mass * v * v, rel=1e-14)
 
 
-def test_a_rod_struck_off_centre_turns_about_its_centre_of_percussion():
+def test_centre_of_percussion_of_a_rod():
     mass, length, d, m, v, e = 2.0, 2.0, 0.6, 0.5, 3.0, 0.7
     particle = Body(Disc(0.1), mass=m, inertia=0.5 * m * 0.01, pose=(d, 2.0, 0.0), twist=(0.0, -v, 0.0))
     run = oracle(rod(mass=mass), particle, e=e)
@@ -78,7 +78,7 @@ def test_a_rod_struck_off_centre_turns_about_its_centre_of_percussion():
 
 
 @pytest.mark.parametrize("spin", [0.3, 3.0, 100.0])
-def test_a_turning_rod_meets_the_floor_with_its_tip_when_bisection_says(spin):
+def test_time_of_a_turning_rod_s_tip_by_bisection(spin):
     run = oracle(FLOOR, rod(y=4.0, vy=1.0, spin=spin), gravity=G)
 
     def lowest(t):
@@ -95,7 +95,7 @@ def test_a_turning_rod_meets_the_floor_with_its_tip_when_bisection_says(spin):
     assert run.next_event() == pytest.approx(high, abs=5e-15)
 
 
-def test_a_turning_box_that_passes_by_a_disc_or_hits_it():
+def test_turning_box_past_a_disc_or_against_it():
     # a square of half-width .5 turns in place: its corner reaches out to .7071
     for distance, hits in ((0.7071, True), (0.7072, False)):
         square = Body(Box((0.5, 0.5)), mass=1.0, inertia=1 / 6, twist=(0.0, 0.0, 2.0))
@@ -113,7 +113,7 @@ def test_a_turning_box_that_passes_by_a_disc_or_hits_it():
         (0.95, math.pi / 4 - math.acos((0.95**2 + 0.5 - 0.0625) / (2 * 0.95 * math.sqrt(0.5)))),
     ],
 )
-def test_a_turning_box_meets_a_disc_with_side_or_corner_at_the_angle_of_geometry(distance, angle):
+def test_angle_of_a_turning_box_that_meets_a_disc(distance, angle):
     near = Body(Disc(0.25), mass=1.0, inertia=0.03, pose=(distance, 0.0, 0.0))
     run = oracle(Body(Box((0.5, 0.5)), mass=1.0, inertia=1 / 6, twist=(0.0, 0.0, 2.0)), near)
     assert run.next_event() == pytest.approx(angle / 2.0, abs=1e-14)
@@ -122,6 +122,6 @@ def test_a_turning_box_meets_a_disc_with_side_or_corner_at_the_angle_of_geometry
     assert run.energy() == pytest.approx(start, rel=1e-14)
 
 
-def test_a_tip_that_digs_in_without_rebound_leaves_the_closed_form():
+def test_refusal_of_a_tip_that_digs_in():
     with pytest.raises(LeavesClosedForm, match="box turns"):
         oracle(FLOOR, rod(y=3.0, angle=0.5), e=0.0, mu=2.0, gravity=G).advance(2.0)

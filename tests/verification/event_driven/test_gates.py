@@ -31,7 +31,7 @@ def test_gate_holds(part):
     assert [row for row in rows if not row.holds] == []
 
 
-def test_a_gate_is_failed_by_what_is_not_a_number():
+def test_gates_of_no_number():
     assert not Gate.at_most("", "", float("nan"), 1.0, "").holds
     assert not Gate.at_most("", "", -2.0, 1.0, "").holds
     assert not Gate.exactly("", "", 3140, 3141, "").holds

@@ -42,7 +42,7 @@ def test_nothing_ever_overlaps_and_nothing_leaves():
         assert min(distance.min(), inside.min()) >= -1e-13  # sixteen units in the last place of 8 m, 300 events
 
 
-def test_a_gas_keeps_momentum_between_walls_and_energy_always():
+def test_momentum_and_energy_of_a_gas():
     run = oracle([*walls(8.0, 6.5), *crowd(2)])
     start = run.energy()
     run.advance(20.0)
@@ -61,7 +61,7 @@ def test_free_discs_keep_momentum_and_centre():
     assert mass @ run.pose[:, :2] == pytest.approx(centre + 5.0 * start, abs=1e-12)
 
 
-def test_a_reversed_run_returns_to_its_start():
+def test_reversed_run():
     bodies = [*walls(8.0, 6.5), *crowd(4)]
     run = oracle(bodies)
     run.advance(4.0)
@@ -79,7 +79,7 @@ def test_a_reversed_run_returns_to_its_start():
     assert np.abs(reverse.pose[4:, :2] - np.array([b.pose[:2] for b in bodies[4:]])).max() <= 1e-16 * 5.0**12
 
 
-def test_mirrored_discs_take_the_mirrored_way_bit_for_bit():
+def test_bits_of_mirrored_discs():
     bodies = crowd(5)
     mirrored = [
         Body(b.shape, mass=b.mass, inertia=b.inertia, pose=(-b.pose[0], b.pose[1], 0.0),
@@ -93,7 +93,7 @@ def test_mirrored_discs_take_the_mirrored_way_bit_for_bit():
     assert np.array_equal(one.pose * [-1, 1, 1], other.pose)
 
 
-def test_doubled_units_give_doubled_numbers_bit_for_bit():
+def test_bits_in_doubled_units():
     bodies = [*walls(8.0, 6.5), *crowd(6)]
     scaled = [
         Body(HalfSpace(b.shape.normal, 4.0 * b.shape.offset), motion="fixed")
@@ -108,7 +108,7 @@ def test_doubled_units_give_doubled_numbers_bit_for_bit():
     assert np.array_equal(4.0 * one.pose[4:, :2], other.pose[4:, :2])
 
 
-def test_a_sample_does_not_disturb_the_run():
+def test_run_with_samples():
     bodies = [*walls(8.0, 6.5), *crowd(7)]
     plain, sampled = oracle(bodies), oracle(bodies)
     plain.advance(4.0)
@@ -117,7 +117,7 @@ def test_a_sample_does_not_disturb_the_run():
 
 
 @pytest.mark.parametrize("law", ["N-SEQ", "N-SIM"])
-def test_a_break_of_a_rack_keeps_its_mirror_symmetry(law):
+def test_mirror_symmetry_of_a_rack_break(law):
     rack = [disc(math.sqrt(3.0) / 2.0 * row, place - row / 2.0) for row in range(3) for place in range(row + 1)]
     run = oracle([disc(-3.0, vx=1.0), *rack], law=law)
     run.advance(5.0)
@@ -129,14 +129,14 @@ def test_a_break_of_a_rack_keeps_its_mirror_symmetry(law):
     assert run.energy() == pytest.approx(0.5, abs=1e-14)
 
 
-def test_a_near_miss_misses_and_a_near_hit_hits():
+def test_near_miss_and_near_hit():
     for offset, hits in ((1.0 + 1e-12, 0), (1.0 - 1e-12, 1)):
         run = oracle([disc(0.0, vx=1.0), disc(5.0, offset)])
         run.run()
         assert len(run.events) == hits
 
 
-def test_a_hit_from_both_sides_at_once_is_ordered_by_the_law():
+def test_hit_from_both_sides_at_once():
     bodies = [disc(-2.0, vx=1.0), disc(0.0), disc(2.0, vx=-1.0)]
     together = oracle(bodies, 0.5, law="N-SIM")
     together.run()
@@ -146,7 +146,7 @@ def test_a_hit_from_both_sides_at_once_is_ordered_by_the_law():
     assert [(e.a, e.b) for e in one_by_one.events[:2]] == [(0, 1), (1, 2)]
 
 
-def test_balls_dropped_on_moving_and_fixed_balls_follow_the_quartic():
+def test_balls_dropped_on_balls_by_the_quartic():
     # a falling ball and a fixed one differ in acceleration: the time against bisection of the closed form
     fixed = Body(Disc(0.5), motion="fixed", pose=(0.0, 0.0, 0.0))
     run = oracle([fixed, disc(0.3, 3.0, vx=-0.05)], gravity=(0.0, -9.81))
@@ -174,14 +174,14 @@ def test_spheres_collide_as_discs_do():
 
 
 @pytest.mark.long
-def test_more_contacts_at_once_than_can_be_enumerated_end_a_run_with_its_reason():
+def test_run_with_too_many_contacts_at_once():
     row = [disc(float(k), vx=0.0 if k else 1.0) for k in range(14)]
     with pytest.raises(LeavesClosedForm, match="13 contacts at once, enumeration ends at 12"):
         oracle(row, law="N-SIM").run()
     oracle(row).run()  # one after the other they are no trouble
 
 
-def test_a_bound_on_events_ends_a_run_with_its_reason():
+def test_run_beyond_its_bound_on_events():
     with pytest.raises(TooManyEvents, match="5 events"):
         EventDriven(
             Model(2, [*walls(2.0, 2.0), disc(1.0, 1.0, 1.0)], (0.0, 0.0), np.float64(1.0), np.float64(0.0)),

@@ -31,12 +31,12 @@ def disc(x, y=0.0):
         ([Body(HalfSpace((0.0, 1.0)), motion="fixed"), Body(Box((1.0, 1.0)), mass=1.0, inertia=1.0)], "overlap"),
     ],
 )
-def test_a_model_without_closed_form_is_refused(bodies, reason):
+def test_refusal_of_a_model_without_closed_form(bodies, reason):
     with pytest.raises(ValueError, match=reason):
         EventDriven(model(*bodies))
 
 
-def test_a_sphere_that_would_wobble_is_refused():
+def test_refusal_of_a_wobbling_sphere():
     body = Body(Sphere(0.5), mass=1.0, inertia=(0.1, 0.1, 0.2), pose=(*STILL, 1.0, 0.0, 0.0, 0.0))
     with pytest.raises(ValueError, match="principal moments"):
         EventDriven(model(body, dimension=3))
@@ -54,6 +54,6 @@ def test_time_does_not_run_backwards():
         run.advance(0.5)
 
 
-def test_touching_is_no_overlap_and_half_spaces_may_cross():
+def test_starts_with_touch_and_crossed_half_spaces():
     corner = [Body(HalfSpace((0.0, 1.0)), motion="fixed"), Body(HalfSpace((1.0, 0.0)), motion="fixed")]
     EventDriven(model(*corner, disc(0.5, 0.5))).run()

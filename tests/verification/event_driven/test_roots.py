@@ -18,7 +18,7 @@ def first_root(coefficients):
 
 
 @given(st.floats(1e-12, 1e3), st.floats(-1e3, 1e3), st.floats(-100.0, -1e-3))
-def test_a_falling_gap_closes_within_round_off_of_the_exact_root(gap, rate, pull):
+def test_root_of_a_falling_gap(gap, rate, pull):
     t = Fraction(first_fall(gap, rate, pull))
     value = Fraction(gap) + Fraction(rate) * t + Fraction(pull) * t * t / 2
     slope = abs(Fraction(rate) + Fraction(pull) * t)
@@ -26,12 +26,12 @@ def test_a_falling_gap_closes_within_round_off_of_the_exact_root(gap, rate, pull
     assert abs(value) <= 8 * Fraction(2.0**-52) * slope * t + Fraction(2.0**-1060)
 
 
-def test_a_contact_just_left_is_met_again_after_twice_the_rise():
+def test_return_to_a_contact_just_left():
     assert first_fall(0.0, 3.0, -10.0) == 0.6
     assert first_fall(0.0, 3.0, 0.0) == math.inf
 
 
-def test_a_gap_that_is_braked_before_it_closes_is_a_miss():
+def test_gap_braked_before_it_closes():
     assert first_fall(1.0, -1.0, 0.6) == math.inf
     assert first_fall(1.0, -1.0, 0.4) == pytest.approx((1 - math.sqrt(0.2)) / 0.4, rel=1e-15)
 
@@ -41,7 +41,7 @@ def test_an_exact_graze_is_a_miss():
 
 
 @given(st.lists(st.integers(-240, 239), min_size=4, max_size=4, unique=True))
-def test_the_first_fall_of_a_quartic_is_the_first_root_with_falling_sign(places):
+def test_first_fall_of_a_quartic(places):
     # Roots closer together than 1e-2 make each other ill-conditioned; what is left is accurate to 1e-9.
     roots = [0.021 * (place + 0.5) for place in places]
     coefficients = np.polynomial.polynomial.polyfromroots(roots)
@@ -50,11 +50,11 @@ def test_the_first_fall_of_a_quartic_is_the_first_root_with_falling_sign(places)
     assert t == pytest.approx(falls[0], abs=1e-9) if falls else t == math.inf
 
 
-def test_a_quartic_that_touches_zero_from_above_does_not_fall():
+def test_quartic_that_touches_zero_from_above():
     assert first_root([4.0, 0.0, -4.0, 0.0, 1.0 + 1e-9]) == math.inf  # (t^2 - 2)^2, lifted
 
 
-def test_a_turning_gap_is_met_to_neighbouring_doubles():
+def test_root_of_a_turning_gap():
     # 1.1 - t - sin t, whose curvature is at most 1
     def gap(t):
         return 1.1 - t - math.sin(t)
@@ -66,5 +66,5 @@ def test_a_turning_gap_is_met_to_neighbouring_doubles():
     assert gap(t) <= 0.0 < gap(math.nextafter(t, 0.0)) + 2e-16
 
 
-def test_what_does_not_close_before_the_horizon_is_a_miss():
+def test_gap_open_until_the_horizon():
     assert first_touch(lambda t: 2.0 + math.sin(t), lambda t: 0.5, 1e-12, 0.0, 100.0) == math.inf

@@ -21,7 +21,7 @@ def test_case_ends_in_its_certified_answer(name):
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_the_textbook_never_ends_in_silent_garbage(name):
+def test_textbook_on_hard_cases(name):
     """Whatever `classical` makes of a case: the certified answer again, or DIVERGED with a reason."""
     case = HARD_CASES[name]
     verdict = case.run(Settings.classical(case.settings.dt))
@@ -50,7 +50,7 @@ def test_doubts_of_a_run_with_one_fault():
     assert "overlap" in doubts(sunk)
 
 
-def test_a_limit_that_is_missed_or_not_a_number_voids_the_answer():
+def test_answers_beyond_a_limit_or_without_a_number():
     assert within({"x": 1.0}, {"x": 0.5}, "fits").answer == {"x": 0.5}
     for value in (1.5, -1.5, math.nan):
         verdict = within({"x": 1.0}, {"x": value}, "fits")
@@ -60,7 +60,7 @@ def test_a_limit_that_is_missed_or_not_a_number_voids_the_answer():
 
 
 @pytest.mark.parametrize("key", SPEEDS, ids=lambda key: " ".join(key))
-def test_the_laws_speeds_follow_from_impulses_written_down(key):
+def test_speeds_of_a_law_from_its_impulses(key):
     places, law = key
     positions = np.array(PLACES[places])
     velocity = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
@@ -85,7 +85,7 @@ def test_the_laws_speeds_follow_from_impulses_written_down(key):
     assert (velocity**2).sum() == pytest.approx(1.0, abs=1e-15)
 
 
-def test_energy_counts_height_speed_and_spin_of_free_bodies():
+def test_energy_of_free_bodies():
     case = HARD_CASES["three discs, row, N-SIM"]
     run = case.played(case.settings)
     total = energy(run.model, run.record.pose, run.record.twist)
