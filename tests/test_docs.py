@@ -21,7 +21,7 @@ from validation.catalogue import CATALOGUE
 ROOT = Path(__file__).parents[1]
 
 
-def test_each_scene_s_page_has_who_passes_it_in_the_published_report(monkeypatch):
+def test_verdicts_on_scene_pages(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     found = importlib.import_module("pages").passed()
     # What came after it was published stands in a fragment of the changelog.
@@ -33,7 +33,7 @@ def test_each_scene_s_page_has_who_passes_it_in_the_published_report(monkeypatch
     assert (found.failed > 0).any() and (found.failed <= found.judged).all()
 
 
-def test_pages_give_lines_to_paste_for_fixes_that_are_recommended_alone(monkeypatch):
+def test_lines_to_paste_for_recommended_fixes(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "docs"))
     fixes = importlib.import_module("pages").fixes
     told = [fix for scene in CATALOGUE for fix in fixes(scene)]

@@ -13,7 +13,7 @@ def start(folder, *arguments):
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_a_foreign_package_is_named_with_its_place_and_nothing_runs(tmp_path, name):
+def test_foreign_package_of_our_name(tmp_path, name):
     (tmp_path / name).mkdir()
     (tmp_path / name / "__init__.py").write_text("")
     result = start(tmp_path, "-m", "contact_crosscheck", "list", "scenes")

@@ -67,7 +67,7 @@ def engines():
     return {name for folder in folders for path in folder.rglob("*.py") for name in imported(path)} - COMMON
 
 
-def test_the_folders_import_the_engines_that_are_known_to_be_there():
+def test_engines_imported_by_folders():
     assert {"pymunk", "pybullet", "mujoco"} <= engines()
 
 

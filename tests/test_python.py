@@ -94,9 +94,7 @@ def drawn(chart):
         ("reference", "exact", "impact", 2, {"e": 0.6}),
     ],
 )
-def test_a_case_has_the_bits_and_verdicts_that_the_command_stores(
-    tmp_path, engine, name, profile, scene, dimension, params
-):
+def test_bits_and_verdicts_of_a_case_in_python(tmp_path, engine, name, profile, scene, dimension, params):
     stored_profile = {"exact": registry.profile_of(name, "solution")}.get(profile, profile)
     words = [word for key, value in params.items() for word in ("--param", f"{key}={value}")]
     words += ["--engine", engine(name), "--profile", stored_profile, "--dim", str(dimension), "--dt", "1/240"]
@@ -184,7 +182,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("error", "said", "given"), WRONG)
-def test_a_wrong_call_is_one_line_that_names_what_is_wrong(error, said, given):
+def test_line_of_a_wrong_call(error, said, given):
     call = {"scene": "bounce", "engine": "chipmunk"} | given
     with pytest.raises(error) as caught:
         assert error in (cc.SceneError, cc.EngineError)
@@ -265,7 +263,7 @@ def test_names_from_files_and_engines_are_text_in_html(tmp_path, monkeypatch, ow
 # ---- engines of a user's own -----------------------------------------------------------------------------------------
 
 
-def test_an_engine_of_one_s_own_is_asked_like_any_other_and_warns_once(own):
+def test_own_engine_with_one_warning(own):
     with pytest.warns(UserWarning) as warned:
         results = [cc.run("bounce", engine=given, e=0.5) for given in (ToyEngine, ToyEngine(), ToyEngine)]
     assert len(warned) == 1 and "without a time limit" in str(warned[0].message)
@@ -286,7 +284,7 @@ def test_rewritten_own_engine_replaces_the_old_one(own):
         assert set(cc.run("bounce", engine=Later).frame().engine_version) == {"2.0"}
 
 
-def test_no_engine_of_one_s_own_takes_the_name_of_an_installed_one(own):
+def test_own_engine_with_the_name_of_an_installed_one(own):
     class Taken(ToyEngine):
         facts = EngineFacts("mujoco", "Mine", "numpy", frozenset({3}), Scheme("none", 1), 1 / 60)
 
@@ -294,7 +292,7 @@ def test_no_engine_of_one_s_own_takes_the_name_of_an_installed_one(own):
         cc.run("bounce", engine=Taken)
 
 
-def test_an_error_of_an_engine_of_one_s_own_is_the_outcome_of_its_case(own):
+def test_error_of_an_own_engine(own):
     class Broken(ToyEngine):
         def build(self, scene, dt, settings):
             raise KeyError("no such thing")
@@ -483,7 +481,7 @@ def test_tables_of_engines_and_scenes(engine):
 # ---- scripts and notebooks -------------------------------------------------------------------------------------------
 
 
-def test_a_foreign_package_is_named_before_anything_of_ours_is_loaded(tmp_path):
+def test_foreign_package_before_our_imports(tmp_path):
     (tmp_path / "adapters").mkdir()
     (tmp_path / "adapters" / "__init__.py").write_text("print('foreign')")
     code = "import sys\nsys.path.insert(0, '.')\nimport contact_crosscheck as cc\ncc.run"
@@ -503,7 +501,7 @@ print(set(found[found["param.e"] == 0.5].state_hash) == set(result.frame().state
     assert called(tmp_path, code)[0].split() == ["begun", "True"]
 
 
-def test_a_script_without_a_guard_asks_an_engine_of_another_package(tmp_path, plugins):
+def test_script_without_a_guard_and_an_outside_engine(tmp_path, plugins):
     code = f"""
 import sys
 sys.path.insert(0, {str(plugins)!r})

@@ -46,7 +46,7 @@ def test_step_of_a_blow_at_the_beginning_of_a_step():
     assert motion.pose[:, :, 3:] == pytest.approx(np.broadcast_to(STILL, (65, 2, 4)))
 
 
-def test_a_ball_meets_a_face_of_a_box_where_it_comes_down_on_it():
+def test_place_of_a_ball_on_a_box_s_face():
     block = Body("block", Box((1.0, 0.5, 0.25)), motion="fixed", pose=(0.0, 0.0, 1.0, *STILL))
     down = ball("ball", (0.5, 0.25, 1.75), (0.25, 0.0, -0.5), 0.25)
     for first, second in ((block, down), (down, block)):  # whichever stands first, the box is the first of a contact
@@ -71,7 +71,7 @@ def test_meeting_of_balls_and_flat_boxes_with_a_tilted_plane():
     assert wait == pytest.approx(2.0) and contact.arms[1] == pytest.approx((0.0, 0.0, 0.0))
 
 
-def test_balls_meet_when_their_distance_is_the_sum_of_their_radii():
+def test_time_at_which_balls_meet():
     left, right = ball("a", (0, 0, 0), (2.0, 0, 0), 0.25), ball("b", (3.0, 0.6, 0.0), (0, 0, 0), 0.75, 2.0)
     wait, contact = meeting(left, right, restitution=0.25, friction=0.125)
     # At the blow the centres are 1 m apart, 0.6 m of them across the way.

@@ -50,7 +50,7 @@ def test_default_of_a_fresh_world_and_polygon():
      ({"skin": -1.0}, "skin"), ({"skin": math.nan}, "skin"), ({"units_per_metre": 0.0}, "units_per_metre"),
      ({"continuous": 1}, "continuous"), ({"early_restitution": None}, "early_restitution"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 

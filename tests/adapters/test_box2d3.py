@@ -69,7 +69,7 @@ def test_default_push_speed_of_3_metres_per_second():
      ({"maximum_speed": 0.0}, "maximum_speed"), ({"continuous": 1}, "continuous"),
      ({"units_per_metre": 0.0}, "units_per_metre"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}: [^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
@@ -230,7 +230,7 @@ def test_laws_only_about_metrics_of_their_scene():
 
 
 @pytest.mark.parametrize(("unit", "stopped"), [(1.0, True), (64.0, False)])
-def test_side_of_the_next_plate_as_a_contact_before_the_seam(unit, stopped):
+def test_contact_before_the_seam_with_the_next_plate(unit, stopped):
     seam = CATALOGUE["seam"]
     scene = seam.scene(2)
     names = [body.name for body in scene.bodies]

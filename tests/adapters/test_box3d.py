@@ -49,7 +49,7 @@ def test_default_is_what_a_fresh_world_holds():
      ({"continuous": 1}, "continuous"), ({"recycle_distance": "0"}, "recycle_distance"), ({"slop": 0.1}, "slop"),
      ({"units_per_metre": 0.0}, "units_per_metre"), ({"push_speed": math.nan}, "push_speed")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
@@ -130,7 +130,7 @@ def test_tipping_on_a_tilted_table_with_kept_points():
     assert found == pytest.approx(0.813, rel=0.05)
 
 
-def test_falling_box_as_if_held_at_the_mean_of_its_corners():
+def test_falling_box_held_at_the_mean_of_its_corners():
     """Energy and v(mean) = 0 give spin by angle: w^2 (a^2 + b^2 + I/m) = 2 g drop, a = height - width sin/4."""
     params = {"from": 1.0, "to": 15.0}
     width, high = 0.5, 1.0

@@ -358,7 +358,7 @@ def test_inertia_of_a_turned_body_in_the_first_step(profile):
     assert record.twist[-1, 0, 4] == pytest.approx(0.02 / 0.3 * DT, rel=1e-12)
 
 
-def test_force_acts_at_the_centre_in_world_axes_of_a_turned_body():
+def test_force_at_the_centre_of_a_turned_body():
     half = math.sqrt(0.5)
     body = Body("b", Box((0.2, 0.5, 0.3)), 1.0, (0.1, 0.2, 0.3), (1.0, 2.0, 3.0, half, 0.0, 0.0, half), force=(1, 0, 0))
     end = drive(scene_of(body, duration=0.1)).twist[-1, 0]
@@ -432,7 +432,7 @@ def test_table_that_no_product_gives_is_refused_in_one_line():
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_state_before_the_first_step_is_the_scene_in_its_order(profile):
+def test_state_before_the_first_step(profile):
     post = Body("post", Box((0.2, 0.3, 0.4)), pose=(9.0, 1.0, 2.0, 0.6, 0.0, 0.8, 0.0), motion="fixed")
     scene = scene_of(ball(3.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), FLOOR, post)
     record = drive(scene, profile)
@@ -624,7 +624,7 @@ def test_contact_points_kept_where_a_box_slides_and_at_rest(profile):
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.6, 0.0, 0.8), (0.48, -0.64, -0.6)])
-def test_a_plane_faces_where_its_normal_points_a_ceiling_as_well(normal):
+def test_side_of_a_plane_and_a_ceiling(normal):
     from adapters.bullet.translation import _turn_up_to
 
     x, y, z, w = _turn_up_to(normal)
@@ -652,7 +652,7 @@ def test_contacts_of_a_box_on_a_hull(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_hull_from_a_file_is_the_hull_of_its_vertices():
+def test_hull_from_a_file():
     """It stands on a half-space, and a ball lies a millimetre deep in its upper face."""
     corners = tuple((x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.1, 0.1))
     above = ball(0.1 + 0.5 - 1e-3, name="above", x=0.1)

@@ -64,7 +64,7 @@ def test_default_is_what_a_fresh_space_holds() -> None:
     assert chosen["start_overlap"] == 0.0
 
 
-def test_tuned_follows_the_needs_and_gives_a_reason_for_each_number() -> None:
+def test_needs_and_reasons_of_tuned_settings() -> None:
     resting = make(FLOOR, unit_box("box", 0.0, 0.5), mu=0.5, gravity=(0.0, -9.81))
     hitting = make(FLOOR, Body("ball", Disc(0.1), pose=(0.0, 1.0, 0.0)), e=0.5)
     rest, impact = ({s.name: s for s in ENGINE.settings("tuned", needs(x), DT)} for x in (resting, hitting))
@@ -110,7 +110,7 @@ def test_a_bad_step_is_refused(dt: float) -> None:
         ENGINE.build(make(FLOOR, Body("ball", Disc(0.5))), dt, settings())
 
 
-def test_a_body_that_would_pass_the_ground_in_one_step_is_refused() -> None:
+def test_refusal_of_a_body_that_passes_the_ground_in_one_step() -> None:
     fast = make(FLOOR, Body("ball", Disc(0.5), pose=(0.0, 1.0, 0.0), twist=(0.0, -2e5, 0.0)))
     with pytest.raises(EngineError, match=r"^dt: "):
         ENGINE.build(fast, DT, settings())
@@ -142,7 +142,7 @@ def test_a_single_contact_rebounds_with_exactly_minus_e_v(profile: str, dt: floa
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_impulses_act_on_the_higher_index_and_normals_point_to_it(order: tuple[int, int]) -> None:
+def test_body_of_impulses_and_normals(order: tuple[int, int]) -> None:
     left = Body("left", Disc(0.5), 2.0, 0.25, (-0.52, 0.0, 0.0), (3.0, 0.0, 0.0))
     right = Body("right", Disc(0.5), 1.0, 0.125, (0.52, 0.0, 0.0), (-1.0, 0.0, 0.0))
     bodies = (left, right) if order == (0, 1) else (right, left)
@@ -211,7 +211,7 @@ def test_a_table_no_product_represents_is_refused_with_its_reason() -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_free_fall_lags_the_parabola_by_g_t_dt_over_two(profile: str) -> None:
+def test_free_fall_behind_the_parabola(profile: str) -> None:
     scene = make(Body("ball", Disc(0.5)), gravity=(3.0, -9.81), T=1.0)
     trajectory = drive(scene, profile)
     t, g = trajectory.t, np.array(scene.gravity)
@@ -234,7 +234,7 @@ def test_a_positive_torque_turns_counter_clockwise() -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.2, -0.2])
-def test_a_box_that_lands_on_its_corner_gets_the_exact_spin(tilt: float) -> None:
+def test_spin_of_a_box_that_lands_on_its_corner(tilt: float) -> None:
     mass, inertia, v, e = 1.0, 1.0 / 6.0, 2.0, 0.5
     arm = -math.sqrt(0.5) * math.sin(math.pi / 4 - abs(tilt)) * np.sign(tilt)  # x of the lowest corner
     height = math.sqrt(0.5) * math.cos(math.pi / 4 - abs(tilt))

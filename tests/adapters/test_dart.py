@@ -81,7 +81,7 @@ def test_materials_that_no_single_body_values_give_refused():
      ("pgs", {"iterations": 0}, "iterations"), ("nsgs", {"tolerance": math.nan}, "tolerance"),
      ("fbf", {"detector": "none"}, "detector"), ("default", {"cfm": 0.0}, "cfm")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(profile, changes, field):
+def test_refusal_of_a_bad_setting_by_name(profile, changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(sliding(), DT, settings(sliding(), profile, **changes))
 

@@ -192,7 +192,7 @@ def test_unsupported_scenes_refused_in_one_line():
     [({"approximation": "lemke"}, "approximation"), ({"modulus": 0.0}, "modulus"), ({"boxes": "mesh"}, "boxes"),
      ({"stiction_tolerance": math.nan}, "stiction_tolerance"), ({"iterations": 5}, "iterations")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 

@@ -60,7 +60,7 @@ def test_box_on_a_conveyor_slips_by_coulomb_and_then_rides(engine, profile, spee
 
 
 @pytest.mark.parametrize(("engine", "profile"), ENGINES)
-def test_ball_on_a_conveyor_rolls_at_a_third_of_its_speed(engine, profile):
+def test_rolling_speed_of_a_ball_on_a_conveyor(engine, profile):
     """About the line of contact the angular momentum stays zero: v = V k/(1 + k), k = 1/2; omega r = V - v."""
     found = driven(engine, profile, scene(floor(surface_velocity=(1.0, 0.0)), disc(), 0.3))
     assert found.twist[-1, 1] == pytest.approx([1.0 / 3.0, 0.0, 4.0 / 3.0], abs=2e-3)

@@ -26,7 +26,7 @@ def tags(root):
 # ---- text and tree ---------------------------------------------------------------------------------------------------
 
 
-def test_each_element_knows_its_line_its_text_and_what_is_below_it():
+def test_line_text_and_children_of_an_element():
     root = read('<mujoco>\n <body name="a&amp;b">  one\n  two <geom size="1"/> three</body>\n\n<body/></mujoco>')
     assert [(e.tag, e.line, " ".join(e.text.split())) for e in root.walk()] == [
         ("mujoco", 1, ""), ("body", 2, "one two three"), ("geom", 3, ""), ("body", 5, "")]  # fmt: skip

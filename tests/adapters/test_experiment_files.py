@@ -69,7 +69,7 @@ def test_error_line_with_file_and_field(read, tmp_path, text, said):
     assert str(caught.value) == f"{tmp_path / 'tuning.toml'}: {said}"
 
 
-def test_a_file_that_is_no_text_or_is_not_there_is_named(tmp_path):
+def test_refusal_of_a_missing_or_binary_file(tmp_path):
     (tmp_path / "tuning.toml").write_bytes(b"\xff\xfe")
     for path, said in ((tmp_path / "tuning.toml", "codec"), (tmp_path / "none.toml", "No such file")):
         with pytest.raises(EngineError, match=rf"{path.name}: .*{said}"):

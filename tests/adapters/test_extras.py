@@ -8,7 +8,7 @@ from adapters import extras
 ROOT = Path(__file__).parents[2]
 
 
-def test_an_extra_is_named_by_the_packages_that_this_system_takes(monkeypatch):
+def test_packages_of_an_extra_on_this_system(monkeypatch):
     listed = ["click>=8", 'b>=1; extra == "two"', 'a<2,>=1; (python_version > "3") and extra == "two"',
               'c; os_name == "none" and extra == "two"', 'd; extra == "one"', 'e; python_version > "3"']  # fmt: skip
     monkeypatch.setattr(extras, "required", lambda: listed)

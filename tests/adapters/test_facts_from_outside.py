@@ -43,7 +43,7 @@ def test_facts_come_through_as_data_field_by_field():
         ("colour", "#1234567", "colour is '#1234567', #rrggbb is needed"),
     ],
 )
-def test_a_fact_that_is_wrong_is_named_with_what_is_possible(field, wrong, said):
+def test_refusal_of_a_wrong_fact(field, wrong, said):
     with pytest.raises(ValueError) as error:
         foreign.facts_from(foreign.plain_facts(FACTS) | {field: wrong})
     assert str(error.value) == said

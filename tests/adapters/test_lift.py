@@ -56,7 +56,7 @@ def test_a_counter_clockwise_spin_moves_points_as_in_the_plane() -> None:
     assert np.allclose(np.cross(lifted.twist[3:], arm), [0.0, 0.0, 1.0])  # a point to the right goes up
 
 
-def test_a_positive_torque_lifts_to_the_axis_of_a_positive_spin() -> None:
+def test_axis_of_a_lifted_torque() -> None:
     body = lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))).bodies[1]
     assert np.allclose(np.array(body.torque) / 0.7, np.array(body.twist[3:]) / 2.0)
 
@@ -74,7 +74,7 @@ def test_shapes_materials_and_loads_keep_their_meaning() -> None:
     assert lifted.material("disc", "box") == flat.material("disc", "box")
 
 
-def test_a_disc_keeps_its_own_moment_not_that_of_a_sphere() -> None:
+def test_moment_of_a_lifted_disc() -> None:
     assert lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))).bodies[2].inertia == (0.12, 0.12, 0.12)
 
 
@@ -117,7 +117,7 @@ def test_departure_from_the_plane_beside_a_nan() -> None:
     assert out_of_plane(nothing, np.array([1.0])) == out_of_plane(nothing[:0], np.array([1.0])) == 0.0
 
 
-def test_an_angle_does_not_depend_on_the_sign_of_the_quaternion() -> None:
+def test_angle_by_either_sign_of_the_quaternion() -> None:
     q = np.array([math.cos(1.2), 0.0, -math.sin(1.2), 0.0])
     pose = np.array([[0.0, 0.0, 0.0, *q], [0.0, 0.0, 0.0, *-q]])
     assert np.allclose(lower_pose(pose)[:, 2], 2.4, atol=1e-15)
@@ -220,7 +220,7 @@ def test_bodies_motions_and_loads_out_of_the_plane_not_planar(changes: dict[str,
     assert lowered(spatial_scene(**changes)) is None
 
 
-def test_gravity_or_a_face_across_the_plane_makes_a_scene_spatial() -> None:
+def test_scene_with_gravity_or_a_face_across_the_plane() -> None:
     scene = spatial_scene()
     assert lowered(replace(scene, gravity=(1.0, 0.5, -9.0))) is None
     across = replace(scene.bodies[0], shape=HalfSpace((0.0, 0.6, 0.8), 0.25))

@@ -73,7 +73,7 @@ def test_ball_rebound_equal_to_e_at_any_speed_phase_and_step(e: float, dt: float
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 1.0])
 @pytest.mark.parametrize("along", [0.0, 1.0, 20.0])
-def test_an_oblique_blow_keeps_e_and_slips_or_sticks_by_coulombs_law(mu: float, along: float) -> None:
+def test_oblique_blow_by_newton_and_coulomb(mu: float, along: float) -> None:
     """v_n+ = e v_n; v_t - v_t+ = min(mu (1 + e) v_n, 2/7 v_t) of a solid ball."""
     e, v = 0.5, 2.0
     start = ball("ball", 0.0, 0.0, 0.5 + 2.5 * v * DT, v=(along, 0.0, -v))
@@ -266,7 +266,7 @@ def test_wrong_settings_of_the_loop_refused(changes: dict[str, Any], said: str) 
         ENGINE.build(scene, DT, lacking)
 
 
-def test_many_steps_at_once_are_the_same_bits_as_one_by_one() -> None:
+def test_bits_of_many_steps_at_once() -> None:
     """The bench times `advance` of many steps; what is judged is stepped as it is sampled."""
     scene = scene_of(FLOOR, replace(ball("ball", 0.0, 0.0, 0.6), twist=(1.0, 0.5, -1.0, 2.0, 0.0, 0.0)), e=0.5, mu=0.4,
                      g=DOWN)  # fmt: skip

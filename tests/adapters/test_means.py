@@ -59,7 +59,7 @@ def test_pair_missed_by_a_little_does_not_meet(size):
     assert means(scene(six(0.5 + size)), "friction") is None
 
 
-def test_a_restitution_above_one_or_a_negative_number_is_no_material():
+def test_refusal_of_a_material_out_of_range():
     """Means of 1 and 0 and of 1.5 and 0 alike ask one body for twice the largest; friction has no largest."""
     e = {("floor", "a"): 0.75, ("floor", "b"): 0.0, ("a", "b"): 0.75}
     everything = {pair: (e.get(pair, 0.0), e.get(pair, 0.0)) for pair in itertools.combinations(("floor", "a", "b"), 2)}

@@ -199,7 +199,7 @@ def test_masses_positions_and_rotations_of_the_compiler():
     assert stone.shape == Sphere(0.5) and stone.pose[:3] == (0.0, 0.0, -4.0) and stone.motion == "fixed"
 
 
-def test_a_keyframe_s_speed_is_that_of_the_centre_of_mass():
+def test_speed_of_a_keyframe_at_the_centre_of_mass():
     """MuJoCo's free joint moves the body's origin, here .5 m below the centre of a ball that turns about x."""
     text = model_of(
         '<body name="ball"><freejoint/><geom type="sphere" size=".1" pos="0 0 .5"/></body>',
@@ -248,7 +248,7 @@ TETRAHEDRON = "0 0 0  1 0 0  0 1 0  0 0 1"
 SOLID = '<body name="solid" pos="0 0 2"><freejoint/><geom type="mesh" mesh="m"/></body>'
 
 
-def test_a_mesh_of_vertices_alone_is_their_hull_about_its_centroid():
+def test_hull_of_a_mesh_of_vertices_alone():
     """Of a tetrahedron with a vertex within it: a sixth of a cube's volume, a quarter from each face."""
     (body,) = reading.read(model_of(SOLID, head=MESH.format(TETRAHEDRON + "  .1 .1 .1", "")), False).scene.bodies
     assert isinstance(body.shape, Hull) and len(body.shape.vertices) == 4
@@ -271,7 +271,7 @@ ROUND = " ".join(f"{np.cos(k)} {np.sin(k)} {z}" for k in range(33) for z in (0, 
     (ROUND, "", "", "<geom>: its hull has 66 corners, a scene's 4 to 64"),
     ("0 0 0  1 0 0  0 1 0  1 1 0", "", "", "MuJoCo does not compile it"),
 ])  # fmt: skip
-def test_a_mesh_that_is_no_hull_of_its_vertices_is_refused(vertices, more, head, said):
+def test_refusal_of_a_mesh_that_is_no_hull(vertices, more, head, said):
     with pytest.raises(SceneError) as refused:
         reading.read(model_of(SOLID, head=head + MESH.format(vertices, more)), False)
     assert said in str(refused.value) and "\n" not in str(refused.value)

@@ -114,7 +114,7 @@ def pose_of(rng, dimension, size):
 
 
 @pytest.mark.parametrize(("dimension", "shapes"), [(2, PLANAR), (3, SPATIAL)])
-def test_the_overlap_at_the_start_is_no_less_than_the_true_one(dimension, shapes):
+def test_overlap_at_the_start_against_the_true_one(dimension, shapes):
     rng = np.random.default_rng(3)
     for _ in range(300):
         chosen = [shapes[k] for k in rng.integers(len(shapes), size=2)]

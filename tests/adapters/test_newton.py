@@ -70,7 +70,7 @@ def test_replayed_step_has_the_bits_of_a_launched_one(name):
      ({"rebounds": "yes"}, "rebounds"), ({"rebound_iterations": 0}, "rebound_iterations"), ({"gap": -1.0}, "gap"),
      ({"torsional": math.inf}, "torsional"), ({"rolling": -1.0}, "rolling"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 

@@ -24,7 +24,7 @@ def told(options="", flags=""):
     return {each.name: each.value for each in found.settings if each.source.startswith("option/")}
 
 
-def test_every_option_is_a_setting_with_its_place_in_the_text():
+def test_setting_and_place_of_every_option():
     options = ('timestep="0.004" integrator="RK4" cone="elliptic" impratio="3" iterations="17" tolerance="1e-5" '
                'noslip_iterations="2" solver="PGS"')  # fmt: skip
     values = {"integrator": "RK4", "cone": "elliptic", "impratio": 3.0, "iterations": 17, "tolerance": 1e-5,

@@ -41,7 +41,7 @@ def test_setting_without_name_or_value_refused(text):
         given([text])
 
 
-def test_two_values_of_one_setting_are_refused_and_names_are_sorted():
+def test_refusal_of_two_values_of_one_setting():
     with pytest.raises(EngineError, match="set: cone is given twice"):
         given(["cone=elliptic", "impratio=1", "cone=pyramidal"])
     found = given(["impratio=10", "cone=elliptic"])

@@ -55,7 +55,7 @@ def test_default_is_what_the_bindings_hold():
      ({"fastest_spin": -1.0}, "fastest_spin"), ({"friction_every_iteration": 1}, "friction_every_iteration"),
      ({"persistent_manifolds": 0}, "persistent_manifolds"), ({"slop": 0.1}, "slop")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 
@@ -92,7 +92,7 @@ def test_impulses_of_smooth_and_rough_contacts(profile):
 
 @pytest.mark.parametrize("solver", ["tgs", "pgs"])
 @pytest.mark.parametrize(("speed", "leaves"), [(1.999, 0.0), (2.0, 0.0), (2.001, 1.0005), (6.0, 3.0)])
-def test_no_approach_of_up_to_2_metres_a_second_rebounds_as_shipped(solver, speed, leaves):
+def test_rebounds_as_shipped_up_to_2_metres_a_second(solver, speed, leaves):
     """A quirk that is stated; the speed itself belongs to those that do not."""
     found = drive(struck(0.5, speed, 1.3 * speed * DT), solver=solver)
     assert found.twist[-1, 1, 2] == pytest.approx(leaves, abs=2e-5)
@@ -119,7 +119,7 @@ def test_world_of_another_size_refused_while_one_exists():
     ENGINE.build(scene, DT, settings(scene, tolerance_length=2.0)).close()
 
 
-def test_spins_are_damped_and_limited_as_shipped_and_not_in_tuned():
+def test_damping_and_limit_of_spins_by_profile():
     ball = Body("ball", Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 9.0, *UPRIGHT), (0, 0, 0, 0.0, 0.0, 200.0))
     fast = Scene("spin", 1, 3, (ball,), (), (0.0, 0.0, 0.0), 24 * DT)
     assert drive(fast).twist[-1, 0, 5] == pytest.approx(100.0, rel=1e-2)

@@ -50,7 +50,7 @@ def test_default_is_what_fresh_parameters_hold():
      ({"relaxations": -1}, "relaxations"), ({"fastest": math.nan}, "fastest"), ({"push_out": "3"}, "push_out"),
      ({"clustering": 0}, "clustering")],
 )  # fmt: skip
-def test_a_bad_setting_is_refused_in_one_line_that_names_it(changes, field):
+def test_refusal_of_a_bad_setting_by_name(changes, field):
     with pytest.raises(EngineError, match=rf"^{field}[^\n]*\Z"):
         ENGINE.build(resting(), DT, settings(resting(), **changes))
 

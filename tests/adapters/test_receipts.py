@@ -79,7 +79,7 @@ def test_receipts_of_a_healthy_engine_to_round_off(toy):
             assert slip.measured == pytest.approx(slip.asked, abs=1e-8)  # 30 sweeps over four corners leave 1e-9
 
 
-def test_probes_run_at_the_settings_and_the_step_of_the_judged_scene(toy_class):
+def test_settings_and_step_of_probes(toy_class):
     seen = set()
 
     class Spy(toy_class):
@@ -192,13 +192,13 @@ def test_wrong_step_order_as_one_step_of_delay(toy_class):
     assert not slip.holds
 
 
-def test_friction_is_told_above_the_coefficient_at_which_a_cube_tips(toy):
+def test_friction_told_above_the_tipping_of_a_cube(toy):
     slip = by_quantity(receipts(toy(), "default", replace(REST, friction=2.0), DT))["friction"]
     assert slip.measured == pytest.approx(2.0, abs=1e-6)  # four corners, 30 sweeps
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_probe_balls_touch_the_floor_at_their_phase_of_a_step(dimension):
+def test_phase_at_which_probe_balls_touch_the_floor(dimension):
     scene = PROBES["rebound"].make(Case(dimension, 0.8, 0.0, DT, 1))
     for body, phase in zip(scene.bodies[1:], REBOUND_PHASES, strict=True):
         steps = (body.pose[dimension - 1] - body.shape.radius) / (REBOUND_SPEED * DT)

@@ -103,7 +103,7 @@ def test_impulses_act_on_the_higher_index(dimension: int, profile: str, swapped:
 
 @both
 @profiles
-def test_free_fall_is_ahead_of_the_parabola_by_g_t_dt_over_two(dimension: int, profile: str) -> None:
+def test_free_fall_ahead_of_the_parabola(dimension: int, profile: str) -> None:
     trajectory = drive(make(body("ball", dimension, (0.0, 0.0)), g=9.81, T=1.0), profile)
     t, up = trajectory.t, dimension - 1
     offset = ENGINE.scheme(profile).position_offset

@@ -248,7 +248,7 @@ def test_name_reason_and_source_of_every_setting(name: str) -> None:
         ("two_lines", "two; it is an engine of another distribution"),
     ],
 )
-def test_a_broken_engine_is_a_reason_in_one_line_and_others_are_found(plugins: None, name: str, reason: str) -> None:
+def test_registry_with_a_broken_engine(plugins: None, name: str, reason: str) -> None:
     found = registry.find(name)
     assert found.engine is None and found.version == ""
     assert reason in found.reason and "\n" not in found.reason

@@ -110,7 +110,7 @@ def test_the_margin_of_two_geoms_makes_that_of_their_contact(release, own):
     assert geom_margin(SimpleNamespace(__version__=release), 0.25) == own * 0.25
 
 
-def test_the_margin_of_a_contact_is_the_one_that_was_asked_for():
+def test_margin_of_a_contact_as_asked_for():
     pytest.importorskip("mujoco")
     engine, checked = registry.load("mujoco"), 0
     for scene in scenes_of(engine):
@@ -145,7 +145,7 @@ def test_mjspec_without_attributes_replaced():
     assert isinstance(empty_spec(older_mujoco(MjSpec=Keeping)), Mjcf)
 
 
-def test_impulses_of_an_opaque_arbiter_are_equal_parts_of_its_total():
+def test_impulses_of_an_opaque_arbiter():
     pymunk = pytest.importorskip("pymunk")
     from adapters.chipmunk.releases import points_of, shape_key
 

@@ -109,7 +109,7 @@ def test_values_at_the_limits_allowed() -> None:
     check_body(Body("b", Disc(1.0)), 2)
 
 
-def test_a_body_is_found_by_its_name_and_its_materials_by_both_names() -> None:
+def test_body_and_materials_by_names() -> None:
     pairs = (Pair(friction=0.1), Pair("floor", "other", friction=0.3))
     made = scene(FLOOR, BALL, replace(BALL, name="other"), pairs=pairs)
     assert [made.index(name) for name in ("floor", "ball", "other")] == [0, 1, 2]
@@ -129,14 +129,14 @@ def test_drives_survive_json_and_labels_may_be_missing() -> None:
 
 
 @pytest.mark.parametrize(("make", "field"), FAULTS, ids=[f"{k}-{field}" for k, (_, field) in enumerate(FAULTS)])
-def test_a_bad_value_is_refused_in_one_line_that_names_the_field(make: Callable[[], object], field: str) -> None:
+def test_refusal_of_a_bad_value_by_field(make: Callable[[], object], field: str) -> None:
     with pytest.raises(SceneError) as caught:
         make()
     assert re.match(rf"(pair [^ .:]+[.:] ?)?{re.escape(field)}", str(caught.value))
     assert "\n" not in str(caught.value)
 
 
-def test_mass_and_inertia_are_read_only_if_the_body_is_free() -> None:
+def test_mass_and_inertia_of_bodies_that_are_not_free() -> None:
     assert scene(replace(BALL, mass=0.0, inertia=0.0, motion="prescribed")).bodies[0].mass == 0.0
 
 

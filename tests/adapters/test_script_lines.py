@@ -18,7 +18,7 @@ SCENE = Scene("plates", 1, 2, (PLATE, Body("ball", Disc(0.5), 2.0, 0.25)), (Pair
 
 
 @pytest.mark.parametrize("course", COURSES)
-def test_a_prescribed_body_is_where_and_as_fast_as_the_adapter_has_it(course):
+def test_place_and_speed_of_a_prescribed_body(course):
     """To the last bit: the same operations in the same order."""
     body = replace(SCENE, bodies=(replace(PLATE, course=course), SCENE.bodies[1])).bodies[0]
     for done in (1, 2, 77):

@@ -248,7 +248,7 @@ def test_refused_models_run_with_the_remaining_elements(name):
     assert sum("the default of SDF, the model states none" in note for note in left.notes) >= 2
 
 
-def test_links_of_a_model_touch_where_one_of_them_says_so():
+def test_contacts_between_links_of_a_model():
     both = link("l") + link("k", INERTIAL + BALL + COLLIDE)
     assert len(read(model(both), False).scene.bodies) == 2
     with pytest.raises(SceneError, match="do not collide with each other"):

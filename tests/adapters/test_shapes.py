@@ -84,7 +84,7 @@ def test_a_triangle_rebounds_flat_and_slides_to_its_stop(engine, profile):
 
 @pytest.mark.parametrize(("engine", "profile"), PLANAR)
 @pytest.mark.parametrize("turn", [0.0, 1.2])
-def test_a_capsule_rolls_where_it_is_round_and_lands_where_its_end_is(engine, profile, turn):
+def test_roll_and_landing_of_a_capsule(engine, profile, turn):
     """No friction, no gravity: the lowest point of a capsule is h |sin a| + r under its centre; flat it keeps e."""
     low = 0.4 * abs(math.sin(turn)) + 0.2
     asked = planar(Capsule(0.4, 0.2), 0.1, low + 0.05, (0.0, -1.0, 0.0), 0.0, 0.5, 0.2, 0.0, turn)

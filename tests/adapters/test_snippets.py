@@ -150,7 +150,7 @@ def test_pasted_grip_with_the_friction_of_each_pair(step):
 
 
 @pytest.mark.parametrize("scene", ["pinch", "wedge", "pair_matrix", "ladder", "arch", "scales", "domino"])
-def test_each_material_of_a_scene_has_a_line_with_its_own_friction(scene):
+def test_line_of_each_material(scene):
     """MuJoCo's explicit pairs take nothing from their geoms: one that states no friction has a friction of 1."""
     pytest.importorskip("mujoco")
     made = resolve(scene).scene(2, {})

@@ -316,7 +316,7 @@ def test_engine_that_refuses_everything_unproven():
         CHECKS["capabilities"](Nothing())
 
 
-def test_a_fixed_body_is_asked_for_where_it_is_at_the_end():
+def test_place_of_a_fixed_body_at_the_end():
     for after, said in ((0, "second: check_resting, 2-D: floor is fixed but does not move like that"), (-1, "")):
 
         class Late(Listening):

@@ -117,7 +117,7 @@ def test_every_step_is_sampled_from_the_start_state_on() -> None:
     assert toy.built[0].calls == [1] * 10 and toy.built[0].closed == 1
 
 
-def test_a_stride_ends_on_the_last_step_even_if_it_does_not_divide() -> None:
+def test_last_step_of_a_stride_that_does_not_divide() -> None:
     toy = Toy({2})
     trajectory = run(toy, scene(), 0.1, {}, Sampling(stride=4))
     assert toy.built[0].calls == [4, 4, 2]
@@ -168,7 +168,7 @@ def spoiled(name: str, index: tuple[int, int], value: float) -> Callable[[Flight
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(("name", "index"), [("_pose", (1, 2)), ("_twist", (0, 2)), ("_twist", (1, 0))])
-def test_a_state_that_is_not_finite_ends_the_run_as_diverged(name: str, index: tuple[int, int], value: float) -> None:
+def test_divergence_by_a_state_that_is_not_finite(name: str, index: tuple[int, int], value: float) -> None:
     toy = Toy({2}, spoiled(name, index, value))
     trajectory = run(toy, scene(), 0.1, {})
     assert trajectory.finish == "diverged" and "not finite at t = 0.4 s" in trajectory.reason
@@ -233,11 +233,11 @@ def test_micrometre_a_second_allowed_without_a_cause(dimension: int, speed: floa
     assert run(Toy({dimension}, spoiled("_twist", (0, 0), speed)), still, 0.1, {}).finish == finish
 
 
-def test_a_body_explodes_by_its_speed_and_not_by_its_spin() -> None:
+def test_divergence_by_speed_and_not_by_spin() -> None:
     assert run(Toy({2}, spoiled("_twist", (0, 2), 1e9)), scene(), 0.1, {}).finish == "completed"
 
 
-def test_an_engine_advances_one_step_at_a_time_unless_told_otherwise() -> None:
+def test_steps_at_a_time_by_default() -> None:
     one, two = Flight(scene(), 0.1, lambda flight: None), Flight(scene(), 0.1, lambda flight: None)
     assert list(advances(one, 3)) == [1, 2, 3] and one.calls == [1, 1, 1]
     assert list(advances(two, 3, 2)) == [2, 3] and two.calls == [2, 1]
@@ -476,7 +476,7 @@ def test_simulation_reusing_its_own_arrays(monkeypatch: pytest.MonkeyPatch, dime
     assert trajectory.contacts.rows.impulse[:, 0].tolist() == list(range(1, 11))
 
 
-def test_an_engine_of_both_dimensions_gets_the_scene_as_it_is() -> None:
+def test_planar_scene_of_an_engine_of_both_dimensions() -> None:
     assert posed_for(Toy({2, 3}), scene()).dimension == 2
     assert run(Toy({2, 3}), scene(), 0.1, {}).out_of_plane is None
     alone = Scene("s", 1, 3, (Body("a", Sphere(0.5), 1.0, (0.1,) * 3),), (), (0.0, 0.0, -9.81), 1.0)
@@ -562,7 +562,7 @@ def test_a_missing_impulse_stays_missing_in_the_sum() -> None:
     assert np.isnan(record.impulse_between(0, 1)).all()
 
 
-def test_the_state_hash_sees_one_bit_and_ignores_the_sign_of_zero() -> None:
+def test_state_hash_by_bits_and_signs_of_zero() -> None:
     trajectory = run(Toy({2}), scene(), 0.1, {})
     pose = trajectory.pose.copy()
     assert replace(trajectory, pose=np.where(pose == 0.0, -0.0, pose)).state_hash() == trajectory.state_hash()

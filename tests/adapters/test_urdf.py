@@ -53,7 +53,7 @@ def test_places_masses_and_names_are_those_of_the_text():
     assert any("friction 1" in note for note in found.notes)
 
 
-def test_a_root_is_free_unless_it_is_the_world_or_has_no_mass():
+def test_roots_that_are_free():
     alone = read((MODELS / "ball_alone.urdf").read_text(), False)
     assert [(body.motion, body.pose[2]) for body in alone.scene.bodies] == [("free", 0.1)]
     assert any("ball is free" in note for note in alone.notes)

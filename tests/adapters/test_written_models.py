@@ -53,7 +53,7 @@ def test_numbers_read_back_to_the_last_bit():
 
 
 @pytest.mark.parametrize("solver", ["Newton", "CG", "PGS"])
-def test_a_model_with_a_solver_of_its_own_is_written_with_it(solver, tmp_path):
+def test_written_model_with_a_solver_of_its_own(solver, tmp_path):
     """Profile `model` brings what its file says: a bug report of it ended in a traceback."""
     from click.testing import CliRunner
 

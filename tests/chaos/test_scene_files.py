@@ -83,7 +83,7 @@ def judged(cells, run="r"):
     return found
 
 
-def test_generated_files_are_refused_in_one_line_or_run_into_rows(dice, soak, tmp_path):
+def test_generated_files(dice, soak, tmp_path):
     count, most = (12_000, 2_000) if soak else (500, 24)
     cells = []
     for number in range(count):

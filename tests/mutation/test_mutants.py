@@ -20,7 +20,7 @@ def tools(monkeypatch):
         sys.modules.pop(name, None)
 
 
-def test_a_fault_changes_one_statement_of_a_kernel_or_one_constant(tools):
+def test_faults_of_one_statement_or_constant(tools):
     faults, only = tools("faults"), "reference_solver/textbook3/manifolds.py"
     chosen = list(islice(faults.faults(3, only), 40))
     told = [each.told for each in chosen]

@@ -401,7 +401,7 @@ def test_distances_of_engines_line_by_line():
     ]  # fmt: skip
 
 
-def test_a_bench_as_data_has_its_run_its_protocol_and_every_table(tmp_path):
+def test_bench_as_data(tmp_path):
     store = Store(tmp_path / "results")
     run, _ = store.start("bench quick: impact", [])
     store.close()

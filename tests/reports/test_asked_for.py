@@ -56,7 +56,7 @@ def test_engine_description_with_habits_and_bad_versions():
     assert shown(missing).count("no wheel") == 1
 
 
-def test_a_bench_is_written_as_one_json_and_a_table_each(tmp_path):
+def test_files_of_a_bench(tmp_path):
     store = Store(tmp_path / "results")
     run, _ = store.start("bench", [])
     table = pd.DataFrame([{"scene": "impact", "cost": 2.5e-3, "slot": {"scene": "impact"}}])

@@ -50,7 +50,7 @@ def test_a_bench_tells_error_and_time_of_every_point(bench):
     assert {row["scene"] for row in data["overhead"]} == {"empty", "free"}
 
 
-def test_every_raw_timing_has_the_error_and_the_state_beside_it(bench):
+def test_error_and_state_of_every_raw_timing(bench):
     out, _ = bench
     store = Store(out, create=False)
     (run,) = reading.bench_runs(store)

@@ -77,7 +77,7 @@ def test_the_error_is_what_the_scheme_of_the_engine_leaves(tmp_path, scene, engi
 
 
 @pytest.mark.long
-def test_a_model_is_timed_on_its_own_engine_as_its_author_made_it(tmp_path):
+def test_times_of_a_model_on_its_own_engine(tmp_path):
     pytest.importorskip("mujoco")
     words = ["--engine", "mujoco", "--dim", "3", "--dt", "1/240", "--param", "duration=0.1"]
     done = bench(MODELS / "ball_dropped.xml", tmp_path, *words)

@@ -21,7 +21,7 @@ def printed(width=120):
     return out, Console(file=out, width=width, no_color=True)
 
 
-def test_units_are_timed_one_by_one_and_how_it_was_done_is_kept(monkeypatch):
+def test_times_of_units_and_their_protocol(monkeypatch):
     """Each lap is kept as it comes; what stood there of the run before is gone first."""
     did, clock, loads = [], iter([100.0, 112.345]), iter([(0.5, 0.25, 0.125), (1.5, 0.5, 0.25)])
     store = SimpleNamespace(

@@ -57,7 +57,7 @@ def test_a_bundle_is_told_as_data_with_its_files(page_folder, tmp_path, monkeypa
     assert written == [(page_folder, "latest", tmp_path / "b.zip")]
 
 
-def test_scene_files_that_ran_are_in_the_bundle_as_they_were(tmp_path):
+def test_scene_files_of_a_bundle(tmp_path):
     pytest.importorskip("pymunk")
     texts = {}
     for place, height in (("a", 2.0), ("b", 3.0)):
@@ -137,7 +137,7 @@ def test_reproducible_list_of_files_in_a_bundle(monkeypatch, tmp_path):
     }  # fmt: skip
 
 
-def test_times_of_a_bench_and_how_they_were_taken_are_in_the_bundle(monkeypatch, tmp_path):
+def test_bench_times_and_protocol_of_a_bundle(monkeypatch, tmp_path):
     from reports import bundle
 
     other = Run("20260102-000000", "2026-01-02T00:00:00", "", {}, "bench quick: all", (), True)

@@ -131,7 +131,7 @@ def test_invariance_breaks_kept_for_the_requested_cells(monkeypatch, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_cells_as_lines_are_run_once_each_and_every_line_gets_an_answer(monkeypatch):
+def test_cells_as_lines_with_an_answer_each(monkeypatch):
     asked = []
 
     def run_cells(cells, jobs, timeout, leave):
@@ -327,7 +327,7 @@ def test_search_progress_and_status_of_a_better_setting(monkeypatch):
 # ---- files that are written ------------------------------------------------------------------------------------------
 
 
-def test_the_schema_is_the_same_on_the_terminal_and_in_a_file(tmp_path):
+def test_schema_on_the_terminal_and_in_a_file(tmp_path):
     from validation.files.scene_files import json_schema
 
     status, out, _ = said("schema")

@@ -66,7 +66,7 @@ def test_headline_of_runs_of_different_extent():
         assert headline([GONE], A, other) == "no check is in both; 1 not run in B"
 
 
-def test_text_has_a_line_per_family_and_says_how_to_run_its_largest():
+def test_lines_of_families_with_their_commands():
     again = reproduce(SLOT)
     lines = as_text([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B).splitlines()
     assert lines[:5] == [*header(A, B), headline([MILDER, GONE, BETTER, FLIP, ALSO_GONE, FASTER, ADDED], A, B)]
@@ -211,7 +211,7 @@ def test_missing_release_refused_with_the_known_ones(released, tmp_path):
         (replace(FLIP, size=-0.5), "error -0.5 tolerances"), (replace(FLIP, size=0.0), ""),
     ],
 )  # fmt: skip
-def test_sizes_have_a_sign_where_they_are_differences_and_three_digits(change, said):
+def test_signs_and_digits_of_sizes(change, said):
     assert as_markdown([change], A, B).splitlines()[-1].endswith(f"| {said} |")
 
 
@@ -233,7 +233,7 @@ def test_side_by_run_or_folder(results, tmp_path):
 
 
 @pytest.mark.parametrize("results", [0.8], indirect=True)
-def test_times_are_of_the_last_bench_run_unless_a_run_is_named(results, monkeypatch):
+def test_times_of_the_last_or_a_named_run(results, monkeypatch):
     """The last run is a bench run here: rows are of the last that is none, ratios of the bench run."""
     import pandas as pd
 
@@ -282,7 +282,7 @@ def test_a_file_that_holds_anything_else_is_refused(tmp_path, line):
     assert str(caught.value) == f"run: {path} does not hold rows of this project"
 
 
-def test_a_file_that_cannot_be_read_is_refused_with_its_name_and_why(tmp_path):
+def test_refusal_of_an_unreadable_file(tmp_path):
     for path in (tmp_path / "none.jsonl", written(tmp_path, "{")):
         with pytest.raises(MissingError) as caught:
             load_side(str(path), tmp_path)

@@ -54,7 +54,7 @@ def call(*arguments, **kwargs):
         (["check-adapter", "chipmonk"], "did you mean 'chipmunk'"),
     ],
 )
-def test_a_bad_call_exits_with_two_and_one_line_that_names_the_field(tmp_path, monkeypatch, arguments, said):
+def test_status_and_line_of_a_bad_call(tmp_path, monkeypatch, arguments, said):
     monkeypatch.chdir(tmp_path)
     result = call(*arguments)
     assert result.exit_code == 2

@@ -101,7 +101,7 @@ def test_a_file_of_something_else_is_refused_in_one_line(tmp_path, content):
 
 
 @pytest.mark.parametrize("side", ["{}/none", "{}/none:latest", "none:latest"])
-def test_a_folder_that_is_not_there_is_refused_by_its_own_name(tmp_path, side):
+def test_refusal_of_a_missing_folder(tmp_path, side):
     """It was looked for as a run of another folder, and that folder was blamed."""
     asked = side.format(tmp_path)
     result = CliRunner().invoke(main, ["compare", str(GOLDEN / "base.jsonl"), asked, "--out", str(tmp_path / "out")])

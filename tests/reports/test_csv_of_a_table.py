@@ -38,6 +38,6 @@ def test_matrix_of_engines_and_profiles_as_csv():
     assert found.iloc[0, 1:].isna().all()
 
 
-def test_a_plain_table_is_as_it_stands_and_short_lines_are_filled():
+def test_plain_table_with_short_lines():
     found = pd.read_csv(io.StringIO(csv_of([["a", "b"]], [["1", "2"], ["3"]])))
     assert found.to_dict("list")["a"] == [1, 3] and found["b"].isna().tolist() == [False, True]

@@ -91,7 +91,7 @@ def test_markdown_is_the_matrix_its_legend_and_what_needs_attention():
     ])  # fmt: skip
 
 
-def test_markdown_of_an_engine_that_did_not_run_has_no_version():
+def test_markdown_of_an_engine_that_did_not_run():
     row = replace(CRASHED, engine="another", engine_version="", outcome="not_installed")
     assert exports.as_markdown(plain(row)).startswith("| scene | another/tuned<br> |\n|---|---|\n")
 
@@ -118,7 +118,7 @@ def junit(*rows):
     return ElementTree.fromstring(exports.as_junit(plain(*rows)))
 
 
-def test_junit_has_a_suite_per_engine_and_profile_and_counts_what_fails():
+def test_suites_and_failures_of_junit():
     document = junit(ROW, KNOWN, PASS, SWEPT, SPATIAL, CRASHED)
     assert document.get("name") == "contact-crosscheck"
     suites = {suite.get("name"): suite for suite in document.iter("testsuite")}
@@ -136,7 +136,7 @@ def test_junit_has_a_suite_per_engine_and_profile_and_counts_what_fails():
     ]
 
 
-def test_junit_counts_each_case_a_few_times_however_many_there_are(monkeypatch):
+def test_junit_of_many_cases(monkeypatch):
     """Counted, not timed: 35 000 rows of `make soak` took half an hour of counting each suite anew for every case."""
     counted = []
     real = TestSuite.update_statistics
@@ -196,7 +196,7 @@ def test_all_files_are_written_in_utf_8(tmp_path):
     assert "3 µm" in texts[1] and "3 µm" in texts[2]
 
 
-def test_rows_of_nulls_have_a_file_of_their_own_where_there_are_any(tmp_path):
+def test_file_of_null_rows(tmp_path):
     nulls = plain(replace(ROW, engine="none", profile="did nothing"))
     paths = exports.write_all(tmp_path, plain(ROW), nulls)
     assert list(paths) == ["rows.jsonl", "rows.csv", "summary.md", "nulls.csv"]
@@ -227,7 +227,7 @@ def ratio(table):
     return table[table["metric"] == "rebound_ratio"][["run", "value"]].values.tolist()
 
 
-def test_load_reads_the_last_run_of_the_usual_folder_or_any_other(two_runs, tmp_path):
+def test_load_of_the_usual_folder_or_another(two_runs, tmp_path):
     first, last = two_runs
     assert isinstance(exports.load(), pd.DataFrame)
     assert ratio(exports.load()) == ratio(exports.load(tmp_path / "crosscheck-out", "latest")) == [[last, 0.8]]

@@ -115,7 +115,7 @@ def test_lines_by_engine_and_profile_at_several_iterations():
     assert _iterations(found, "impact", 3) is None and _iterations(found, "bounce", 2) is None
 
 
-def test_times_are_drawn_with_the_interval_in_which_their_median_lies():
+def test_times_drawn_with_the_interval_of_their_median():
     """A half and twice as long are as far from the mark as a factor of two is on the axis of times."""
     spread = {"chipmunk": 10.0**0.25, "bullet": 2.0}
     points = pd.DataFrame([

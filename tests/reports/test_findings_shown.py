@@ -104,7 +104,7 @@ def test_uncertified_run_told_once_with_its_reason():
     assert families([row(**ended, reason="receipt mass: 2")])[0].line.endswith("ratio=0.99: receipt mass: 2")
 
 
-def test_a_family_is_told_in_one_line_and_as_plain_data():
+def test_family_in_one_line_and_as_data():
     worst, mild = row("impulse[2]", 0.9, iterations=4), row("impulse[1]", 0.2, iterations=4)
     (family,) = families([mild, worst])
     line = "FAIL, known: mujoco/default incline 3-D ratio=0.99 at 4 iterations: impulse[2] 0.9 m/s, truth 0 m/s, " \
@@ -151,13 +151,13 @@ def test_reasons_told_once_when_nothing_ran():
     ]
 
 
-def test_a_scene_file_that_an_engine_cannot_run_is_said_beside_what_ran():
+def test_scene_file_that_an_engine_cannot_run():
     file = "/somewhere/my-scene.toml"
     rows = [row(), refused(scene=file), refused("not_installed", scene=file), refused(), row(scene=file)]
     assert list(refusals(rows)) == [f"UNSUPPORTED: mujoco {file}: it has no boxes"]
 
 
-def test_an_engine_that_is_not_installed_is_said_once_for_all_scenes():
+def test_single_line_for_a_missing_engine():
     rows = [
         refused("not_installed", "pip install it", engine="drake", scene=scene)
         for scene in ("incline", "stack", "slide")

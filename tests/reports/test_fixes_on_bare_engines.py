@@ -58,7 +58,7 @@ def fails(error):
     "key",
     [pytest.param(key, id="-".join(map(str, key)), marks=[] if key in CHOSEN else pytest.mark.long) for key in CURES],
 )
-def test_a_listed_cure_mends_a_bare_model_of_its_scene_in_both_sizes(key):
+def test_listed_cures_on_bare_models(key):
     """What it says is mended is, and what it tells fails without it; in other sizes by the formulas beside numbers."""
     cure = CURES[key]
     pytest.importorskip(PACKAGES[cure.engine])

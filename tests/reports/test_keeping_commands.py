@@ -108,7 +108,7 @@ def test_run_unfinished_on_both_machines_after_a_merge(out, tmp_path):
     store.close()
 
 
-def test_a_folder_without_results_is_refused_and_left_as_it_is(tmp_path):
+def test_refusal_of_a_folder_without_results(tmp_path):
     done = call("export", "--parquet", tmp_path / "p", "--out", tmp_path / "none", status=2)
     assert "out: there are no results at" in done.output and "crosscheck run makes them" in done.output
     assert not (tmp_path / "none").exists() and not list((tmp_path / "p").glob("*.parquet"))

@@ -88,7 +88,7 @@ def test_role_of_a_profile_beside_its_first_line():
     ]  # fmt: skip
 
 
-def test_scenes_that_do_not_fit_beside_each_other_make_further_tables():
+def test_further_tables_of_a_wide_matrix():
     assert [len(tables_of(matrix_of(ROWS), VERSIONS, width)) for width in (46, 45)] == [1, 2]
     apart = tables_of(matrix_of(ROWS), VERSIONS, 40)
     assert [[column.header for column in table.columns] for table in apart] == [

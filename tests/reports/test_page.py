@@ -74,7 +74,7 @@ def elements(text):
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("found", [True, False])
-def test_the_command_writes_the_same_page_prints_its_path_and_opens_it(page_folder, text, tmp_path, monkeypatch, found):
+def test_page_written_and_opened_by_the_command(page_folder, text, tmp_path, monkeypatch, found):
     opened, path = [], tmp_path / "page.html"
     monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or found)
     result = CliRunner().invoke(main, ["report", "--open", "--out", str(page_folder), "-o", str(path)])
@@ -320,7 +320,7 @@ def test_slower_run_leaves_the_sentences():
     assert said("slow") == said("base")
 
 
-def test_an_explained_failure_is_a_departure_and_an_alarm_is_wrong():
+def test_marks_of_explained_failures_and_alarms():
     source = golden("base")
     rows = copy.deepcopy(list(source.rows))
     rows[0] |= {"physics": "fail", "standing": "explained", "reason": "slop takes a share, always (predicted 1 +- 2)"}
@@ -370,7 +370,7 @@ def test_finding_with_the_number_of_its_worst_row(page_source):
 # ---- families ----
 
 
-def test_every_scene_stands_in_one_family_and_unknown_ones_in_the_last(page_source):
+def test_families_of_scenes(page_source):
     found = families(page_source)
     assert sorted(scene for family in found for scene in family.scenes) == sorted(page_source.scenes)
     assert found[0].name == "rebound" and found[0].scenes == ("impact", "bounce") and found[-1].name == "others"
@@ -468,7 +468,7 @@ def test_explorer_heights_and_names_of_wrong_rebounds(page_source):
 # ---- replay ----
 
 
-def test_a_packed_replay_gives_back_every_pose_to_half_a_level(page_source):
+def test_poses_of_a_packed_replay(page_source):
     found = next(r for r in replays(page_source) if r.id == "replay-bounce-2")
     data = found.head
     planes = np.frombuffer(zlib.decompress(base64.b64decode(found.levels)), np.uint8).reshape(2, -1)
@@ -491,7 +491,7 @@ def test_a_packed_replay_gives_back_every_pose_to_half_a_level(page_source):
     assert exact[0] == pytest.approx([0.0, 1.5], abs=data["unit"]) and len(exact) == data["count"]
 
 
-def test_the_head_of_a_replay_has_what_the_page_s_script_reads(page_source):
+def test_head_of_a_replay(page_source):
     """What stands there by another name the script takes for nothing: it draws an empty picture and says no word."""
     head = next(r for r in replays(page_source) if r.id == "replay-bounce-2").head
     read = ("dimension", "dt", "count", "bodies", "fixed", "tracked", "low", "high", "unit", "angle", "place", "arrow")

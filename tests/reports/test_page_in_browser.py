@@ -210,7 +210,7 @@ def test_gravity_points_down_so_that_an_incline_is_inclined(browser, page_file, 
 
 
 @pytest.mark.usefixtures("bullet")
-def test_no_name_of_a_lane_is_cut_off_by_the_next_lane(browser, page_file):
+def test_names_of_lanes(browser, page_file):
     """On a phone lanes stand in several rows: the name of each must fit beside its square."""
     with opened(browser, page_file, "#replay", width=320) as page:
         until(page, "document.getElementById('replay-series').querySelectorAll('label').length > 0")
@@ -338,7 +338,7 @@ def test_heading_of_a_group_of_rows_in_a_saved_table(browser, page_file):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, page_file):
+def test_title_and_legend_of_a_saved_picture(browser, page_file):
     with opened(browser, page_file, "#impact-2") as page:
         figure = page.locator("#scene-impact figure.plot").first
         title = figure.locator("svg").get_attribute("aria-label")
@@ -367,7 +367,7 @@ def test_a_picture_that_is_saved_says_its_title_and_whose_marks_it_has(browser, 
         assert x + 6.2 * len(text) < right, text
 
 
-def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file, page_source):
+def test_csv_with_every_digit_and_no_formula(browser, page_file, page_source):
     with opened(browser, page_file, "#tables") as page:
         with page.expect_download() as found:
             page.locator("#as-csv button").click()
@@ -378,7 +378,7 @@ def test_rows_come_out_as_csv_with_every_digit_and_no_formula(browser, page_file
     assert [row["because"] for row in rows] == [row["because"] for row in page_source.rows]
 
 
-def test_a_field_of_a_table_of_errors_gives_the_command_of_its_cell(browser, page_file, page_source):
+def test_commands_in_a_table_of_errors(browser, page_file, page_source):
     """Each line holds only what its command does not share with the others of its table."""
     with opened(browser, page_file, "#impact-2") as page:
         page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
@@ -401,7 +401,7 @@ def test_no_width_scrolls_sideways(browser, page_file, width):
 
 
 @pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
-def test_no_caption_is_wider_than_what_is_seen_of_its_table(browser, page_file, width):
+def test_width_of_captions(browser, page_file, width):
     with opened(browser, page_file, width=width) as page:
         page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
         said = page.evaluate(
@@ -430,7 +430,7 @@ def test_width_of_the_table_of_what_is_wrong(browser, page_file, width):
     assert over and max(over) <= 0
 
 
-def test_on_a_phone_no_line_of_a_table_is_mostly_empty(browser, page_file):
+def test_lines_of_tables_on_a_phone(browser, page_file):
     """What lies outside the picture makes no line taller than a screen."""
     with opened(browser, page_file, width=390) as page:
         page.evaluate("document.querySelectorAll('details').forEach(node => node.open = true)")
@@ -442,7 +442,7 @@ def test_on_a_phone_no_line_of_a_table_is_mostly_empty(browser, page_file):
     assert tall == []
 
 
-def test_the_text_of_the_explorer_can_be_read_on_a_phone(browser, page_file):
+def test_text_of_the_explorer_on_a_phone(browser, page_file):
     with opened(browser, page_file, "#explorer", width=390) as page:
         height = page.locator("#explorer-plot text").first.evaluate("node => node.getBoundingClientRect().height")
     assert height > 10

@@ -84,7 +84,7 @@ def test_failure_count_in_the_mark_of_a_family():
 
 
 @pytest.mark.parametrize("values", [[1e-3, 10.0], [2.0, 3.0], [5.0]])
-def test_a_logarithmic_scale_has_room_at_both_ends_and_ticks_inside(values):
+def test_ends_and_ticks_of_a_logarithmic_scale(values):
     scale, ticks = log_scale([*values, 0.0, float("inf")])
     low, high = scale.to_dict()["domain"]
     assert low < min(values) <= max(values) < high and high / low >= 10.0

@@ -67,7 +67,7 @@ def between(own):
 
 @pytest.mark.few(4)
 @pytest.mark.parametrize(("scene", "own"), axes(), ids=lambda x: x if isinstance(x, str) else x.name)
-def test_the_command_of_an_end_of_a_bracket_asks_for_its_cell(scene, own):
+def test_command_of_an_end_of_a_bracket(scene, own):
     found = brackets([scene], ENGINES, (), (), quick=True)
     mine = [each for each in found if each.frontier == own]
     assert mine
@@ -92,7 +92,7 @@ def test_the_command_of_a_field_note_asks_for_its_cell(note):
     )  # fmt: skip
 
 
-def test_the_two_cells_of_a_bracket_end_again_as_it_says():
+def test_cells_of_a_bracket_run_again():
     pytest.importorskip("pymunk")
     assert facts("chipmunk")
     (one,) = brackets(["thin_wall"], ["chipmunk"], ["tuned"], [2], quick=True)

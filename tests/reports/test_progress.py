@@ -47,7 +47,7 @@ def counted(text):
     return [(int(a), int(b)) for a, b in re.findall(r"(\d+)/(\d+)", text)]
 
 
-def test_the_line_counts_every_cell_that_ends_and_names_the_last(planned):
+def test_progress_line_with_count_and_last_cell(planned):
     run, said = planned(lambda todo, leave: map(answer, todo))
     assert counted(said)[-1] == (4, 4) and "impact on toy" in said
     assert run.finished and {o.slot for o in planned.store.observations(run)} == set(SLOTS)

@@ -38,7 +38,7 @@ def test_a_command_of_the_readme_exists_with_its_options(line):
     assert CliRunner().invoke(main, [name, "--help"]).exit_code == 0
 
 
-def test_the_readme_is_short_and_counts_the_scenes_that_there_are():
+def test_length_and_scene_count_of_the_readme():
     assert len(README.split()) <= 600
     assert set(map(int, re.findall(r"(\d+) scenes", README))) == {len(CATALOGUE)}
 
@@ -57,7 +57,7 @@ def test_answer_in_the_readme_equal_to_a_run(tmp_path):
         assert " ".join(line.split()) in flat
 
 
-def test_there_are_commands_in_the_readme_and_every_command_has_help():
+def test_commands_of_the_readme_and_their_help():
     assert len(COMMANDS) >= 12
     assert all(main.get_command(None, name).help for name in main.list_commands(None))
 
@@ -185,7 +185,7 @@ def results(tmp_path_factory):
     return folder
 
 
-def test_every_command_of_the_readme_is_run_or_says_why_not():
+def test_commands_of_the_readme_that_run():
     assert set(COMMANDS) == set(RUN) | set(NOT_RUN)
     assert not set(RUN) & set(NOT_RUN) and len(NOT_RUN) <= 8
     assert {*SAID, *SLOW} == {line for calls in list(RUN.values())[1:] for line in calls}

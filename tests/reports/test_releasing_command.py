@@ -76,7 +76,7 @@ def test_same_cells_and_one_line_for_every_release(monkeypatch, tmp_path):
     assert "1.1" in call("releases", "chipmunk", "1.0..2.0", "impact", "--out", str(tmp_path)).stdout
 
 
-def test_the_command_below_what_moved_finds_the_results_in_their_folder(monkeypatch, tmp_path):
+def test_command_below_what_moved(monkeypatch, tmp_path):
     Asked(monkeypatch, lambda version, slot: 0.9 if version == "2.0" else 0.5)
     said = " ".join(call("releases", "chipmunk", "1.0..2.0", "impact", "--out", str(tmp_path)).stdout.split())
     assert f"crosscheck compare chipmunk==1.1 chipmunk==2.0 --out {tmp_path}" in said

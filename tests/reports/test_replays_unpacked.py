@@ -29,7 +29,7 @@ def recording(dimension, frames, seed):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_replay_gives_back_every_number_to_half_of_its_level(dimension):
+def test_numbers_of_an_unpacked_replay(dimension):
     up = (*(0.0,) * (dimension - 1), 1.0)
     inertia = 0.1 if dimension == 2 else (0.1,) * 3
     box = Box((0.25,) * dimension)

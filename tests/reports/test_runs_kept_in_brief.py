@@ -90,7 +90,7 @@ def test_unfinished_run_judged_each_time_and_deleted_run_dropped(stored, monkeyp
     assert judged(store, run) and len(asked) == 4
 
 
-def test_a_row_is_judged_by_laws_and_lists_of_known_failures_too(tmp_path, monkeypatch):
+def test_row_judged_by_laws_and_known_failures(tmp_path, monkeypatch):
     """An edit of any of them is other code."""
     for name in ("validation", "adapters/toy/findings"):
         (tmp_path / name).mkdir(parents=True)

@@ -427,7 +427,7 @@ def test_mjcf_note_on_what_it_cannot_express():
     assert done.exit_code == 2 and "rounds: MJCF has no word for a loop around the solver" in done.output
 
 
-def test_the_head_says_what_is_asked_what_is_true_and_who_judges(tmp_path):
+def test_head_of_a_script(tmp_path):
     pytest.importorskip("pymunk")
     call = ["export", "bounce", "--engine", "chipmunk", "--to", "python", "--param", "e=0.5", "--dt", "1/120"]
     done = CliRunner().invoke(main, call)

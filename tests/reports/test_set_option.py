@@ -122,7 +122,7 @@ def test_explain_of_an_unknown_setting_as_in_run(ran, asked, said):
     assert said in done.output and len(done.output.splitlines()) == 1
 
 
-def test_the_command_that_runs_a_row_again_asks_for_the_same_cell(ran):
+def test_command_that_runs_a_row_again(ran):
     for row in ran[1]:
         words = shlex.split(reproduce(row["slot"]))
         assert words[:2] == ["crosscheck", "run"]

@@ -27,7 +27,7 @@ def said(console):
     ("seconds", "text"),
     [(0.2, "0 s"), (8.4, "8 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (185.0, "3 min 05 s"), (3599.0, "59 min 59 s")],
 )
-def test_a_duration_is_said_in_seconds_until_there_is_a_whole_minute(seconds, text):
+def test_durations_below_and_above_a_minute(seconds, text):
     assert stages.clock(seconds) == text
 
 
@@ -90,7 +90,7 @@ def sections(text):
     return found
 
 
-def test_timings_tell_the_stages_of_a_command_and_of_its_cases(tmp_path, monkeypatch):
+def test_stages_of_a_command_and_of_its_cases(tmp_path, monkeypatch):
     monkeypatch.setattr(stages, "LEAST", 0.0)
     call = ["run", "impact", "--engine", "chipmunk", "--dim", "2", "--jobs", "1", "--out", str(tmp_path)]
     done = CliRunner().invoke(main, ["--timings", *call])

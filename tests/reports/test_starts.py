@@ -80,7 +80,7 @@ def test_a_run_imports_its_engine_and_its_scenes_alone():
     assert {f"validation.scenes.{name}" for name in OURS} & found == {"validation.scenes.bounce"}
 
 
-def test_an_engine_that_is_described_is_the_only_one_that_is_imported():
+def test_imports_for_the_description_of_an_engine():
     pytest.importorskip("mujoco")
     assert imported("describe mujoco")["describe mujoco"] & (LARGE | ENGINES) == {"mujoco"}
 

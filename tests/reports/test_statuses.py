@@ -34,7 +34,7 @@ def test_the_documentation_has_the_table_of_the_code():
     assert {int(status): meaning for status, meaning in rows.items()} == statuses.MEANING
 
 
-def test_a_healthy_run_is_fine_and_a_crash_is_an_alarm(plugins, tmp_path):
+def test_status_of_a_healthy_run_and_a_crash(plugins, tmp_path):
     assert call(*SMALL, "--out", tmp_path / "a").exit_code == statuses.FINE
     crash = call("run", "impact", "--param", "v=6", "--dim", 2, "--engine", "evil", "--profile", "raise", "--out",
                  tmp_path / "b")  # fmt: skip
@@ -124,7 +124,7 @@ def test_missing_engine_named_by_tune():
 
 
 @pytest.mark.parametrize("command", [["report"], ["list", "runs"], ["compare", "latest", "latest"], SMALL])
-def test_a_store_of_a_later_version_is_said_in_one_line(tmp_path, command):
+def test_store_of_a_later_version(tmp_path, command):
     with sqlite3.connect(tmp_path / FILE) as database:
         database.execute(f"PRAGMA user_version = {VERSION + 1}")
     result = call(*command, "--out", tmp_path)
@@ -180,7 +180,7 @@ def test_stream_closed_by_the_caller(tmp_path, closed, arguments, status):
     assert "Traceback" not in said.read_text()
 
 
-def test_a_line_of_a_batch_that_is_wrong_loses_no_other(tmp_path):
+def test_batch_with_a_wrong_line(tmp_path):
     good = {"scene": "impact", "engine": "chipmunk", "profile": "tuned", "dt": "1/240", "params": {"v": 6.0}}
     wrong = ["{", "[1]", "7", json.dumps(good | {"engine": "chipmonk"}), json.dumps(good | {"dt": "nan"}),
              json.dumps(good | {"scene": 7}), json.dumps(good | {"params": {"v": "fast"}}), "[" * 100000,
@@ -244,7 +244,7 @@ def test_missing_package_in_one_line_with_a_status(tmp_path, arguments, status, 
     assert said in " ".join((done.stdout + done.stderr).split()) and "Traceback" not in done.stderr
 
 
-def test_a_bench_of_which_no_cell_has_a_result_says_so(tmp_path):
+def test_bench_without_a_result(tmp_path):
     """Chipmunk is planar: there is nothing to time in space."""
     result = call("bench", "impact", "--engine", "chipmunk", "--dim", 3, "--dt", "1/60", "--out", tmp_path)
     assert result.exit_code == statuses.INCOMPLETE

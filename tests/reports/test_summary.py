@@ -127,7 +127,7 @@ def test_parameter_named_only_if_the_truth_depends_on_it():
     assert answers(rows)[0].wrong.endswith(", whatever v is")
 
 
-def test_a_bounce_is_told_as_the_restitution_that_its_first_apex_shows():
+def test_bounce_told_as_restitution():
     rows = [row("bounce", 2, "bullet", "default", "known", 0.25, 0.64, e=0.8, height=1.0)]
     (answer,) = answers(rows)
     assert answer.wrong == "rebounds at 0.5 instead of 0.8 (e=0.8 height=1)"
@@ -322,7 +322,7 @@ def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
     assert "chipmunk is planar" not in text and "Nothing was judged" not in text
 
 
-def test_an_invalid_cell_prints_its_reason_and_no_number_of_its_metrics():
+def test_reason_of_an_invalid_cell():
     why = "receipt size: measured 0.98, declared 1 +- 0.0035"
     lost = {"outcome": "invalid", "reason": why, "physics": None}
     whole = row("impact", 2, "bullet", "tuned", value=1.0, truth=1.0) | lost
@@ -537,7 +537,7 @@ def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeyp
     assert "off plane" not in call("explain", "mujoco/default/bounce/out_of_plane", "--out", out).stdout
 
 
-def test_a_row_or_a_scene_alone_is_what_the_whole_run_says(two_engines):
+def test_row_or_scene_alone_against_the_whole_run(two_engines):
     out, _ = two_engines
     store = Store(out, create=False)
     rows = showing.load(store, "latest").rows
@@ -637,7 +637,7 @@ def test_a_check_whose_name_is_not_quite_right():
 
 
 @pytest.mark.parametrize("name", ["zzzz", "mujoco/default/nowhere", ""])
-def test_a_row_that_is_not_there_is_refused_in_one_line(two_engines, name):
+def test_refusal_of_a_missing_row(two_engines, name):
     out, _ = two_engines
     result = call("explain", name, "--out", out)
     assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1 and "check: " in result.stderr

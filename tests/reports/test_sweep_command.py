@@ -49,7 +49,7 @@ def test_ends_are_exact_and_a_logarithm_spreads_evenly():
 
 
 @pytest.mark.parametrize("kind", ["random", "sobol"])
-def test_points_lie_within_their_range_and_a_seed_gives_them_again(kind):
+def test_range_and_seed_of_points(kind):
     pytest.importorskip("scipy")
     ranges = [(kind, Range("a", -1.0, 1.0)), (kind, Range("b", 1.0, 100.0, True))]
     first, again, other = (points(ranges, 100, seed) for seed in (3, 3, 4))

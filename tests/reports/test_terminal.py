@@ -90,14 +90,14 @@ def test_text_shown_literally_by_commands_about_a_run(folder, arguments, texts):
         assert text in flat(result.stdout)
 
 
-def test_describe_shows_names_and_reasons_of_a_scene_file_as_they_are(folder):
+def test_names_and_reasons_of_a_scene_file(folder):
     result = call("describe", folder / FILE_NAME)
     assert result.exit_code == 0, result.output
     for text in (NAME, FILE_NAME, f"{BODY}.vy", BECAUSE):
         assert text in flat(result.stdout)
 
 
-def test_lists_of_engines_and_doctor_show_what_plugins_say_as_it_is(monkeypatch):
+def test_plugin_texts_in_lists_and_doctor(monkeypatch):
     said = "[bold]no[/bold] [/] [red :smile:"
     engine = {"name": f"[i]{said}", "version": said, "status": "not installed", "profiles": [said], "reason": said}
     found = listing.doctor()
@@ -110,7 +110,7 @@ def test_lists_of_engines_and_doctor_show_what_plugins_say_as_it_is(monkeypatch)
         assert result.stdout.count(said) >= 3, result.stdout
 
 
-def test_settings_and_habits_of_a_plugin_are_shown_as_they_are(monkeypatch):
+def test_settings_and_habits_of_a_plugin(monkeypatch):
     said = "[bold]so[/bold] [/] [red :smile:"
     data = listing.describe("chipmunk")
     if data["status"] != "installed":
@@ -213,7 +213,7 @@ def test_roles_of_profiles_in_list_and_describe():
     assert "Profile default (as shipped)" in told and "Profile tuned" in told
 
 
-def test_a_run_of_many_scenes_is_listed_by_the_first_of_them(tmp_path):
+def test_listing_of_a_run_of_many_scenes(tmp_path):
     """The title of a quick suite names forty-six scenes: a screen for every run."""
     store = Store(tmp_path)
     names = [f"scene{k}" for k in range(46)]

@@ -49,7 +49,7 @@ def test_rows_in_the_order_of_the_plan_whatever_ends_first(kept):
     assert shown(run, some, plan)[2] == rows_of(run.id, kept_order, plan)
 
 
-def test_a_line_as_soon_as_a_scene_on_an_engine_has_ended(kept):
+def test_line_at_the_end_of_each_scene(kept):
     run, observations = kept
     own = [o for o in observations if o.slot.engine == "mujoco" and o.slot.scene in ("impact", "bounce")]
     plan = [observation.slot for observation in own]
@@ -78,7 +78,7 @@ def test_no_control_characters_without_a_terminal_and_colours_with_one(kept):
     assert any("\x1b[" in line for line in shown(run, observations, plan, terminal=True)[1])
 
 
-def test_no_lines_for_a_single_scene_nor_where_an_engine_cannot_run_one(kept):
+def test_lines_of_a_single_scene_or_a_refusing_engine(kept):
     run, observations = kept
     own = [o for o in observations if o.slot.scene == "bounce"]
     assert own and shown(run, own, [o.slot for o in own])[1] == []

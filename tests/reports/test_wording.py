@@ -47,7 +47,7 @@ SLOT = {"scene": "impact", "params": {"e": 0.8, "v": 6.0}, "dimension": 2, "engi
         (1.0, "weights", "1 weight"),
     ],
 )
-def test_a_quantity_has_its_unit_unless_it_is_a_ratio_or_nothing(value, unit, text):
+def test_unit_of_a_quantity(value, unit, text):
     assert quantity(value, unit) == text
 
 
@@ -70,7 +70,7 @@ def test_failing_value_printed_like_its_truth_with_its_error(value, truth, unit,
     assert measured(row) == said
 
 
-def test_of_many_names_the_first_are_said_and_how_many_more():
+def test_first_of_many_names():
     assert (first_of([]), first_of(list("abcd"))) == ("", "a, b, c, d")
     assert first_of(list("abcdef")) == "a, b, c, d and 2 more"
 
@@ -173,7 +173,7 @@ def test_plural_of_nouns(count, noun, text):
 # ---- profiles by role ------------------------------------------------------------------------------------------------
 
 
-def test_a_profile_is_named_by_its_name_or_by_its_role():
+def test_profile_by_name_or_role():
     ours, engines = registry.solver(), registry.names()
     for engine in engines:
         for name, role in registry.facts(engine).roles.items():
@@ -186,7 +186,7 @@ def test_a_profile_is_named_by_its_name_or_by_its_role():
     assert profiles_called([], engines) == []
 
 
-def test_a_line_says_what_profiles_are_where_their_names_do_not():
+def test_line_that_explains_profile_names():
     columns = [("mujoco", "default"), ("mujoco", "tuned"), ("bullet", "default"), ("bullet", "one"), ("nobody", "x"),
                ("mujoco", "default+cone=elliptic")]  # fmt: skip
     assert roles_line(columns) == "Profiles: default: as shipped; one: compromise."

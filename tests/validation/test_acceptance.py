@@ -148,7 +148,7 @@ def test_unsupported_case_refused_until_listed():
     assert not propose(refused, "nameless", replace(listed(FAMILY), unsupported=(here,))).refused
 
 
-def test_value_that_the_engine_does_not_tell_is_no_refused_case():
+def test_value_that_the_engine_does_not_tell():
     untold = observed(SLOT, creep=None)
     untold.metrics["creep"] = (None, UNAVAILABLE)
     assert not propose(rows_of("run", [untold]), "nameless", listed(FAMILY)).refused
@@ -351,7 +351,7 @@ def test_further_starts_only_for_hiding_bands_and_once():
     assert further((0.5,)) == []  # their first moves come first
 
 
-def test_draws_stand_in_the_order_of_moves_and_only_of_sound_cells():
+def test_order_of_draws_of_sound_cells():
     seen = scattered(*range(1, 18))
     seen[2] = replace(seen[2], outcome=Outcome.DIVERGED)
     assert acceptance.draws_of(reversed(seen)) == {KEY: (1, 2, *range(4, 18))}
@@ -429,7 +429,7 @@ def test_moved_starts_of_rows_after_those_of_other_families():
     assert found == [replace(SLOT, ulp=move) for move in MOVES]
 
 
-def test_starts_of_an_engine_of_singles_are_moved_by_units_of_singles():
+def test_moved_starts_of_an_engine_of_singles():
     """Moved by units of doubles they would be the same numbers to it, and nothing would scatter."""
     for engine, kind in (("box2d", np.float32), ("mujoco", np.float64)):
         own = prepare(replace(SLOT, engine=engine)).scene.bodies[1].pose[1]

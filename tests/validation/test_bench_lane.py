@@ -159,7 +159,7 @@ def test_an_engine_that_is_not_deterministic_shows_in_its_states(clockwork):
     assert len({t.state_hash for t in found["random"]}) == len(found["random"])
 
 
-def test_the_same_seed_gives_the_same_order_and_another_seed_another(clockwork):
+def test_order_by_seed(clockwork):
     units = [unit("one", steps) for steps in (1, 2, 3, 4)] + [unit("two", steps) for steps in (1, 2, 3, 4)]
     for k, u in enumerate(units):  # eight units in four groups that differ in a parameter only
         units[k] = replace(u, slot=replace(u.slot, params=(("k", float(u.steps)),)))
@@ -207,7 +207,7 @@ def test_timed_run_ends_with_the_judged_run(engine):
     assert plain.state_hash == sampled.state_hash == hashlib.sha256(state).hexdigest()[:16]
 
 
-def test_pyramids_have_as_many_boxes_as_they_say_and_none_overlaps():
+def test_boxes_of_pyramids():
     for u in size_units([("reference", "classical")], [2], [("stack", "n")], [3], [1, 4, 13]):
         scene = scene_of(u.slot)
         free = [b for b in scene.bodies if b.motion == "free"]
@@ -218,7 +218,7 @@ def test_pyramids_have_as_many_boxes_as_they_say_and_none_overlaps():
                 assert gap > -1e-12
 
 
-def test_the_error_of_a_fall_is_its_distance_from_the_parabola():
+def test_error_of_a_fall_from_the_parabola():
     scene = scene_of(Slot("free", (), 2, "reference", "classical", 1 / 240))
     start = np.array([body.pose for body in scene.bodies], float)
     fallen = start.copy()

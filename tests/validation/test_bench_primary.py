@@ -29,7 +29,7 @@ def truth(scene, params):
     return dict(resolve(scene).exact(resolve(scene).scene(lowest(scene), params)))
 
 
-def test_every_scene_of_the_catalogue_declares_one_error_with_a_reason():
+def test_declared_error_of_every_scene():
     for scene in CATALOGUE:
         primary = primary_of(scene)
         assert primary.because and primary.law and primary.state

@@ -6,7 +6,7 @@ import pytest
 from validation.bench.statistics import drift, lower_envelope, power_law, spread
 
 
-def test_the_interval_covers_the_true_median_as_often_as_it_says():
+def test_coverage_of_the_median_s_interval():
     rng = np.random.default_rng(1)
     # Times: a floor, and a long tail of disturbances. The true median of exp(N(0, s)) is 1.
     found = [spread(np.exp(rng.normal(0.0, 0.3, 25))) for _ in range(400)]
@@ -26,7 +26,7 @@ def test_one_disturbed_round_does_not_move_the_median():
     assert spread([1.0] * 9 + [50.0]).median == 1.0
 
 
-def test_a_slow_down_during_the_lane_is_drift_and_noise_is_not():
+def test_drift_and_noise_of_a_lane():
     rng = np.random.default_rng(3)
     noise = 1.0 + 0.01 * rng.standard_normal(20)
     slower = np.where(np.arange(20) < 10, 1.0, 1.1) * noise

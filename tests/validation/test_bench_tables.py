@@ -79,7 +79,7 @@ def test_raw_timings_come_back_as_they_went_in(store):
     assert store.timings(run) == []
 
 
-def test_a_bench_is_the_latest_run_only_where_there_is_no_other(store):
+def test_bench_run_beside_other_runs(store):
     first = filled(store, {}, {})
     assert store.run("latest").id == first.id and [run.id for run in bench_runs(store)] == [first.id]
     plain, _ = store.start("quick: impact", [impact_slot("a", 0.1)])
@@ -104,7 +104,7 @@ def test_untimed_work_point_without_rounds(store):
 
 
 @pytest.mark.parametrize("outcome", [Outcome.INVALID, Outcome.DIVERGED, Outcome.CRASHED, Outcome.UNSUPPORTED])
-def test_one_phase_with_invalid_physics_voids_the_point_and_its_timing(store, outcome):
+def test_point_with_one_invalid_phase(store, outcome):
     run = filled(store, {("a", STEPS[0]): 0.4, ("a", STEPS[1]): 0.1}, {})
     bad = replace(observed(impact_slot("a", STEPS[0], 7), 0.0), outcome=outcome, reason="it is not as declared")
     store.add(run, bad)
@@ -168,7 +168,7 @@ def test_best_points_undominated_by_any_engine(store):
     assert points["on_front"].to_dict() == {key: key != ("b", STEPS[1]) for key in errors}
 
 
-def test_corrected_cost_leaves_out_what_an_empty_scene_costs_per_step(store):
+def test_cost_corrected_by_an_empty_scene(store):
     run = filled(store, {("a", STEPS[1]): 0.1}, {("a", STEPS[1]): 1e-3})
     empty = Slot("empty", (), 2, "a", "default", 1 / 240)
     store.add_timings(run, [timing(empty, 240e-6, k, "overhead", 240) for k in range(3)])  # 1 us a step
@@ -214,7 +214,7 @@ def test_a_ratio_survives_a_machine_that_slows_down(store):
     assert ((found["ratio_low"] <= 1.5) & (found["ratio_high"] >= 1.5)).sum() >= 2
 
 
-def test_two_runs_of_the_same_agree_and_a_slow_down_of_a_tenth_does_not(store):
+def test_equal_runs_and_a_slow_down_of_a_tenth(store):
     first, second = planted_lane(store, 1.5, "bench one", seed=1), planted_lane(store, 1.5, "bench two", seed=2)
     slower = planted_lane(store, 1.65, "bench three", seed=3)
     base = ratios(store, first)
@@ -228,7 +228,7 @@ def test_versions_that_differ_are_not_compared(store):
     assert len(agreement(ratios(store, first), other)) == 0
 
 
-def test_a_sweep_asks_for_all_phases_at_every_step_and_count():
+def test_phases_of_a_sweep():
     sweep = Sweep(Request(["impact"], ["reference"], profiles=["classical"], dimensions=[2]), dts=STEPS, iterations=[1])
     asked = accuracy_slots(sweep)
     assert len(asked) == 16 * len(STEPS) * 2
@@ -280,7 +280,7 @@ def test_profiles_without_a_rank_neither_best_nor_tied(store, monkeypatch):
 
 
 @pytest.mark.skipif(registry.find("mujoco").engine is None, reason="mujoco is not installed")
-def test_a_profile_without_a_rank_is_benched_where_it_is_named():
+def test_bench_of_a_profile_without_a_rank():
     def benched(*profiles):
         sweep = Sweep(Request(["impact"], ["mujoco"], profiles, dimensions=[2]), dts=STEPS[:1])
         return {slot.profile for slot in accuracy_slots(sweep)}, {unit.slot.profile for unit in timed_units(sweep, [])}
@@ -289,7 +289,7 @@ def test_a_profile_without_a_rank_is_benched_where_it_is_named():
     assert benched("matched") == ({"matched"},) * 2
 
 
-def test_ratios_side_by_side_have_an_iteration_count_of_none_as_nought(store):
+def test_ratios_without_an_iteration_count(store):
     first = ratios(store, planted_lane(store, 1.5, "bench one"))
     both = agreement(first, first)
     assert len(both) == len(first) > 0 and set(both["iterations"]) == {0.0}

@@ -39,7 +39,7 @@ def test_scene_of_an_engine_that_is_not_in_the_table(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("needed", [1, 10, 11, 19, 20, 21, 34, 159, 160, 161, 640])
-def test_the_search_finds_the_fewest_sweeps_of_an_error_that_falls(needed):
+def test_fewest_sweeps_of_a_falling_error(needed):
     tried = []
 
     def reaches(sweeps):
@@ -126,7 +126,7 @@ def test_side_contacts_are_where_boxes_of_a_row_touch():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_heap_is_drawn_from_its_seed_and_lies_between_its_walls(dimension):
+def test_heap_by_its_seed_and_between_its_walls(dimension):
     def made(seed):
         params = (("layers", 4.0), ("n", 100.0), ("seed", seed))
         return scene_of(Slot("heap", params, dimension, registry.solver(), "classical", 1 / 240))
@@ -174,7 +174,7 @@ def test_heap_error_by_deepest_overlap_and_final_energy(dimension):
     assert found == pytest.approx({"overlap [m]": 0.05, "kinetic energy [J]": energy})
 
 
-def test_a_free_fall_is_measured_as_a_sag_of_the_discrete_fall():
+def test_free_fall_measured_as_a_sag():
     pytest.importorskip("numba")
     slot = Slot("free", (), 2, registry.solver(), "classical", 1 / 240)
     found = errors_of("column", slot, 0.25)

@@ -53,7 +53,7 @@ def test_no_growth_allowance_at_e_1_for_late_impacts(scheme, dt):
 
 @pytest.mark.parametrize("scheme", ["velocity first", "position first", "mid-point"])
 @pytest.mark.parametrize("dt", DTS)
-def test_an_engine_that_restitutes_gravity_s_own_step_is_seen_to_grow(dt, scheme):
+def test_growth_by_restitution_of_gravity_s_step(dt, scheme):
     """Each rebound is g dt too fast, |v| dt of height: as much as a late impact used to be forgiven."""
     scene = CATALOGUE["bounce"].scene(2, {"e": 1.0})
     growth, bound = judged(scene, reflected(scene, dt, scheme, restitute_gravity=True), "apex_growth")
@@ -70,7 +70,7 @@ def sunk(n, overlap, which):
 
 @pytest.mark.parametrize("dt", DTS)
 @pytest.mark.parametrize(("n", "which"), [(1, 1), (10, 1), (10, 7), (20, 20)])
-def test_one_interface_owes_one_step_of_fall_however_high_the_column(n, which, dt):
+def test_bound_of_one_interface_at_any_height(n, which, dt):
     for share, passes in ((0.99, True), (1.01, False), (0.99 * n, n == 1)):
         scene, pose = sunk(n, share * 9.81 * dt * dt, which)
         twist = np.zeros_like(pose)
@@ -90,7 +90,7 @@ def test_a_whole_column_that_is_found_one_step_late_passes(dt):
 
 @pytest.mark.parametrize("dt", DTS)
 @pytest.mark.parametrize("n", [1, 5, 20])
-def test_a_column_drifts_by_one_step_of_fall_at_each_of_its_interfaces(n, dt):
+def test_drift_bound_of_a_column_s_interfaces(n, dt):
     """A contact that is missing for a step lets what it holds go for g dt^2; the slips below a body add up in it."""
     for share, passes in ((0.99, True), (1.01, False)):
         scene, pose = sunk(n, 0.0, 1)

@@ -49,7 +49,7 @@ def keep(folder, *found, version="1.5"):
     write(folder, listed("chipmunk", version, found))
 
 
-def test_a_break_is_new_then_known_and_drifts_when_it_is_another(folder):
+def test_states_of_a_break(folder):
     assert standing_of(slot(), "1.5", BROKEN) == (Standing.NEW, "")
     keep(folder, (slot(), BROKEN))
     assert standing_of(slot(), "1.5", BROKEN) == (Standing.KNOWN, "contacts are solved in the order of the bodies")
@@ -78,7 +78,7 @@ def test_lost_answer_listed_as_such(folder):
     assert standing_of(slot(), "1.5", BROKEN)[0] is Standing.DRIFTED
 
 
-def test_a_list_holds_for_its_release_its_profiles_and_its_cell_only(folder):
+def test_scope_of_a_list_of_breaks(folder):
     keep(folder, (slot(), BROKEN), (slot("tuned"), BROKEN), (slot(iterations=7), BROKEN))
     assert len(breaks_of("chipmunk").members) == 1
     assert standing_of(slot(), "2.0", BROKEN)[0] is Standing.NEW

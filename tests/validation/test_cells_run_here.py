@@ -49,7 +49,7 @@ class Told:
         return self.said
 
 
-def test_a_cell_of_a_frontier_is_run_with_its_profile_and_measured(monkeypatch):
+def test_measured_cell_of_a_frontier(monkeypatch):
     told = Told(monkeypatch, frontier)
     found = run_only(SLOT)
     assert (found.slot, found.cell, found.scene_version, found.engine_version) == (SLOT, "", 7, "toy 1.5")

@@ -11,7 +11,7 @@ pytest.importorskip("pymunk")
 SLOT = Slot("stack", (("n", 2.0),), 2, "chipmunk", "tuned", 1 / 240, 7)
 
 
-def test_a_lost_cell_has_its_own_key_and_versions_and_what_was_said():
+def test_key_versions_and_output_of_a_lost_cell():
     prepared = prepare(SLOT)
     assert pool._lost(SLOT, Outcome.TIMED_OUT, "no answer", "last words") == Observation(
         SLOT, prepared.cell.key(), prepared.scene.version, prepared.cell.engine_version, Outcome.TIMED_OUT, "no answer",

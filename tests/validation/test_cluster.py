@@ -113,7 +113,7 @@ def undisturbed(tmp_path_factory):
 @pytest.mark.long
 # 5000 cells took eleven minutes both ways on two busy cores, more than a test is given otherwise.
 @pytest.mark.timeout(7200 if os.environ.get("CROSSCHECK_SOAK") else 600)
-def test_a_study_has_the_rows_of_the_local_pool_and_runs_no_cell_twice(tmp_path):
+def test_study_on_a_cluster_against_the_local_pool(tmp_path):
     """As many batches as workers, and more; all 5000 cells under `make soak`'s switch. Prints how many a second."""
     count = 5000 if os.environ.get("CROSSCHECK_SOAK") else 120
     here, there = tmp_path / "here", tmp_path / "there"

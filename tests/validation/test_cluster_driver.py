@@ -136,7 +136,7 @@ def test_a_worker_with_other_code_is_refused(driver):
         list(driver._heard({"batch": name, "line": answer(slot, cell="0" * 16, engine_version="7.0"), "worker": "w"}))
 
 
-def test_a_batch_that_begins_a_second_time_is_in_the_journal(driver):
+def test_journal_of_a_batch_begun_twice(driver):
     name = batch_of(driver, cells(2))
     for worker in ("a", "b"):
         list(driver._heard({"batch": name, "begun": worker}))

@@ -87,7 +87,7 @@ def test_change_beyond_a_hundredth_of_the_tolerance():
         Kind.ERROR, False, "-0.5 m (pass)", "0.25 m (pass)", -0.25, note.replace(SAME, MOVED))  # fmt: skip
 
 
-def test_change_to_the_other_side_of_the_truth_is_not_worse():
+def test_change_to_the_other_side_of_the_truth():
     found = change(moved_to(-0.25), moved_to(0.25))
     assert (found.kind, found.regressed, found.size) == (Kind.ERROR, False, 0.0)
 
@@ -176,7 +176,7 @@ def test_the_most_serious_change_comes_first():
     assert by_seriousness(replace(CHANGE, slot={})) == by_seriousness(CHANGE)
 
 
-def test_a_change_is_plain_data_and_what_is_not_finite_is_none():
+def test_change_as_plain_data():
     plain = CHANGE.as_dict()
     assert (plain["kind"], plain["size"], plain["slot"]) == ("value changed", 1.0, {"iterations": None})
     for size in (math.inf, math.nan):

@@ -24,7 +24,7 @@ DTS = tuple(1.0 / rate for rate in (60.0, 120.0, 240.0, 480.0, 960.0))
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.0, 4.0])
-def test_a_power_of_the_step_has_its_exponent_as_order_without_error(order):
+def test_order_of_a_power_of_the_step(order):
     fit = observed_order(DTS, [0.3 * dt**order for dt in DTS])
     assert fit.order == pytest.approx(order, abs=1e-12)  # a line through exact powers: round-off of logarithms
     assert fit.standard_error < 1e-12
@@ -104,7 +104,7 @@ def impact_slot(dt, k):
     return Slot("impact", (("delay", 0.0525 + (k + 0.5) / PHASES * dt),), 2, "toy", "default", dt)
 
 
-def test_the_error_of_a_step_is_the_supremum_over_all_phases():
+def test_error_of_a_step_over_all_phases():
     cells = [
         observed(impact_slot(dt, k), {"rebound_ratio": 0.8 + dt * (1.0 if k == 3 else 0.1)})
         for dt in DTS[:3]
@@ -116,7 +116,7 @@ def test_the_error_of_a_step_is_the_supremum_over_all_phases():
     assert found.order.order == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_step_with_a_missing_or_crashed_phase_has_no_error():
+def test_step_with_a_missing_or_crashed_phase():
     cells = [observed(impact_slot(dt, k), {"rebound_ratio": 0.8 + dt}) for dt in DTS[:2] for k in range(PHASES)]
     crashed = replace(cells[0], outcome=Outcome.CRASHED, reason="it crashed")
     missing = cells[1:-1]
@@ -166,7 +166,7 @@ def test_error_plateau_of_three_values_over_a_factor_of_four():
     assert said([9.0, 0.5, 0.45, 0.4], [0.2, 0.05, 0.04, 0.03])[0] is not Limit.ELSEWHERE  # .05 to .03 s
 
 
-def test_an_order_is_told_with_its_error_and_judged_at_two_of_them():
+def test_order_with_its_error_and_verdict():
     truth = said([0.4, 0.1, 0.025])
     assert truth == (Limit.TRUTH, "order 2.00 +- 0.00 over 3 steps")
     assert said([0.025, 0.1, 0.4]) == (Limit.NOT, "the error grows as the step shrinks, order -2.00 +- 0.00")
@@ -279,7 +279,7 @@ def test_values_that_cannot_be_extrapolated_have_a_reason(offsets, limit, becaus
         assert (found.order, found.value, found.band) == (None, None, None)
 
 
-def test_round_off_is_that_of_the_largest_value_and_of_one_at_least():
+def test_round_off_of_the_largest_value():
     for off, limit in ((1.9e-12, Limit.TRUTH), (2.1e-12, Limit.ELSEWHERE)):
         assert extrapolated(*[TRUTH + off] * 3).limit is limit  # the truth is below 1 m/s^2: one counts
     large = [TRUTH + 1e6, *[TRUTH + 1.9e-6] * 3]
@@ -338,7 +338,7 @@ def test_values_equal_but_for_round_off_as_the_finest_one():
     assert (found.value, found.because) == (1e-13, "the same value at every step, 1e-13")
 
 
-def test_round_off_of_small_values_is_that_of_a_large_truth():
+def test_round_off_of_small_values_with_a_large_truth():
     """A thousand times the gravity, a truth of some 40 m/s^2: values that differ by 3e-11 are the same."""
 
     def cell(dt, value):

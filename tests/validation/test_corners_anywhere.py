@@ -75,13 +75,13 @@ def test_own_moments_for_a_free_hull_off_its_main_axes():
         ("polygon", ((0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)), "b.shape"),
     ],
 )  # fmt: skip
-def test_corners_that_are_no_polygon_or_hull_are_refused_by_their_field(kind, points, said):
+def test_refusal_of_corners_that_are_no_polygon_or_hull(kind, points, said):
     with pytest.raises(SceneError) as error:
         centre(body(kind, points), [])
     assert str(error.value).startswith(said)
 
 
-def test_without_the_library_of_hulls_it_is_said_what_to_install(monkeypatch):
+def test_message_without_the_library_of_hulls(monkeypatch):
     def missing(points):
         raise ModuleNotFoundError("scipy")
 

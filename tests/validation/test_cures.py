@@ -67,7 +67,7 @@ def test_table_of_cures_with_numpy_numbers_or_unwritable(tmp_path):
     assert read(path) == [CURE]
 
 
-def test_a_cure_is_told_in_one_line_with_error_and_cost():
+def test_line_of_a_cure_with_error_and_cost():
     text = cure_text(CURE)
     assert text.startswith("2-D: cone=elliptic, solimp=0.9999 0.9999 0.001 0.5 1; creep at margin=1.05: ")
     assert "0.0157 -> 1.4e-6 m/s" in text and text.endswith("at 1.7 times the cost") and "\n" not in text
@@ -111,7 +111,7 @@ def test_planar_cures_not_told_in_space(monkeypatch):
     assert planar and decided_by("mujoco", "4.0.1", "pinch", [2, 3], "default", "tuned") == f"{planar} (2-D)"
 
 
-def test_a_row_is_told_the_cure_of_its_own_check_alone(monkeypatch):
+def test_cure_of_a_row_s_own_check(monkeypatch):
     listed = {("pinch", 2): replace(CURE, mends=("creep", "turned"))}
     monkeypatch.setattr("reports.fixes.cures_of", lambda engine: listed)
     row = {"engine": "mujoco", "engine_version": "4.0.1", "scene": "pinch", "dimension": 2, "profile": "default"}
@@ -157,7 +157,7 @@ def test_cure_of_another_case_not_told(monkeypatch, case, command):
     assert told_cure(row | case | {"outcome": "not_installed"}) == told_cure(row | case | {"profile": "tuned"}) == ""
 
 
-def test_a_cure_has_the_values_of_the_cell_that_is_asked(monkeypatch):
+def test_values_of_a_cure_for_the_asked_cell(monkeypatch):
     """What a profile chooses by the material is chosen anew: the listed numbers are those of the cell that is told."""
     listed = {("bounce", 2): replace(
         CURE, scene="bounce", cells=({}, {"e": 1.0}), metric="apex", params={"e": 1.0}, mends=("apex",),
@@ -218,7 +218,7 @@ def test_printed_fixes_with_words_of_their_engine():
             assert not re.search(words, " ".join([cure_text(cure), cure_paste(cure), *told])), cure
 
 
-def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypatch):
+def test_single_line_for_a_cure_of_both_dimensions(monkeypatch):
     both = {("pinch", 2): CURE, ("pinch", 3): replace(CURE, dimension=3, cost_after=4.5e-5)}
     monkeypatch.setattr("reports.fixes.cures_of", lambda engine: both)
     (text,) = told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])
@@ -227,7 +227,7 @@ def test_one_cure_of_both_dimensions_is_told_once_with_the_dearer_cost(monkeypat
     assert len(told_cures("mujoco", "4.0.1", "pinch", "default", [2, 3])) == 2
 
 
-def test_a_cure_is_pasted_with_the_values_of_its_own_cell():
+def test_pasted_values_of_a_cure():
     pytest.importorskip("mujoco")
     assert 'cone="elliptic"' in cure_paste(CURE) and 'solimp="0.9999 0.9999 0.001 0.5 1"' in cure_paste(CURE)
     assert cure_paste(replace(CURE, changes={})) == ""
@@ -527,7 +527,7 @@ def test_a_file_is_mended_by_the_smallest_change_first(tmp_path, name, text, mon
     assert first and first[0] == '<option cone="elliptic"/>'
 
 
-def test_one_case_of_a_scene_is_searched_at_its_own_step(monkeypatch):
+def test_step_of_a_searched_case(monkeypatch):
     asked = []
     monkeypatch.setattr(
         "reports.command.curing.search", lambda *given: asked.append(given) or Unsearched(True, "it rests")
@@ -539,7 +539,7 @@ def test_one_case_of_a_scene_is_searched_at_its_own_step(monkeypatch):
     assert kept.exit_code == 2 and "keep: stores fixes of whole scenes of the catalogue" in kept.output
 
 
-def test_a_scene_in_other_sizes_is_judged_in_its_own_units():
+def test_scene_in_other_sizes():
     base, small = resolve("bounce"), resolve("bounce@0.3")
     own, made = base.scene(2, {"e": 0.5}), small.scene(2, {"e": 0.5})
     assert made.gravity == own.gravity and made.duration == pytest.approx(own.duration * 0.3**0.5)

@@ -117,7 +117,7 @@ MEANT = {
 
 
 @pytest.mark.parametrize("name", MEANT)
-def test_the_fault_that_a_check_is_there_for_is_in_the_table(name):
+def test_fault_of_each_check_in_the_table(name):
     text = re.sub(r"\n +", " ", "\n".join(committed()[0]))
     (line,) = [line for line in text.splitlines() if line.startswith(name + " ")]
     fault, size = MEANT[name]
@@ -160,7 +160,7 @@ def committed():
     return lines[:at], lines[at:]
 
 
-def test_the_table_that_is_committed_has_every_check_of_every_scene():
+def test_checks_in_the_committed_table():
     """`make detection` writes it; a scene that came since is not in it."""
     names = {found[0] for line in committed()[0] if (found := re.match(r"\w+/\w+(?=  )", line))}
     expected = set()

@@ -68,13 +68,13 @@ def test_bullet_impact_law_excludes_a_hundredth_of_a_per_cent():
         assert abs(check.truth - centre) > 1e3 * band and band < 1e-4 * check.truth
 
 
-def test_mass_and_radius_enter_the_law_as_they_enter_the_engine():
+def test_mass_and_radius_in_the_law_and_the_engine():
     rows = compare("impact", {"e": 0.4, "v": 3.1, "mass": 7.0, "radius": 0.21}, "default", 1 / 240)
     assert_predicted(rows, 5)
     assert rows["impulse"][0] == pytest.approx(7.0 * rows["velocity_change"][0], rel=0.02)  # drag aside
 
 
-def test_impulse_misses_m_dv_by_the_drag_of_the_default_profile_only():
+def test_impulse_and_drag_of_the_default_profile():
     rows = compare("impact", {"e": 0.63, "v": 6.3}, "default", 1 / 240)
     value, (centre, band), check = rows["momentum_defect"]
     assert value > 1e3 * check.bound and abs(value - centre) <= band < 1e-6

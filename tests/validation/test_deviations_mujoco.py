@@ -143,7 +143,7 @@ def test_acceleration_of_a_slide_is_predicted(profile: str, ratio: float, dt: fl
     assert_predicted(compare(profile, dt, "incline", ratio=ratio), "acceleration")
 
 
-def test_mu_and_mass_enter_the_slide_as_they_enter_the_engine() -> None:
+def test_mu_and_mass_in_the_law_of_slides() -> None:
     for profile in ("default", "tuned"):
         assert_predicted(compare(profile, DT, "incline", ratio=1.3, mu=0.23, mass=4.0), "acceleration")
 
@@ -194,14 +194,14 @@ def test_rest_depth_is_the_documented_one() -> None:
     assert gap == pytest.approx(-9.81 * 0.2 * 0.03**2 * 0.7**2, rel=1e-9)
 
 
-def test_impedance_runs_from_the_surface_to_the_width_and_is_clamped() -> None:
+def test_impedance_over_the_width() -> None:
     d = Impedance.of(STOCK)
     assert (d(0.0), d(-0.001), d(-1.0)) == (0.9, 0.95, 0.95)
     assert d(-0.0005) == pytest.approx(0.925) and d(-0.00025) == pytest.approx(0.9 + 0.05 * 2 * 0.25**2)
     assert Impedance.of((0.0, 1.0, 0.001, 0.5, 2.0))(-1.0) == 0.9999
 
 
-def test_a_pyramid_of_mu_one_is_as_soft_as_its_normal() -> None:
+def test_softness_of_a_pyramid_of_mu_one() -> None:
     assert (
         softness_of("pyramidal", 3, 1.0) == 1.0 == softness_of("elliptic", 3, 0.2) == softness_of("pyramidal", 1, 0.2)
     )

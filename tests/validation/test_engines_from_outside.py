@@ -291,7 +291,7 @@ def hashes():
 
 
 @pytest.mark.parametrize("engine", ["reference", "chipmunk", "bullet", "mujoco"])
-def test_an_edit_in_one_folder_changes_the_cells_of_that_engine_only(site, engine, monkeypatch):
+def test_cells_after_an_edit_in_one_folder(site, engine, monkeypatch):
     """`toy` is made of Chipmunk's adapter and does not change with it: others' imports are their own matter."""
     before = hashes()
     read = Path.read_bytes
@@ -325,7 +325,7 @@ def test_the_shared_vocabulary_is_in_every_identity(site, monkeypatch, shared):
     assert not set(before.items()) & set(hashes().items())
 
 
-def test_a_solver_of_ours_is_in_the_identity_of_its_adapter_only(site, monkeypatch):
+def test_identity_of_adapters_with_our_solver(site, monkeypatch):
     before, read = hashes(), Path.read_bytes
     edited = next((ROOT / "reference_solver").rglob("*.py"))
     monkeypatch.setattr(Path, "read_bytes", lambda self: read(self) + b"\n" * (self == edited))

@@ -32,7 +32,7 @@ def observed(monkeypatch, *slips, certificate=None):
     return found[0] if isinstance(found, tuple) else found
 
 
-def test_steps_that_are_too_long_for_a_scene_are_a_refusal_and_no_crash(monkeypatch):
+def test_refusal_of_steps_too_long_for_a_scene(monkeypatch):
     """Chipmunk's ground has a depth: what is faster than half of it a step is refused, at shorter steps it is asked."""
     monkeypatch.setattr("adapters.chipmunk.translation.GROUND_DEPTH", 4.0)
     slot = Slot("bounce", (), 2, "chipmunk", "tuned", 1 / 20)  # 2.3 m a step

@@ -73,7 +73,7 @@ def test_notes_are_chosen_by_words():
     assert len(matching(["mujoco"])) >= 8 and matching([]) == list(notes())
 
 
-def test_a_source_is_never_cut_within_its_number_at_80_columns(monkeypatch):
+def test_source_numbers_at_80_columns(monkeypatch):
     """Folded by the width alone, 3328 was shown as 33 and 28."""
     found = [Finding(note, note.said) for note in notes()]
     monkeypatch.setattr("reports.command.fielding.ask", lambda notes, jobs: found)

@@ -131,7 +131,7 @@ def test_unlisted_failure_is_new_despite_a_family(findings):
     assert judged(SLOT, creep=0.5) == ("fail", "new", True)
 
 
-def test_a_check_without_a_value_is_new_unless_listed_as_having_none(findings):
+def test_finding_of_a_check_without_a_value(findings):
     findings(members=HEAD)
     assert judged(SLOT, creep=None) == (None, "new", True)
     findings(members=HEAD + "creeps,default,2,ratio=0.99,1/240,,creep,,\n")
@@ -221,7 +221,7 @@ def test_alarm_for_a_planned_cell_without_an_observation(findings):
         (FAMILY, HEAD + "creeps,default\n", "has 2 fields"),
     ],
 )
-def test_a_wrong_file_is_refused_with_one_line_that_names_the_entry(findings, families, members, said):
+def test_refusal_of_a_wrong_file_by_entry(findings, families, members, said):
     folder = findings(families, members)
     with pytest.raises(FindingsError) as caught:
         files.read("nameless", folder)
@@ -268,7 +268,7 @@ def test_wrong_finding_told_with_file_and_line_or_entry(findings, families, memb
 
 
 @pytest.mark.parametrize("name", [files.FAMILIES, files.MEMBERS])
-def test_a_file_that_is_no_utf_8_is_refused_by_its_name(findings, name):
+def test_refusal_of_a_file_that_is_no_utf_8(findings, name):
     folder = findings()
     (folder / name).write_bytes(b"\xff\xfe" + "µ".encode("utf-16-le"))
     with pytest.raises(FindingsError, match=rf"^.*{name}: .*codec"):
@@ -298,7 +298,7 @@ def test_solver_profile_rows_not_listed_by_hand(findings, profiles):
         files.read("reference", folder)
 
 
-def test_what_is_written_is_read_again_within_a_twentieth_of_its_band(findings):
+def test_written_values_read_again(findings):
     folder = findings()
     family = files.read("nameless", folder).families["creeps"]
     members = {
@@ -318,7 +318,7 @@ def test_what_is_written_is_read_again_within_a_twentieth_of_its_band(findings):
             assert again[key].band == pytest.approx(finding.band, rel=0.05)
 
 
-def test_a_band_with_two_ends_is_read_and_holds_what_lies_between_them(findings):
+def test_band_with_two_ends(findings):
     (found,) = files.read("nameless", findings(FAMILY, HEAD + MEMBER.replace("1e-3", "0.45..6e-1"))).members.values()
     assert (found.value, found.ends) == (0.5, (0.45, 0.6))
     assert [found.holds(value) for value in (0.449, 0.45, 0.6, 0.601, float("nan"))] == [
@@ -354,7 +354,7 @@ def test_ends_are_written_outwards_with_the_value_between_them(findings, value, 
     assert again.ends[0] <= ends[0] < ends[1] <= again.ends[1] <= again.ends[0] + wide and again.holds(value)
 
 
-def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):
+def test_added_family_read_again(findings):
     folder = findings()
     family = Family("quoted", ("a", "b"), "stack", ("drift",), 'it "slips" \\ \t by 3 µm', "its manual", "==1.*")
     files.add_entries(folder, [family])
@@ -366,7 +366,7 @@ def test_a_family_that_is_added_is_read_again_whatever_its_words(findings):
     [(0.3, 1e-3, "0.3"), (123.4, 600.0, "1e+02"), (0.1234567890123456, 1e-16, "0.1234567890123456"),
      (0.75, 1.1, "0.8"), (0.1, 1e-20, "0.1")],
 )  # fmt: skip
-def test_values_are_written_with_as_many_digits_as_their_band_needs(findings, value, band, text):
+def test_digits_of_values_by_their_band(findings, value, band, text):
     folder = findings()
     family = files.read("nameless", folder).families["creeps"]
     files.write_members(folder, {row_key(SLOT, "creep"): Finding(family, value, band)})
@@ -386,7 +386,7 @@ def test_members_are_written_as_lines_that_git_can_compare(findings):
 
 
 @pytest.mark.parametrize("engine", [name for name in ENGINES if files.findings_of(name) is not None])
-def test_members_that_are_written_again_keep_every_digit_of_the_file(engine, tmp_path):
+def test_digits_of_members_written_again(engine, tmp_path):
     before = (files.findings_folder(engine) / files.MEMBERS).read_bytes()
     files.write_members(tmp_path, files.findings_of(engine).members)
     assert (tmp_path / files.MEMBERS).read_bytes() == before

@@ -126,7 +126,7 @@ def test_words_for_every_way_to_end(scene, name, good, changes, word):
 
 
 @pytest.mark.parametrize(("scene", "own"), axes(), ids=lambda x: x if isinstance(x, str) else x.name)
-def test_every_axis_that_is_declared_can_be_asked_from_end_to_end(scene, own):
+def test_ends_of_every_declared_axis(scene, own):
     assert isinstance(own, Frontier) and own.survives and own.easy != own.hard
     for number in (own.easy, own.hard, own.hardest):
         slot = slot_at(Bracket(Slot(scene, (), resolve(scene).dimensions[0], "toy", "tuned", 1 / 240), own), number)
@@ -149,7 +149,7 @@ def test_a_real_engine_is_bracketed_and_its_cells_prove_it():
     assert one.fails.fate in ("tunnelled", "stuck")
 
 
-def test_a_scene_that_cannot_be_driven_is_refused_with_those_that_can():
+def test_refusal_of_a_scene_that_cannot_be_driven():
     from click.testing import CliRunner
 
     from reports.command import main

@@ -136,7 +136,7 @@ def test_between_round_bodies_the_centre_line_bounds_exactly():
 
 
 @pytest.mark.parametrize("pair", [*PLANAR, *SPATIAL], ids=str)
-def test_bodies_at_one_place_overlap_and_nothing_is_divided_by_zero(pair):
+def test_overlap_of_bodies_at_one_place(pair):
     a, b = pair
     place = (0.2, 0.1) if pair in PLANAR else (0.2, 0.1, 0.4)
     turns = ((0.3,), (0.9,)) if pair in PLANAR else ((0.8, 0.6, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
@@ -193,7 +193,7 @@ def test_a_round_body_clear_of_a_corner_does_not_overlap(dimension):
 
 @pytest.mark.filterwarnings("ignore:invalid value")
 @pytest.mark.parametrize("shapes", [*PLANAR, *SPATIAL, (HalfSpace((0.0, 1.0)), Box((0.4, 0.7)))])
-def test_a_pose_that_gives_no_distance_is_neither_apart_nor_shallow(shapes):
+def test_pose_without_a_distance(shapes):
     """A NaN after a depth that is a number was passed over, and left an overlap of 0, which passes."""
     a, b = shapes
     d = 3 if shapes in SPATIAL else 2

@@ -173,7 +173,7 @@ def test_energy_judged_unless_the_requested_law_adds_some(shape, restitution, fr
     assert (energy.truth is not None) is judged
 
 
-def test_newton_s_law_with_friction_does_add_energy_to_a_rod():
+def test_energy_added_to_a_rod_by_newton_s_law():
     """Kane's paradox, solved by hand: a rod at 45 degrees, e = 1, whose slip reverses within the impact."""
     e, mu, gain = 1.0, 0.5, 0.0
     for slope in np.linspace(0.2, 1.4, 60):
@@ -225,7 +225,7 @@ def test_infinite_bounds_judge_nothing_without_a_warning():
 STEP = 1 / 64
 
 
-def test_both_checks_say_what_they_judge_in_which_unit_and_why():
+def test_unit_and_reason_of_both_checks():
     scene = over_floor(ball())
     energy, depth = invariants.checks(scene, STEP)
     assert (energy.metric, energy.unit, energy.truth, energy.bound) == (
@@ -264,7 +264,7 @@ def box(name="box", x=0.0, **changed):
         ((Pair("box", "ball", 0.5, 0.25),), True),
     ],
 )
-def test_kane_s_paradox_needs_a_box_with_both_in_one_pair(pairs, fed):
+def test_pairs_that_allow_kane_s_paradox(pairs, fed):
     floor = Body("floor", HalfSpace((0.0, 1.0), 0.0), motion="fixed")
     for bodies in ((floor, box(), ball()), (floor, ball(), box())):
         scene = Scene("drop", 1, 2, bodies, pairs, (0.0, -9.81), 1.0)
@@ -292,7 +292,7 @@ def test_energy_bound_by_work_of_loads_and_round_off():
     assert invariants.energy_bound(scene, STEP) - work == pytest.approx(1e-12 * (at_play + size), rel=1e-3, abs=0.0)
 
 
-def test_a_body_without_load_is_known_to_the_round_off_of_its_size():
+def test_round_off_of_a_body_without_load():
     scene = over_floor(box(mass=2.0, pose=(0.0, 0.0, 0.0)), gravity=(0.0, 0.0))
     reach = math.sqrt(0.5)
     assert invariants.energy_bound(scene, STEP) == pytest.approx(1e-24 * (reach / STEP) ** 2, rel=1e-12, abs=0.0)
@@ -372,7 +372,7 @@ def test_the_overlap_of_an_approach_ends_when_the_body_rests(speed, ends):
     assert granted[5:].tolist() == [speed * 0.01 if ends else 0.2] * 5
 
 
-def test_a_ball_that_rests_in_the_floor_after_a_blow_overlaps_it():
+def test_overlap_of_a_ball_at_rest_in_the_floor():
     """Found a step late it may be 0.02 m deep; there it stays."""
     scene = over_floor(ball())
     blow = resting(scene, [-0.1, *(0.02,) * 200], speed=0.0)
@@ -436,7 +436,7 @@ def test_energy_growth_without_round_off_of_the_work():
     assert invariants.energy_growth(far, moved(far, (pose, twist), dt=STEP))[0] == pytest.approx(0.09 - 0.048)
 
 
-def test_the_work_of_a_load_is_from_the_start_and_of_a_torque_added_up():
+def test_work_of_a_load_and_of_a_torque():
     scene = over_floor(ball(torque=(4.0,), force=(0.0, 3.0)), gravity=(0.0, -8.0))
     pose = np.array([(5.0, 2.0, 0.0), (6.0, 3.0, 0.0), (9.0, 1.0, 0.0)])
     twist = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 2.0), (0.0, 0.0, 4.0)])

@@ -173,7 +173,7 @@ def test_finished_state_of_a_run_in_either_store(tmp_path, monkeypatch):
         assert [run.finished for run in ours.runs()] == [True]
 
 
-def test_a_store_from_before_a_table_was_there_is_merged_without_it(tmp_path, monkeypatch):
+def test_merge_of_a_store_without_a_later_table(tmp_path, monkeypatch):
     ours = filled(tmp_path / "a", "one", monkeypatch)
     filled(tmp_path / "b", "two", monkeypatch).close()
     db = sqlite3.connect(tmp_path / "b" / storing.FILE)
@@ -185,7 +185,7 @@ def test_a_store_from_before_a_table_was_there_is_merged_without_it(tmp_path, mo
         assert _copy(here, source, "protocols", "any", "any") == (0, 0)
 
 
-def test_a_store_that_breaks_while_it_is_read_is_one_line_with_its_path(tmp_path, monkeypatch):
+def test_store_that_breaks_while_it_is_read(tmp_path, monkeypatch):
     from validation.records import keeping
 
     ours = filled(tmp_path / "a", "one", monkeypatch)

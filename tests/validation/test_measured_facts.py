@@ -49,7 +49,7 @@ def test_a_tuned_chipmunk_column_of_ten_carries_its_weight():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_bullet_loses_its_bounce_as_shipped_and_keeps_it_when_tuned(dimension):
+def test_bounce_of_bullet_by_profile(dimension):
     shipped = measure("impact", "bullet", "default", 1 / 240, dimension, v=1.0)["rebound_ratio"]
     tuned = measure("impact", "bullet", "tuned", 1 / 240, dimension, v=1.0)["rebound_ratio"]
     assert abs(shipped) <= 1e-9
@@ -62,7 +62,7 @@ def test_mujoco_rebounds_with_about_an_eighth_as_shipped(dt):
     assert ratio == pytest.approx(0.13, abs=0.01)
 
 
-def test_mujoco_s_rebound_as_shipped_depends_on_the_phase_within_a_step():
+def test_mujoco_s_rebound_by_phase_of_a_step():
     ratios = [
         measure("impact", "mujoco", "default", 1 / 240, v=1.0, delay=(12 + k / 16) / 240)["rebound_ratio"]
         for k in range(1, 16)

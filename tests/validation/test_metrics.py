@@ -23,7 +23,7 @@ def planar(t, y, v):
 
 
 @given(st.floats(0.2, 5.0), st.floats(0.0, 1.0), st.sampled_from([1 / 60, 1 / 240, 1 / 977]))
-def test_the_apex_of_a_sampled_parabola_is_exact_at_any_phase(v0, phase, dt):
+def test_apex_of_a_sampled_parabola(v0, phase, dt):
     t = (np.arange(int(2 * v0 / G / dt) + 4) + phase) * dt
     y, v = v0 * t - 0.5 * G * t * t, v0 - G * t
     assert v[0] > 0.0 > v[-1]  # at least 0.2 m/s at the start, at most a sixtieth of a second of gravity later
@@ -181,7 +181,7 @@ def test_tops_of_two_arcs_that_lie_between_samples():
 
 
 @pytest.mark.parametrize(("least", "found"), [(1.0, 0), (0.999, 1), (0.5, 1)])
-def test_an_arc_counts_if_it_starts_faster_than_the_least_speed(least, found):
+def test_arcs_above_the_least_speed(least, found):
     """Its fastest sample is 1 m/s; that an earlier arc was faster does not make this one count."""
     v = np.array([5.0, 2.0, -3.0, 1.0, 0.5, 0.0, -0.5])
     times, _ = metrics.apexes(np.arange(7) / 8, np.array([0.0, 0.5, 0.25, 0.0, 0.25, 0.375, 0.25]), v, least)
@@ -195,7 +195,7 @@ def test_end_of_an_arc_at_rest_and_cut_off():
     assert len(metrics.apexes(t, y, np.array([2.0, 1.0, 0.5, 0.25]))[0]) == 0
 
 
-def test_a_top_without_curvature_is_the_first_of_its_highest_samples():
+def test_top_without_curvature():
     t = np.arange(6) / 8
     times, tops = metrics.apexes(t, np.full(6, 0.5), np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
     assert (list(times), list(tops)) == ([0.125], [0.5])
@@ -275,7 +275,7 @@ def test_the_deepest_overlap_is_of_neighbours_at_any_sample():
     assert metrics.deepest_overlap(alone, trajectory) == 0.0
 
 
-def test_overlaps_are_those_of_all_pairs_that_can_meet_and_do():
+def test_overlaps_of_all_pairs_that_meet():
     scene = pile(2, Disc(0.5), Disc(0.5), Disc(0.5))
     pose = np.zeros((2, 4, 3))
     pose[:, 1:, 1] = [[0.5, 1.5, 9.0], [0.375, 1.5, 9.0]]
@@ -322,7 +322,7 @@ def test_top_within_a_step_of_its_sample(height, velocity, time):
     assert list(times) == pytest.approx([time]) and list(tops) == pytest.approx([0.975])
 
 
-def test_the_drift_is_that_of_one_body_and_not_of_all():
+def test_drift_of_one_body():
     pose = np.zeros((2, 3, 3))
     pose[1, :, 0] = [0.0, 3.0, -4.0]
     assert metrics.lateral_drift(Trajectory(np.arange(2.0), pose, np.zeros_like(pose), None, 1.0, "completed")) == 4.0
@@ -353,7 +353,7 @@ def turned(axis, angles):
     return [[math.cos(0.5 * a), *(math.sin(0.5 * a) * np.array(axis))] for a in angles]
 
 
-def test_a_hop_is_the_largest_change_of_height_up_or_down():
+def test_hop_up_or_down():
     for heights, size in (([1.0, 1.2, 0.9], 0.2), ([1.0, 1.2, 0.5], 0.5)):
         assert metrics.hop(moved([(9.0 * k, y, 7.0 * k) for k, y in enumerate(heights)])) == pytest.approx(size)
         space = [(3.0 * k, 4.0 * k, y, 1.0, 0.0, 0.0, 0.0) for k, y in enumerate(heights)]
@@ -497,7 +497,7 @@ def test_largest_distance_from_the_first_sample():
 
 
 @pytest.mark.parametrize("angles", [(0.3, 0.5, -0.4), (0.3, 1.0, 0.4), (-2.0, 1.0, 0.0)])
-def test_what_has_turned_is_the_largest_angle_against_the_first_pose(angles):
+def test_largest_turn_from_the_first_pose(angles):
     largest = max(abs(a - angles[0]) for a in angles)
     assert metrics.turned(np.array([(7.0, 8.0 * k, a) for k, a in enumerate(angles)])) == pytest.approx(largest)
     for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (2 / 3, 1 / 3, -2 / 3)):

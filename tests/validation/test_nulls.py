@@ -60,7 +60,7 @@ def test_a_null_is_a_run_like_any_other(null):
     assert found.pose.shape == found.twist.shape == (11, 1, 3)
 
 
-def test_bodies_in_space_turn_each_about_its_own_axis_from_any_attitude():
+def test_turns_of_bodies_from_any_attitude():
     """Turned by a third about (1, 1, 1) at the start, then by half a radian about z: products of rotations."""
     tumble = CATALOGUE["tumble"].scene(3)
     attitude, spin = (0.5, 0.5, 0.5, 0.5), (0.0, 0.0, 0.5)

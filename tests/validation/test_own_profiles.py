@@ -112,7 +112,7 @@ def test_engines_that_know_all_settings_asked_by_default():
             knowing(replace(request, sets=(("cone", "elliptic"), ("collision_slop", 0.01))))
 
 
-def test_a_named_engine_that_does_not_know_a_setting_is_refused():
+def test_refusal_of_a_setting_unknown_to_a_named_engine():
     with pytest.raises(EngineError, match="set: reference has no setting 'damping'"):
         slots(Request(["bounce"], ["chipmunk", "reference"], sets=(("damping", 0.5),)))
 

@@ -137,7 +137,7 @@ def test_quick_suite_as_a_part_of_the_standard_suite(name):
     assert {canonical.minimal(canonical.representative)} <= {params for params, _, _ in asked["quick"]}
 
 
-def test_the_standard_suite_is_one_of_cells_at_the_quick_step():
+def test_step_of_the_standard_suite():
     quick, standard = (slots(Request(["impact"], ["chipmunk"], suite=suite)) for suite in ("quick", "standard"))
     assert set(quick) < set(standard)
     assert {slot.dt for slot in standard} == {plan.QUICK_DT} and all(map(plan.is_standard, standard))

@@ -203,7 +203,7 @@ def test_each_body_has_a_reach_of_its_own():
     assert seen.reach == pytest.approx([0.5, 0.125])
 
 
-def test_a_run_that_is_invalid_keeps_how_far_it_left_its_plane(observed):
+def test_way_off_the_plane_of_an_invalid_run(observed):
     slip = Receipt("step", 1.0, 1.0, 0.01, 0.75, False, "planted")
     kept = execution._measured
 
@@ -252,7 +252,7 @@ def test_no_plane_bound_for_a_cell_without_an_answer(observed):
     assert "out_of_plane" not in {row.metric for row in rows_of("run", [crashed])}
 
 
-def test_without_gravity_the_largest_load_over_its_mass_stands_for_it():
+def test_largest_load_without_gravity():
     """A box of 2 kg between pads: the pad of .5 kg that is pressed with 3, 4 N may be off by one step of 10 m/s^2."""
     pad = replace(Body("pad", Disc(0.5), 0.5, 0.1), force=(3.0, 4.0))
     box = replace(Body("box", Disc(0.5), 2.0, 0.1, (2.0, 0.0, 0.0)), force=(4.0, 0.0))
@@ -263,7 +263,7 @@ def test_without_gravity_the_largest_load_over_its_mass_stands_for_it():
     assert heavy.bound == pytest.approx(DT**2, rel=1e-3) and "g dt^2" in heavy.because
 
 
-def test_a_plane_that_is_not_judged_is_a_check_all_the_same():
+def test_plane_that_is_not_judged():
     scene = flying(Body("a", Disc(0.5), 1.0, 0.1, (3.0, 4.0, 0.0)), (0.0, 0.0))
     found = bounds.planar(scene, DT, 1e12)
     assert (found.metric, found.unit, found.truth, found.bound, found.source) == ("out_of_plane", "m", None, None, "")

@@ -242,7 +242,7 @@ def test_kernel_compilation_beside_cells_without_kernels(compiled):
     assert ("cell", [MIXED[0]]) in log[at:]
 
 
-def test_a_worker_is_renewed_after_the_last_part_that_it_compiles(compiled, run):
+def test_renewal_of_a_worker_that_compiles(compiled, run):
     """Parts share code in one process, which leaves much memory in use."""
     log = compiled(list(filter(needs_kernels, MIXED)), 1)
     assert [kind for kind, _ in log] == ["compile", "cell", "cell", "compile", "cell", "cell"] and run.begun == 2

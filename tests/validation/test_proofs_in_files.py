@@ -29,7 +29,7 @@ def proofs(tmp_path):
     return write
 
 
-def test_a_family_may_have_no_proof_and_the_next_family_has_its_own(proofs):
+def test_family_without_a_proof(proofs):
     assert proofs() == ()
     (first,) = proofs(PROOF, FAMILY.replace("creeps", "slides"), PROOF, PROOF)
     assert first.family == "creeps"

@@ -46,7 +46,7 @@ def test_units(names, expected):
 
 
 @pytest.mark.parametrize(("duration", "window"), [(4.0, 1.0), (2.0, 1.0), (1.0, 0.5)])
-def test_forces_are_means_over_a_second_or_the_last_half_of_a_short_run(duration, window):
+def test_time_over_which_forces_are_means(duration, window):
     assert force_window(scene_of(2, duration)) == window
 
 
@@ -70,7 +70,7 @@ def test_no_third_axis_in_the_plane(name):
         quantity(scene_of(2), moving(2), name)
 
 
-def test_an_angle_in_the_plane_counts_all_turns_since_the_start():
+def test_turns_of_an_angle_in_the_plane():
     """Three turns and a half, sampled as angles between -pi and pi, from 1 rad."""
     angle = 1.0 + np.linspace(0.0, 7.0 * math.pi, 200)
     pose = np.zeros((200, 3, 3))

@@ -84,7 +84,7 @@ def test_unreported_forces_with_a_reason_and_no_number():
     assert "does not report" in residuals(scene, found)[0]["cone"][1]
 
 
-def test_a_bounce_obeys_newtons_law_and_half_of_it_does_not():
+def test_newton_s_law_of_a_bounce_and_its_half():
     for back, wrong in ((1.5, 0.0), (0.9, 0.6 / 3.0)):
         scene = Scene(
             "toy", 1, 2,
@@ -123,7 +123,7 @@ def touching(dimension, bodies, row, pairs, twists, gravity=None, dt=DT):
     return scene, Trajectory(np.array([0.0, dt]), pose, np.array(twists, float), record, dt, "completed")
 
 
-def test_a_ball_in_space_slips_by_what_its_spin_leaves_of_its_speed():
+def test_slip_of_a_ball_in_space():
     """3 m/s, less half a metre times 2 rad/s, are 2 m/s; a quarter of the load pushes that way, over g dt = 8 m/s."""
     flat, up = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
     floor = Body("floor", HalfSpace(up), motion="fixed")
@@ -158,7 +158,7 @@ def test_no_slip_on_a_belt_and_its_force_as_a_load():
     assert found["slip"] == pytest.approx(0.0, abs=1e-12) and found["momentum"] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_momentum_that_is_missing_is_that_of_the_worst_step():
+def test_missing_momentum_of_the_worst_step():
     told = values(residuals(*sliding(impulse=(0.0, 0.25 * WEIGHT))))
     assert told["momentum"] == pytest.approx(0.2)  # a quarter of the weight too much, over 5/4 of it, in every step
 
@@ -195,7 +195,7 @@ def test_refused_broken_and_lost_cells_told():
     assert measured(two).slot == two and measured(three).contacts > measured(two).contacts > 0
 
 
-def test_a_ball_that_rolls_does_not_slip_whatever_friction_holds_it():
+def test_slip_of_a_rolling_ball():
     rolling = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0))
     floor = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
     twists = [[[0.0] * 3, [2.0, 0.0, -4.0]]] * 2

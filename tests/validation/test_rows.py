@@ -97,7 +97,7 @@ def test_check_newer_than_a_stored_run_not_judged(monkeypatch):
 
 
 @pytest.mark.parametrize("outcome", ["not_installed", "crashed", "timed_out", "invalid"])
-def test_a_cell_without_an_answer_has_its_reason_and_no_verdict(outcome):
+def test_row_without_an_answer(outcome):
     row = judged(outcome=Outcome(outcome), reason="it is so", metrics={})
     assert (row.outcome, row.physics, row.standing, row.reason) == (outcome, None, None, "it is so")
 
@@ -108,7 +108,7 @@ def test_unsupported_and_diverged_cells_say_why():
     assert (row.physics, row.reason) == ("fail", "not finite after 3 steps; the engine has no list of findings")
 
 
-def test_an_unsupported_cell_of_a_listed_engine_says_why_as_well(monkeypatch):
+def test_reason_of_an_unsupported_cell(monkeypatch):
     class Listed:
         def unsupported_by(self, slot):
             return None
@@ -147,7 +147,7 @@ def moved(ulp, value, outcome=Outcome.OK):
         ([replace(moved(1, 9.0), slot=replace(OWN, ulp=1))], None),  # of another cell
     ],
 )
-def test_the_floor_of_a_value_is_the_largest_move_of_its_moved_starts(others, floor):
+def test_floor_of_a_value(others, floor):
     (row,) = rows_of("run1", [SEEN, *others])
     assert row.floor == floor
 
@@ -176,7 +176,7 @@ MOST = 0.1 * CHECK.bound
         ({"certified": True, "full": {}, "metric_errors": {"creep": 1.234e-9}}, "full, to 1.2e-09 m/s"),
     ],
 )
-def test_a_row_says_which_certificate_ran_and_how_exact_its_value_is(certificate, shown):
+def test_certificate_and_exactness_of_a_row(certificate, shown):
     assert judged(certificate=certificate).certificate == shown
 
 
@@ -233,13 +233,13 @@ def law(monkeypatch):
 GIVEN = [("incline", 3, 0.99, 1 / 240, CATALOGUE["incline"].measure)]
 
 
-def test_a_law_explains_a_failing_row_at_the_settings_of_its_profile(law):
+def test_row_explained_by_a_law(law):
     row = judged(slot=OWN)
     assert row.standing == "explained" and "it is soft" in row.reason
     assert law == GIVEN
 
 
-def test_laws_say_nothing_of_rows_that_pass_nor_at_iterations_asked_for(law):
+def test_rows_without_a_law(law):
     judged(slot=OWN, metrics={"creep": (0.0, "")})
     judged(slot=SLOT)
     judged(slot=replace(OWN, profile="other"))
@@ -278,7 +278,7 @@ def test_own_model_without_list_and_alarm_for_lost_cells(monkeypatch, outcome, a
     assert outcome is not Outcome.OK or row.reason.endswith("not listed: your own model")
 
 
-def test_laws_that_cannot_be_had_leave_the_verdict_and_say_so(monkeypatch):
+def test_verdict_without_laws(monkeypatch):
     def gone(*row):
         raise EngineError("nameless: its laws cannot be loaded: no such file")
 
@@ -316,7 +316,7 @@ def inclines(*slides):
     return rows_of("run1", observations)[-1]
 
 
-def test_a_study_is_a_row_of_its_cells_and_of_no_single_run():
+def test_row_of_a_study():
     row = inclines((0.9, False), (0.99, False), (1.01, True), (1.1, True))
     assert (row.run, row.metric, row.unit, row.value, row.truth) == ("run1", "threshold", "1", 1.0, 1.0)
     assert (row.physics, row.reason) == ("pass", "sticks at 0.99, slides at 1.01")
@@ -326,7 +326,7 @@ def test_a_study_is_a_row_of_its_cells_and_of_no_single_run():
     assert not predictions_of(replace(row, physics="fail"))
 
 
-def test_a_study_has_no_floor_though_its_cells_have_been_moved():
+def test_floor_of_a_study():
     """What several cells say together is none of their values, not even of the one that it is told under."""
     sets = ((), (("ratio", 0.9),), (("ratio", 1.01),), (("ratio", 1.1),))
     slots = [Slot("incline", params, 2, "nameless", "default", 1 / 240) for params in sets]
@@ -337,7 +337,7 @@ def test_a_study_has_no_floor_though_its_cells_have_been_moved():
     assert floors == {("threshold", None), ("creep", 0.25), ("acceleration", 0.0)}
 
 
-def test_a_study_that_fails_says_what_was_found_and_how_it_stands():
+def test_failing_study():
     row = inclines((0.9, True), (0.99, True), (1.01, True))
     assert (row.physics, row.value) == ("fail", 0.9)
     assert row.reason == "it never sticks; the engine has no list of findings"
@@ -447,7 +447,7 @@ def test_engine_without_a_list_alarms_for_lost_cells_alone(tmp_path):
     assert alarms(plain) == [] and "* INVALID" not in as_markdown(plain) and "<failure" not in as_junit(plain)
 
 
-def test_missing_force_of_an_engine_is_no_failure_of_a_file(tmp_path):
+def test_missing_force_of_an_engine_in_a_file(tmp_path):
     for why in UNTOLD:
         told = of_a_file(tmp_path, "bullet", **{OWN_CHECK: (None, why)})[OWN_CHECK]
         assert (told.outcome, told.physics, told.standing, told.failing) == ("unsupported", None, None, False)

@@ -115,7 +115,7 @@ def stated(tmp_path, text):
     return canonical_from_file(path)
 
 
-def test_a_missing_inertia_is_derived_from_shape_and_mass_and_said(tmp_path):
+def test_inertia_from_shape_and_mass(tmp_path):
     canonical = stated(tmp_path, GOOD.replace("mass = 1.0\ninertia = 0.125", "mass = 3.0"))
     assert canonical.scene(2).bodies[1].inertia == pytest.approx(0.5 * 3.0 * 0.25)
     assert canonical.notes == ("ball.inertia: 0.375 kg m^2, of a uniform disc; none was given",)
@@ -257,7 +257,7 @@ def test_refusal_by_an_engine_unsupported_and_no_alarm(tmp_path):
         assert list(refusals([row.as_dict() for row in rows])) == [f"UNSUPPORTED: {engine} {path}: {why}"]
 
 
-def test_the_recipe_s_example_is_a_scene_and_its_number_is_right(tmp_path):
+def test_recipe_s_example(tmp_path):
     text = (ROOT / "docs/howto/own-scene.md").read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
     canonical = stated(tmp_path, text)
     scene = canonical.scene(2)

@@ -40,7 +40,7 @@ def test_text_of_a_scene(name):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_every_cell_it_declares_can_be_made_and_has_judged_checks(name):
+def test_judged_checks_of_declared_cells(name):
     canonical = CATALOGUE[name]
     for dimension in canonical.dimensions:
         for params in cells(canonical):

@@ -126,7 +126,7 @@ def test_running_and_measuring_code_in_the_identity_of_a_cell(monkeypatch):
         ("Bad-Name", "SCENE = 7", "is not a name of small letters"),
     ],
 )
-def test_a_broken_scene_is_named_by_the_doctor_and_costs_nothing_else(site, name, code, said):
+def test_doctor_with_a_broken_scene(site, name, code, said):
     install(site, catalogue.GROUP, {name: "mypackage.bad:SCENE"}, bad=code)
     forget()
     assert name not in CATALOGUE and list(CATALOGUE) == list(catalogue.OURS)

@@ -61,7 +61,7 @@ SEARCHED = {
 }  # fmt: skip
 
 
-def test_the_best_change_of_each_round_is_kept_until_none_is_better(monkeypatch):
+def test_rounds_of_best_changes(monkeypatch):
     world = World(monkeypatch, CANDIDATES, searched=SEARCHED)
     found = world.search()
     assert (found.engine, found.profile, found.group) == ("toy", "tuned", "rest")
@@ -95,7 +95,7 @@ def test_a_change_that_harms_other_cells_is_passed_over(monkeypatch, kind, bad, 
     assert key(world.search().changes) == changes
 
 
-def test_a_change_of_the_count_itself_may_harm_cells_that_have_too_few(monkeypatch):
+def test_change_of_the_iteration_count(monkeypatch):
     more = (("iterations", 50),)
     searched = {(): (10.0, 10.0), more: (0.5, 0.5)}
     for name, kept in (("iterations", True), ("other", False)):

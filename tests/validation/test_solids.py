@@ -55,7 +55,7 @@ def test_a_cylinder_s_distance_in_closed_form():
     assert deepest(cylinder, sunk, floor, np.tile(at(0, 0, 0), (3, 1))) == pytest.approx(0.05, abs=1e-9)
 
 
-def test_a_hull_over_a_face_is_its_lowest_corner_without_any_library(monkeypatch):
+def test_lowest_corner_of_a_hull_over_a_face(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "coal", None)
     floor = HalfSpace((0.0, 0.0, 1.0))
     assert separation(floor, at(0, 0, 0), BRICK, at(0, 0, 1.0)) == pytest.approx([0.7])
@@ -144,7 +144,7 @@ def read(kind, sizes, d, tmp_path):
     return stated_from_text(text, tmp_path / "odd.toml")
 
 
-def test_a_file_s_corners_are_moved_about_their_centroid_and_said(tmp_path):
+def test_centroid_of_a_file_s_corners(tmp_path):
     found = read("polygon", "vertices = [[0, 0], [3, 0], [0, 3]]", 2, tmp_path)
     body = found.scene.bodies[0]
     assert body.mass == pytest.approx(9.0) and body.shape.vertices[0] == pytest.approx((-1.0, -1.0))

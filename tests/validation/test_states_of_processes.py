@@ -103,7 +103,7 @@ def test_rounding_mode_detected_by_sums():
     assert len(other) == len(known) and other[-5:] == known[-5:]
 
 
-def test_more_open_files_than_are_spare_are_named_and_one_is_not():
+def test_open_files_beyond_the_spare_ones():
     before = state.taken()
     files = [os.dup(0) for _ in range(state.SPARE_FILES)]
     try:

@@ -95,7 +95,7 @@ def test_runs_by_id_and_the_last_without(tmp_path):
     assert [store.run(run).title for run in ids] == ["one", "two", "three"]
 
 
-def test_a_file_that_is_no_store_is_said_in_one_line(tmp_path):
+def test_refusal_of_a_file_that_is_no_store(tmp_path):
     (tmp_path / "results.sqlite").write_text("this is not a database, but long enough to look like one" * 20)
     with pytest.raises(StoreError, match="out: cannot use"):
         Store(tmp_path)

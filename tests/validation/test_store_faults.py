@@ -400,7 +400,7 @@ def test_moved_scene_file_without_effect_on_its_run(tmp_path, forget):
     assert rows_of(run.id, made.observations(run)) == expected
 
 
-def test_a_pinned_name_of_a_file_that_has_changed_is_refused(tmp_path, forget):
+def test_refusal_of_a_pinned_name_of_a_changed_file(tmp_path, forget):
     path = tmp_path / "drop.json"
     name = written(path)[0].scene
     assert pinned(name) == name and name.startswith(f"{path}@")

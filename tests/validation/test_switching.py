@@ -47,7 +47,7 @@ def test_switched_cell_through_json_and_never_listed():
     assert "switched" not in SLOT.as_dict()
 
 
-def test_a_setting_is_replaced_in_place_and_changes_the_cell_s_identity():
+def test_cell_identity_after_a_replaced_setting():
     other = switched(SLOT, {"collision_slop": 1e-5})
     cells = [prepare(slot).cell for slot in (SLOT, other)]
     assert cells[0].settings_hash != cells[1].settings_hash
@@ -133,7 +133,7 @@ MEASURED_ONLY = {
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_every_family_has_a_proof_of_a_cell_of_its_scene(engine):
+def test_proof_of_every_family(engine):
     """A reason that nobody can prove or refute is not one."""
     findings = findings_of(engine)
     families = findings.families if findings else {}
@@ -195,7 +195,7 @@ def read(value):
         (2.0, 0.5, (None,), False),
     ],
 )
-def test_a_proof_holds_only_if_the_mechanism_alone_makes_the_row_fail(before, after, idle, holds):
+def test_proof_by_the_mechanism_alone(before, after, idle, holds):
     experiment = Experiment(
         "f", "says", "default", "stack", "x", {"a": 1}, idle=tuple({"b": k} for k in range(len(idle)))
     )

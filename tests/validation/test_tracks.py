@@ -86,7 +86,7 @@ def test_replay_bytes_to_half_a_level_of_sixteen_bits():
     assert (np.abs(again.pose - recording.pose) <= 0.5 * half_range / 32767 * (1 + 1e-9) + 1e-15).all()
 
 
-def test_frames_are_sixty_a_second_and_at_least_a_hundred_and_twenty():
+def test_number_of_frames():
     scene, trajectory = bouncing(0.8, 1.0, True)
     t = record(CATALOGUE["bounce"], scene, trajectory).t
     assert np.allclose(np.diff(t), 1 / 60)

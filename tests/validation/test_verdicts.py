@@ -80,7 +80,7 @@ def test_standing_of_a_row(value, predictions, known, physics, standing):
     [(NEW, Standing.NEW), (UNLISTED, None), (EXPLODES, Standing.KNOWN), (FAILS, Standing.DRIFTED),
      (NO_VALUE, Standing.DRIFTED)],
 )  # fmt: skip
-def test_a_divergence_is_a_fail_and_known_only_if_listed_as_one(known, standing):
+def test_verdict_of_a_divergence(known, standing):
     verdict = judge_divergence(known, "the state is not finite")
     assert (verdict.physics, verdict.standing) == (Physics.FAIL, standing)
     assert "the state is not finite" in verdict.reason
@@ -124,7 +124,7 @@ def test_the_tolerance_itself_passes(side):
 
 
 @pytest.mark.parametrize(("off", "marginal"), [(0.0625, True), (0.25, True), (0.0624, False), (0.2501, False)])
-def test_the_edges_of_marginal_are_half_the_tolerance_and_twice_it(off, marginal):
+def test_edges_of_marginal(off, marginal):
     assert is_marginal(1.0 + off, EDGE) is marginal
     assert is_marginal(1.0 - off, EDGE) is marginal
 

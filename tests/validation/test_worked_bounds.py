@@ -23,7 +23,7 @@ def bounds_of(name, **kwargs):
     return {metric: check.bound for metric, check in checks_of(name, **kwargs).items()}
 
 
-def test_an_impact_is_exact_to_round_off_of_its_speed_and_momentum():
+def test_bound_of_an_impact():
     found = checks_of("impact", e=0.8, v=6.0, mass=0.5)
     assert {m: (c.unit, c.bound, c.truth) for m, c in found.items()} == {
         "rebound_ratio": ("1", ROUND_OFF, pytest.approx(0.8, abs=1e-15)),
@@ -81,7 +81,7 @@ def test_the_ratio_of_intervals_needs_three_arcs():
 
 
 @pytest.mark.parametrize(("e", "height", "g", "dt"), [(0.8, 1.0, 9.81, 1 / 240), (0.5, 2.0, 1.62, 1 / 960)])
-def test_intervals_carry_the_speed_errors_of_both_arcs_and_a_step(e, height, g, dt):
+def test_bound_of_intervals_between_arcs(e, height, g, dt):
     check = checks_of("bounce", dt=dt, e=e, height=height, g=g)["apex_interval_ratio"]
     v = [math.sqrt(2.0 * g * height) * e**n for n in range(4)]
     wrong_speed = {n: bound * g / v[n] for n, bound in apex_bounds(e, height, g, dt).items() if n < 4}
@@ -95,7 +95,7 @@ def test_intervals_carry_the_speed_errors_of_both_arcs_and_a_step(e, height, g, 
 
 
 @pytest.mark.parametrize(("height", "g", "dt"), [(1.0, 9.81, 1 / 240), (4.0, 8.0, 1 / 128)])
-def test_growth_allows_the_top_of_the_first_parabola_and_nothing_else(height, g, dt):
+def test_growth_bound_by_the_first_parabola(height, g, dt):
     check = checks_of("bounce", dt=dt, height=height, g=g)["apex_growth"]
     assert check.bound == pytest.approx(g * (dt / 2) ** 2 / 2 / height + ROUND_OFF, rel=1e-12)
     assert (check.truth, check.unit, check.source) == (0.0, "1", "conservation of energy")
@@ -159,7 +159,7 @@ def test_overlap_round_off_of_a_high_column():
     assert bound == pytest.approx(9.81e-14 + 999.5e-12, rel=1e-9)
 
 
-def test_a_stack_must_rest_in_its_last_second_however_short_the_run():
+def test_rest_of_a_stack_in_its_last_second():
     assert bounds_of("stack", n=5, duration=2.0)["settle_time"] == pytest.approx(1.0)
     assert bounds_of("stack", n=2, duration=1.5)["settle_time"] == pytest.approx(0.5)
 
@@ -254,7 +254,7 @@ def test_default_scale_of_one_and_short_run_without_settling():
     assert bounds.settled(2, 0.25, 10.0).value == 9.0
 
 
-def test_a_metric_with_an_index_is_a_pattern_of_itself_alone():
+def test_pattern_of_a_metric_with_an_index():
     assert exactly("impulse[2]") == "impulse[[]2]"
     assert fnmatchcase("impulse[2]", exactly("impulse[2]"))
     assert not fnmatchcase("impulse2", exactly("impulse[2]"))

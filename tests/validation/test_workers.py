@@ -51,7 +51,7 @@ def test_changes_of_a_process_cost_only_their_cell(plugins, profile, outcome, re
         assert found[slot].outcome is Outcome.OK
 
 
-def test_a_hanging_cell_is_timed_out_and_the_next_one_runs(plugins):
+def test_cell_after_a_hanging_one(plugins):
     slots = [evil("hang"), evil("refuse")]
     found = {o.slot: o for o in run_cells(slots, jobs=1, timeout=8.0)}
     assert found[slots[0]].outcome is Outcome.TIMED_OUT
@@ -200,7 +200,7 @@ def test_changed_denormal_or_rounding_mode_noticed(bit):
     assert told != before.facts["floating point"] == state._rounding()
 
 
-def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():
+def test_next_cell_of_a_worker_before_its_answer():
     """It does not wait for what is kept of that: of three cells two have been handed out with the first answer."""
     slots = [Slot("impact", (("v", v),), 2, "chipmunk", "tuned", DT) for v in (1.0, 2.0, 3.0)]
     handed = []
@@ -209,7 +209,7 @@ def test_a_worker_has_its_next_cell_before_its_answer_is_looked_at():
     assert [found.slot for found in cells] == slots[1:] and handed == slots
 
 
-def test_open_files_are_counted_from_the_first_look_at_a_process(monkeypatch):
+def test_first_count_of_open_files(monkeypatch):
     """A leak of one a cell ends the process after as many cells as it may keep files, also where each cell imports.
 
     Files that tests before this one have left to the collector must not be closed while these are counted.

@@ -166,7 +166,7 @@ def test_step_mark_half_way_between_two_points(timed, factor, says):
 
 
 @pytest.mark.parametrize("count", [1, 2, 40, MANY])
-def test_every_judged_run_has_a_cell_of_its_own_filled_where_it_fails(count):
+def test_cells_of_judged_runs(count):
     points = [point(i, error=1.0, fails=i % 4 // 2, judged=2 * (i % 5 != 4)) for i in range(count)]
     tree = drawn(points)
     places = [x for x, _ in dots_of(tree)]

@@ -58,7 +58,7 @@ def without_steps(seed):
     return out
 
 
-def test_twenty_histories_without_a_step_raise_at_most_one_false_alarm():
+def test_false_alarms_of_twenty_histories_without_a_step():
     alarms = [mark for seed in range(20) for mark in marked(_divided(without_steps(seed), "runs"))]
     assert len(alarms) <= 1, alarms
 
@@ -363,7 +363,7 @@ def test_summary_computed_each_time_without_a_writable_folder(tmp_path):
     kept.close()
 
 
-def test_a_panel_that_is_equal_in_two_runs_is_one_object(tmp_path):
+def test_panel_equal_in_two_runs(tmp_path):
     kept, other = Kept(tmp_path), ("e", "q", "impact", 2)
     for run, error in (("first", 0.1), ("second", 0.2)):
         panel = {"s": (0.5, 0, 1, 0)}

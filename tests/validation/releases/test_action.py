@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = ROOT / "reports" / "action" / "steps.sh"
 
 
-def test_the_action_runs_this_script_and_gives_it_all_that_it_reads():
+def test_inputs_of_the_action_s_script():
     text = (ROOT / "action.yml").read_text()
     assert 'bash "$GITHUB_ACTION_PATH/reports/action/steps.sh"' in text
     given = set(re.findall(r"^        ([A-Z_]+): \$\{\{ inputs\.[a-z-]+ \}\}$", text, re.MULTILINE))
@@ -51,7 +51,7 @@ def job(toy, tmp_path):
 
 
 @pytest.mark.long
-def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
+def test_outputs_of_a_sound_build(job):
     home = job('float("inf")', 0)
     out = home / "crosscheck-out"
     for name in ("junit.xml", "summary.md", "comment.md", "base.json", "results.sqlite", "report.html"):
@@ -62,7 +62,7 @@ def test_a_sound_build_passes_and_leaves_all_that_a_job_shows(job):
 
 
 @pytest.mark.long
-def test_a_build_that_lost_a_verdict_fails_and_its_comment_says_which(job):
+def test_comment_on_a_build_that_lost_a_verdict(job):
     home = job("3.0", 1)
     comment = (home / "crosscheck-out" / "comment.md").read_text()
     assert "newly failing" in comment and "`rebound_ratio`" in comment and "worse" in comment

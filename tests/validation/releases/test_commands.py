@@ -51,7 +51,7 @@ def test_the_commands_that_it_prints_reproduce_the_two_cells(call):
 
 
 @pytest.mark.long
-def test_every_release_asked_before_a_change_is_called_the_only_one(call):
+def test_releases_asked_before_the_only_change(call):
     done = call("bisect", "toy", "1.0.0,1.1.0,1.2.0", "impact", "--check", "rebound_ratio", *CELL, "--all")
     assert "the only change of this check: every release ran" in done.stdout
 

@@ -62,7 +62,7 @@ def test_the_planted_change_shows_in_the_release_that_has_it(toy, store):
     assert before == pytest.approx(5.0) and after == pytest.approx(3.0)
 
 
-def test_a_release_that_cannot_be_imported_is_a_row_with_its_reason(toy, store):
+def test_row_of_a_release_without_import(toy, store):
     (observation,) = ask(store, "1.1.0")
     assert observation.outcome is Outcome.NOT_INSTALLED and observation.engine_version == "1.1.0"
     assert "cannot be imported" in observation.reason and "libtoy.so.1" in observation.reason
@@ -70,7 +70,7 @@ def test_a_release_that_cannot_be_imported_is_a_row_with_its_reason(toy, store):
     assert rows and not any(row.physics or row.alarming for row in rows)
 
 
-def test_a_release_that_cannot_be_installed_is_a_row_with_its_reason(toy, store):
+def test_row_of_a_release_without_installation(toy, store):
     (observation,) = ask(store, "1.5.0")
     assert observation.outcome is Outcome.NOT_INSTALLED
     assert "there is no wheel of toyphysics 1.5.0" in observation.reason

@@ -57,7 +57,7 @@ def test_imports_leave_an_environment_unchanged(made):
     assert environments.check(made) == ""
 
 
-def test_an_environment_that_was_changed_is_not_trusted_and_made_anew(made):
+def test_environment_that_was_changed(made):
     (module,) = made.path.glob("lib/python*/site-packages/toyphysics.py")
     module.write_text(module.read_text() + "KEEPS = 0.5\n")
     assert "have changed since it was installed" in environments.check(made)
@@ -84,7 +84,7 @@ def test_other_requirements_are_another_environment(own_cache):
     assert environments.name_of(plain) != environments.name_of(old)
 
 
-def test_a_release_that_does_not_exist_is_one_line_and_leaves_nothing(own_cache):
+def test_refusal_of_a_release_that_does_not_exist(own_cache):
     with pytest.raises(environments.BuildError, match=r"there is no wheel of toyphysics 9\.9"):
         environments.build(toy_release("9.9"))
     assert [path for path in environments.folder().iterdir() if path.suffix != ".lock"] == []

@@ -145,7 +145,7 @@ def test_pass_beyond_the_band_of_an_older_finding_is_mended(monkeypatch, value, 
 # ---- what one release says of itself ----
 
 
-def test_a_release_is_told_by_its_name_its_rows_and_its_times():
+def test_name_rows_and_times_of_a_release():
     times = {("toy", "default", "impact", 2): 2.0}
     release = told_by(
         "toy", "2", [Observation(SLOT, "c", 1, "2", Outcome.OK, metrics={"rebound_ratio": (0.4, "")})], times
@@ -252,7 +252,7 @@ def test_newest_answer_kept_over_later_non_answers(releases, first, second, kept
     assert found.metrics["rebound_ratio"][0] == kept
 
 
-def test_the_newest_ratio_of_each_scene_of_a_release_is_its_time(releases, monkeypatch):
+def test_time_of_a_release_by_its_newest_ratios(releases, monkeypatch):
     import pandas as pd
 
     store, add = releases
@@ -298,7 +298,7 @@ def test_a_change_is_told_with_its_cell(iterations, said):
     assert history.sentence(change) == said
 
 
-def test_a_row_has_the_finding_of_its_own_engine_and_cell(monkeypatch):
+def test_finding_of_a_row(monkeypatch):
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "")
     finding = Finding(family, 0.4, 0.01)
     listed = Findings("toy", {"slow": family}, (), {row_key(SLOT, "rebound_ratio"): finding})
@@ -313,7 +313,7 @@ def test_a_row_has_the_finding_of_its_own_engine_and_cell(monkeypatch):
 
 
 @pytest.mark.parametrize(("listed", "found", "is_mended"), [(None, 0.5, True), (0.4, 0.41, False), (0.4, 0.411, True)])
-def test_mended_value_that_was_missing_or_at_the_band_s_end(monkeypatch, listed, found, is_mended):
+def test_mended_value_once_missing_or_at_the_band_s_end(monkeypatch, listed, found, is_mended):
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "<2")
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, listed, 0.41 - 0.4))
     row = next(row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio")

@@ -102,7 +102,7 @@ def test_pip_installs_of_wheels_alone_with_one_line_errors(programs, monkeypatch
     )  # fmt: skip
 
 
-def test_a_new_interpreter_says_what_it_is_and_what_it_has(programs, tmp_path):
+def test_version_and_packages_of_a_new_interpreter(programs, tmp_path):
     asked = programs((0, '{"python": "3.11.1", "packages": {"numpy": "2.0"}}', ""))
     assert environments._told_by(tmp_path) == {"python": "3.11.1", "packages": {"numpy": "2.0"}}
     command = [str(environments._python(tmp_path)), "-I", "-c", environments._TELL]

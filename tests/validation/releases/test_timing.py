@@ -65,7 +65,7 @@ def stored(tmp_path, laps, version="1.0"):
     return store, void
 
 
-def test_a_time_is_the_median_over_rounds_of_its_ratio_to_the_yardstick(tmp_path):
+def test_time_as_a_median_ratio_to_the_yardstick(tmp_path):
     """A machine that is four times slower in a round slows both; one lap that was disturbed is outvoted."""
     rounds = [(0.5, 0.25), (2.0, 1.0), (0.5, 0.25), (9.0, 0.25)]
     laps = [lap(round_=k, seconds=taken, yardstick=beside) for k, (taken, beside) in enumerate(rounds)]
@@ -95,7 +95,7 @@ def test_the_newest_times_of_a_release_count(tmp_path):
     store.close()
 
 
-def test_a_pace_is_the_median_over_scenes_that_both_releases_have():
+def test_pace_over_common_scenes():
     def told(**times):
         return Told("toy", "1", (), times={("toy", "p", scene, 2): time for scene, time in times.items()})
 

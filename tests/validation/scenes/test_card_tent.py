@@ -109,7 +109,7 @@ SHAPES = [{}, {"lean": 45.0}, {"lean": 75.0}, {"aspect": 0.2}]
 
 
 @pytest.mark.parametrize("params", SHAPES)
-def test_a_tent_touches_the_floor_and_itself_and_its_cards_are_uniform(params):
+def test_contacts_and_inertia_of_a_card_tent(params):
     _, scene = made("card_tent", **params)
     card = scene.bodies[1]
     assert gaps(scene, start_of(scene)) == pytest.approx(np.zeros(3), abs=1e-15)

@@ -40,7 +40,7 @@ def values(scene, trajectory):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_column_that_rests_measures_as_its_truth_and_says_nothing(dimension):
+def test_measures_of_a_column_at_rest(dimension):
     scene = column(dimension)
     measured = columns.measure(scene, resting(scene, [1.0, 1.0, 1.0]))
     assert {name: value for name, (value, _) in measured.items()} == columns.exact(scene)
@@ -129,7 +129,7 @@ def test_overlap_rounding_by_the_height_of_the_column():
         ((None, "it left"), (None, "no shape"), (None, "it left")),
     ],
 )
-def test_a_displacement_is_the_larger_of_drift_and_overlap_in_sizes(drift, penetration, found):
+def test_displacement_in_sizes(drift, penetration, found):
     assert columns.displacement({"drift": drift, "penetration": penetration}, 0.25) == found
 
 

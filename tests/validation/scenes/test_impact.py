@@ -48,7 +48,7 @@ def run(scene, after, impulses, recorded=True):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_numbers_are_those_of_the_end_and_of_the_whole_contact(dimension):
+def test_numbers_of_the_end_and_of_the_contact(dimension):
     scene = scene_of(dimension)
     measured = impact.measure(scene, run(scene, 2.0, [7.0, 5.0]))
     assert measured == {

@@ -19,7 +19,7 @@ def scene(dimension=2, ratio=SLOPE / MU, **params):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_gravity_is_turned_and_the_box_stands_on_a_level_floor(dimension):
+def test_turned_gravity_on_a_level_floor(dimension):
     made = scene(dimension, mass=2.0, duration=4.0)
     floor, box = made.bodies
     level = (0.0,) * (dimension - 2)

@@ -59,7 +59,7 @@ def recorded(scene, after, dt=DT):
 
 
 @pytest.mark.parametrize("params", CELLS)
-def test_the_blow_is_that_of_the_equations_of_a_rigid_body(params):
+def test_blow_by_the_equations_of_a_rigid_body(params):
     canonical, scene = made("kane", **params)
     assert failing(canonical, scene, recorded(scene, blown(scene))) == set()
 

@@ -63,7 +63,7 @@ def test_blows_found_at_their_time_or_a_step_late_pass(closing, dt, swept):
         assert found == pytest.approx(truth, abs=1e-12)
 
 
-def test_the_formula_s_times_are_those_of_an_integration_with_events():
+def test_times_of_the_formula_against_integration():
     """x' = v between events that DOP853 finds; and (v - V) L is the same after each blow of the plate."""
     canonical, scene = made("closing_wall")
     p, truth = scene.params, canonical.exact(scene)
@@ -149,7 +149,7 @@ def landed(scene, dt=DT, e=None, share=(0.5, 0.5), moment=1.0):
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("tilt", [20.0, 30.0, 44.0])
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_a_blow_worked_out_at_the_scene_s_own_corner_passes(e, tilt, dimension):
+def test_blow_worked_out_at_the_scene_s_corner(e, tilt, dimension):
     canonical, scene = made("edge_drop", dimension, e=e, tilt=tilt)
     trajectory = landed(scene)
     assert failing(canonical, scene, trajectory) == set()
@@ -171,7 +171,7 @@ def test_blow_with_wrong_e_inertia_or_share(size):
     assert failing(canonical, scene, pushed) == {"sideways"}
 
 
-def test_a_box_whose_other_edge_would_land_too_is_refused_by_name():
+def test_refusal_of_a_box_that_lands_on_two_edges():
     with pytest.raises(ValueError, match=r"edge_drop\.tilt"):
         made("edge_drop", e=1.0, tilt=5.0)
 

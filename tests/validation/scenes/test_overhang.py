@@ -54,7 +54,7 @@ def test_overhang_that_sinks_slips_shakes_or_carries_too_little(size):
     assert failing(canonical, scene, replace(good, twist=moving)) == {"settle_time", "kinetic_energy"}
 
 
-def test_a_stack_that_falls_is_seen_on_both_sides_of_the_limit():
+def test_stack_on_both_sides_of_the_limit():
     for margin, fails in ((0.05, True), (-0.05, False)):
         canonical, scene = made("overhang", margin=margin)
         fallen = at_rest(scene)

@@ -91,7 +91,7 @@ def test_thrown_sinking_or_slipping_box(size):
         assert failing(canonical, scene, spoilt) == {metric}
 
 
-def test_speed_from_a_correction_throws_the_box_as_high_as_its_energy():
+def test_height_of_a_box_thrown_by_a_correction():
     """v = beta depth/dt rises by v^2/(2 g) less what it has climbed within the floor."""
     canonical, scene = made("position_correction")
     trajectory = coming_up(scene, 0.2, kept=1.0)

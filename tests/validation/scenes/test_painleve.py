@@ -84,14 +84,14 @@ CELLS = [{}, {"ratio": 0.6}, {"ratio": 0.2}, {"ratio": 2.0}, {"ratio": 1.05, "le
 
 
 @pytest.mark.parametrize("params", CELLS)
-def test_a_rod_slides_or_jams_as_forces_and_impulses_at_its_end_say(params):
+def test_rod_that_slides_or_jams(params):
     canonical, scene = made("painleve", **params)
     measured, truth = canonical.measure(scene, moved(scene, 1 / 960)), canonical.exact(scene)
     for name, value in truth.items():
         assert measured[name][0] == pytest.approx(value, abs=2e-4 if name == "slowed" else 1e-6), name
 
 
-def test_the_critical_friction_is_where_pressing_the_end_pulls_it_down():
+def test_critical_friction_of_the_rod():
     """And the impulse that stops the end is just within the cone there; for a thin rod as published."""
     for lean in (30.0, 60.0, 75.0):
         _, scene = made("painleve", ratio=0.3, lean=lean, v=50.0)

@@ -68,7 +68,7 @@ CELLS = [{}, {"from": 1.0, "to": 30.0}, {"aspect": 0.2, "from": 1.0, "to": 60.0,
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("params", CELLS[:2])
-def test_a_box_falls_over_its_edge_as_its_equation_of_motion_says(params, dimension):
+def test_fall_of_a_box_over_its_edge(params, dimension):
     canonical, scene = made("pivot", dimension, **params)
     measured, truth = canonical.measure(scene, fallen(scene)), canonical.exact(scene)
     assert measured["passing_time"][0] == pytest.approx(truth["passing_time"], rel=2e-5)  # elements of 1/400

@@ -94,7 +94,7 @@ def test_wall_that_sinks_leans_shakes_or_carries_too_little(dimension):
         assert failing(canonical, scene, with_impulses(good, shaking)) - loads == {"impulse_scatter"}
 
 
-def test_boxes_of_a_row_do_not_touch_and_rest_on_two():
+def test_gaps_and_supports_of_a_row_of_boxes():
     _, scene = made("pyramid", rows=5)
     rows = pyramid.layers(5)
     assert [len(row) for row in rows] == [1, 5, 4, 3, 2, 1] and list(chain(*rows)) == list(range(len(scene.bodies)))
@@ -162,6 +162,6 @@ def test_weak_floor_creeping_box_and_wrong_slide_fail(params, size):
         assert {"acceleration", "sheared"} == failing(canonical, scene, pushed(scene, mu=0.5 * (1.0 - size)))
 
 
-def test_a_push_that_would_tip_the_box_is_refused_by_name():
+def test_refusal_of_a_push_that_tips_the_box():
     with pytest.raises(ValueError, match=r"pressed_box\.shear"):
         made("pressed_box", mu=2.0, shear=1.9)

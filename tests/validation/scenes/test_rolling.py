@@ -113,7 +113,7 @@ def test_integrated_friction_moves_a_ball_as_the_formula_says(name, dimension, p
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize(("name", "dimension", "params"), CELLS)
-def test_every_step_order_and_a_contact_that_is_found_late_pass(name, dimension, params, dt, offset, late):
+def test_step_orders_and_a_late_contact(name, dimension, params, dt, offset, late):
     canonical, scene = made(name, dimension, **params)
     assert failing(canonical, scene, integrated(scene, dt, late=late * dt, offset=offset)) == set()
 
@@ -214,7 +214,7 @@ def bounced(v, w, fall, e, mu, k, radius, stiffness=1e6, h=2e-7):
         (2, {"v": 0.0, "spin": 5.0, "mu": 0.2}),
     ],
 )
-def test_a_spring_that_rubs_sends_a_ball_off_as_coulomb_s_law_says(dimension, params):
+def test_ball_on_a_rubbing_spring(dimension, params):
     canonical, scene = made("oblique", dimension, **params)
     p, truth = scene.params, canonical.exact(scene)
     k = 0.5 if dimension == 2 else 0.4

@@ -22,7 +22,7 @@ def test_boxes_stand_on_each_other_touching(dimension):
     assert track.body == "box3" and track.position(1.0) == track.position(9.0) == (*level, 2.5)
 
 
-def test_five_heights_run_and_the_one_of_ten_boxes_at_five_counts_more():
+def test_cells_of_the_stack():
     standard = {v.params["n"]: v.iterations for v in CATALOGUE["stack"].standard}
     assert standard == {n: (None, 1, 4, 10, 30, 100) if n == 10 else (None,) for n in (1, 2, 5, 10, 20)}
     full = {v.params["n"]: v.iterations for v in CATALOGUE["stack"].full}

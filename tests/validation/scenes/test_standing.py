@@ -33,7 +33,7 @@ def groove(left, right):
 
 
 @pytest.mark.parametrize(("left", "right"), [(45.0, 45.0), (60.0, 20.0), (10.0, 80.0), (85.0, 85.0)])
-def test_the_triangle_of_forces_holds_a_ball_that_touches_both_planes(left, right):
+def test_triangle_of_forces_on_a_ball_in_a_groove(left, right):
     canonical, scene, trajectory, loads = groove(left, right)
     for body in scene.bodies[:2]:
         assert np.dot(body.shape.normal, scene.bodies[2].pose[:2]) == pytest.approx(0.5, abs=1e-12)

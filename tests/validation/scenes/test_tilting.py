@@ -144,14 +144,14 @@ def test_blocks_in_two_regimes_refused_by_name(params, named):
 
 
 @pytest.mark.parametrize(("aspect", "limit"), [(0.3, 0.3), (1.0, 0.5)])
-def test_gravity_is_turned_to_a_share_of_the_limit_that_is_met_first(aspect, limit):
+def test_turned_gravity_by_the_first_limit(aspect, limit):
     for ratio in (0.98, 1.1):
         _, scene = made("tilt_table", ratio=ratio, aspect=aspect)
         across, up = scene.gravity
         assert -across / up == pytest.approx(ratio * limit) and math.hypot(across, up) == pytest.approx(9.81)
 
 
-def test_what_is_told_of_a_toppling_block_comes_before_it_lands():
+def test_toppling_block_before_its_landing():
     _, scene = made("tilt_table", ratio=1.1)
     assert 0.5 * math.pi > TOLD and scene.duration < 1.2
 

@@ -113,7 +113,7 @@ def test_resting_wedge_that_moves_or_turns_fails(size):
             assert failing(canonical, scene, replace(still, pose=moved)) == {"moved"}
 
 
-def test_the_block_lies_on_the_face_and_the_wedge_is_a_right_triangle():
+def test_shapes_of_the_wedge_and_its_block():
     _, scene = made("wedge", slope=40.0)
     _, wedge, block = scene.bodies
     a = math.radians(40.0)

@@ -31,7 +31,7 @@ INSIDE = {"depth": 0.5, "ratio": 4.0, "v": 2.0, "mass": 3.0, "duration": 0.5}
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_two_balls_start_inside_each_other_and_move_side_by_side(dimension):
+def test_start_of_two_overlapping_balls(dimension):
     _, scene = made("overlap", dimension, **INSIDE)
     first, second = scene.bodies
     assert (scene.name, scene.version, scene.duration, scene.gravity) == ("overlap", 1, 0.5, (0.0,) * dimension)
@@ -85,7 +85,7 @@ def test_balls_of_two_sizes_overlap_as_their_own_radii_do():
     assert found["grown"][0] == pytest.approx(0.1) and found["left"][0] == pytest.approx(0.25 / 0.15)
 
 
-def test_the_error_of_an_overlap_is_the_share_that_a_step_throws():
+def test_error_of_an_overlap():
     canonical, scene = made("overlap", **INSIDE)
     assert canonical.primary.error(scene, DT, {"thrown": (1.5, "")}) == (pytest.approx(1.5 / 16.0), "")
     assert canonical.primary.error(scene, DT, {"thrown": (None, "lost")}) == (None, "lost")
@@ -159,7 +159,7 @@ def test_truth_of_the_replay_between_two_walls():
         assert ghost.position(t) == pytest.approx((x, 0.0, 0.0), abs=1e-12)
 
 
-def test_the_error_of_a_closing_plate_is_over_what_it_has_added():
+def test_error_of_a_closing_plate():
     canonical, scene = made("closing_wall", **CLOSING)
     assert canonical.primary.error(scene, DT, {"speed[3]": (7.6, "")}) == (pytest.approx(0.1), "")
     assert canonical.primary.error(scene, DT, {"speed[3]": (6.4, "")}) == (pytest.approx(0.1), "")

@@ -162,7 +162,7 @@ def test_friction_that_a_toppling_block_needs_is_asked_for(ratio, aspect):
             made("tilt_table", ratio=ratio, aspect=aspect, mu=0.98 * needed)
 
 
-def test_the_error_on_a_tilted_table_is_in_heights_or_relative():
+def test_error_on_a_tilted_table():
     canonical, stays = made("tilt_table", height=2.0)
     error = canonical.primary.error
     assert error(stays, DT, {"moved": (0.5, "")}) == (pytest.approx(0.25), "")
@@ -210,7 +210,7 @@ def test_measures_on_a_tilted_table():
 @pytest.mark.parametrize(
     ("start", "spin", "end"), [(0.1, 0.0, 0.6), (0.1, 1.5, 0.6), (-0.3, 2.0, 0.5), (0.0, 0.3, 0.4)]
 )
-def test_the_time_of_a_fall_is_that_of_its_equation_of_motion(start, spin, end):
+def test_time_of_a_fall_by_its_equation_of_motion(start, spin, end):
     """phi'' = r sin(phi), integrated in time until the angle is passed; r is the rate of a pendulum upside down."""
     on = Pivot(0.5, 1.0, 9.81)
 

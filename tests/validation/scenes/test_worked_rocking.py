@@ -114,7 +114,7 @@ def test_allowance_of_a_rocking_board():
     assert long == pytest.approx(1.0 + max(abs(each - swing) for each in fifth))
 
 
-def test_the_error_of_a_rocking_board_is_that_of_its_time_over_it():
+def test_error_of_a_rocking_board():
     canonical, scene = made("rocker", **BOARD)
     swing = canonical.exact(scene)["swing_time"]
     assert canonical.primary.error(scene, DT, {"swing_time": (0.9 * swing, "")}) == (pytest.approx(0.1), "")

@@ -26,7 +26,7 @@ def near(value):
     return pytest.approx(value, rel=1e-13)
 
 
-def test_the_box_lies_on_the_floor_and_moves_along_its_heading():
+def test_start_of_a_box_along_its_heading():
     _, scene = made("slide", 3, heading=30.0, mass=3.0)
     box = scene.bodies[-1]
     assert (scene.name, scene.version, box.name, box.mass, scene.duration) == ("slide", 1, "box", 3.0, 1.5)
@@ -40,7 +40,7 @@ def test_the_box_lies_on_the_floor_and_moves_along_its_heading():
     assert long.duration == 3.0  # half as long again as the 2 s that it slides
 
 
-def test_five_plates_carry_the_box_half_as_far_again_and_its_own_width():
+def test_length_of_five_plates():
     """Half a plate, 3 m and a width of 1 m are 4.5 m of plates of 1 m."""
     _, scene = made("seam", 3, plate=1.0)
     *plates, box = scene.bodies
@@ -80,7 +80,7 @@ def test_a_slide_of_two_steps_is_told_over_one():
     assert found["hop"] == ("m", near(1 / 512 + 1e-12 / 512))  # the way is 1/512 m
 
 
-def test_places_on_plates_are_told_to_the_round_off_of_the_farthest():
+def test_round_off_of_places_on_plates():
     canonical, scene = made("seam", 3, plate=1.0)
     found = stated(canonical.checks(scene, DT))
     for metric in ("hop", "turned", "astray"):
