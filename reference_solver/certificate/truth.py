@@ -11,7 +11,7 @@ at once meet, or do not, as round-off has it: what that moves comes to it as wel
 
 *Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
 is made twice more far from the origin: what differs there, beyond the X of both and what coarser coordinates explain,
-refuses.
+refuses. The rest, as the run's own coordinates are smaller, is in X.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -205,6 +205,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = _error(model, run, record, steps, stride) + round_off
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
+    # Bodies meet within the units in which coordinates are known, each time, and go on from there.
+    assert record.pieces is not None
+    met = np.searchsorted(record.pieces.begin[record.pieces.kind == IMPACT], record.t, side="right")
+    error += COORDINATE_UNITS * np.spacing(place) * (1.0 + met) * (1.0 + np.minimum(growth, GROWTH))
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
         reasons.append("the run at another tolerance is no numbers")
@@ -228,7 +232,10 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
         record.pose,
     )
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
-    reasons += _misplaced(model, settings, found, steps, stride) if found.holds else []
+    if found.holds:
+        otherwise, rounded = _misplaced(model, settings, found, steps, stride)
+        reasons += otherwise
+        found = replace(found, error=np.maximum.accumulate(found.error + rounded))
     holds = not reasons
     if horizon < record.t[-1]:
         reasons.append(beyond)
@@ -311,27 +318,32 @@ def away(model: Model, far: float) -> Change:
     return Change(model.dimension, shift=tuple(far * _size(model) * x for x in AWAY[: model.dimension]))
 
 
-def _misplaced(model: Model, settings: Settings, found: Certificate, steps: int, stride: int) -> list[str]:
-    """Where a run that holds so far comes out otherwise far from the origin: one sentence for the first such place."""
-    within = found.t < found.horizon
+def _misplaced(
+    model: Model, settings: Settings, found: Certificate, steps: int, stride: int
+) -> tuple[list[str], Array]:
+    """Where a run that holds so far comes out otherwise far from the origin: one sentence for the first such place.
+
+    And how far (s,) coordinates move it where it stands: as far as there, by as much less as they are smaller.
+    """
+    within, d, rounded = found.t < found.horizon, model.dimension, np.zeros(len(found.t))
+    here = float(np.nanmax(np.abs(found.pose[:, :, :d])))
     for far in PLACES:
         change = away(model, far)
         moved = poses_of(change.model(model), settings, steps, stride)
         apart = distance(model, change.pose(found.pose, found.t), moved)
         # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
         error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
-        place = float(np.nanmax(np.abs(moved[:, :, : model.dimension])))
+        place = float(np.nanmax(np.abs(moved[:, :, :d])))
         allowed = 2.0 * error + found.rounding(place)
         if (within & ~(apart <= allowed)).any():
             allowed += _grazed_there(change.model(model), settings, found, steps, stride, place)
         beyond = np.flatnonzero(within & ~(apart <= allowed))
         if len(beyond):
             k = int(beyond[0])
-            return [
-                f"moved by {far:g} half widths it comes out otherwise: {apart[k]:.3g} m at {found.t[k]:.3g} s, at most "
-                f"{allowed[k]:.3g} m is round-off"
-            ]
-    return []
+            said = f"{apart[k]:.3g} m at {found.t[k]:.3g} s, at most {allowed[k]:.3g} m is round-off"
+            return [f"moved by {far:g} half widths it comes out otherwise: {said}"], rounded
+        rounded = np.maximum(rounded, apart * min(1.0, here / place))
+    return [], rounded
 
 
 def _grazed_there(model: Model, settings: Settings, found: Certificate, steps: int, stride: int, place: float) -> Array:

@@ -89,7 +89,8 @@ def _by_rounds(contacts: Contacts, free: Array, slips: Array) -> tuple[Array, fl
     tangents = np.repeat(~slides, d)
     tangents[::d] = False
     matrix = contacts.matrices[0]
-    twist = np.linalg.lstsq(matrix[tangents], free[tangents] / size)[0]
+    each = np.tile(world.per_length, n)
+    twist = each * np.linalg.lstsq(matrix[tangents] * each, free[tangents] / size)[0]
     body.twist[:, :q] = twist.reshape(n, q)
     contact.target[:] = matrix[::d] @ twist - free[::d] / size
     mass, moment = world.bodies.inverse_mass, world.bodies.moment

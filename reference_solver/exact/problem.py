@@ -236,7 +236,7 @@ class Problem:
 
 def loads_shared(contacts: Contacts, near: Array) -> Array:
     """Return how changes of redundant forces (m, d) are weighed: by what is carried there (E37)."""
-    bears = np.maximum(near[:, :1], 1e-12 * max(1e-300, near[:, 0].max()))
+    bears = np.maximum(near[:, :1] / max(1e-300, near[:, 0].max()), 1e-12)
     weight = np.repeat(bears, near.shape[1], axis=1)
     weight[:, 1:] *= contacts.friction[:, None]
     return np.sqrt(weight)

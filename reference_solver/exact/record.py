@@ -251,7 +251,8 @@ class Recorder:
         s = np.array([first, 0.5 * (first + last), last])[:, None]
         way, rate = (each @ (s ** np.arange(each.shape[2])).T for each in (piece.way, piece.velocity))
         bend = 0.125 * (last - first) * piece.length * (rate[..., 0] - rate[..., 2])
-        off = np.abs(way[..., 1] - 0.5 * (way[..., 0] + way[..., 2]) - bend).max() / (CLOSE * self._world.size)
+        bent = np.abs(way[..., 1] - 0.5 * (way[..., 0] + way[..., 2]) - bend) / self._world.per_length
+        off = bent.max() / (CLOSE * self._world.size)
         ends = np.linspace(first, last, 1 + max(1, int(np.ceil(off**0.25))))  # errors fall with the fourth power
         return ends[1:].tolist()
 

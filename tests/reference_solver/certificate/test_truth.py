@@ -136,6 +136,24 @@ def test_error_of_bodies_that_meet_across_a_rounded_gap(shift):
     assert not found.holds or (off <= found.error)[found.t < found.horizon].all()
 
 
+@pytest.mark.parametrize("place", [(20476.0, -3055.0), (17098.0, -20320.0), (23677.0, -16002.0)])
+def test_error_of_bounces_far_from_the_origin(place):
+    """Each of them is met some units of the coordinates late. All numbers of the start are exact."""
+    up, angle, g, e = np.array([-0.8, 0.6]), np.arctan2(0.8, 0.6), 9.81, 0.9
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed", pose=(*place, angle))
+    ball = Body(Disc(0.25), 1.0, 0.03125, (place[0] - 1.0, place[1] + 0.75, 0.0))
+
+    def height(t):
+        here, v = 1.0, 0.0
+        while t > (flight := (v + np.sqrt(v * v + 2.0 * g * here)) / g):
+            here, v, t = 0.0, e * (g * flight - v), t - flight
+        return here + v * t - 0.5 * g * t * t
+
+    found = certify(Model(2, [floor, ball], tuple(-g * up), e, 0.0), Settings.reference(1.0 / 60.0), 180, 5)
+    off = np.abs((found.pose[:, 1, :2] - place) @ up - 0.25 - [height(t) for t in found.t])
+    assert found.holds and (off <= found.error).all()
+
+
 def test_certificate_of_a_world_without_free_bodies():
     still = Body(Disc(0.1), pose=(0.0, 0.0, 0.0), twist=(1.0, 0.0, 0.0), motion="prescribed")
     assert certify(Model(2, [still], (0.0, 0.0), 0.0, 0.0), Settings.reference(0.01), 5).holds
