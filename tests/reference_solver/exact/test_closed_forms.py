@@ -108,6 +108,20 @@ def test_slide_of_a_box_until_it_stops(d, heading):
 
 
 @pytest.mark.parametrize("d", [2, 3])
+def test_slide_of_a_ball_until_it_rolls(d):
+    """Of I = k m r^2: friction has spun it up when it is as slow as v / (1 + k)."""
+    speed, mu, k = 3.0, 0.3, 0.5 if d == 2 else 0.4
+    way = np.array((1.0, 0.0) if d == 2 else (math.cos(0.7), math.sin(0.7), 0.0))
+    found = record(Model(d, [ground(d), ball(d, up(d, 0.5), speed * way)], up(d, -G), 0.0, mu), 2.0)
+    slides, rolls = k * speed / ((1.0 + k) * mu * G), speed / (1.0 + k)
+    t = np.minimum(found.t, slides)
+    truth = speed * t - 0.5 * mu * G * t * t + rolls * (found.t - t)
+    assert np.abs(found.pose[:, 1, :d] - truth[:, None] * way - up(d, 0.5)).max() < SMALL
+    spin = (-rolls / 0.5,) if d == 2 else np.cross([0.0, 0.0, 1.0], rolls * way) / 0.5
+    assert np.abs(found.twist[-1, 1] - [*rolls * way, *spin]).max() < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
 def test_rest_of_a_stack_to_the_bit(d):
     half = (0.5,) * d
     bodies = [ground(d), *(box(d, half, up(d, 0.5 + k)) for k in range(3))]
