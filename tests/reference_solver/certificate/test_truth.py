@@ -55,7 +55,7 @@ def test_a_tolerance_below_round_off():
 
 
 def test_refusal_of_another_outcome_far_from_the_origin(monkeypatch):
-    """Gravity a millionth stronger there. Where nothing is, what is left is round-off, and X is what it was."""
+    """Gravity a millionth stronger there. Where nothing is, round-off is left, of which X has what is due here."""
     floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
     disc = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.7, 0.0), (1.0, -1.0, 3.0))
     model = Model(2, [floor, disc], (0.0, -9.81), 0.8, 0.1)
@@ -71,7 +71,7 @@ def test_refusal_of_another_outcome_far_from_the_origin(monkeypatch):
     monkeypatch.setattr(truth, "away", lambda model, far: Heavier(2, shift=plain(model, far).shift))
     other = certify(model, Settings.reference(1.0 / 240.0), 60)
     assert not other.holds and "moved by 30 half widths" in other.reasons[0]
-    assert (other.error == found.error).all()
+    assert ((other.error < found.error) & (found.error < 1.001 * other.error)).all()
 
 
 def over_the_edge(d, large, r, v, e, way):
