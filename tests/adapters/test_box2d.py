@@ -77,7 +77,7 @@ def test_rest_height_of_boxes_shipped_and_tuned():
 
 
 @pytest.mark.parametrize("unit", [1.0, 8.0])
-def test_forces_and_impulses_are_in_newtons_whatever_the_unit(unit):
+def test_newtons_of_forces_in_any_unit(unit):
     pushed = resting(force=(2.0, 0.0), torque=(0.1,))
     found = drive(replace(pushed, pairs=(Pair(),)), units_per_metre=unit)
     assert found.twist[-1, 1, 0] == pytest.approx(2.0 / 3.0 * 0.5, rel=1e-5)
@@ -95,7 +95,7 @@ def test_each_pair_has_its_own_material():
         assert found.twist[-1, k, 0] == pytest.approx(2.0 - pair.friction * 2.0 * (1 + pair.restitution), abs=1e-5)
 
 
-def test_a_wall_along_an_axis_has_exactly_that_normal():
+def test_normal_of_a_wall_along_an_axis():
     """A turn by a single angle would miss it by 4e-8, which many blows blow up."""
     bodies = (Body("wall", HalfSpace((1.0, 0.0)), motion="fixed"), Body("ball", Disc(0.5), pose=(0.6, 0.0, 0.0),
               twist=(-2.0, 0.0, 0.0)))  # fmt: skip

@@ -93,7 +93,7 @@ def test_import_of_the_adapter_without_engine_or_output():
         ("tuned", 0.0, 9.81, REST),
     ],
 )
-def test_a_profile_s_law_has_the_numbers_of_its_settings(profile, e, gravity, law):
+def test_numbers_of_a_profile_s_law(profile, e, gravity, law):
     scene = scene_of(FLOOR, ball(2.0), e=e, gravity=(0.0, 0.0, -gravity))
     assert law_of(profile, needs(scene), DT) == law
 
@@ -137,7 +137,7 @@ def test_default_rebound_of_an_initial_overlap_with_baumgarte():
     assert record.twist[-1, 1, 2] == pytest.approx(e * v + 0.08 * (v * DT - gap - 1e-5) / DT, abs=1e-11)
 
 
-def test_default_ball_at_1_metre_per_second_does_not_bounce():
+def test_default_rebound_at_1_metre_per_second():
     assert abs(drive(hit(0.0525, 1.0, 0.8), "default").twist[-1, 1, 2]) < 1e-12
 
 
@@ -168,7 +168,7 @@ def test_recurrence_follows_a_dropped_ball(profile, law, e):
     assert np.allclose(predicted.gap, record.pose[:, 1, 2] - 0.5, rtol=0.0, atol=1e-9)
 
 
-def test_tilted_half_space_returns_a_ball_along_its_own_normal():
+def test_rebound_along_the_normal_of_a_tilted_half_space():
     normal = np.array([1.0, 2.0, 2.0]) / 3.0
     wall = Body("wall", HalfSpace(tuple(normal), 0.7), motion="fixed")
     start, velocity = normal * (0.7 + 0.5 + 0.055), -3.0 * normal + 0.5 * np.array([2.0, 1.0, -2.0]) / 3.0
@@ -221,7 +221,7 @@ def test_share_of_the_weight_with_substeps(substeps):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_friction_impulse_is_m_dv_and_opposes_the_slide(profile):
+def test_friction_impulse_of_a_slide(profile):
     box = Body("box", Box((0.5,) * 3), 2.0, (1 / 3,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (2.0, -1.0, 0.0, 0.0, 0.0, 0.0))
     scene = scene_of(FLOOR, box, mu=0.4, gravity=(0.0, 0.0, -9.81), duration=0.2)
     record = drive(scene, profile, linearDamping=0.0, angularDamping=0.0)
@@ -308,7 +308,7 @@ def test_direction_and_rate_of_a_positive_planar_torque(profile):
 
 @pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_box_that_lands_on_a_corner_turns_away_from_it(profile, side):
+def test_turn_of_a_box_that_lands_on_a_corner(profile, side):
     # Turned by a negative angle a square stands on the corner right of its centre: the floor lifts that side.
     tilt = -0.3 * side
     lowest = 0.5 * (math.cos(0.3) + math.sin(0.3))
@@ -376,7 +376,7 @@ def test_gravity_pulls_in_any_direction_with_semi_implicit_steps(profile):
     assert ENGINE.facts.scheme.position_offset == 1
 
 
-def test_default_drag_is_linear_and_quadratic_and_tuned_has_none():
+def test_drag_by_profile():
     flying = scene_of(ball(5.0, (10.0, 0.0, 0.0)), duration=1.0)
     assert drive(flying, "default").twist[-1, 0, 0] == pytest.approx(6.90, abs=0.01)
     assert drive(flying, "tuned").twist[-1, 0, 0] == 10.0
@@ -416,7 +416,7 @@ def test_friction_zero_for_a_body_without_rough_pairs():
     assert shares[0] * shares[1] == pytest.approx(0.5, rel=1e-15) and shares[2] == 0.0
 
 
-def test_table_that_no_product_gives_is_refused_in_one_line():
+def test_refusal_of_a_table_that_no_product_gives():
     names = ("a", "b", "c")
     pairs = tuple(Pair(i, j, friction=0.5) for i, j in zip(names, names[1:] + names[:1], strict=True))
     bodies = (FLOOR, *(ball(5.0 + 2 * k, name=n) for k, n in enumerate(names)))
@@ -537,7 +537,7 @@ def test_scenes_beyond_bullet_refused_with_a_reason(scene, message):
     assert ENGINE.refuses(hit(0.02, 1.0, 0.5), "tuned") is None
 
 
-def test_settings_follow_the_scenes_needs_and_carry_their_reasons():
+def test_needs_and_reasons_of_settings():
     impact, rest = needs(hit(0.02, 1.0, 0.5)), needs(scene_of(FLOOR, ball(1.0), gravity=(0.0, 0.0, -9.81)))
     names = {s.name: s.value for s in ENGINE.settings("tuned", impact, DT)}
     assert names["splitImpulsePenetrationThreshold"] == 0.0 and names["contactSlop"] == 1e-6
@@ -571,7 +571,7 @@ def test_declared_rebound_at_other_phases(profile, e, dt):
         assert e - declared.value > 2.0 * declared.band
 
 
-def test_declared_drag_is_what_a_second_of_flight_loses():
+def test_declared_drag_over_a_second_of_flight():
     flying = scene_of(ball(5.0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), duration=1.0)
     declared = ENGINE.declares("default", needs(flying), DT)
     end = drive(flying, "default").twist[-1, 0]
@@ -583,7 +583,7 @@ def test_declared_drag_is_what_a_second_of_flight_loses():
 # ---- measured without the adapter --------------------------------------------------------------------------------
 
 
-def test_ten_boxes_drift_as_was_measured_and_carry_their_weight():
+def test_drift_and_weight_of_ten_boxes():
     boxes = [Body(f"b{k}", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5 + k, *UPRIGHT)) for k in range(10)]
     scene = scene_of(FLOOR, *boxes, mu=0.5, gravity=(0.0, 0.0, -9.81), duration=5.0)
     record = drive(scene, sampling=Sampling(1, 4.0))
@@ -594,7 +594,7 @@ def test_ten_boxes_drift_as_was_measured_and_carry_their_weight():
 
 
 @pytest.mark.parametrize(("ratio", "slides"), [(0.5, False), (0.999, False), (1.001, True), (1.1, True)])
-def test_tuned_box_sticks_below_the_cone_and_slides_above(ratio, slides):
+def test_tuned_box_below_and_above_the_cone(ratio, slides):
     theta = math.atan(0.5 * ratio)
     gravity = (9.81 * math.sin(theta), 0.0, -9.81 * math.cos(theta))
     box = Body("box", Box((0.5,) * 3), 1.0, (1 / 6,) * 3, (0.0, 0.0, 0.5, *UPRIGHT))

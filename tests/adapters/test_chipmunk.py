@@ -128,7 +128,7 @@ def test_a_mass_whose_inverse_overflows_is_refused() -> None:
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
 @pytest.mark.parametrize("e", [0.0, 0.2, 0.37, 0.8, 1.0])
 @pytest.mark.parametrize("v", [0.1, 6.0, 100.0])
-def test_a_single_contact_rebounds_with_exactly_minus_e_v(profile: str, dt: float, e: float, v: float) -> None:
+def test_exact_rebound_of_a_single_contact(profile: str, dt: float, e: float, v: float) -> None:
     gap = 3.4 * v * dt  # the contact falls inside the fourth step
     ball = Body("ball", Disc(0.5), 0.5, 0.0625, (0.0, 0.5 + gap, 0.0), (0.0, -v, 0.0))
     trajectory = drive(make(FLOOR, ball, e=e, T=8.0 * dt), profile, dt)
@@ -198,7 +198,7 @@ def test_a_body_without_friction_among_others_gets_none() -> None:
     assert found is not None and found[1] == 0.0 and found[0] * found[2] == 0.5
 
 
-def test_a_table_no_product_represents_is_refused_with_its_reason() -> None:
+def test_refusal_of_a_table_that_no_product_represents() -> None:
     bodies = (FLOOR, unit_box("a", 0.0, 0.5), unit_box("b", 0.0, 1.5))
     scene = make(*bodies, mu=0.5, gravity=(0.0, -9.81), pairs=(Pair("a", "b", friction=0.0),))  # all can meet
     reason = ENGINE.refuses(scene, "default")
@@ -277,7 +277,7 @@ def test_a_prescribed_body_keeps_its_motion_and_pushes(profile: str) -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_a_resting_box_carries_its_weight_on_two_points(profile: str) -> None:
+def test_weight_of_a_resting_box_on_two_points(profile: str) -> None:
     trajectory = drive(make(FLOOR, unit_box("box", 0.0, 0.5), mu=0.5, gravity=(0.0, -9.81), T=1.0), profile)
     assert trajectory.contacts is not None
     last = trajectory.contacts.offset[-2]
@@ -322,7 +322,7 @@ def test_tuned_column_starting_overlap_within_the_slop() -> None:
     assert drive(column(5)).initial_change == ()
 
 
-def test_the_tuned_column_carries_its_weight_from_the_start() -> None:
+def test_weight_of_a_tuned_column_from_the_start() -> None:
     trajectory = drive(column(5), "tuned")
     assert trajectory.contacts is not None
     load = trajectory.contacts.impulse_between(0, 1)[-60:, 1] / (5.0 * 9.81 * DT)
@@ -333,7 +333,7 @@ def test_the_tuned_column_carries_its_weight_from_the_start() -> None:
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.3, -0.8])
-def test_a_box_on_an_incline_sinks_along_the_floors_normal(theta: float) -> None:
+def test_box_that_sinks_on_an_incline(theta: float) -> None:
     n = np.array([-math.sin(theta), math.cos(theta)])
     floor = Body("floor", HalfSpace((float(n[0]), float(n[1])), 0.0), motion="fixed")
     box = unit_box("box", *map(float, 0.5 * n), theta)

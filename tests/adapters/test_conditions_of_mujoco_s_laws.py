@@ -222,7 +222,7 @@ def test_slide_told_over_its_second_half_until_blurred(monkeypatch, metric, colu
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_column_is_recorded_as_the_step_loop_does(dimension):
+def test_record_of_a_column_against_the_step_loop(dimension):
     scene, d = scene_of(dimension, ball_of(dimension)), dimension
     rows = np.array([[[0.5], [0.0], [0.0]], [[0.375], [-8.0], [0.0]], [[0.25], [-8.0], [3.0]]])
     found = motions.as_trajectory(scene, DT, rows)

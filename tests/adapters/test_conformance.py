@@ -41,7 +41,7 @@ def test_conformance_of_an_engine_that_refuses_every_scene(toy_class):
     assert passed == {"packages", "facts", "profiles"}
 
 
-def test_items_are_one_per_check_and_fail_with_the_finding(toy):
+def test_items_of_checks_with_their_findings(toy):
     healthy, spoilt = items(toy()), items(toy("start displaced"))
     assert [str(item) for item in healthy] == [*CHECKS, "receipt probes", *(f"receipt {q}" for q in QUANTITIES)]
     by_name = {item.name: item for item in spoilt}
@@ -98,7 +98,7 @@ def test_failure_expected_in_one_profile_only():
 
 
 @pytest.mark.usefixtures("worlds_in_time")
-def test_the_healthy_toy_conforms_and_every_check_is_told(toy):
+def test_conforming_toy_with_every_check(toy):
     findings = check_adapter(toy())
     assert [str(finding) for finding in findings if not finding.holds] == []
     assert [finding.check for finding in findings] == [*CHECKS, *(f"receipt {q}" for q in QUANTITIES)]

@@ -47,14 +47,14 @@ def test_friction_cone_shipped_as_a_pyramid_and_exact_otherwise(profile, share):
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_a_rebound_is_short_by_the_compliance_of_a_contact(profile):
+def test_rebound_short_by_compliance(profile):
     ball = Body("ball", Sphere(0.5), 1.0, (0.1, 0.1, 0.1), (0.0, 0.0, 0.52, 1, 0, 0, 0), (0.0, 0.0, -2.0, 0, 0, 0))
     found = drive(Scene("blow", 1, 3, (FLOOR, ball), (Pair(restitution=0.8),), (0.0, 0.0, 0.0), 0.1), profile)
     assert found.twist[-1, 1, 2] / 2.0 == pytest.approx(restitution(0.8, 2.0), abs=1e-9)
     assert restitution(0.8, 2.0) == pytest.approx(0.799982, abs=1e-9)
 
 
-def test_loads_act_in_every_step_and_contacts_carry_the_weight():
+def test_loads_and_weight_in_every_step():
     still = replace(sliding(), pairs=(Pair(),))
     pushed = replace(still, bodies=(FLOOR, replace(still.bodies[1], twist=(), force=(3.0, 0.0, 0.0))))
     found = drive(pushed)

@@ -88,7 +88,7 @@ def test_separation_speed_of_overlapping_balls_by_the_law(params, dimension, pro
     assert abs(found["thrown"][0] - said) <= band < 1e-3 * said
 
 
-def test_a_point_of_contact_lies_half_way_into_the_overlap():
+def test_point_of_contact_in_an_overlap():
     """SAP's regularisation knows the arm of the point: at the surface it would be 1.2e-3 of the rebound off."""
     impact = CATALOGUE["impact"]
     scene = impact.scene(3, {"e": 0.0})
@@ -156,7 +156,7 @@ def test_sliding_edge_braked_by_the_slant_of_a_compliant_face(params, changes):
     assert found == pytest.approx(told, rel=0.02) and abs(true / told - 1.0) > 0.25
 
 
-def test_loads_act_in_every_step_and_contacts_carry_the_weight():
+def test_loads_and_weight_in_every_step():
     pushed = replace(resting(0.0, force=(3.0, 0.0, 0.0)), pairs=(Pair(),))
     found = drive(pushed, "tamsi")
     assert found.twist[-1, 1, 0] == pytest.approx(0.25, rel=1e-6)

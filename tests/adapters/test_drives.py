@@ -190,7 +190,7 @@ def test_adapter_without_declared_abilities():
     assert posed_for(engine, scene(floor(), box(), 0.3)).bodies[0].motion == "fixed"
 
 
-def test_velocity_of_a_course_adds_up_to_its_path():
+def test_path_of_a_course_by_its_velocity():
     body = Body(
         "b", Sphere(1.0), motion="prescribed", twist=(0.1, 0, 0, 0, 0, 0), course=Harmonic((0.0, 2.0, 0.0), 3.0, 1.0)
     )
@@ -202,7 +202,7 @@ def test_velocity_of_a_course_adds_up_to_its_path():
 
 
 @pytest.mark.parametrize("course", [None, Harmonic((0.0, 2.0, 0.5), 3.0, 1.0)])
-def test_a_prescribed_body_is_where_its_velocities_have_taken_it(course):
+def test_place_of_a_prescribed_body_by_its_velocities(course):
     body = Body(
         "b", Sphere(1.0), motion="prescribed", pose=(1.0, 2.0, 3.0, 1.0, 0, 0, 0), twist=(0.1, 0, -1.0, 0, 0, 0)
     )

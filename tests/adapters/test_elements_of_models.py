@@ -37,7 +37,7 @@ def test_line_text_and_children_of_an_element():
     assert str(Element("geom", {"name": "geom@7"}, 7)) == "line 7: <geom>", "a name that we gave is none"
 
 
-def test_a_tree_written_is_read_back_with_its_lines():
+def test_written_tree_read_again():
     text = '<mujoco>\n\n <body name="&lt;&quot;x&quot;&gt;">a  &lt; b<geom/>\n<geom/></body></mujoco>'
     root = read(text)
     again = read(text_of(root))

@@ -24,7 +24,7 @@ def test_experiment_file_with_parts_missing(read):
     assert read('[belongs]\na = "b"\n') == Tuning(belongs={"a": "b"})
 
 
-def test_values_are_read_in_their_order_and_with_their_kinds(read):
+def test_order_and_kinds_of_values_read(read):
     found = read(
         '[candidates]\nslop = [0.1, 1]\nref = ["none", [0.5, 1.0]]\ncone = ["a", "b"]\non = [false, true]\n'
         + CURED.replace("[{}]", "[{}, { n = 10, e = 0.5 }]")

@@ -16,7 +16,7 @@ def test_packages_of_an_extra_on_this_system(monkeypatch):
     assert extras.install("two") == "pip install 'a<2,>=1' 'b>=1'"
 
 
-def test_without_metadata_the_hint_is_the_way_of_a_checkout(monkeypatch):
+def test_hint_without_metadata(monkeypatch):
     def missing():
         raise PackageNotFoundError(extras.PROJECT)
 

@@ -38,7 +38,7 @@ def slip(speed, spin):
 @pytest.mark.parametrize(
     ("speed", "spin"), [((3.0, 0.0), (0.0, 0.0)), ((2.0, 2.0), (0.0, 0.0)), ((2.0, 0.0), (4.0, 0.0))]
 )
-def test_friction_of_small_steps_is_a_cone_against_the_slip(speed, spin):
+def test_friction_cone_of_small_steps(speed, spin):
     along = slip(speed, spin) / np.linalg.norm(slip(speed, spin))
     assert pushed("tgs", speed, spin) == pytest.approx(-along, abs=2e-3)
 
@@ -59,7 +59,7 @@ def test_gauss_seidel_friction_pyramid_along_the_centre_s_path():
 
 
 @pytest.mark.parametrize("changes", [{}, {"iterations": 255}, {"contact_offset": 1e-4}], ids=str)
-def test_gauss_seidel_holds_a_ladder_that_small_steps_let_slide(changes):
+def test_ladder_with_gauss_seidel_and_small_steps(changes):
     held = measured("ladder", "pgs", params={"ratio": 0.8}, **changes)
     slid = measured("ladder", "pgs", params={"ratio": 0.8}, solver="tgs", **changes)
     assert held["passing_time"] is None

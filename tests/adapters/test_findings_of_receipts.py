@@ -35,7 +35,7 @@ def measured(monkeypatch):
     return made
 
 
-def test_every_profile_is_asked_for_all_needs_at_both_steps(measured):
+def test_needs_and_steps_asked_of_every_profile(measured):
     asked = measured(lambda *of: {})
     engine = Listening()
     findings = receipt_findings(engine)

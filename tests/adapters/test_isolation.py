@@ -278,7 +278,7 @@ def test_last_lines_of_a_child_s_long_output_kept(child):
     assert child.tail() == "to the other stream, and the last words"
 
 
-def test_wait_for_a_child_ends_on_answer_output_or_exit(child):
+def test_end_of_the_wait_for_a_child(child):
     assert asked(child, "answer(1)") == "1"  # it has begun
     assert not wait(child.sentinels, 0.0) and not child.has_answer()
     child.send(b"answer(2)")
@@ -293,7 +293,7 @@ def test_wait_for_a_child_ends_on_answer_output_or_exit(child):
     assert wait(child.sentinels, PATIENCE) and within(PATIENCE, child.ended)
 
 
-def test_child_has_its_own_session_without_input_or_interrupts(child):
+def test_session_of_a_child(child):
     session, waiting = asked(child, "answer(os.getsid(0), repr(sys.stdin.read() if sys.stdin else ''))").split()
     assert int(session) != os.getsid(0) and waiting == "''"
     assert asked(child, "os.kill(os.getpid(), signal.SIGINT); answer('goes on')") == "goes on"

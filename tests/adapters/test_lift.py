@@ -50,7 +50,7 @@ def test_a_body_point_lands_where_the_plane_says() -> None:
     assert np.allclose(point, [2.0 + c * 0.5 - s * 0.2, 0.0, 3.0 + s * 0.5 + c * 0.2], atol=1e-15)
 
 
-def test_a_counter_clockwise_spin_moves_points_as_in_the_plane() -> None:
+def test_lifted_counter_clockwise_spin() -> None:
     lifted = lift(planar_scene((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))).bodies[1]
     arm = np.array([0.5, 0.0, 0.0])
     assert np.allclose(np.cross(lifted.twist[3:], arm), [0.0, 0.0, 1.0])  # a point to the right goes up

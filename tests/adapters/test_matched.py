@@ -108,7 +108,7 @@ def test_two_balls_keep_momentum_and_e(ratio: float) -> None:
     assert abs(v[0] + ratio * v[1] - (2.0 - ratio)) <= ROUND_OFF * (2.0 + ratio)
 
 
-def test_each_pair_has_its_own_restitution_whichever_geom_comes_first() -> None:
+def test_restitution_of_each_pair_in_either_order() -> None:
     """A sphere's geom stands before a box's in a contact, whatever their bodies' order."""
     box = Body("box", Box((0.5, 0.5, 0.5)), 1.0, (1 / 6,) * 3, (0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0), motion="fixed")
     up = ball("up", 0.0, 0.0, 3.98, v=(0.0, 0.0, 2.0))
@@ -160,7 +160,7 @@ def test_box_stopping_distance_by_coulomb_in_any_heading(mu: float, heading: flo
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.5, 1.0])
-def test_stick_below_mu_and_slide_above_within_a_thousandth(mu: float) -> None:
+def test_friction_limit_within_a_thousandth(mu: float) -> None:
     for ratio in (0.999, 1.001):
         lean = math.atan(ratio * mu)
         scene = scene_of(FLOOR, slab(), mu=mu, g=(G * math.sin(lean), 0.0, -G * math.cos(lean)), T=1.0)
@@ -278,7 +278,7 @@ def test_bits_of_many_steps_at_once() -> None:
     assert np.array_equal(at_once.pose(), singly.pose()) and np.array_equal(at_once.twist(), singly.twist())
 
 
-def test_planar_scenes_run_lifted_and_stay_in_their_plane() -> None:
+def test_lifted_planar_scenes_in_their_plane() -> None:
     flat = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed")
     disc = Body("disc", Disc(0.5), 1.0, 0.125, (0.0, 0.6, 0.0), (3.0, -1.0, 2.0))
     scene = Scene("test", 1, 2, (flat, disc), (Pair(restitution=0.5, friction=0.3),), (0.0, -G), 0.5)

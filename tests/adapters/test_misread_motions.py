@@ -66,7 +66,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("fault", REPORTED)
-def test_fault_of_a_given_size_changes_only_its_quantity(fault):
+def test_quantity_changed_by_a_fault(fault):
     told = dict(zip(("pose", "twist", "impulse", "after"), misread(fault), strict=True))
     healthy = {"pose": END, "twist": V, "impulse": IMPULSE, "after": np.zeros((0, 2))}
     for name, value in (healthy | WRONG[fault]).items():

@@ -38,13 +38,13 @@ def model_of(body, head="", after=""):
 BALL = '<body name="ball" pos="0 0 1"><freejoint/><geom type="sphere" size=".1"/></body>'
 
 
-def test_there_are_thirty_models_of_which_twenty_are_read():
+def test_number_of_models_read():
     assert len(READ) >= 20 and len(READ) + len(REFUSED) >= 30
     assert {path.stem for path in MODELS.glob("refused*.xml")} == set(REFUSED)
 
 
 @pytest.mark.parametrize("path", READ, ids=lambda path: path.stem)
-def test_a_model_moves_as_mujoco_moves_its_own_file(path):
+def test_motion_of_a_model_against_mujoco(path):
     """Profile `model` against the file itself: places and speeds after 40 steps, contacts made and broken.
 
     The bound is round-off that contacts of stiffness 1/dt^2 amplify, 1e-9 of the motion, far below any softness.
@@ -154,7 +154,7 @@ def test_nan_value_and_invalid_step_refused(old, new, said):
         assert said == "" and found.dt == 0.002
 
 
-def test_the_compiler_s_complaint_names_the_line_of_the_text():
+def test_line_in_the_compiler_s_complaint():
     with pytest.raises(SceneError, match=r"does not compile it: .*'sise'.* line 4"):
         reading.read(model_of("\n\n" + BALL.replace("<geom", "\n<geom").replace("size=", "\nsise=")), False)
 

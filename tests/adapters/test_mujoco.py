@@ -101,7 +101,7 @@ def test_default_is_what_a_fresh_spec_holds() -> None:
     assert option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and chosen["cone"] == "pyramidal"
 
 
-def test_tuned_follows_the_needs_and_every_setting_has_a_reason() -> None:
+def test_needs_and_reasons_of_tuned_settings() -> None:
     down = (0.0, 0.0, -G)
     free = settings(make(ball("ball", 1.0)), "tuned")
     smooth = settings(make(FLOOR, ball("ball", 1.0), e=0.5, g=down), "tuned")
@@ -225,7 +225,7 @@ def test_default_rebounds_as_measured() -> None:
     assert min(at_240) == pytest.approx(0.09, abs=0.01) and max(at_240) == pytest.approx(0.145, abs=0.01)
 
 
-def test_tuned_sticking_oblique_impact_keeps_e_and_stops_the_slip() -> None:
+def test_tuned_oblique_impact_that_sticks() -> None:
     spin = {"twist": (0.3, 0.0, -2.0, 0.0, 0.0, 0.0)}
     scene = make(FLOOR, ball("ball", 0.5 + 0.0104, **spin), e=0.5, mu=0.5, T=0.05)
     v = drive(scene, "tuned").twist[-1, 1]
@@ -253,7 +253,7 @@ def test_impulses_against_the_momentum_of_the_higher_body(profile: str, floor_fi
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_resting_box_is_carried_by_its_weight_times_dt(profile: str) -> None:
+def test_impulse_on_a_resting_box(profile: str) -> None:
     trajectory = drive(make(FLOOR, cube("box", 0.5), mu=0.5, g=(0.0, 0.0, -G), T=1.0), profile)
     assert trajectory.contacts is not None
     last = trajectory.contacts.impulse_between(0, 1)[-1]
@@ -286,7 +286,7 @@ def test_planar_torque_above_zero_turns_counter_clockwise() -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_box_landing_on_a_corner_turns_towards_its_face(profile: str) -> None:
+def test_turn_of_a_box_landing_on_a_corner(profile: str) -> None:
     for tilt in (0.3, -0.3):
         height = 0.5 * (math.cos(tilt) + abs(math.sin(tilt))) + 0.002
         box = Body("box", Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.0, height, tilt), (0.0, -1.0, 0.0))
@@ -361,7 +361,7 @@ def test_tuned_conserves_the_energy_of_a_tumbling_body() -> None:
 @pytest.mark.parametrize(
     "normal", [(0.6, 0.0, 0.8), (0.0, -0.6, 0.8), (0.48, 0.36, -0.8), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)]
 )
-def test_half_space_lies_where_its_normal_and_offset_say(normal: tuple[float, ...]) -> None:
+def test_place_of_a_half_space(normal: tuple[float, ...]) -> None:
     n = np.array(normal)
     start, velocity = (0.3 + 0.5 + 0.01) * n + np.cross(n, [0.2, 0.5, 0.1]), -2.0 * n
     wall = Body("wall", HalfSpace(normal, 0.3), motion="fixed")
@@ -374,7 +374,7 @@ def test_half_space_lies_where_its_normal_and_offset_say(normal: tuple[float, ..
     assert trajectory.contacts.rows.normal[0] == pytest.approx(n, abs=1e-12)
 
 
-def test_fixed_boxes_are_obstacles_and_stay_where_they_are() -> None:
+def test_fixed_boxes_as_obstacles() -> None:
     post = cube("post", 0.5, motion="fixed")
     trajectory = drive(make(post, ball("ball", 1.51, -1.0), e=1.0, T=0.1), "tuned")
     assert trajectory.twist[-1, 1, 2] == pytest.approx(1.0, abs=ROUND_OFF)
@@ -452,7 +452,7 @@ def test_readback_equals_what_was_asked() -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.9, 0.99, 0.999])
-def test_tuned_sticks_up_to_the_edge_of_the_cone(ratio: float) -> None:
+def test_tuned_friction_at_the_edge_of_the_cone(ratio: float) -> None:
     theta = math.atan(0.5 * ratio)
     scene = make(FLOOR, cube("box", 0.5), mu=0.5, g=(G * math.sin(theta), 0.0, -G * math.cos(theta)), T=1.0)
     trajectory = drive(scene, "tuned")
@@ -460,7 +460,7 @@ def test_tuned_sticks_up_to_the_edge_of_the_cone(ratio: float) -> None:
     assert 0.0 <= creep <= 2e-7
 
 
-def test_tuned_stack_carries_its_weight_and_does_not_sink() -> None:
+def test_weight_and_sinking_of_a_tuned_stack() -> None:
     boxes = [cube(f"box{k}", k + 0.5) for k in range(10)]
     trajectory = drive(make(FLOOR, *boxes, mu=0.5, g=(0.0, 0.0, -G), T=1.0), "tuned")
     assert trajectory.contacts is not None
@@ -481,7 +481,7 @@ def test_two_builds_give_the_same_bits(profile: str) -> None:
     assert drive(scene, profile).state_hash() == drive(scene, profile).state_hash()
 
 
-def test_silent_divergence_of_a_state_that_is_not_finite(tmp_path, monkeypatch, capfd) -> None:
+def test_silent_divergence_of_an_infinite_state(tmp_path, monkeypatch, capfd) -> None:
     monkeypatch.chdir(tmp_path)
     scene = make(ball("ball", 1.0, 1.0, 1e-9, force=(1e300, 0.0, 0.0)), T=0.1)
     trajectory = drive(scene, "default")
@@ -654,7 +654,7 @@ def test_forces_beside_a_prescribed_body_match_momentum(profile, mass, speed):
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 @pytest.mark.parametrize(("mu", "condim"), [(0.5, 3), (0.0, 3), (0.0, 1)])
-def test_forces_of_contacts_are_bit_for_bit_those_of_mujoco(cone: str, mu: float, condim: int) -> None:
+def test_bits_of_contact_forces_against_mujoco(cone: str, mu: float, condim: int) -> None:
     """A tilted cube that lands beside one that slides, so that the number of contacts changes."""
     import mujoco
 

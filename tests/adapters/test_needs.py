@@ -56,7 +56,7 @@ def test_need_of_a_force_without_gravity():
         (ball(shape=Box((0.25, 0.25))), Pair(), True),
     ],
 )
-def test_a_box_friction_spin_or_torque_can_turn_a_body(body, pair, turns):
+def test_causes_that_turn_a_body(body, pair, turns):
     assert needs(scene(FLOOR, body, pair=pair)).rotation is turns
     fixed = Body("wall", Box((0.25, 0.25)), motion="fixed", pose=(9.0, 9.0, 0.0))
     assert needs(scene(FLOOR, fixed, ball(), pair=Pair())).rotation is False
@@ -68,7 +68,7 @@ def test_a_box_friction_spin_or_torque_can_turn_a_body(body, pair, turns):
      ((0.0, 0.0), (0.0, 1.0), 0.0, "rest"), ((0.0, 0.0), (0.0, 0.0), 0.0, "impact"),
      ((0.0, -8.0), (0.0, 0.0), 0.5, "impact")],
 )  # fmt: skip
-def test_bodies_at_rest_under_a_load_do_not_rebound(gravity, force, e, regime):
+def test_rebound_need_of_bodies_at_rest_under_a_load(gravity, force, e, regime):
     assert needs(scene(FLOOR, ball(force=force), pair=Pair(restitution=e), gravity=gravity)).regime == regime
 
 

@@ -55,7 +55,7 @@ def test_shipped_numbers_equal_to_the_engine_s_own():
 
 
 @pytest.mark.parametrize("name", ["incline", "bounce"])
-def test_replayed_step_has_the_bits_of_a_launched_one(name):
+def test_bits_of_a_replayed_step(name):
     scene = posed_for(ENGINE, CATALOGUE[name].scene(3, {}))
     replayed, launched = (ENGINE.build(scene, DT, settings(scene)) for _ in range(2))
     replayed.advance(200)
@@ -83,7 +83,7 @@ def test_settings_in_the_model_and_its_solver():
 
 
 @pytest.mark.parametrize("profile", ENGINE.profiles)
-def test_contacts_carry_the_weight_and_are_where_bodies_touch(profile):
+def test_weight_and_place_of_contacts(profile):
     found = drive(resting(), profile)
     assert found.contacts.impulse_between(0, 1)[-20:, 2].mean() / DT == pytest.approx(3.0 * 9.81, rel=2e-2)
     assert abs(found.contacts.rows.point[:, 2]).max() < 1e-3 and (found.contacts.rows.normal[:, 2] == 1.0).all()

@@ -150,7 +150,7 @@ def test_a_prescribed_body_follows_its_course_and_turns():
 @pytest.mark.parametrize(
     "normal", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0.6, 0.0, 0.8), (-0.36, 0.48, 0.8)]
 )
-def test_planes_look_where_half_spaces_do_and_exactly_along_axes(normal):
+def test_sides_of_planes_along_axes(normal):
     w, x, y, z = turn_to(tuple(map(float, normal)))
     looked = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
     assert looked == pytest.approx(normal, abs=1e-15)

@@ -220,7 +220,7 @@ def test_written_program_conforms_and_runs_in_workers(written):
      ("while True: pass", Outcome.TIMED_OUT, "no answer after 5 s"),
      ("world.x = 'x' * 10**10", Outcome.CRASHED, "step: the process ended with exit code 1: MemoryError")],
 )  # fmt: skip
-def test_program_that_fails_in_a_worker_costs_one_case(written, fault, outcome, said):
+def test_failing_program_in_a_worker(written, fault, outcome, said):
     program = written("piped", "Piped") / "engine.py"
     program.write_text(program.read_text().replace("            world.step()", f"            {fault}"))
     slots = [Slot("impact", (("e", e),), 2, "piped", "plain", 1 / 240) for e in (0.5, 0.7)]

@@ -56,7 +56,7 @@ def told(monkeypatch, faults, *args):
     return CliRunner().invoke(main, ["check-adapter", "--self-test", *args])
 
 
-def test_the_self_test_is_a_command_that_tells_every_row(monkeypatch):
+def test_rows_of_the_self_test_command(monkeypatch):
     few = {name: FAULTS[name] for name in ("states", "nothing read back", "start displaced") if name in FAULTS}
     done = told(monkeypatch, few, "--json")
     rows = json.loads(done.output)
@@ -112,7 +112,7 @@ def test_property_checks_of_an_engine_without_faults(toy, dt):
         assert [slip for slip in receipts(engine, "default", needs, dt) if not slip.holds] == []
 
 
-def test_a_twirl_turns_spatial_poses_as_the_lift_lowers_them():
+def test_twirl_of_spatial_poses():
     """A turn from x towards the vertical, whatever the pose was before."""
     half = 0.3
     pose = np.array([[1.0, 0.0, 2.0, math.cos(half), 0.0, -math.sin(half), 0.0]])

@@ -67,7 +67,7 @@ def test_settings_in_the_world(changes):
     assert {name: held[name] for name in changes} == changes
 
 
-def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
+def test_limit_of_speed_by_profile():
     box = replace(resting().bodies[1], twist=(500.0, 0.0, 0.0, 0.0, 0.0, 0.0), pose=(0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0))
     fast = replace(resting(), bodies=(FLOOR, box), gravity=(0.0, 0.0, 0.0), duration=5 * DT)
     assert drive(fast).twist[-1, 1, 0] == pytest.approx(400.0, rel=1e-6)
@@ -76,7 +76,7 @@ def test_speed_has_a_limit_as_shipped_and_none_in_tuned():
 
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000, 1 / 2000])
-def test_spin_round_off_in_small_steps_breaks_no_measurement(profile, dt):
+def test_spin_round_off_in_small_steps(profile, dt):
     slips = receipts(ENGINE, profile, needs(resting()), dt)
     assert [slip.quantity for slip in slips if not slip.holds] == []
     (spin,) = (slip for slip in slips if slip.quantity == "angular_damping")

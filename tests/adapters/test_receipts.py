@@ -152,7 +152,7 @@ def test_declared_drag_widens_only_what_it_slows():
     assert 1e-3 < slips["gravity"].band < 1e-2
 
 
-def test_a_quantity_that_no_probe_measures_cannot_be_declared():
+def test_refusal_of_a_quantity_without_a_probe():
     with pytest.raises(EngineError, match="declares 'viscosity'"):
         receipts(declaring(viscosity=Declared(1.0, 0.1)), "default", IMPACT, DT)
 
@@ -575,7 +575,7 @@ def test_stiff_friction_pyramid_forces_to_round_off(friction, dt):
     assert told["impulse"].holds and told["impulse"].band <= 0.01
 
 
-def test_settings_may_be_lists_of_lists_but_no_tables(toy_class):
+def test_settings_as_lists_of_lists(toy_class):
     class Listing(toy_class):
         @property
         def profiles(self):

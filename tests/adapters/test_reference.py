@@ -65,7 +65,7 @@ profiles = pytest.mark.parametrize("profile", PROFILES)
 @both
 @profiles
 @pytest.mark.parametrize(("e", "v"), [(0.0, 6.0), (0.2, 0.1), (0.8, 6.0), (1.0, 50.0)])
-def test_a_single_contact_rebounds_with_exactly_minus_e_v(dimension: int, profile: str, e: float, v: float) -> None:
+def test_exact_rebound_of_a_single_contact(dimension: int, profile: str, e: float, v: float) -> None:
     ball = body("ball", dimension, (0.0, 0.5 + 3.4 * v * DT), (0.0, -v))
     trajectory = drive(make(floor(dimension), ball, e=e, T=8 * DT), profile)
     up = dimension - 1
@@ -238,7 +238,7 @@ def test_both_ends_of_the_tolerance_certified(tolerance: float) -> None:
 
 
 @pytest.mark.parametrize(("spins", "others"), [((0.0, 0.0, 0.0), 0), ((2.0, 0.01, 1.0), 2)])
-def test_other_tolerances_where_a_step_was_made_to_one(spins: tuple[float, ...], others: int) -> None:
+def test_tolerance_of_a_step(spins: tuple[float, ...], others: int) -> None:
     """A brick that flies without a spin is in closed form; one that tumbles is not, and differs a little."""
     brick = body("brick", 3, (0.0, 0.0), box=True, inertia=(0.1, 0.2, 0.3))
     scene = make(replace(brick, twist=(0.0, 0.0, 0.0, *spins)), T=1.0)
@@ -308,7 +308,7 @@ def test_two_builds_give_the_same_bits(dimension: int, profile: str) -> None:
     assert first.contacts.rows.impulse.tobytes() == second.contacts.rows.impulse.tobytes()
 
 
-def test_the_version_names_the_package_and_the_solvers_sources() -> None:
+def test_version_of_package_and_solver_sources() -> None:
     package, _, sources = ENGINE.version().partition("+")
     assert package and len(sources) == 8 and int(sources, 16) >= 0
     assert ENGINE.version() == ENGINE.version()

@@ -207,7 +207,7 @@ def test_required_engines_that_are_missing_named_with_reasons(plugins, monkeypat
     assert "healthy" not in str(caught.value)
 
 
-def test_a_run_and_the_tests_fail_without_a_required_engine(monkeypatch, tmp_path):
+def test_failure_without_a_required_engine(monkeypatch, tmp_path):
     monkeypatch.setenv(registry.REQUIRED, "havok")
     for command in (
         [sys.executable, "-m", "reports.command", "run", "impact", "--dry-run", "--out", str(tmp_path)],

@@ -18,7 +18,7 @@ WITH_RELEASES = ["chipmunk", "bullet", "mujoco"]
 
 
 @pytest.mark.parametrize("name", WITH_RELEASES)
-def test_the_installed_release_is_one_that_the_adapter_knows(name):
+def test_known_installed_release(name):
     if name == "bullet":
         pytest.importorskip("pybullet", reason="pybullet has no wheel for this Python")
     releases = registry.adapter(name).releases
@@ -103,7 +103,7 @@ def test_reset_state_refused_where_resets_cannot_be_disabled():
 @pytest.mark.parametrize(
     ("release", "own"), [("3.0.0", 1.0), ("3.4.0", 1.0), ("3.5.0", 0.5), ("3.10.1", 0.5), ("4.0.1", 0.5)]
 )
-def test_the_margin_of_two_geoms_makes_that_of_their_contact(release, own):
+def test_margin_of_two_geoms(release, own):
     """Their sum since 3.5.0, the larger of the two before."""
     from adapters.mujoco.releases import geom_margin
 
@@ -198,7 +198,7 @@ def test_dart_world_without_deactivation_unchanged():
     assert splits_impulses(world.getConstraintSolver()) is False
 
 
-def test_a_dart_world_that_deactivates_bodies_is_kept_awake():
+def test_dart_world_kept_awake():
     from adapters.dart.releases import keep_awake, may_sleep
 
     options = SimpleNamespace(mEnabled=True)

@@ -23,7 +23,7 @@ def test_box2d_strike_of_a_rod_at_half_the_overlap(params, delay):
 @pytest.mark.optional("box2d3")
 @pytest.mark.parametrize("profile", ["default", "tuned"])
 @pytest.mark.parametrize("params", [{"e": 0.8}, {"e": 0.5, "mu": 0.1}])
-def test_a_rebound_of_box2d3_comes_last_and_without_friction(profile, params):
+def test_rebound_of_box2d3_without_friction(profile, params):
     """One that is faster turns the rod and lifts it, and leaves it as fast along the floor, unlike the textbook's."""
     x, _, square, p = end_of(params)
     slower = params | {"e": 0.1}

@@ -147,7 +147,7 @@ def test_empty_pose_twist_and_loads_as_rest_at_the_origin() -> None:
     assert cube.pose == (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
-def test_the_most_specific_pair_wins_in_any_order_of_names() -> None:
+def test_most_specific_pair_in_any_order() -> None:
     pairs = (Pair(friction=0.1), Pair("ball", "*", friction=0.2), Pair("floor", "ball", friction=0.3))
     made = scene(FLOOR, BALL, replace(BALL, name="other"), pairs=pairs)
     assert made.material("ball", "floor").friction == made.material("floor", "ball").friction == 0.3
@@ -160,7 +160,7 @@ def test_a_scene_without_pairs_is_smooth_and_plastic() -> None:
     assert (made.material("floor", "ball").restitution, made.material("floor", "ball").friction) == (0.0, 0.0)
 
 
-def test_pairs_that_can_meet_have_at_least_one_free_body() -> None:
+def test_free_body_in_pairs_that_can_meet() -> None:
     wall = replace(FLOOR, name="wall")
     pushed = replace(BALL, name="pushed", motion="prescribed")
     made = scene(FLOOR, wall, BALL, pushed)
@@ -206,7 +206,7 @@ def test_labels_do_not_change_the_hash() -> None:
     assert scene(params={"height": 3.0}).hash() == scene().hash()
 
 
-def test_a_scene_cannot_be_changed_after_it_was_validated() -> None:
+def test_change_of_a_validated_scene() -> None:
     with pytest.raises(AttributeError):
         scene().duration = 2.0  # type: ignore[misc]
 

@@ -128,7 +128,7 @@ def test_cylinders_and_capsules_lie_along_their_bodies_first_axis():
 
 
 @pytest.mark.parametrize("path", READ, ids=lambda path: path.name)
-def test_a_model_moves_as_drake_moves_its_own_file(path):
+def test_motion_of_a_model_against_drake(path):
     """Profile `model` against the file itself in Drake alone, gravity aside, which Drake does not read.
 
     The bound is round-off that springs amplify, as for models of MuJoCo: far below any softness.
@@ -289,7 +289,7 @@ def test_model_read_in_another_process():
     assert read_apart("drake", ".sdf", text, False) == read(text, False)
 
 
-def test_a_world_runs_as_made_on_drake_and_rigid_elsewhere(tmp_path):
+def test_compliant_world_on_drake_and_elsewhere(tmp_path):
     pytest.importorskip("mujoco")
     words = ["--engine", "drake", "--engine", "mujoco", "--profile", "model", "--profile", "default", "--jobs", "1"]
     words += ["--param", "duration=0.2", "--out", str(tmp_path), "--json"]

@@ -44,14 +44,14 @@ def test_refusal_of_a_wrong_value_by_setting_and_allowed_values(name, value, wan
     assert str(refused.value) == f"{name}: {value!r} must be {wanted}"
 
 
-def test_a_setting_that_is_unknown_or_missing_is_named():
+def test_refusal_of_an_unknown_or_missing_setting():
     with pytest.raises(EngineError, match=r"^sweeps: toy has no such setting, it has iterations, skin, warm, solver$"):
         checked("toy", KINDS, GOOD | {"sweeps": 3})
     with pytest.raises(EngineError, match=r"^skin: this setting is missing$"):
         checked("toy", KINDS, {name: value for name, value in GOOD.items() if name != "skin"})
 
 
-def test_a_step_is_a_positive_finite_number_of_seconds():
+def test_range_of_a_step():
     assert checked_step(1 / 240) == 1 / 240 and checked_step(5e-324) == 5e-324
     for dt in (0.0, -1 / 240, math.nan, math.inf):
         with pytest.raises(EngineError, match=r"^dt: .* must be a positive, finite number of seconds$"):

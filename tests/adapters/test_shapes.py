@@ -62,7 +62,7 @@ def made(engine, profile, asked, **switched):
 
 
 @pytest.mark.parametrize(("engine", "profile"), PLANAR)
-def test_a_rectangle_as_a_polygon_slides_as_the_box_does(engine, profile):
+def test_slide_of_a_rectangle_as_a_polygon(engine, profile):
     box, polygon = (
         made(engine, profile, planar(shape, 1.25 / 12.0, 0.25, (1.0, 0.0, 0.0))) for shape in (Box(HALF), RECTANGLE)
     )
@@ -73,7 +73,7 @@ def test_a_rectangle_as_a_polygon_slides_as_the_box_does(engine, profile):
 
 
 @pytest.mark.parametrize(("engine", "profile"), PLANAR)
-def test_a_triangle_rebounds_flat_and_slides_to_its_stop(engine, profile):
+def test_rebound_and_slide_of_a_triangle(engine, profile):
     height = math.sqrt(3.0) / 6.0
     flat = planar(TRIANGLE, 1.0 / 12.0, height + 0.05, (0.0, -1.0, 0.0), mu=0.0, e=0.5, duration=0.2, gravity=0.0)
     found = made(engine, profile, flat)
@@ -176,7 +176,7 @@ def test_invalid_spatial_shape_refused_by_its_field(shape, said):
         spatial(shape, (1.0, 1.0, 1.0), 1.0)
 
 
-def test_shapes_come_back_from_plain_data_with_their_hash():
+def test_shapes_from_plain_data():
     for asked in (
         planar(RECTANGLE, 1.0, 1.0),
         spatial(BRICK, (1.0,) * 3, 1.0),
@@ -233,7 +233,7 @@ def test_polygons_double_winding_star_and_64_corners():
     ],
     ids=str,
 )
-def test_a_shape_is_refused_by_the_name_of_its_field(shape, said):
+def test_refusal_of_a_shape_by_field(shape, said):
     with pytest.raises(SceneError) as refusal:
         shape.validate("b")
     assert str(refusal.value).startswith(said)

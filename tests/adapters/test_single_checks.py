@@ -71,7 +71,7 @@ def test_of_several_contacts_each_one_counts():
             assert mechanics._wrong_contact(scenes.resting(), Contacts(**spoilt), 1e-9), (name, k)
 
 
-def test_the_floor_may_stand_last_and_the_plane_be_lifted():
+def test_floor_listed_last_and_lifted_plane():
     turned = touching(a=[1], b=[2], normal=[[0.0, -1.0]], impulse=[[0.0, -1.0]])
     assert mechanics._wrong_contact(scenes.resting(-1), turned, 1e-9) == ""
     assert "from the first" in mechanics._wrong_contact(scenes.resting(-1), touching(a=[1], b=[2]), 1e-9)

@@ -61,7 +61,7 @@ def test_mjcf_of_a_scene_without_contacts_with_its_option_alone():
     assert text.startswith("<option ") and "integrator=" in text and len(text.splitlines()) == 1
 
 
-def test_python_of_chipmunk_runs_and_sets_what_the_profile_has():
+def test_python_snippet_of_chipmunk():
     pymunk = pytest.importorskip("pymunk")
     scene = drop(2, 0.8, -9.81)
     settings, names = changed(registry.load("chipmunk"), scene)
@@ -71,7 +71,7 @@ def test_python_of_chipmunk_runs_and_sets_what_the_profile_has():
     assert all(getattr(space, name) == pytest.approx(settings[name]) for name in names if name != "start_overlap")
 
 
-def test_python_of_bullet_runs_and_sets_what_the_profile_has():
+def test_python_snippet_of_bullet():
     p = pytest.importorskip("pybullet")
     scene = drop(3, 0.8, -9.81)
     settings, names = changed(registry.load("bullet"), scene)

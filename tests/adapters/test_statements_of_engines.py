@@ -261,7 +261,7 @@ class Round(Listening):
 
 
 @pytest.mark.parametrize("check", ["refusals", "bad_numbers", "capabilities"])
-def test_an_engine_without_boxes_is_asked_with_what_it_has(check):
+def test_questions_to_an_engine_without_boxes(check):
     engine = Round()
     assert CHECKS[check](engine) == ""
     shapes = {type(body.shape).__name__ for world in engine.built for body in world.scene.bodies}

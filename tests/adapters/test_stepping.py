@@ -103,7 +103,7 @@ def test_steps_cover_the_duration_despite_rounding(duration: float, dt: float, s
     assert step_count(duration, dt) == steps
 
 
-def test_every_step_is_sampled_from_the_start_state_on() -> None:
+def test_samples_of_every_step() -> None:
     toy = Toy({2})
     trajectory = run(toy, scene(), 0.1, {})
     assert trajectory.t.tolist() == [k * 0.1 for k in range(11)]
@@ -125,13 +125,13 @@ def test_last_step_of_a_stride_that_does_not_divide() -> None:
 
 
 @pytest.mark.parametrize(("stride", "contacts_from"), [(0, None), (-1, None), (1.5, None), (True, None), (2, 0.0)])
-def test_a_stride_that_would_hang_or_lose_impulses_is_refused(stride: Any, contacts_from: float | None) -> None:
+def test_refusal_of_a_stride_that_hangs_or_loses_impulses(stride: Any, contacts_from: float | None) -> None:
     with pytest.raises(ValueError, match="stride"):
         Sampling(stride, contacts_from)
 
 
 @pytest.mark.parametrize("dt", [0.0, -0.1, math.nan, math.inf])
-def test_a_bad_step_is_refused_before_anything_is_built(dt: float) -> None:
+def test_refusal_of_a_bad_step(dt: float) -> None:
     toy = Toy({2})
     with pytest.raises(EngineError, match=r"^dt: "):
         run(toy, scene(), dt, {})
@@ -149,7 +149,7 @@ def test_contacts_recorded_from_the_requested_time() -> None:
     assert sample.tolist() == [1, 2, 2, 4] and impulse[:, 1].tolist() == [7.0, 8.0, 8.0, 10.0]
 
 
-def test_contacts_of_time_zero_are_those_of_the_first_step() -> None:
+def test_contacts_of_time_zero() -> None:
     record = run(Toy({2}), scene(), 0.1, {}, Sampling(1, 0.0)).contacts
     assert record is not None and record.step.tolist() == list(range(1, 11))
 
@@ -323,7 +323,7 @@ def test_orientation_of_an_unnormalised_quaternion(length: float, is_turn: bool)
             run(Toy({3}, short), scene(), 0.1, {})
 
 
-def test_samples_are_the_same_however_many_are_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_samples_read_in_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     def sideways(flight: Flight) -> None:
         flight._pose[0, 1] = 0.125 if flight.steps == 2 else 0.0
 
@@ -420,7 +420,7 @@ def test_divergence_in_the_last_sample_of_a_batch(
     assert found.finish == "diverged" and "t = 1 s" in found.reason
 
 
-def test_fast_spin_in_a_batch_of_samples_is_no_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fast_spin_in_a_batch_of_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     recording(monkeypatch)
     assert run(Toy({2}, spoiled("_twist", (0, 2), 1e9)), scene(), 0.1, {}).finish == "completed"
 
@@ -439,7 +439,7 @@ def test_exception_after_the_end_of_a_run_ignored(monkeypatch: pytest.MonkeyPatc
     assert found.finish == "diverged" and "not finite at t = 0.4 s" in found.reason
 
 
-def test_an_error_of_a_step_is_raised_by_that_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_step_that_raises_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(flight: Flight) -> None:
         if flight.steps == 6:
             raise EngineError("state: none")
@@ -531,14 +531,14 @@ def test_step_duration_and_settings_of_a_run() -> None:
     assert recorded is not None and recorded.step.dtype == recorded.offset.dtype == np.int64
 
 
-def test_a_spatial_scene_is_refused_by_a_planar_engine() -> None:
+def test_spatial_scene_on_a_planar_engine() -> None:
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), motion="fixed")
     spatial = Scene("s", 1, 3, (floor,), (), (0.0, 0.0, -9.81), 1.0)
     with pytest.raises(EngineError, match=r"^dimension: toy is planar"):
         run(Toy({2}), spatial, 0.1, {})
 
 
-def test_rows_turn_so_that_the_lower_index_comes_first() -> None:
+def test_order_of_bodies_in_rows() -> None:
     contacts = Contacts.from_rows([(2, 1, (5.0, 6.0), (0.0, 1.0), (3.0, 4.0), -0.1)], 2)
     assert (contacts.a[0], contacts.b[0], contacts.gap[0]) == (1, 2, -0.1)
     assert contacts.point.tolist() == [[5.0, 6.0]]
@@ -617,7 +617,7 @@ def test_contacts_of_two_bodies_without_a_third() -> None:
     assert (sample.tolist(), impulse.tolist()) == ([0], [[0.0, 2.0]])
 
 
-def test_settings_take_an_iteration_count_only_where_there_is_one() -> None:
+def test_iteration_count_of_settings() -> None:
     toy = Toy({2})
     assert [s.value for s in toy.settings("only", None, 0.1, 7)] == [7]  # type: ignore[arg-type]
     with pytest.raises(EngineError, match=r"^profile: toy has no profile 'best'"):

@@ -118,7 +118,7 @@ def test_measured_defaults_equal_to_the_documented(engine):
     assert len(measured) >= 5 or engine == "newton"
 
 
-def test_the_table_says_what_was_measured_and_what_differs(monkeypatch):
+def test_table_of_measured_defaults(monkeypatch):
     rows = (
         Unset("friction of a pair", "0.5", "book, page 1", 0.5, lambda: 0.500001),
         Unset("restitution of a pair", "0", "book, page 2", 0.0, lambda: 0.25),

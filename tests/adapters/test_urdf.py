@@ -26,7 +26,7 @@ def robot(inside):
 
 
 @pytest.mark.parametrize("name", ["cube_on_table", "ball_by_a_post", "barrel"])
-def test_a_robot_moves_as_mujoco_moves_its_own_file(name):
+def test_motion_of_a_robot_against_mujoco(name):
     """Profile `model` against the file itself, as `tests/adapters/test_models.py` asks of MJCF."""
     text = (MODELS / f"{name}.urdf").read_text().replace('link="base"', 'link="world"').replace('"base"', '"world"')
     found = read(text, False)
@@ -43,7 +43,7 @@ def test_a_robot_moves_as_mujoco_moves_its_own_file(name):
     assert abs(ours.pose[-1, free, 2] - scene.bodies[free].pose[2]) > 0.1
 
 
-def test_places_masses_and_names_are_those_of_the_text():
+def test_places_masses_and_names_of_the_text():
     found = read((MODELS / "cube_on_table.urdf").read_text(), False)
     table, cube = found.scene.bodies
     assert (table.name, table.motion, table.shape) == ("table", "fixed", Box((1.0, 1.0, 0.05)))

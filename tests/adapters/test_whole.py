@@ -31,7 +31,7 @@ def test_a_link_and_a_device(tmp_path):
     assert not Path(os.devnull).is_file()
 
 
-def test_a_trajectory_that_is_read_while_another_is_written(tmp_path):
+def test_trajectory_read_while_another_is_written(tmp_path):
     path = tmp_path / "kept.npz"
     path.write_bytes(b"old")
     found = Trajectory(np.array([0.0]), np.zeros((1, 1, 3)), np.zeros((1, 1, 3)), None, 0.1, "completed")

@@ -19,7 +19,7 @@ def test_memory_is_asked_with_a_ball(monkeypatch):
 
 
 @pytest.mark.parametrize(("kind", "scene"), [(Discs, rolling()), (Listening, sliding())])
-def test_bits_of_every_profile_are_those_of_one_scene(kind, scene):
+def test_bits_of_every_profile_against_one_scene(kind, scene):
     engine = kind()
     found = worlds._hashes(engine)
     assert list(found) == list(SWEEPS) and all(len(each) >= 16 for each in found.values())

@@ -155,7 +155,7 @@ def processes():
 
 
 @pytest.mark.long
-def test_cost_of_a_hanging_engine_is_three_time_limits(faulty, tmp_path):
+def test_cost_of_a_hanging_engine(faulty, tmp_path):
     hanging = [faulty_slot("hang", v=float(v)) for v in range(1, 6)]
     elsewhere = Slot("bounce", (), 2, "faulty", "none", DT)
     store, said = Store(tmp_path), StringIO()

@@ -121,7 +121,7 @@ def test_accepted_family_listed_and_run_quiet(out, findings):
     assert (findings / files.MEMBERS).read_bytes() == finer
 
 
-def test_a_terminal_is_asked_for_the_reason_of_every_family(out, findings, monkeypatch):
+def test_reason_of_every_family_at_a_terminal(out, findings, monkeypatch):
     monkeypatch.setattr(accepting, "_on_a_terminal", lambda: True)
     result = accept(out, input="one sweep is not enough\nits manual\n" + "\n" * 10)
     assert result.exit_code == 1  # the others got no reason
@@ -224,7 +224,7 @@ def test_run_fails_on_new_and_drifted_rows_only(out, findings):
     assert call(*CELL, "--out", out).exit_code == 1  # drifted
 
 
-def test_run_fails_on_a_planned_cell_without_a_result(tmp_path, monkeypatch):
+def test_planned_cell_without_a_result(tmp_path, monkeypatch):
     from reports import progress
 
     monkeypatch.setattr(progress, "run_cells", lambda *arguments, **options: iter(()))

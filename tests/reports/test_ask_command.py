@@ -176,7 +176,7 @@ def test_verdicts_and_defaults_of_every_engine(engine):
     assert "checks fail" in asked(failed, engine)
 
 
-def test_reason_why_an_engine_does_not_run_the_scene():
+def test_reason_of_an_engine_that_cannot_run_the_scene():
     said = " ".join(asked("conveyor", "drake").split())
     assert "drake does not run the scene: the adapter sets no surface velocities" in said and "\nrun it" not in said
 

@@ -71,7 +71,7 @@ def test_files_of_a_bench(tmp_path):
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_an_engine_that_is_not_installed_is_described_by_why(monkeypatch, as_json):
+def test_description_of_a_missing_engine(monkeypatch, as_json):
     from reports import listing
 
     found = SimpleNamespace(version="", engine=None, reason="no module named toy; pip install toy")

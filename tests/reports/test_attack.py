@@ -84,7 +84,7 @@ WITHOUT = {"impulse": set(), "friction": {"impact"}}
 
 
 @pytest.mark.long
-def test_a_fault_of_two_per_cent_cannot_be_accepted(attacked, request):
+def test_refusal_to_accept_a_fault_of_two_per_cent(attacked, request):
     out, call = str(attacked / "out"), CliRunner().invoke
     common = ["--engine", "attacked", "--profile", "tuned", "--dim", "2", "--jobs", "1", "--out", out]
     told, sound = [], WITHOUT[request.node.callspec.params["attacked"]]

@@ -34,7 +34,7 @@ def bench(tmp_path_factory):
     return out, call(*ONE, "--seed", 3, "--json", "--out", out)
 
 
-def test_a_bench_tells_error_and_time_of_every_point(bench):
+def test_error_and_time_of_bench_points(bench):
     _, result = bench
     assert result.exit_code == 0, result.stderr
     data = json.loads(result.stdout)
@@ -76,7 +76,7 @@ def test_tables_are_written_as_csv_and_json(bench):
     assert {"raw_timings.csv", "scaling.csv", "overhead.csv", "time_at_equal_error.csv", "ratios.csv"} <= names
 
 
-def test_a_dry_run_says_how_many_cells_and_times_nothing(tmp_path):
+def test_cells_of_a_dry_run(tmp_path):
     result = call(*ONE, "--dry-run", "--out", tmp_path / "none")
     assert result.exit_code == 0 and result.stdout == "32 cases\n"
     assert not (tmp_path / "none").exists()
@@ -92,7 +92,7 @@ def test_a_dry_run_says_how_many_cells_and_times_nothing(tmp_path):
         (["bench", "impact", "--dt", "0"], "dt: 0 must be a positive"),
     ],
 )
-def test_a_bad_call_exits_with_two_and_one_line(tmp_path, monkeypatch, arguments, said):
+def test_status_and_line_of_a_bad_bench_call(tmp_path, monkeypatch, arguments, said):
     monkeypatch.chdir(tmp_path)
     result = call(*arguments)
     assert result.exit_code == 2 and said in result.stderr and "Traceback" not in result.output

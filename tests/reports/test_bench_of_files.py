@@ -58,7 +58,7 @@ def bench(path, out, *words, status=0):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("scene", "engine"), [(PLANE, "chipmunk"), (SPACE, "mujoco")])
-def test_the_error_is_what_the_scheme_of_the_engine_leaves(tmp_path, scene, engine):
+def test_error_left_by_the_scheme_of_an_engine(tmp_path, scene, engine):
     """Semi-implicit Euler falls short of g t^2 / 2 by g dt t / 2; our own solver flies exactly."""
     pytest.importorskip({"chipmunk": "pymunk"}.get(engine, engine))
     path = tmp_path / "ball.toml"
@@ -87,7 +87,7 @@ def test_times_of_a_model_on_its_own_engine(tmp_path):
 
 
 @pytest.mark.long
-def test_a_line_says_why_there_is_no_certified_run(tmp_path):
+def test_reason_without_a_certified_run(tmp_path):
     pytest.importorskip("pymunk")
     path = tmp_path / "sunk.toml"
     path.write_text(SUNK)

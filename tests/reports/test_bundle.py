@@ -28,7 +28,7 @@ pose = [0.0, {height}, 0.0]
 """
 
 
-def test_the_bundle_holds_what_it_lists_and_its_checksums_hold(page_folder, page_source, tmp_path):
+def test_contents_and_checksums_of_a_bundle(page_folder, page_source, tmp_path):
     path = tmp_path / "b.zip"
     result = CliRunner().invoke(main, ["bundle", "-o", str(path), "--out", str(page_folder)])
     assert result.exit_code == 0, result.output
@@ -48,7 +48,7 @@ def test_the_bundle_holds_what_it_lists_and_its_checksums_hold(page_folder, page
     assert f"run {page_source.run.id}" in texts["CITATION.cff"].decode()
 
 
-def test_a_bundle_is_told_as_data_with_its_files(page_folder, tmp_path, monkeypatch):
+def test_bundle_as_data(page_folder, tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr("reports.bundle.write_bundle", lambda *given: written.append(given) or ["README.txt", "a"])
     result = CliRunner().invoke(main, ["bundle", "-o", str(tmp_path / "b.zip"), "--out", str(page_folder), "--json"])

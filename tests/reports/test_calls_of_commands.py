@@ -188,7 +188,7 @@ def test_kernels_compiled_for_the_named_cells(monkeypatch, tmp_path):
 # ---- studies ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_study_hands_on_its_cells_and_writes_its_table(ran, monkeypatch, tmp_path):
+def test_cells_and_table_of_a_study(ran, monkeypatch, tmp_path):
     table = pd.DataFrame([{"e": 0.5, "off": 0.1234567890123456, "outcome": "ok"}, {"e": 0.7, "outcome": "unsupported"}])
     monkeypatch.setattr(sweeping, "table", lambda rows: table)
     monkeypatch.setattr(sweeping, "counted", lambda found: f"{len(found)} lines")

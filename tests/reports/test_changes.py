@@ -38,7 +38,7 @@ A = side(
 B = side("", ("bullet", "3.2.7"), ("mujoco", "4.0.1"), ("planck", "1.0"), date="today")
 
 
-def test_the_header_says_runs_commits_and_which_versions_moved():
+def test_header_of_changes():
     assert header(A, B) == [
         "A: one (commit 0123456789ab, 4 checks)",
         "B: checks (3 checks)",

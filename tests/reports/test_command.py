@@ -72,7 +72,7 @@ def test_exception_while_building_as_a_row_with_its_reason(plugins, tmp_path):
     assert {row["reason"] for row in rows} == {"RuntimeError: building failed"}
 
 
-def test_a_scene_file_runs_and_a_bad_one_is_refused(tmp_path):
+def test_scene_file_and_a_bad_one(tmp_path):
     path = tmp_path / "drop.toml"
     text = """
 name = "drop"

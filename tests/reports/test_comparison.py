@@ -41,11 +41,11 @@ def test_a_planted_change_is_found_and_nothing_else(planted, kind, metric, exit_
 
 
 @pytest.mark.parametrize("same", ["base", "noise"])
-def test_equal_runs_and_noise_below_the_floor_change_nothing(same):
+def test_comparison_of_equal_runs_and_noise(same):
     assert changes("base", same) == (0, [])
 
 
-def test_a_slow_down_is_the_factor_that_was_planted():
+def test_factor_of_a_planted_slow_down():
     _, (change,) = changes("base", "slow")
     assert change["size"] == pytest.approx(2.0)
     assert change["engine"] == "bullet"
@@ -92,7 +92,7 @@ def test_two_runs_without_a_common_check(tmp_path, fail_on):
 
 
 @pytest.mark.parametrize("content", ["not json", '{"a": 1}', "[1, 2]"])
-def test_a_file_of_something_else_is_refused_in_one_line(tmp_path, content):
+def test_refusal_of_a_file_of_something_else(tmp_path, content):
     path = tmp_path / "x.jsonl"
     path.write_text(content)
     result = CliRunner().invoke(main, ["compare", str(path), str(path)])
@@ -122,7 +122,7 @@ def planted(tmp_path, change):
 
 
 @pytest.mark.parametrize(("share", "counts"), [(1e-9, False), (0.009, False), (0.02, True)])
-def test_a_change_counts_from_a_hundredth_of_the_tolerance_on(tmp_path, share, counts):
+def test_least_change_that_counts(tmp_path, share, counts):
     base = planted(tmp_path, lambda row: {})
     before = tmp_path / "before.jsonl"
     base.rename(before)
@@ -140,7 +140,7 @@ def test_difference_of_one_last_bit_ignored(tmp_path):
     assert result.exit_code == 0 and "in both: none changed" in result.stdout
 
 
-def test_the_head_says_runs_and_versions_and_lines_are_families(tmp_path):
+def test_head_and_lines_of_a_comparison(tmp_path):
     before = planted(tmp_path, lambda row: {}).rename(tmp_path / "before.jsonl")
     change = {"run": "other", "engine_version": "9.9"}
     after = planted(tmp_path, lambda row: change | {"value": row["value"] + 0.5 * row["tolerance"]})

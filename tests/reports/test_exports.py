@@ -73,7 +73,7 @@ def test_csv_holds_all_fields_but_slot_and_log():
 # ---- Markdown ------------------------------------------------------------------------------------------------------
 
 
-def test_markdown_is_the_matrix_its_legend_and_what_needs_attention():
+def test_contents_of_markdown():
     rows = plain(KNOWN, ROW, PASS, SPATIAL, CRASHED)
     matrix = matrix_of(rows)
     assert exports.as_markdown(rows) == "\n".join([

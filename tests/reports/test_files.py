@@ -42,7 +42,7 @@ def test_a_folder_without_permission_is_refused(tmp_path):
     assert call(*ONE, "--out", tmp_path / "out").exit_code == 2
 
 
-def test_a_folder_may_have_a_dot_in_its_name(tmp_path):
+def test_folder_with_a_dot_in_its_name(tmp_path):
     result = call(*ONE, "--out", tmp_path / "name.with.dot", "--json")
     assert result.exit_code == 0, result.stderr
     assert (tmp_path / "name.with.dot").is_dir() and json.loads(result.stdout)

@@ -113,7 +113,7 @@ PUBLISHED = list(pastes(PAGE.read_text(encoding="utf-8")))
 
 @pytest.mark.long
 @pytest.mark.parametrize("shown", [pytest.param(shown, id="-".join(shown[:2])) for shown in PUBLISHED])
-def test_a_fix_of_the_published_report_mends_a_bare_model(shown):
+def test_published_fixes_on_bare_models(shown):
     if "priority=" not in "".join(paste for *_, paste in PUBLISHED):
         pytest.skip("the published page is of before its fixes were run: make publish")
     check_page(*shown)
@@ -128,7 +128,7 @@ def lifted(body):
 
 
 @pytest.mark.parametrize(("engine", "scene"), [("mujoco", "slide"), ("bullet", "slide"), ("chipmunk", "slide")])
-def test_bare_model_falls_as_its_scene_at_any_size(engine, scene):
+def test_fall_of_a_bare_model_at_any_size(engine, scene):
     """A model in other sizes is told in the scene's own units."""
     pytest.importorskip(PACKAGES[engine])
     canonical = resolve(scene)

@@ -14,7 +14,7 @@ def helped(*words):
     return CliRunner(env={"COLUMNS": "80"}).invoke(main, [*words, "--help"]).output
 
 
-def test_every_command_stands_in_one_section_with_a_whole_line():
+def test_section_and_line_of_every_command():
     listed = main.list_commands(None)
     assert len(listed) == len(set(listed)) == sum(map(len, SECTIONS.values()))
     lines = helped().splitlines()
@@ -36,7 +36,7 @@ def test_help_lines_of_all_commands():
 
 
 @pytest.mark.parametrize("name", main.list_commands(None))
-def test_the_example_of_a_command_has_its_arguments_and_options(name):
+def test_arguments_and_options_of_examples(name):
     command = main.get_command(None, name)
     said, _, example = command.epilog.partition(": ")
     assert said == "Example" and " ".join(helped(name).split()).endswith(example)

@@ -31,7 +31,7 @@ def out(tmp_path_factory):
     return folder
 
 
-def test_rows_metrics_and_trajectories_come_back_as_they_were(out, tmp_path):
+def test_rows_metrics_and_trajectories_read_again(out, tmp_path):
     told = json.loads(call("export", "--parquet", tmp_path / "p", "--out", out, "--json").stdout)
     rows, metrics, states = (
         pd.read_parquet(tmp_path / "p" / f"{name}.parquet") for name in ("rows", "observations", "trajectories")
@@ -52,7 +52,7 @@ def test_rows_metrics_and_trajectories_come_back_as_they_were(out, tmp_path):
         assert (own.t.to_numpy().reshape(len(kept.t), -1)[:, 0] == kept.t).all()
 
 
-def test_all_exports_every_run_and_a_named_one_only_that(out, tmp_path):
+def test_export_of_all_runs_or_a_named_one(out, tmp_path):
     call("export", "--all", "--parquet", tmp_path / "p", "--out", out)
     runs = pd.read_parquet(tmp_path / "p" / "observations.parquet").run.unique()
     assert len(runs) == 2
@@ -83,7 +83,7 @@ def test_merge_reports_added_runs(out, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_prune_needs_a_rule_and_a_dry_run_deletes_nothing(out, tmp_path):
+def test_rule_and_dry_run_of_prune(out, tmp_path):
     call("merge", out, "--out", tmp_path)
     assert "needs --keep" in call("prune", "--out", tmp_path, status=2).output
     # Two runs that ask differently have different titles: none is a repetition of the other.

@@ -119,7 +119,7 @@ def test_colours_support_the_words_and_alarms_stand_out():
     assert [getattr(text, "style", "") for text in odd.columns[1].cells][1] == ""
 
 
-def test_an_engine_whose_version_nobody_knows_stands_by_its_name():
+def test_engine_of_unknown_version():
     assert shown(ROWS, 100, {})[2] == "flat" and shown(ROWS, 100, {})[5] == "deep"
 
 

@@ -81,7 +81,7 @@ def test_failure_of_an_own_model_is_no_alarm(tmp_path):
 @pytest.mark.parametrize(
     ("engine", "profile"), [("bullet", "tuned"), ("reference", "classical"), ("reference", "reference")]
 )
-def test_failure_of_a_model_is_no_alarm_for_any_profile(engine, profile):
+def test_failure_of_a_model(engine, profile):
     name = posed.pinned(str(MODELS / "ball_on_floor.xml"))
     slot = Slot(name, (), 3, engine, profile, 1 / 240, None)
     found = {"energy_growth": (0.0, ""), "penetration": (1.0, "")}
@@ -91,7 +91,7 @@ def test_failure_of_a_model_is_no_alarm_for_any_profile(engine, profile):
     assert row.reason.endswith("not listed: your own model")
 
 
-def test_results_are_read_without_the_file_and_without_its_engine(ran, monkeypatch):
+def test_results_without_their_file_and_engine(ran, monkeypatch):
     out, rows, _ = ran
     monkeypatch.setattr(posed, "_texts", {})
     posed.resolve.cache_clear()
@@ -264,7 +264,7 @@ def test_momentum_beside_a_fixed_body_shown_and_not_judged():
     assert check.because.startswith("shown")
 
 
-def test_momentum_of_a_fixed_body_is_its_reported_impulse():
+def test_momentum_of_a_fixed_body():
     assert momentum_drift(*falling(kick=0.5, impulse=(0.0, 1.0)))[0] == pytest.approx(0.0, abs=1e-12)
     assert momentum_drift(*falling(kick=0.5, impulse=(0.0, 0.9)))[0] == pytest.approx(0.1)
     assert momentum_drift(*falling(kick=0.5, impulse=(0.0, float("nan"))))[0] is None

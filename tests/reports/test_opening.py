@@ -81,7 +81,7 @@ def test_first_matrix_with_shipped_beside_tuned():
     }
 
 
-def test_every_engine_is_called_by_a_name_of_its_own():
+def test_names_of_engines():
     names = {name: called(name) for name in registry.names()}
     assert len(set(names.values())) == len(names) and max(map(len, names.values())) < 12
     assert called("of somebody") == "of somebody"

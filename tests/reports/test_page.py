@@ -90,7 +90,7 @@ def test_report_of_an_empty_run_exits_with_two(tmp_path):
     assert "there are no results" in result.stderr and "Traceback" not in result.output
 
 
-def test_no_attribute_carries_code_or_style_or_an_address_elsewhere(elements):
+def test_attributes_of_the_page(elements):
     for tag, attributes in elements.tags:
         assert not [name for name in attributes if name.startswith("on") or name == "style"], (tag, attributes)
         for name in ("src", "href", "action", "data", "poster", "srcset"):
@@ -145,7 +145,7 @@ def test_content_policy_with_one_style_and_one_script(elements):
     assert "unsafe" not in content and content.startswith("default-src 'none'")
 
 
-def test_one_changed_letter_of_the_script_breaks_the_policy():
+def test_policy_against_a_changed_script():
     assert policy("a{}", "f()") != policy("a{}", "g()")
 
 
@@ -223,7 +223,7 @@ def said(name):
     return [sentence for _, sentence in sentences(golden(name))]
 
 
-def test_the_sentences_change_when_the_physics_of_the_data_flips():
+def test_sentences_of_flipped_data():
     base, flipped = said("base"), said("flip")
     assert "bounce" in base[0].partition("every engine has a profile")[0]
     assert "bounce" not in flipped[0].partition("every engine has a profile")[0]
@@ -302,7 +302,7 @@ def test_settings_with_mostly_failed_checks_counted_only(page_source, monkeypatc
     assert found and all(not each.fixes and "the best settings found fix 1 of 20 checks" in each.said for each in found)
 
 
-def test_only_scenes_that_were_timed_have_a_first_choice(page_source):
+def test_first_choice_of_timed_scenes(page_source):
     found = choices(page_source)
     assert any(choice.timed for choice in found)
     assert not any(choice.timed for choice in choices(Source(page_source.run, page_source.rows, [])))
@@ -379,7 +379,7 @@ def test_families_of_scenes(page_source):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_familys_marks_count_the_rows_of_its_scenes(page_source):
+def test_marks_of_a_family(page_source):
     (rebound, *_) = families(page_source)
     column = page_source.columns.index(("bullet", "default"))
     judged = [
@@ -449,7 +449,7 @@ def test_no_ranking_by_times_of_a_busy_machine(page_source, monkeypatch):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_cure_names_the_settings_that_differ_with_their_reasons(page_source):
+def test_settings_and_reasons_of_a_cure(page_source):
     cure = next(c for c in cures(page_source) if (c.engine, c.scene, c.dimension) == ("bullet", "impact", 2))
     assert cure.before.mark != "pass" and cure.after.mark == "pass"
     assert "useMaximalCoordinates" in {change.name for change in cure.changes}

@@ -58,7 +58,7 @@ def test_the_policy_stops_a_script_that_is_injected(browser, page_file):
     context.close()
 
 
-def test_a_scene_named_like_a_script_is_shown_as_text(browser, page_file):
+def test_scene_named_like_a_script(browser, page_file):
     with opened(browser, page_file) as page:
         assert page.evaluate("window.hacked") is None
         assert page.locator("img").count() == 0
@@ -198,7 +198,7 @@ TOPMOST = (
 
 
 @pytest.mark.parametrize(("scene", "falls"), [("impact", False), ("incline", True)])
-def test_gravity_points_down_so_that_an_incline_is_inclined(browser, page_file, scene, falls):
+def test_picture_of_an_incline(browser, page_file, scene, falls):
     """The scene is posed with its floor level and gravity aslant; beside the bodies the floor alone is drawn."""
     with opened(browser, page_file, "#replay") as page:
         page.select_option("#replay-scene", f"replay-{scene}-2")

@@ -131,7 +131,7 @@ def test_receipt_farthest_from_its_declared_value():
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
+def test_count_of_a_listed_reason(page_source):
     findings = fairness.findings_of("bullet")
     listed = {entry.id: entry.count for entry in fairness._listed(page_source, "bullet")}
     rows = [row for row in page_source.of(engine="bullet") if row["standing"] == "known"]
@@ -142,7 +142,7 @@ def test_a_listed_reason_counts_the_known_rows_that_say_it(page_source):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_a_changed_setting_says_which_other_one_it_belongs_to(page_source, monkeypatch):
+def test_changed_setting_with_its_other_one(page_source, monkeypatch):
     """Where it was measured what decides, a setting that only completes another says so."""
     kept = page_source.observations
     monkeypatch.setattr(told_fixes, "belongs_of", lambda engine: {"useMaximalCoordinates": f"the solver of {engine}"})

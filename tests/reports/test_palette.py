@@ -42,7 +42,7 @@ def oklab(rgb):
 
 @pytest.mark.parametrize("colour", sorted({*ENGINES.values(), *OTHERS}))
 @pytest.mark.parametrize("paper", PAPER.values())
-def test_every_colour_has_three_to_one_contrast_on_both_papers(colour, paper):
+def test_contrast_of_colours(colour, paper):
     """WCAG 2.2, 1.4.11: graphics need 3:1."""
     bright, dark = sorted((luminance(colour), luminance(paper)), reverse=True)
     assert (bright + 0.05) / (dark + 0.05) >= 3.0
@@ -84,7 +84,7 @@ def test_profiles_of_one_engine_differ_in_shape_and_dash():
     assert shape_of("of somebody") not in {shape for shape, _ in MARKS.values()}
 
 
-def test_an_engine_that_is_set_apart_brings_no_colour():
+def test_colour_of_an_engine_set_apart():
     apart = [name for name in registry.names() if registry.facts(name).apart]
     assert apart and not [name for name in apart if registry.facts(name).colour]
 

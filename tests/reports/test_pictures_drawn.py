@@ -54,7 +54,7 @@ def fields(encoding):
                 yield channel, each["field"]
 
 
-def test_every_column_that_a_picture_asks_for_is_there(drawn):
+def test_columns_of_pictures(drawn):
     """Vega draws nothing, without a word, where a column is missing."""
     for spec in drawn:
         for mark, own in layers(spec):
@@ -75,7 +75,7 @@ def test_every_mark_has_a_place_in_both_directions(drawn):
                 assert said & ACROSS and said & UP, (mark, said)
 
 
-def test_every_number_of_a_picture_lies_within_its_axes(drawn):
+def test_numbers_within_axes_of_a_picture(drawn):
     """A mark outside is cut off or drawn over the words; and a logarithm needs a positive number."""
     looked = 0
     for spec in drawn:

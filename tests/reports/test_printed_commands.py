@@ -83,7 +83,7 @@ def test_command_of_an_end_of_a_bracket(scene, own):
 
 
 @pytest.mark.parametrize("note", notes(), ids=lambda note: note.source)
-def test_the_command_of_a_field_note_asks_for_its_cell(note):
+def test_command_of_a_field_note(note):
     (again,) = asked_by(reproduce(note.slot.as_dict()))
     canonical = resolve(note.scene)
     assert canonical.complete(dict(again.params)) == canonical.complete(dict(note.slot.params))

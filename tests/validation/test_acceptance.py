@@ -41,7 +41,7 @@ def listed(*families, **members):
     return Findings("nameless", {family.id: family for family in families}, (), entries)
 
 
-def test_new_row_listed_only_after_its_family_is_accepted():
+def test_new_row_before_and_after_acceptance():
     proposal = propose(rows(), "nameless", listed(FAMILY))
     (change,) = proposal.changes
     assert (list(change.new), change.asks, change.is_draft) == ([KEY], True, False)
@@ -73,7 +73,7 @@ def test_row_within_its_band_kept_without_a_question():
     assert accepted(proposal, []) == accepted(proposal, ["creeps"]) == {KEY: old}
 
 
-def test_passing_row_dropped_only_after_its_family_is_accepted():
+def test_passing_row_before_and_after_acceptance():
     old = Finding(FAMILY, 0.5, 1e-3)
     proposal = propose(rows(creep=0.0), "nameless", listed(FAMILY, creep=old))
     assert list(proposal.changes[0].gone) == [KEY]
@@ -126,7 +126,7 @@ def test_a_divergence_is_listed_as_one():
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, None, diverged=True)}
 
 
-def test_pass_that_fails_from_a_moved_start_is_listed():
+def test_listing_of_a_pass_that_fails_from_a_moved_start():
     near = 0.9 * TOLERANCE
     wide = propose(rows(creep=near, moved=0.2 * TOLERANCE), "nameless", listed(FAMILY))
     assert list(wide.changes[0].new) == [KEY]
@@ -403,7 +403,7 @@ def test_new_row_of_another_family_told_or_refused_by_a_law(monkeypatch):
     assert all("predicts another" in why for _, why in proposal.refused) and proposal.refused
 
 
-def test_only_new_and_drifted_rows_of_other_families_told():
+def test_rows_told_of_other_families():
     """In the order of the run, whatever stands between; what is asked about afterwards is still proposed."""
     known = {row_key(SLOT, name): Finding(FAMILY, 0.5, 1e-3) for name in ("known", "drifted", "drifted pass")}
     cases = (
@@ -471,7 +471,7 @@ def test_draft_with_profile_scene_metric_kind_and_release():
 @pytest.mark.parametrize(
     ("version", "releases"), [("4.1+5f3a", "==4.1.*"), ("7", "==7.*"), ("0.1.0+cbe56602", "==0.1.*")]
 )
-def test_a_draft_holds_for_its_release_whatever_was_built_locally(version, releases):
+def test_release_of_a_draft(version, releases):
     assert acceptance._draft(rows(version=version)[0]).releases == releases
 
 
@@ -588,7 +588,7 @@ def test_the_reasons_of_refusals_in_full(monkeypatch):
     assert why == "a contact law predicts another value: the law or the engine has changed"
 
 
-def test_a_study_has_no_scatter_and_the_least_of_bands():
+def test_scatter_and_band_of_a_study():
     study = CATALOGUE["incline"].studies[0]
     why, (value, width, *_) = acceptance._entry(row_of(metric=study.name, floor=None, truth=1.0, tolerance=0.125))
     assert (why, value, width) == ("", 0.5, pytest.approx(0.00125))
@@ -613,7 +613,7 @@ def test_which_rows_are_run_again_from_moved_starts(fields, moved):
     assert bool(slots_to_move([row], row.engine)) is moved
 
 
-def test_which_bands_are_of_sixteen_starts_and_which_of_four():
+def test_number_of_starts_of_bands():
     """Twelve to sixteen moved starts that left a value; what nobody asked for, more of them, is a half width again."""
     truth, all_of = 0.0, (*TWO_WAYS, 2.5)
     for number in range(2, 19):

@@ -123,13 +123,13 @@ def test_twice_the_work_takes_twice_the_time(clockwork):
     assert one == pytest.approx(5e-3, rel=0.02) and two / one == pytest.approx(2.0, rel=0.02)
 
 
-def test_waiting_is_not_charged_but_is_seen_in_wall_time(clockwork):
+def test_waiting_in_cpu_and_wall_time(clockwork):
     for timing in timed([unit("sleep")]):
         assert timing.seconds < 0.01 < 0.02 <= timing.wall_seconds
 
 
 @pytest.mark.long
-def test_an_abort_or_a_hang_voids_its_own_unit_only(clockwork):
+def test_unit_voided_by_an_abort_or_a_hang(clockwork):
     units = [unit("one"), unit("abort"), unit("two"), unit("raise"), unit("hang")]
     # Three seconds without an answer are a hang: the healthy units answer in milliseconds, a start takes a second.
     found = by_profile(timed(units, replace(PATIENT, patience=10.0)))
@@ -153,7 +153,7 @@ def test_invalid_physics_voids_the_timing(clockwork):
     assert "not finite" in found["nan"][0].void
 
 
-def test_an_engine_that_is_not_deterministic_shows_in_its_states(clockwork):
+def test_states_of_an_engine_that_is_not_deterministic(clockwork):
     found = by_profile(timed([unit("one"), unit("random")]))
     assert len({t.state_hash for t in found["one"]}) == 1
     assert len({t.state_hash for t in found["random"]}) == len(found["random"])
@@ -185,7 +185,7 @@ def test_a_unit_closes_when_its_interval_is_narrow(clockwork):
 
 
 @pytest.mark.long
-def test_a_series_ends_where_a_pile_takes_too_long(clockwork):
+def test_end_of_a_series_of_piles(clockwork):
     sizes = size_units([("clockwork", "one")], [2], [], [], [1, 2, 3])
     steps = {1: 10, 3: 12000, 6: 10}  # 1 ms, 1.2 s: the limit of 1 s leaves room for a busy machine
     slow = [replace(u, steps=steps[u.bodies]) for u in sizes]
@@ -238,7 +238,7 @@ def test_pile_error_by_motion_and_not_by_the_declared_start():
     assert own_error(scene, 0.2, start, moved) == pytest.approx(0.02)
 
 
-def test_overhead_is_timed_for_every_engine_that_has_the_dimension(clockwork):
+def test_overhead_of_engines_by_dimension(clockwork):
     units = list(overhead_units([("clockwork", "one"), ("clockwork", "two")], [2, 3]))
     assert {(u.slot.scene, u.slot.dimension, u.sampled) for u in units} == {
         (scene, 2, sampled) for scene in ("empty", "free") for sampled in (False, True)

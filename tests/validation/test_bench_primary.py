@@ -42,13 +42,13 @@ def test_the_truth_itself_has_no_error(scene):
 
 
 @pytest.mark.parametrize("scene", sorted(CATALOGUE))
-def test_variations_are_parameters_the_scene_accepts_at_any_step(scene):
+def test_accepted_variations_at_any_step(scene):
     for dt in (1 / 30, DT, 1 / 7680):
         for params in primary_of(scene).variations(dt):
             resolve(scene).complete(params)
 
 
-def test_impacts_are_met_in_sixteen_phases_spread_over_one_step():
+def test_sixteen_phases_of_impacts():
     phases = sorted(p["delay"] / DT % 1.0 for p in primary_of("impact").variations(DT))
     gaps = [b - a for a, b in zip(phases, [*phases[1:], phases[0] + 1.0], strict=True)]
     assert len(phases) == 16

@@ -52,7 +52,7 @@ def test_no_envelope_without_error_or_cost():
     assert lower_envelope([1.0, np.nan, 2.0], [np.nan, 1.0, 3.0]).tolist() == [False, False, True]
 
 
-def test_a_planted_exponent_is_found_within_its_standard_error():
+def test_planted_exponent_within_its_standard_error():
     rng = np.random.default_rng(5)
     x = np.array([10.0, 28.0, 91.0, 300.0, 990.0])
     hits = 0
@@ -93,7 +93,7 @@ def test_drift_needs_four_samples_and_halves_them():
     assert drift([2.0, 2.0, 2.0, 2.0, 6.0, 6.0, 6.0, 6.0]) == pytest.approx(2.0)
 
 
-def test_an_envelope_is_told_of_numbers_as_text_holds_them():
+def test_envelope_of_numbers_as_text():
     assert lower_envelope(["9", "10"], ["2", "1"]).tolist() == [True, True]
     assert lower_envelope(["9", "10"], ["10", "9"]).tolist() == [True, True]
 
@@ -109,7 +109,7 @@ def test_drift_between_halves():
     assert drift([1.0, 3.0, 9.0, 4.0, 8.0]) == 3.0  # the middle one belongs to the second half: 8 over 2
 
 
-def test_an_interval_leaves_a_fortieth_out_at_either_end():
+def test_share_left_out_of_an_interval():
     """Ten of 400 resampled medians lie below it and ten above."""
     samples = np.random.default_rng(6).random(2000)
     found = spread(samples)

@@ -245,7 +245,7 @@ def test_quick_benchmark_of_a_dozen_quick_suite_scenes():
 
 
 @pytest.mark.parametrize(("scene", "dimensions"), [("slide", (2, 3)), ("tumble", (3,))])
-def test_a_quick_benchmark_runs_one_dimension_unless_others_are_named(scene, dimensions):
+def test_dimensions_of_a_quick_benchmark(scene, dimensions):
     def asked(**more):
         return {slot.dimension for slot in accuracy_slots(Sweep(Request([scene], ["reference"], **more)))}
 

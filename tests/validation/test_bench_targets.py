@@ -74,7 +74,7 @@ def errors(seconds=0.0, reason="", **found):
     return Found(found, dict.fromkeys(found, 1e-12), 0, 0, seconds, reason)
 
 
-def test_every_error_must_be_within_one_percent_or_round_off():
+def test_limit_of_every_error():
     theirs = errors(overlap=1e-3, energy=0.0)
     assert errors(overlap=1.01e-3, energy=1e-12).is_within(theirs)
     assert not errors(overlap=1.02e-3, energy=0.0).is_within(theirs)
@@ -83,7 +83,7 @@ def test_every_error_must_be_within_one_percent_or_round_off():
     assert not errors(reason="it broke").is_within(theirs)
 
 
-def test_sweeps_are_tried_once_and_only_while_there_is_time():
+def test_sweeps_tried_within_the_time():
     tried = []
 
     def ask(sweeps):
@@ -118,7 +118,7 @@ def test_target_scenes_with_their_number_of_bodies(case):
     assert (case.clock is None) == (case.drift is not None) and set(case.timed_only) <= set(case.against)
 
 
-def test_side_contacts_are_where_boxes_of_a_row_touch():
+def test_side_contacts_of_a_row_of_boxes():
     slot = Slot("wall", (("gap", 0.0), ("rows", 4.0)), 2, registry.solver(), "classical", 1 / 240)
     places = np.array([body.pose[:2] for body in scene_of(slot).bodies[1:]])
     apart = np.diff(places[:4], axis=0)
@@ -238,7 +238,7 @@ def test_share_of_levels_that_another_engine_reaches():
 
 
 @pytest.mark.long
-def test_a_scene_is_measured_from_its_errors_to_its_ratio():
+def test_ratio_of_a_measured_scene():
     pytest.importorskip("pymunk")
     small = [replace(case, seconds=0.25) for case in ASKED.cases if case.scene == "stack" and case.dimension == 2]
     small = [replace(case, clock=case.clock and (0.1, 0.1), against={"chipmunk": [0.001, 1e6]}) for case in small]

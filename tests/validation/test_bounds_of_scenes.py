@@ -79,7 +79,7 @@ def test_bound_of_one_interface_at_any_height(n, which, dt):
 
 
 @pytest.mark.parametrize("dt", DTS)
-def test_a_whole_column_that_is_found_one_step_late_passes(dt):
+def test_column_found_one_step_late(dt):
     """All contacts are missing in the first step: everything falls together, only the lowest interface overlaps."""
     scene, pose = sunk(10, 9.81 * dt * dt, 1)
     depth, bound = judged(

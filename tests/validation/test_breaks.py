@@ -161,7 +161,7 @@ def test_invariance_status_of_new_drifted_and_known_breaks(folder, monkeypatch):
 
 
 @pytest.mark.parametrize("engine", [name for name in names() if breaks_of(name).families])
-def test_committed_breaks_are_of_scenes_and_relations_that_exist(engine):
+def test_scenes_and_relations_of_committed_breaks(engine):
     known, relations = breaks_of(engine), {relation.name for relation in RELATIONS}
     for family in known.families.values():
         assert {*family.relations} <= relations | {"*"} and {*family.scenes} <= {*CATALOGUE} | {"*"}

@@ -190,7 +190,7 @@ SPATIAL = {
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("world", [PLANAR, SPATIAL], ids=["plane", "space"])
-def test_a_puck_slides_outwards_on_a_face_that_turns(tmp_path, world):
+def test_puck_on_a_turning_face(tmp_path, world):
     """Without friction s'' = omega^2 s along the face: s = s0 cosh(omega t) + v0/omega sinh(omega t)."""
     path = tmp_path / "door.toml"
     path.write_text(DOOR.format(**world))

@@ -197,13 +197,13 @@ def test_without_dask_the_line_that_installs_it(monkeypatch, tmp_path):
     assert done.exit_code == 2 and install("dask") in done.output and "'distributed>=" in done.output
 
 
-def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, monkeypatch):
+def test_missing_scheduler(tmp_path, monkeypatch):
     monkeypatch.setattr("validation.workers.cluster.SILENCE", 1.0)
     with pytest.raises(LimitError, match="does not answer"):
         list(run_cells_on("tcp://127.0.0.1:9", [Slot("impact", (), 2, "chipmunk", "tuned", 0.1)], 9.0, tmp_path / "j"))
 
 
-def test_texts_handed_to_run_cell_must_be_a_table():
+def test_refusal_of_texts_that_are_no_table():
     for line in ('{"scenes": 1}', '{"scenes": {"a.toml@00000000": "x"}}', '{"scenes": '):
         done = CliRunner().invoke(main, ["run-cell", "--batch"], input=line + "\n")
         assert done.exit_code == 2 and json.loads(done.output.splitlines()[0])["error"]

@@ -18,7 +18,7 @@ pytest.importorskip("distributed", reason="pip install -e '.[dask]'")
 pytest.importorskip("pymunk")
 
 
-def test_batches_are_of_one_engine_and_neither_tiny_nor_huge():
+def test_engine_and_size_of_batches():
     slots = [Slot("impact", (("v", float(k + 1)),), 2, e, "p", 0.1) for k in range(2000) for e in ("a", "b")]
     batches = list(_batches(slots, 2))
     assert sorted((s for batch in batches for s in batch), key=Slot.key) == sorted(slots, key=Slot.key)
@@ -148,7 +148,7 @@ def test_journal_of_a_batch_begun_twice(driver):
 
 
 @pytest.mark.parametrize("line", ["", "{", '{"slot": 1}', "[]", '{"line": 1, "error": "left"}'])
-def test_partial_line_of_a_dead_process_is_no_observation(driver, line):
+def test_partial_line_of_a_dead_process(driver, line):
     name = batch_of(driver, cells(1))
     assert list(driver._line(driver.batches[name], line, "w")) == [] and len(driver.batches[name].slots) == 1
 

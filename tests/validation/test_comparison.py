@@ -59,7 +59,7 @@ def test_growth_of_a_flipped_verdict_in_tolerances():
 
 
 @pytest.mark.parametrize("missing", [{"error": None}, {"tolerance": None}, {"tolerance": 0.0}])
-def test_a_flip_without_error_or_tolerance_has_no_size(missing):
+def test_size_of_a_flip_without_error_or_tolerance(missing):
     assert change(ROW, {**ROW, "physics": "fail", "value": 9.0, "error": 9.0, **missing}).size == 0.0
     assert change({**ROW, "error": None}, {**ROW, "physics": "fail"}).size == 0.0
 
@@ -101,7 +101,7 @@ def test_change_within_the_larger_floor_is_noise(side):
     assert change(*pair).note == f"more than its floor 0.2; {SAME}"
 
 
-def test_rows_without_a_floor_are_compared_by_their_tolerance():
+def test_comparison_of_rows_without_a_floor():
     del (before := moved_to(0.0))["floor"], (after := moved_to(0.5))["floor"]
     assert "hundredth" in change(before, after).note
 
@@ -132,7 +132,7 @@ def test_failure_without_a_row_on_the_other_side(physics, kind):
     assert (elsewhere.kind, elsewhere.regressed) == (Kind.ADDED, False)
 
 
-def test_the_same_question_is_found_however_its_slot_is_written():
+def test_question_by_differently_written_slots():
     turned = {**ROW, "slot": dict(reversed(list(ROW["slot"].items())))}
     assert compare_rows([ROW], [turned]) == []
     assert len(compare_rows([ROW], [{**ROW, "metric": "sink"}])) == 2
@@ -224,7 +224,7 @@ def timed(ratio, low=None, high=None, **more):
     return unit | {"ratio": ratio, "ratio_low": low or ratio, "ratio_high": high or ratio} | more
 
 
-def test_a_change_of_speed_says_both_ratios_and_its_interval():
+def test_ratios_and_interval_of_a_change_of_speed():
     (found,) = compare_speeds([timed(2.0, 1.0, 4.0)], [timed(16.0, 8.0, 32.0)])
     assert found == Change(
         Kind.SPEED, True, "toy", "soft", "stack", 3, "n=2", "time", "2 x ball/default", "16 x ball/default", 8.0,
@@ -252,14 +252,14 @@ def test_speed_change_with_its_interval_beyond_a_tenth(before, after, counts):
     assert bool(found) == counts and all(each.regressed == (after["ratio"] > before["ratio"]) for each in found)
 
 
-def test_only_the_same_unit_against_the_same_opponent_is_compared():
+def test_compared_units_and_opponents():
     for other in ({"purpose": "bodies"}, {"opponent": "box/default"}, {"slot": replace(SLOT, dimension=2).as_dict()}):
         assert compare_speeds([timed(1.0)], [timed(9.0, **other)]) == []
     turned = timed(9.0, slot=dict(reversed(list(SLOT.as_dict().items()))))
     assert len(compare_speeds([timed(1.0)], [turned])) == 1
 
 
-def test_every_change_of_speed_is_told_the_largest_slowdown_first():
+def test_order_of_changes_of_speed():
     ratios = {f"p{k}": r for k, r in enumerate((1.0, 4.0, 0.25, 1.02, 8.0))}
     before = [timed(1.0, slot=replace(SLOT, profile=name).as_dict()) for name in ratios]
     after = [timed(r, slot=replace(SLOT, profile=name).as_dict()) for name, r in ratios.items()]

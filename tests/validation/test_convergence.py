@@ -31,7 +31,7 @@ def test_order_of_a_power_of_the_step(order):
     assert limit_of(DTS, [0.3 * dt**order for dt in DTS])[1] is Limit.TRUTH
 
 
-def test_the_standard_error_covers_the_order_of_noisy_errors():
+def test_standard_error_of_noisy_orders():
     """Least squares of log-normal scatter: the slope lies within two standard errors in about 95 % of tries."""
     rng, inside = np.random.default_rng(5), 0
     for _ in range(400):
@@ -64,7 +64,7 @@ def test_each_kind_of_sequence_gets_its_verdict(errors, limit):
     assert limit_of(DTS[: len(errors)], errors)[1] is limit
 
 
-def test_a_quarter_order_is_still_told_from_a_level():
+def test_quarter_order_against_a_level():
     """Half-way order 1/4 over a factor of four in dt parts errors by 4^(1/4) = 1.41, beyond what counts as level."""
     assert limit_of(DTS, [dt**0.25 for dt in DTS])[1] is Limit.TRUTH
 
@@ -130,7 +130,7 @@ def slide(dt, acceleration):
     return observed(slot, {"acceleration": acceleration, "creep": 0.0})
 
 
-def test_a_smooth_metric_is_extrapolated_and_compared_with_its_truth():
+def test_extrapolation_of_a_smooth_metric():
     theta = math.atan(1.1 * 0.5)
     truth = 9.81 * (math.sin(theta) - 0.5 * math.cos(theta))
     (near,) = extrapolations([slide(dt, truth - 0.4 * dt) for dt in DTS])
@@ -197,7 +197,7 @@ def test_errors_at_the_floor_carry_no_order():
     assert (limit, because) == (Limit.FEW, "too few errors above round-off for an order")
 
 
-def test_a_fall_to_round_off_is_told_with_its_step():
+def test_step_of_a_fall_to_round_off():
     assert said([1e-3, 1e-9, 1e-15]) == (
         Limit.NOISY, "round-off at dt = 0.00417 s only, from 1e-09 one step coarser")  # fmt: skip
     assert said([1e-3, 1e-11, 1e-15]) == (Limit.TRUTH, "falls to round-off at dt = 0.00417 s ")
@@ -212,7 +212,7 @@ def test_a_fall_to_round_off_is_told_with_its_step():
     assert said([1e-3, 1e-15, 1e-12, 1e-15])[0] is Limit.TRUTH  # and a rise to it is none
 
 
-def test_two_positive_errors_have_a_slope_and_no_standard_error():
+def test_slope_of_two_positive_errors():
     assert observed_order(DTS[:1], [0.5]) is None
     fit = observed_order(DTS[:2], [0.5, 0.25])
     assert (fit.order, fit.standard_error) == (pytest.approx(1.0), math.inf)
@@ -242,7 +242,7 @@ def extrapolated(*values, dts=None):
     return found
 
 
-def test_an_extrapolation_says_of_which_cell_and_number_it_is():
+def test_cell_and_number_of_an_extrapolation():
     found = extrapolated(TRUTH + 0.8, TRUTH + 0.4, TRUTH + 0.2)
     assert (found.scene, found.dimension, found.engine, found.profile) == ("incline", 2, "toy", "default")
     assert (found.metric, found.unit, found.params) == ("acceleration", "m/s^2", "ratio=1.1")
@@ -320,7 +320,7 @@ def test_undeclared_and_moved_cells_not_in_an_error():
     assert whole.errors == pytest.approx(DTS[:2], rel=1e-9)
 
 
-def test_zero_order_over_few_steps_neither_falls_nor_grows():
+def test_zero_order_over_few_steps():
     """Errors of exactly one have the order 0 with no scatter; the steps are too near each other for a level."""
     assert said([1.0] * 3, [0.1, 0.06, 0.05]) == (Limit.NOISY, "order 0.00 +- 0.00: neither falling nor constant")
 

@@ -297,7 +297,7 @@ def test_single_setting_that_mends_all_with_equivalents(monkeypatch):
     assert [dict(each.changes[0]) for each in singles] == [{"b": 2}, {"c": 1}]
 
 
-def test_change_that_breaks_a_passed_check_is_no_cure(monkeypatch):
+def test_change_that_breaks_a_passed_check(monkeypatch):
     def off(s):
         return (0.0, 0.0, 1.5) if s.get("a") else (9.0, 0.5) if s.get("b") else (9.0, 9.0)
 
@@ -514,7 +514,7 @@ MODEL = """
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "text"), [("crate.toml", BOX), ("crate.xml", MODEL)])
-def test_a_file_is_mended_by_the_smallest_change_first(tmp_path, name, text, monkeypatch):
+def test_smallest_change_for_a_file(tmp_path, name, text, monkeypatch):
     """With a friction of 6 or 7 MuJoCo's pyramid lets a box sink by a third of its size: the round cone is enough."""
     pytest.importorskip("mujoco")
     monkeypatch.setattr(cures, "candidates_of", lambda engine: {"cone": ("elliptic",), "impratio": (10.0,)})

@@ -230,7 +230,7 @@ def test_reading_fault_leaves_the_built_world(fault):
     assert wrong.contacts().impulse == pytest.approx(share * right.contacts().impulse, abs=1e-15)
 
 
-def test_a_fault_that_does_not_exist_cannot_be_planted():
+def test_refusal_of_an_unknown_fault():
     with pytest.raises(Exception, match="fault: 'colour' is none of"):
         Planted(registry.load("reference"), "colour", 0.1)
 

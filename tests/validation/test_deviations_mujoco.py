@@ -148,7 +148,7 @@ def test_mu_and_mass_in_the_law_of_slides() -> None:
         assert_predicted(compare(profile, DT, "incline", ratio=1.3, mu=0.23, mass=4.0), "acceleration")
 
 
-def test_slide_law_is_sharper_than_the_departure_it_explains() -> None:
+def test_sharpness_of_the_slide_law() -> None:
     for profile in ("default", "tuned"):
         _, prediction, check = compare(profile, DT, "incline", ratio=2.0)["acceleration"]
         assert prediction is not None

@@ -73,7 +73,7 @@ def test_a_pyramid_off_its_axis_is_not_predicted(name, params, profile, metric):
     assert law.law(CATALOGUE[name].scene(3, params), DT, CATALOGUE[name].measure) is None
 
 
-def test_the_law_of_a_belt_is_measured_in_the_room():
+def test_law_of_a_belt_in_the_room():
     """From rest to the belt's velocity, on the floor's level."""
     canonical, seen = CATALOGUE["conveyor"], []
     (law,) = covering("mujoco", "4.0.1", "tuned", "conveyor", "pull")

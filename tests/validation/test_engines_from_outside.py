@@ -116,7 +116,7 @@ def run(tmp_path, *args):
     return done, rows
 
 
-def test_one_entry_point_brings_all_parts_of_its_folder(site):
+def test_parts_of_one_entry_point(site):
     assert engine_folder.folder_of("toy") == site and engine_folder.problems() == []
     assert registry.names()[-1] == "toy" and registry.facts("toy").profile("shipped") == "default"
     assert {law.engine for law in laws_of("toy")} == {"toy"} and len(laws_of("toy")) == len(laws_of("chipmunk"))

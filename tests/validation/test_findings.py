@@ -69,7 +69,7 @@ def judged(slot, version="1.2", outcome=Outcome.OK, **metrics):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_engine_of_ours_has_findings_that_can_be_read(engine):
+def test_findings_of_every_engine(engine):
     findings = files.findings_of(engine)
     if findings is None:  # unlisted, which only an engine that is set apart may be
         assert registry.facts(engine).apart
@@ -86,7 +86,7 @@ def slot_of(engine, key):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_family_with_members_has_one_in_the_quick_suite(engine):
+def test_members_in_the_quick_suite(engine):
     findings = files.findings_of(engine)
     quick = {
         (name, canonical.minimal(variation.params), dimension, count)
@@ -103,7 +103,7 @@ def test_every_family_with_members_has_one_in_the_quick_suite(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_every_member_is_a_row_that_the_standard_suite_states(engine):
+def test_members_in_the_standard_suite(engine):
     findings = files.findings_of(engine)
     for key in findings.members if findings else ():
         slot, metric = slot_of(engine, key), key[6]
@@ -139,7 +139,7 @@ def test_finding_of_a_check_without_a_value(findings):
     assert judged(SLOT, creep=0.0) == ("pass", "drifted", True)
 
 
-def test_a_divergence_is_known_only_if_listed_as_one(findings):
+def test_finding_of_a_divergence(findings):
     findings()
     assert judged(SLOT, outcome=Outcome.DIVERGED) == ("fail", "drifted", True)
     findings(members=HEAD + "creeps,default,2,ratio=0.99,1/240,,creep,diverged,\n")
@@ -147,7 +147,7 @@ def test_a_divergence_is_known_only_if_listed_as_one(findings):
     assert judged(SLOT, creep=0.5) == ("fail", "drifted", True)
 
 
-def test_a_family_holds_for_its_releases_and_no_others(findings):
+def test_releases_of_a_family(findings):
     findings()
     assert judged(SLOT, "2.0", creep=0.5) == ("fail", "new", True)
     assert judged(SLOT, "not a version", creep=0.5) == ("fail", "new", True)
@@ -344,7 +344,7 @@ def test_band_with_two_ends(findings):
         (-0.25, (-0.25, 0.996), "-0.2,-0.3..1"),
     ],
 )
-def test_ends_are_written_outwards_with_the_value_between_them(findings, value, ends, text):
+def test_written_ends_of_a_band(findings, value, ends, text):
     folder = findings()
     family = files.read("nameless", folder).families["creeps"]
     files.write_members(folder, {row_key(SLOT, "creep"): Finding(family, value, ends=ends)})
@@ -373,7 +373,7 @@ def test_digits_of_values_by_their_band(findings, value, band, text):
     assert (folder / files.MEMBERS).read_text().splitlines()[1].split(",")[7] == text
 
 
-def test_members_are_written_as_lines_that_git_can_compare(findings):
+def test_written_lines_of_members(findings):
     folder = findings()
     family = files.read("nameless", folder).families["creeps"]
     members = {row_key(replace(SLOT, params=(("ratio", r),)), "creep"): Finding(family, None) for r in (0.9, 0.5)}
@@ -431,7 +431,7 @@ def test_a_release_candidate_is_of_its_release():
 
 
 @pytest.mark.parametrize(("iterations", "written"), [(None, ""), (20, "20")])
-def test_a_row_is_found_by_all_that_it_was_asked(iterations, written):
+def test_finding_by_all_that_was_asked(iterations, written):
     key = row_key(replace(SLOT, iterations=iterations), "creep")
     assert key == ("default", "incline", "2", "ratio=0.99", "1/240", written, "creep")
     assert row_key(SLOT, "apex[2]")[-1] == "apex[2]"  # one of several is listed alone

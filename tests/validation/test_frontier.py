@@ -134,12 +134,12 @@ def test_ends_of_every_declared_axis(scene, own):
         resolve(scene).scene(slot.dimension, dict(slot.params))
 
 
-def test_no_axis_leads_to_steps_that_cannot_be_run():
+def test_steps_along_every_axis():
     ends = [end for _, own in axes() if own.axis == "dt" for end in (own.easy, own.hard, own.hardest)]
     assert ends and max(ends) <= LONGEST_DT
 
 
-def test_a_real_engine_is_bracketed_and_its_cells_prove_it():
+def test_bracket_of_a_real_engine():
     pytest.importorskip("pymunk")
     found = brackets(["thin_wall"], ["chipmunk"], ["tuned"], [2], quick=True)
     *_, _ = search(found, QUICK_RATIO)

@@ -167,7 +167,7 @@ def test_separate_and_shallower_pairs_not_measured(monkeypatch):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_round_body_clear_of_a_corner_does_not_overlap(dimension):
+def test_round_body_clear_of_a_corner(dimension):
     """6.6 cm clear of a corner, seen along the line of centres it used to be 1.5 cm deep."""
     half, radius = (1.0, 0.25, 0.5), 0.3
     away = np.array([0.8, 0.6]) if dimension == 2 else np.array([0.8, 0.36, 0.48])
@@ -223,7 +223,7 @@ def test_depth_of_a_rotation_that_is_nan():
     assert math.isnan(deepest(ROD, pose_a, ROD, pose_b))
 
 
-def test_a_tilted_half_space_is_measured_along_its_normal():
+def test_distance_from_a_tilted_half_space():
     face, box = HalfSpace((-math.sin(0.3), math.cos(0.3)), 0.25), Box((0.5, 0.5))
     centre = 0.75 * np.array(face.normal)
     touching = np.array([[*centre, 0.3]])

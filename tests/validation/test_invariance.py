@@ -68,7 +68,7 @@ def test_transformed_motion_mapped_back(name, dimension, relation):
 
 
 @pytest.mark.parametrize("name", ["turned 33", "turned 90", "mirrored"])
-def test_a_map_of_space_keeps_distances_from_every_face(name):
+def test_distances_under_a_map_of_space(name):
     scene = CATALOGUE["incline"].scene(3)
     posed = BY_NAME[name].pose(scene).scene
     for one, other in zip(scene.bodies, posed.bodies, strict=True):
@@ -95,7 +95,7 @@ def corner(pose, twist, d, own):
 
 @pytest.mark.parametrize("name", ["turned 33", "mirrored"])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_points_of_turning_bodies_move_as_the_world_was_mapped(name, dimension):
+def test_points_of_turning_bodies_under_a_map(name, dimension):
     """A wrong sign of a spin that goes forth and back would cancel: here it does not."""
     if dimension == 2:
         body = Body("box", Box((0.5, 0.25)), 1.0, 0.1, (1.0, 2.0, 0.7), (0.5, -0.25, 3.0))
@@ -120,7 +120,7 @@ def test_points_of_turning_bodies_move_as_the_world_was_mapped(name, dimension):
 
 
 @pytest.mark.parametrize(("name", "dimension"), LINES)
-def test_a_bystander_is_out_of_reach_and_in_no_wall(name, dimension):
+def test_place_of_a_bystander(name, dimension):
     """Between walls that face each other their directions cancel: it stands beside the scene, not on its first body."""
     scene = CATALOGUE[name].scene(dimension)
     far = BY_NAME["bystander"].pose(scene).scene.bodies[-1]
@@ -143,7 +143,7 @@ def test_no_place_for_a_bystander_between_closing_walls():
     assert isinstance(BY_NAME["bystander"].pose(closed), str)
 
 
-def test_contacts_of_renumbered_bodies_come_back_with_the_other_sign():
+def test_signs_of_contacts_of_renumbered_bodies():
     scene = CATALOGUE["head_on"].scene(2)
     posed = BY_NAME["renumbered"].pose(scene)
     rows = Contacts.from_rows([(0, 1, (0.0, 0.0), (1.0, 0.0), (2.0, 0.5), -1e-3)], 2)
@@ -167,7 +167,7 @@ def test_lost_digits_of_distant_positions_not_required():
     ).holds
 
 
-def test_an_answer_is_json_whatever_numbers_a_measure_gives():
+def test_json_of_any_measured_numbers():
     base = {"load": (np.float64(2.0), "")}
     found = judged("mirrored", base, {"load": (np.float64(2.0), "")},
                    Allowances({"load": 0.0}, {"load": np.float64(1.0)}))  # fmt: skip
@@ -219,7 +219,7 @@ def test_moved_start_changes_distances_along_every_axis(dimension):
     assert _nudged(scene, 0.0) is scene
 
 
-def test_a_dependence_on_order_and_on_the_side_is_found(monkeypatch):
+def test_dependence_on_order_and_side(monkeypatch):
     """An engine that pushes the body that is listed last to the right: order and mirror show it, place does not."""
     from adapters.registry import load
     from validation.questions import invariance
@@ -302,7 +302,7 @@ def test_scene_size_by_distance_and_largest_free_body():
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.5, True), (20.0, False)])
-def test_scatter_of_turned_starts_counts_as_that_of_moved_ones(monkeypatch, share, holds):
+def test_scatter_of_turned_and_moved_starts(monkeypatch, share, holds):
     """A box that lands flat scatters when it is turned in the last place, and not when it is moved."""
     size = size_of(CATALOGUE["off_centre"].scene(3))
     unit = unit_of(CATALOGUE["off_centre"].scene(3), 0.0)

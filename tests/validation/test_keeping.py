@@ -146,7 +146,7 @@ def test_id_of_a_run_from_another_machine_and_a_third_refused(tmp_path, monkeypa
         merge(ours, tmp_path / "b1")
 
 
-def test_a_name_of_any_length_is_refused_in_a_line(tmp_path, monkeypatch):
+def test_refusal_of_a_name_of_any_length(tmp_path, monkeypatch):
     ours = filled(tmp_path / "a", "one", monkeypatch)
     filled(tmp_path / "b", "two", monkeypatch)
     for folder in ("a", "b"):
@@ -221,7 +221,7 @@ def test_pruning_rules_and_newest_run_of_a_title(rules, going):
     assert "".join(each.id for each in doomed(RUNS, rules, NOW)) == going
 
 
-def test_pruned_runs_leave_no_row_and_give_their_room_back(tmp_path, monkeypatch):
+def test_rows_and_room_of_pruned_runs(tmp_path, monkeypatch):
     store = filled(tmp_path, "one", monkeypatch, [0.1 * k for k in range(40)])
     store.compact()
     size = store.path.stat().st_size

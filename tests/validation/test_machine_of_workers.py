@@ -60,7 +60,7 @@ def test_requested_workers_within_the_machine(monkeypatch):
     assert limits.cores() == 1 and limits.workers(0, 100) == 1
 
 
-def test_cores_are_those_of_this_process_or_of_the_machine(monkeypatch):
+def test_number_of_cores(monkeypatch):
     machine(monkeypatch, cores=3)
     assert limits.cores() == 3
     monkeypatch.delattr(os, "sched_getaffinity")

@@ -40,7 +40,7 @@ def test_chipmunk_rebounds_to_two_units_of_round_off(e, dt):
     assert abs(ratio - e) <= 2.3e-16
 
 
-def test_a_tuned_chipmunk_column_of_ten_carries_its_weight():
+def test_weight_of_a_tuned_chipmunk_column():
     # Known from 10 s runs: bottom impulse off by 1e-11 in the mean with a standard deviation of 3e-8. The transient
     # still decays then (7e-8 in the mean after 5 s, 5e-13 after 20 s), so the mean is held against that deviation.
     found = measure("stack", "chipmunk", "tuned", 1 / 240, n=10.0, duration=10.0)
@@ -80,7 +80,7 @@ def test_mujoco_tuned_reflects_the_velocity_to_2e_minus_5(e):
     ("engine", "profile"),
     [("chipmunk", "tuned"), ("bullet", "tuned"), ("mujoco", "tuned"), ("reference", "classical")],
 )
-def test_the_worked_example_holds_on_every_engine_that_can_bounce(engine, profile):
+def test_worked_example_on_every_bouncing_engine(engine, profile):
     found = measure("impact", engine, profile, 1 / 240, e=0.8, v=6.0, mass=0.5)
     assert found["rebound_speed"] == pytest.approx(4.8, abs=1e-9)
     assert found["impulse"] == pytest.approx(5.4, abs=1e-9)
@@ -195,7 +195,7 @@ def in_a_line(radius, first):
         ("mujoco", 0.5, 0.0, (0.0, 0.0, 0.0, 0.0, 1.0)),
     ],
 )
-def test_touching_balls_part_as_measured_where_a_place_is_rounded(engine, radius, first, speeds):
+def test_touching_balls_at_a_rounded_place(engine, radius, first, speeds):
     """Newton's law for the contacts that rounding leaves closed: 2 k r is 0.6000000000000001 for k = 3, r = 0.1."""
     found = ran(slot_of("cradle", engine, "tuned", 1 / 240, n=5.0, apart=0.0), in_a_line(radius, first))
     assert found.twist[-1, :, 0] / found.twist[0, 0, 0] == pytest.approx(speeds, abs=1e-3)
@@ -276,7 +276,7 @@ def test_agreement_by_a_later_choice_told():
     assert "this agreement is no test" in " ".join(told.split())
 
 
-def test_a_fact_is_shown_contradicted_or_refused_by_its_numbers():
+def test_fact_by_its_numbers():
     ends = {"says": "it creeps", "scene": "incline", "profile": "default", "metric": "creep", "low": 1.0, "high": 2.0}
     assert measured._fact(ends | {"found": 1.5}).standing == SHOWN
     assert measured._fact(ends | {"found": 2.5, "because": "another floor"}).standing == CONTRADICTED

@@ -52,7 +52,7 @@ def test_mean_rate_of_a_parabola_as_its_middle_slope():
     assert metrics.mean_rate(t, 0.5 * 3.0 * t * t)[0] == pytest.approx(3.0 * 1.5, rel=1e-12)
 
 
-def test_kinetic_energy_uses_the_stated_inertia_in_body_axes():
+def test_kinetic_energy_with_inertia_in_body_axes():
     box = Body("box", Box((0.5, 0.5, 0.5)), 2.0, (1.0, 2.0, 3.0), (0, 0, 0, math.cos(0.3), math.sin(0.3), 0, 0))
     scene = Scene("s", 1, 3, (box,), (), (0.0, 0.0, 0.0), 1.0)
     # Turned by 0.6 rad about x: a world spin about x is a body spin about x.
@@ -63,7 +63,7 @@ def test_kinetic_energy_uses_the_stated_inertia_in_body_axes():
     assert metrics.kinetic_energy(scene, trajectory) == pytest.approx(0.5 * 2 * 14 + 0.5 * 1 * 16)
 
 
-def test_interface_load_is_signed_and_relative_to_the_weight():
+def test_sign_and_scale_of_interface_loads():
     t = np.arange(11) * 0.1
     rows = Contacts.from_rows([(1, 0, (0, 0), (0, -1), (0, -0.25), 0.0)] * 20, 2)
     record = ContactRecord(np.arange(1, 11), np.arange(0, 22, 2), rows)
@@ -102,7 +102,7 @@ def test_round_shapes_and_half_spaces_are_exact(x, y, r):
     assert other == pytest.approx(math.hypot(x, y) - r - 0.5, abs=1e-14)
 
 
-def test_a_spatial_box_on_a_turned_box_keeps_its_gap():
+def test_gap_of_a_spatial_box_on_a_turned_box():
     turn = np.array([math.cos(0.4), 0.0, 0.0, math.sin(0.4)])
     below = np.array([[0.0, 0.0, 0.5, *turn]])
     above = np.array([[0.1, 0.0, 1.52, 1.0, 0.0, 0.0, 0.0]])
@@ -163,7 +163,7 @@ def test_unrecorded_impulses_have_no_value():
     assert metrics.interface_load(resting(2), [(0, 1)], 1.0, 1.0) == ((None, "contacts were not recorded"), None)
 
 
-def test_one_component_that_is_not_reported_makes_the_impulse_none():
+def test_impulse_without_one_component():
     trajectory = recorded(resting(2), [[(0, 1, (1.0, math.nan))]])
     assert metrics.total_impulse(trajectory, 0, 1) == (None, metrics.UNAVAILABLE)
 
@@ -201,7 +201,7 @@ def test_top_without_curvature():
     assert (list(times), list(tops)) == ([0.125], [0.5])
 
 
-def test_the_ratio_of_intervals_is_the_second_over_the_first():
+def test_ratio_of_intervals():
     assert metrics.interval_ratio(np.array([1.0, 3.0, 4.0, 9.0])) == (0.5, "")
     assert metrics.interval_ratio(np.array([1.0, 3.0, 4.0])) == (0.5, "")
     assert metrics.interval_ratio(np.array([1.0, 3.0])) == (0.0, "there are only 2 apexes, three are needed")
@@ -217,7 +217,7 @@ def test_last_motion_by_the_speed_threshold():
 
 
 @pytest.mark.parametrize("samples", [5, 6])
-def test_the_mean_rate_is_that_of_the_second_half(samples):
+def test_mean_rate_of_the_second_half(samples):
     t = np.arange(samples) / 4
     value = np.where(np.arange(samples) < samples // 2, 100.0, 3.0 * t)
     assert metrics.mean_rate(t, value) == (pytest.approx(3.0), "")
@@ -228,7 +228,7 @@ def test_the_mean_rate_is_that_of_the_second_half(samples):
     [(Disc(0.25), 0.25), (Sphere(0.75), 0.75), (Box((3.0, 4.0)), 5.0), (Box((1.0, 2.0, 2.0)), 3.0),
      (HalfSpace((0.0, 1.0)), 0.0)],
 )  # fmt: skip
-def test_the_reach_of_a_shape_is_its_outermost_point(shape, reach):
+def test_reach_of_a_shape(shape, reach):
     assert metrics.reach(shape) == pytest.approx(reach)
 
 
@@ -265,7 +265,7 @@ def test_drift_is_horizontal_and_from_start_to_end():
     assert metrics.lateral_drift(solid) == 5.0
 
 
-def test_the_deepest_overlap_is_of_neighbours_at_any_sample():
+def test_deepest_overlap_of_neighbours():
     scene = pile(2, Disc(0.5), Disc(0.5), Disc(0.5))
     pose = np.zeros((2, 4, 3))
     pose[:, 1:, 1] = [[0.5, 1.5, 2.5], [0.5, 1.25, 2.25]]
@@ -390,7 +390,7 @@ def test_a_point_of_a_body_goes_with_it():
 
 
 @pytest.mark.parametrize("level", [-0.8, -0.3, 0.0, 0.4, 1.3, 5.0])
-def test_a_crossing_of_a_cubic_is_exact_wherever_samples_lie(level):
+def test_crossing_of_a_cubic(level):
     """Value t^3 / 2 + t - 1, sampled at uneven times that begin late; the root is found by itself."""
     t = np.array([0.1, 0.35, 0.8, 1.7, 2.5])
     value, rate = 0.5 * t**3 + t - 1.0, 1.5 * t**2 + 1.0
@@ -479,7 +479,7 @@ def test_unreported_late_impulses_have_no_value():
     assert metrics.late_impulses(recorded(resting(2), [[(0, 1, (1.0, math.nan))]]), 0, 1, 1.0) is None
 
 
-def test_the_deepest_overlap_of_stated_pairs_is_of_them_alone():
+def test_deepest_overlap_of_stated_pairs():
     scene = pile(2, Disc(0.5), Disc(0.5))
     pose = np.zeros((1, 3, 3))
     pose[:, 1:, 1] = [0.25, 0.125]  # 0.25 deep in the floor and 0.375; 0.875 in each other

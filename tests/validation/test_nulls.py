@@ -106,7 +106,7 @@ def test_a_body_that_meets_nothing_keeps_its_spin():
     assert perfectly_inelastic(scene_of(*row), DT).twist[-1, :, 2].tolist() == [0.0, 0.0, 2.0]
 
 
-def test_a_null_says_its_value_and_why_it_has_none():
+def test_value_and_reason_of_a_null():
     found = {null.name: null for null in nulls_of("impact", 2, {"e": 0.5}, DT, "rebound_ratio", 0.5)}
     assert found["free flight"] == Null("free flight", -1.0, 1.5, "")
     assert found["did nothing"] == Null("did nothing", 0.0, 0.5, "")
@@ -117,7 +117,7 @@ def test_a_null_says_its_value_and_why_it_has_none():
     }
 
 
-def test_a_body_in_space_keeps_turning_about_its_axis():
+def test_turn_of_a_body_in_space():
     tumble = CATALOGUE["tumble"].scene(3)
     found = free_flight(tumble, DT)
     assert np.linalg.norm(found.pose[:, 0, 3:], axis=1) == pytest.approx(1.0)
@@ -186,7 +186,7 @@ def test_reason_for_missing_skill():
     assert "no trivial answer has this value" in skill(0.1, [Null("a", None, None)])[1]
 
 
-def test_the_skill_of_a_row_is_that_of_its_cell():
+def test_skill_of_a_row():
     row = {"scene": "impact", "dimension": 2, "slot": {"params": {"e": 0.5}}, "dt": DT, "metric": "rebound_ratio",
            "truth": 0.5, "value": 0.105}  # fmt: skip
     assert skill_of(row) == (pytest.approx(1.0 - 0.395 / 0.5), "did nothing")

@@ -45,7 +45,7 @@ def test_experiment_not_counted_as_an_own_profile():
     assert odd.base == "a+b" and odd.with_own(OWN.switched).base == "a+b"
 
 
-def test_a_matched_profile_with_settings_has_no_rank_either():
+def test_rank_of_a_matched_profile_with_settings():
     assert registry.is_ranked("mujoco", "default+cone=elliptic")
     assert not registry.is_ranked("mujoco", "matched+cone=elliptic")
 
@@ -58,7 +58,7 @@ def test_shipped_profile_cells_with_own_settings(more):
     assert {slot.profile for slot in found} == {"default+damping=0.5"}
 
 
-def test_profiles_that_are_named_are_asked_with_the_settings():
+def test_named_profiles_with_settings():
     found = asked("chipmunk", ("damping", 0.5), profiles=["tuned", "default"])
     assert {slot.profile for slot in found} == {"default+damping=0.5", "tuned+damping=0.5"}
 
@@ -155,7 +155,7 @@ def test_row_of_own_settings_with_verdict_and_no_standing():
     assert not any(row.alarming for row in own)
 
 
-def test_a_release_that_has_no_such_setting_was_not_asked():
+def test_release_without_the_setting():
     odd = SLOT.with_own((("slop_of_later_releases", 0.1),))
     found = execute(odd)
     assert found.outcome is Outcome.UNSUPPORTED and "no setting 'slop_of_later_releases'" in found.reason

@@ -44,7 +44,7 @@ def test_check_of_many_variants_counted_once():
     assert found.mends == 0 and [each.case for each in found.breaks] == ["its own scene elsewhere"]
 
 
-def test_fix_that_breaks_more_than_it_mends_not_printed():
+def test_fix_that_breaks_more_than_it_mends():
     cost = Cost("a body at rest", "penetration", "m", 1e-4, 0.041, 0.0)
     fix = next(each for each in cures_of("mujoco").values() if each.recommended)
     kept = replace(fix, panel=Panel(20, 1, (cost,)))

@@ -45,7 +45,7 @@ def test_full_suite_of_all_variations_and_all_steps(scene):
         assert steps >= set(FULL_DT) if slot in asked else steps == {plan.QUICK_DT}, slot
 
 
-def test_steps_that_are_asked_for_are_asked_of_all_variations():
+def test_asked_steps_of_all_variations():
     found = slots(Request(["bounce"], ["chipmunk"], suite="full", dts=[1 / 60]))
     assert {slot.dt for slot in found} == {1 / 60}
     assert len({slot.params for slot in found}) == 64

@@ -309,7 +309,7 @@ def test_time_limits_of_cells_do_not_include_compilation(compiled, monkeypatch):
     assert len(log) == 10 and late == [] and warming.missing(MIXED) == []
 
 
-def test_a_compilation_that_hangs_ends_and_its_cells_run(compiled, monkeypatch):
+def test_cells_after_a_hanging_compilation(compiled, monkeypatch):
     clock = iter(range(10**6))
     monkeypatch.setattr(pool.time, "monotonic", lambda: float(next(clock)))
     monkeypatch.setattr(Compiler, "rounds", 10**6)

@@ -15,7 +15,7 @@ def test_polynomials_of_twice_the_order_are_integrated_exactly(count):
     assert np.array_equal(gauss(count)[0], np.polynomial.legendre.leggauss(count)[0])
 
 
-def test_a_rule_is_made_once_and_cannot_be_written_to():
+def test_read_only_quadrature_rule():
     assert gauss(7) is gauss(7)
     for values in gauss(7):
         with pytest.raises(ValueError, match="read-only"):

@@ -101,7 +101,7 @@ def test_rotation_angle_in_space_at_any_axis_and_start(axis, turn):
     assert quantity(scene_of(3), trajectory, "ball.angle", 0.0)[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_name_with_a_slash_is_that_of_its_body():
+def test_body_name_with_a_slash_in_a_quantity():
     scene = scene_of(2)
     named = Scene("s", 1, 2, (*scene.bodies[:2], Body("a/b", Disc(0.5))), (Pair(),), (0.0, 0.0), 4.0)
     assert quantity(named, moving(2), "a/b.y") == (214.0, "")

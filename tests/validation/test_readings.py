@@ -93,7 +93,7 @@ def test_size_of_an_error_where_forces_on_a_body_cancel(situation):
 
 
 @pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
-def test_an_action_that_is_not_minus_the_reaction_fails(situation):
+def test_action_against_reaction(situation):
     scene, run, keeps = made_up(situation)
     fixed = [k for k, body in enumerate(scene.bodies) if body.motion == "fixed"]
     alike = spoilt(run, lambda step, body, told: scaled(-np.eye(2))(step, body, told) if body in fixed else told)
@@ -116,7 +116,7 @@ def test_a_reading_of_another_body_fails(situation):
 
 
 @pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
-def test_a_reading_that_is_wrong_in_one_step_fails(situation):
+def test_reading_wrong_in_one_step(situation):
     scene, run, keeps = made_up(situation)
     once = spoilt(run, lambda step, body, told: told[:-1] if step == 4 else told)
     told = judge(situation, scene, once, "vector", keeps)
@@ -182,7 +182,7 @@ def test_kept_readings_complete_and_explained(engine):
 
 
 @pytest.mark.parametrize("engine", OURS)
-def test_the_kept_table_is_that_of_the_installed_release(engine):
+def test_release_of_the_kept_table(engine):
     """As shipped, of the first call; all of it with CROSSCHECK_ALL=1 by `crosscheck forces ENGINE --keep`."""
     loaded, first = load(engine), readings_of(engine)[0]
     known = [each for each in known_of(engine) if each.call == first.call]
@@ -210,7 +210,7 @@ def test_settings_that_switch_off_a_cause(engine):
 
 
 @pytest.mark.parametrize(("threshold", "rightly"), [(0.0, True), (None, False)])
-def test_points_of_bullet_apart_carry_force_only_as_shipped(threshold, rightly):
+def test_force_of_bullet_points_apart(threshold, rightly):
     """To skip points apart is right for a threshold of 0; as shipped it loses forces of every landing and rest."""
     p = pytest.importorskip("pybullet")
     client = p.connect(p.DIRECT)

@@ -70,7 +70,7 @@ def test_a_planted_fault_is_seen_with_its_size(changes, law, share, size):
     assert told[law] < 5.0 * share * size
 
 
-def test_a_contact_that_pulls_and_friction_that_drives_are_seen():
+def test_pulling_contact_and_driving_friction():
     assert values(residuals(*sliding(impulse=(0.0, -1.5 * WEIGHT))))["pull"] == pytest.approx(1.0)
     driven = values(residuals(*sliding(impulse=(2.0 * MU * WEIGHT, 0.0))))
     assert driven["slip"] > 0.1 and driven["cone"] < 1e-12
@@ -104,7 +104,7 @@ def test_newton_s_law_of_a_bounce_and_its_half():
         assert told["momentum"] < 1e-12
 
 
-def test_real_engines_are_asked_in_a_process_of_their_own():
+def test_process_of_real_engines():
     pytest.importorskip("pymunk")
     with Apart() as apart:
         found = ask(Slot("pinch", (), 2, "chipmunk", "tuned", 1 / 240), apart)

@@ -180,7 +180,7 @@ def test_certificate_and_exactness_of_a_row(certificate, shown):
     assert judged(certificate=certificate).certificate == shown
 
 
-def test_a_unit_that_is_empty_leaves_no_space_behind():
+def test_text_of_an_empty_unit():
     observation = replace(SEEN, certificate={"certified": True, "full": {}, "metric_errors": {"m": 0.25}})
     assert rows._certificate(observation, replace(CHECK, metric="m", unit="")) == "full, to 0.25"
 
@@ -246,7 +246,7 @@ def test_rows_without_a_law(law):
     assert law == []
 
 
-def test_predictions_can_be_asked_of_a_row_whatever_its_standing(law):
+def test_predictions_of_any_row(law):
     row = replace(judged(slot=OWN), standing="known")
     law.clear()
     ((_, centre, band),) = predictions_of(row)
@@ -353,7 +353,7 @@ def test_a_study_without_a_value_says_why(monkeypatch):
 # ---- as a table ----------------------------------------------------------------------------------------------------
 
 
-def test_a_table_has_a_column_per_field_and_per_parameter():
+def test_columns_of_a_table():
     other = replace(judged(), scene="impact", params={"e": 0.8}, value=None)
     table = frame([judged(), other])
     fields = list(Row.__dataclass_fields__)

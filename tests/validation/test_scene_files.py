@@ -121,7 +121,7 @@ def test_inertia_from_shape_and_mass(tmp_path):
     assert canonical.notes == ("ball.inertia: 0.375 kg m^2, of a uniform disc; none was given",)
 
 
-def test_a_density_gives_mass_and_inertia_and_says_so(tmp_path):
+def test_mass_and_inertia_by_density(tmp_path):
     canonical = stated(tmp_path, GOOD.replace("mass = 1.0\ninertia = 0.125", "density = 2.0"))
     body = canonical.scene(2).bodies[1]
     assert body.mass == pytest.approx(2.0 * math.pi * 0.25)
@@ -270,7 +270,7 @@ def test_recipe_s_example(tmp_path):
     assert len(canonical.notes) == 2
 
 
-def test_a_body_may_have_a_slash_in_its_name():
+def test_body_with_a_slash_in_its_name():
     from validation.files.scene_format import parts_of
 
     names = ["a/b", "b", "a"]
@@ -370,7 +370,7 @@ def pairs_notes(tmp_path, pairs):
          ["pairs: restitution 0 of top-floor, none was given"]),
     ],
 )  # fmt: skip
-def test_friction_and_restitution_that_a_file_leaves_out_are_said(tmp_path, pairs, said):
+def test_friction_and_restitution_left_out_of_a_file(tmp_path, pairs, said):
     assert pairs_notes(tmp_path, pairs) == said
 
 

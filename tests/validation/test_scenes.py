@@ -79,7 +79,7 @@ def test_parameter_ranges_of_every_scene_made_or_refused(name):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_faults_are_planted_where_each_of_its_checks_is_stated(name):
+def test_planted_faults_of_stated_checks(name):
     canonical = CATALOGUE[name]
     (dimension, *_) = canonical.dimensions
     stated = {

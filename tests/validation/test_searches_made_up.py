@@ -88,7 +88,7 @@ def test_rounds_of_best_changes(monkeypatch):
         ("held", (0.9, 0.9), (("a", 3), ("b", 5))), ("starved", (0.9, 0.9), BOTH),
     ],
 )  # fmt: skip
-def test_a_change_that_harms_other_cells_is_passed_over(monkeypatch, kind, bad, changes):
+def test_change_that_harms_other_cells(monkeypatch, kind, bad, changes):
     world = World(monkeypatch, CANDIDATES, searched=SEARCHED, **{kind: {A2: bad}})
     if kind == "held" or bad[1] > 1.0:
         world.said[kind][BOTH] = bad
@@ -110,7 +110,7 @@ def test_change_of_the_iteration_count(monkeypatch):
     assert world.search().changes == {}  # as many fails, and one of them is new
 
 
-def test_no_more_settings_are_changed_than_there_are_rounds(monkeypatch):
+def test_settings_changed_in_all_rounds(monkeypatch):
     names = [f"s{k}" for k in range(6)]
 
     class Better(dict):

@@ -137,7 +137,7 @@ def test_search_without_a_visible_gain_and_limit_of_rounds(monkeypatch):
     assert len(found.changes) == tuning.ROUNDS == 4 and found.after.failing == 0
 
 
-def test_engine_without_a_shipped_profile_has_no_needless_settings(monkeypatch):
+def test_settings_of_an_engine_without_a_shipped_profile(monkeypatch):
     asked = Asked(lambda slot: (0.5,))
     monkeypatch.setattr(tuning, "observe", asked)
     monkeypatch.setattr(tuning, "profile_of", lambda engine, role: None)
@@ -369,7 +369,7 @@ def test_dependent_setting_switched_with_its_main_one(monkeypatch):
         ([], (), "toy impact: 3 tolerances as shipped, 2.25 with every change, so this is no fix"),
     ],
 )
-def test_checks_always_passed_or_always_failed_give_no_cure(monkeypatch, enough, metrics, said):
+def test_checks_always_passed_or_failed(monkeypatch, enough, metrics, said):
     with pytest.raises(ValueError, match="no fix") as refused:
         measured(monkeypatch, enough, metrics=metrics)
     assert str(refused.value) == said

@@ -109,7 +109,7 @@ def test_mass_moments_of_a_solid_ball_and_a_disc():
             measure(HalfSpace((0.0, 1.0)))
 
 
-def test_mass_properties_of_corners_are_those_of_the_box():
+def test_mass_properties_of_corners():
     assert volume(BRICK) == pytest.approx(0.48)
     assert moments(BRICK, 3.0, 3) == pytest.approx(moments(Box((0.5, 0.4, 0.3)), 3.0, 3))
     rectangle = Polygon(((0.5, 0.25), (-0.5, 0.25), (-0.5, -0.25), (0.5, -0.25)))
@@ -165,7 +165,7 @@ def test_centroid_of_a_file_s_corners(tmp_path):
     ("capsule", "radius = 1", 2, "half_length"),
     ("cylinder", "radius = 1, half_length = 1", 2, "odd.shape: a Cylinder cannot be used in 2-D"),
 ])  # fmt: skip
-def test_corners_that_are_none_are_refused_by_their_field(kind, sizes, d, said, tmp_path):
+def test_refusal_of_corners_that_are_none(kind, sizes, d, said, tmp_path):
     with pytest.raises(SceneError, match=said.replace("(", r"\(")) as refusal:
         read(kind, sizes, d, tmp_path)
     assert len(str(refusal.value).splitlines()) == 1

@@ -45,7 +45,7 @@ def test_other_plan_as_another_run(tmp_path):
     assert first.id != second.id
 
 
-def test_the_same_plan_of_other_code_is_another_run(tmp_path, monkeypatch):
+def test_run_of_the_same_plan_by_other_code(tmp_path, monkeypatch):
     store = Store(tmp_path)
     first, _ = store.start("test", SLOTS)
     store.add(first, observed(SLOTS[0]))
@@ -76,7 +76,7 @@ def test_run_of_moved_starts_as_latest_only_alone(tmp_path):
     assert store.run(second.id).id == second.id
 
 
-def test_missing_results_and_runs_are_said_in_one_line(tmp_path):
+def test_line_for_missing_results_and_runs(tmp_path):
     with pytest.raises(StoreError, match="there are no results"):
         Store(tmp_path / "nowhere", create=False)
     store = Store(tmp_path)
@@ -101,7 +101,7 @@ def test_refusal_of_a_file_that_is_no_store(tmp_path):
         Store(tmp_path)
 
 
-def test_a_store_that_is_closed_says_that_it_cannot_write(tmp_path):
+def test_write_to_a_closed_store(tmp_path):
     store = Store(tmp_path)
     store.compact()
     store.close()

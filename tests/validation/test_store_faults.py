@@ -233,7 +233,7 @@ def test_full_disk_in_one_line_without_loss(tmp_path):
     assert made.observations(run) == [observed(SLOTS[0])]
 
 
-def test_text_in_a_store_is_cleaned_when_it_is_read(tmp_path):
+def test_text_cleaned_as_a_store_is_read(tmp_path):
     run = filled(tmp_path)
     sql(tmp_path, "UPDATE observations SET body = json_set(body, '$.reason', ?, '$.engine_version', ?, '$.log', ?)",
         "\x1b[2J\nsecond", "9" * 10**6, "\x07" * 10**6)  # fmt: skip

@@ -59,7 +59,7 @@ def test_iterations_are_the_slot_s_own_field():
     assert other.iterations == 7 and other.switched == (("collision_slop", 1e-5),)
 
 
-def test_a_cell_runs_with_the_setting_and_says_so():
+def test_cell_with_a_switched_setting():
     own, more, wrong = side_by_side(SLOT, [{"iterations": 1000}, {"no_such_setting": 1}])
     assert reading(own, "penetration").badness > 1.0 > reading(more, "penetration").badness
     assert {s["name"]: s["value"] for s in more.settings}["iterations"] == 1000

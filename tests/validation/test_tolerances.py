@@ -113,7 +113,7 @@ def failing(scene, trajectory):
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("dt", DTS)
 @pytest.mark.parametrize("e", [0.5, 0.8, 0.95, 1.0])
-def test_a_rigid_bounce_passes_in_every_order_whatever_the_phase(e, dt, order):
+def test_rigid_bounce_in_every_order_and_phase(e, dt, order):
     canonical = CATALOGUE["bounce"]
     for height in np.linspace(1.0, 1.15, 7):
         scene = canonical.scene(2, {"e": e, "height": float(height)})
@@ -129,7 +129,7 @@ def test_wrong_physics_fails_the_bounce(order):
     assert "rest_time" in failing(scene, bounce_by(scene, dt, order, g_factor=0.7))
 
 
-def test_an_order_that_loses_height_at_every_bounce_fails():
+def test_order_that_loses_height_at_every_bounce():
     """At e = 0.8 it rests 0.6 s early, where scatter and location of the impacts allow 0.25 s."""
     scene = CATALOGUE["bounce"].scene(2, {"e": 0.8})
     assert failing(scene, bounce_by(scene, 1 / 240, LOSING)) == {"rest_time"}
@@ -149,7 +149,7 @@ def test_reported_force_in_flight_fails_the_bounce(order):
         assert failing(scene, replace(right, contacts=touching(wrong))) == {"force_in_flight"}
 
 
-def test_energy_growth_is_caught_where_e_is_below_one():
+def test_energy_growth_below_e_of_one():
     scene = CATALOGUE["bounce"].scene(2, {"e": 0.95})
     assert "apex_growth" in failing(scene, bounce_by(scene, 1 / 240, "velocity first", e=1.02))
 

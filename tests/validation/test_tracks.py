@@ -60,14 +60,14 @@ def test_tube_width_by_the_allowance_of_the_whole_run(unit, reach):
 
 
 @pytest.mark.parametrize("e", [0.75, 0.85, 0.13])
-def test_a_wrong_rebound_leaves_the_tube_before_its_second_impact(e):
+def test_wrong_rebound_in_the_tube(e):
     scene, trajectory = bouncing(e, 1.0, True)
     fall = math.sqrt(2.0 / 9.81)
     gone = record(CATALOGUE["bounce"], scene, trajectory).departure
     assert gone is not None and fall < gone < fall * (1.0 + 2.0 * 0.85)
 
 
-def test_the_departure_is_the_first_sample_outside_the_tube():
+def test_departure_from_the_tube():
     canonical = CATALOGUE["incline"]
     scene = canonical.scene(2, {"ratio": 0.9})
     t = np.arange(481) * DT

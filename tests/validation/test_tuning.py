@@ -25,7 +25,7 @@ def test_scenes_say_what_is_searched_together():
 
 
 @pytest.mark.long
-def test_more_sweeps_are_found_where_too_few_are_the_fault(small, monkeypatch):
+def test_sweeps_found_by_tuning(small, monkeypatch):
     candidates = {"iterations": (10, 1000), "collision_persistence": (1, 3)}
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: candidates)
     found = search("chipmunk", "default", "stand", dimensions=(2,))

@@ -159,7 +159,7 @@ def numbers(scene):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_a_scene_is_built_of_its_parameters_by_their_units(name, in_other_units):
+def test_scene_by_units_of_its_parameters(name, in_other_units):
     canonical = CATALOGUE[name]
     asked = [(d, p) for d in canonical.dimensions for p in cells(canonical)]
     before = [list(numbers(canonical.make(d, p))) for d, p in asked]

@@ -90,12 +90,12 @@ def test_reason_of_a_missing_value():
     assert "there is no apex" in judge(None, CHECK, (), NEW, "there is no apex").reason
 
 
-def test_a_law_never_turns_a_fail_into_a_pass():
+def test_fail_explained_by_a_law():
     wide = [(LAW, 1.5, 1e9)]
     assert judge(2.0, CHECK, wide, NEW).physics is Physics.FAIL
 
 
-def test_marginal_is_within_a_factor_of_two_of_the_tolerance():
+def test_range_of_marginal():
     assert [is_marginal(1.0 + x, CHECK) for x in (0.04, 0.06, 0.19, 0.21)] == [False, True, True, False]
 
 
@@ -130,12 +130,12 @@ def test_edges_of_marginal(off, marginal):
 
 
 @pytest.mark.parametrize(("value", "standing"), [(1.75, Standing.EXPLAINED), (1.7501, Standing.DRIFTED)])
-def test_the_band_of_a_law_holds_at_its_edge(value, standing):
+def test_edge_of_a_law_s_band(value, standing):
     assert judge(value, EDGE, [(LAW, 1.5, 0.25)], NEW).standing is standing
 
 
 @pytest.mark.parametrize(("value", "standing"), [(1.3125, Standing.KNOWN), (1.3126, Standing.DRIFTED)])
-def test_the_band_of_a_finding_holds_at_its_edge(value, standing):
+def test_edge_of_a_finding_s_band(value, standing):
     assert judge(value, EDGE, [], Known(Finding(FAMILY, 1.25, 0.0625), True)).standing is standing
 
 

@@ -104,7 +104,7 @@ def test_parts_in_the_order_of_the_profiles_of_a_plan(toy):
         assert {warming.key_of(slot) for slot in part.slots} == {part.key}
 
 
-def test_parts_that_are_compiled_are_not_missing_for_any_scene(toy):
+def test_compiled_parts_for_all_scenes(toy):
     first, *rest = toy(PLAN[:16])
     first.keep()
     assert first.mark.read_text() == "toy/tuned 3-D\n"

@@ -99,7 +99,7 @@ def test_engine_exit_as_a_crash_and_a_fresh_process_after(answer, error):
 
 
 @pytest.mark.parametrize("works", [True, False])
-def test_kernels_are_compiled_for_cells_of_scene_files_as_well(monkeypatch, works):
+def test_kernels_for_cells_of_scene_files(monkeypatch, works):
     did = []
     monkeypatch.setattr(process.posed, "remember", lambda scenes: did.append(("remember", scenes)))
     monkeypatch.setattr(process.posed, "hand_over", lambda stated: did.append(("hand over", stated)))

@@ -59,7 +59,7 @@ def test_cell_after_a_hanging_one(plugins):
     assert found[slots[1]].outcome is Outcome.UNSUPPORTED
 
 
-def test_a_broken_plugin_is_a_row_with_its_reason(plugins):
+def test_row_of_a_broken_plugin(plugins):
     slot = Slot("impact", (), 2, "broken", "default", DT)
     (observation,) = run_cells([slot])
     assert observation.outcome is Outcome.NOT_INSTALLED
@@ -82,7 +82,7 @@ def test_run_without_temporary_files_or_semaphores(monkeypatch):
     assert observation.outcome is Outcome.OK
 
 
-def test_limits_follow_from_the_machine_and_the_number_of_workers(monkeypatch):
+def test_limits_by_machine_and_workers(monkeypatch):
     gib = limits.GIB
     monkeypatch.setattr(limits, "_hard_limit", lambda: None)
     monkeypatch.setattr(limits, "cores", lambda: 4)

@@ -23,7 +23,7 @@ def opened(browser, file, anchor="", width=1280, **options):
     assert [entry for entry in wrong if not entry.startswith(allowed)] == []
 
 
-def test_the_four_planted_steps_are_marked_and_no_other(browser, dashboard_file, planted):
+def test_marks_of_four_planted_steps(browser, dashboard_file, planted):
     with opened(browser, dashboard_file) as page:
         assert page.locator(".panel").count() == 4
         assert page.locator(".panel .step").count() == len(planted) == page.locator("#moved tbody tr").count()
@@ -42,7 +42,7 @@ def test_without_javascript_everything_is_there_but_the_filter(browser, dashboar
         assert not page.locator("#filter").is_visible()
 
 
-def test_filters_narrow_what_is_shown_and_an_address_keeps_them(browser, dashboard_file):
+def test_filters_kept_in_the_address(browser, dashboard_file):
     with opened(browser, dashboard_file) as page:
         page.select_option("select[name=engine]", "bullet")
         assert page.locator(".panel:visible").count() == 2

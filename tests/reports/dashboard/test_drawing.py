@@ -58,7 +58,7 @@ def size(tree):
     return [float(x) for x in tree.get("viewBox").split()][2:]
 
 
-def test_points_stand_evenly_between_the_labels_and_inside_the_picture():
+def test_points_between_labels_of_the_picture():
     tree = drawn([point(i, error=10.0 ** -(i % 3)) for i in range(7)])
     places = [x for x, _ in dots_of(tree)]
     assert len(places) == 7 and np.diff(places) == pytest.approx(np.full(6, places[1] - places[0]), abs=2 * DRAWN)

@@ -41,7 +41,7 @@ def test_missing_or_foreign_summary_table(file):
         kept.close()
 
 
-def test_a_summary_that_another_program_wrote_is_made_anew(file):
+def test_summary_written_by_another_program(file):
     kept = Kept(file.parent)
     kept.put("run", summary())
     assert kept.get("run") == summary() and kept.get("other") is None

@@ -74,7 +74,7 @@ def test_the_same_series_with_a_step_raise_one():
 
 
 @pytest.mark.parametrize("n", [2, 3, 8, 22])
-def test_values_that_repeat_exactly_have_a_step_wherever_they_change(n):
+def test_steps_of_exactly_repeated_values(n):
     for at in range(1, n):
         (found,) = steps([1.0] * at + [1.1] * (n - at), ERROR)
         assert found.at == at and found.factor == pytest.approx(1.1)
@@ -92,7 +92,7 @@ def test_single_outlier_of_time_and_lasting_change():
     assert [step.at for step in steps([1.0] * 9 + [1.5] * 3, TIME)] == [9]
 
 
-def test_a_flip_is_marked_once_and_says_in_which_direction():
+def test_mark_and_direction_of_a_flip():
     entries = []
     for k, fails in enumerate([0, 0, 1, 1, 0]):
         cells = {("e", "p", "impact", 2): {"s": (0.1, fails, 1, fails)}}
@@ -374,7 +374,7 @@ def test_panel_equal_in_two_runs(tmp_path):
     assert first.times == {KEY: (2.0, "a/b")}
 
 
-def test_a_summary_that_older_code_wrote_is_made_again(tmp_path):
+def test_summary_written_by_older_code(tmp_path):
     kept, key = Kept(tmp_path), ("e", "p", "impact", 2)
     kept.put("old", Summary({key: {"s": (0.1, 0, 1)}}, {}))  # without the fourth number
     kept.put("new", Summary({key: {"s": (0.1, 0, 1, 0)}}, {}))
@@ -382,7 +382,7 @@ def test_a_summary_that_older_code_wrote_is_made_again(tmp_path):
     kept.close()
 
 
-def test_a_summary_counts_failing_checks_of_sound_cells_only(observation):
+def test_failing_checks_counted_in_a_summary(observation):
     who = ("chipmunk", "tuned")
     good, bad = observation(who, 0.0), observation(who, 0.2)
     key = (*who, "impact", 2)
@@ -395,7 +395,7 @@ def test_a_summary_counts_failing_checks_of_sound_cells_only(observation):
     assert not summarise([other_step, replace(bad, slot=replace(bad.slot, iterations=4))]).cells
 
 
-def test_the_command_writes_the_page_and_says_what_moved(history_folder, tmp_path):
+def test_page_and_moves_of_the_command(history_folder, tmp_path):
     path = tmp_path / "d.html"
     done = CliRunner().invoke(main, ["dashboard", "--out", str(history_folder), "-o", str(path), "--json"])
     assert done.exit_code == 0, done.output

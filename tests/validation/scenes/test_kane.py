@@ -64,7 +64,7 @@ def test_blow_by_the_equations_of_a_rigid_body(params):
     assert failing(canonical, scene, recorded(scene, blown(scene))) == set()
 
 
-def test_the_landing_gains_energy_as_published_for_a_thin_rod():
+def test_energy_gain_of_a_thin_rod_as_published():
     """.1236 m v^2 for a rod without thickness: twice that is over the energy of the approach."""
     _, scene = made("kane", aspect=1e-9)
     assert CATALOGUE["kane"].exact(scene)["gain"] == pytest.approx(2.0 * 0.1236, abs=1e-4)

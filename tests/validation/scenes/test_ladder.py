@@ -100,7 +100,7 @@ def test_loads_and_friction_threshold_of_a_standing_ladder(params):
 
 @pytest.mark.parametrize("params", LEANS)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
-def test_a_ladder_slides_as_forces_at_its_ends_move_it(params, ratio):
+def test_ladder_by_forces_at_its_ends(params, ratio):
     canonical, scene = made("ladder", ratio=ratio, **params)
     measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
     assert measured["passing_time"][0] == pytest.approx(truth["passing_time"], rel=1e-5)

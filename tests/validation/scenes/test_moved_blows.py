@@ -53,7 +53,7 @@ def thrown(scene, dt=DT, e=1.0, moved=1.0, swept=False, gain=0.0):
 @pytest.mark.parametrize("swept", [False, True])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("closing", [0.05, 0.1, 0.25])
-def test_blows_found_at_their_time_or_a_step_late_pass(closing, dt, swept):
+def test_blows_in_time_or_a_step_late(closing, dt, swept):
     canonical, scene = made("closing_wall", closing=closing)
     trajectory = thrown(scene, dt, swept=swept)
     assert failing(canonical, scene, trajectory) == set()

@@ -31,7 +31,7 @@ def test_moments_about_each_edge_say_whether_it_stands(n, margin):
     assert canonical.exact(scene)["stands"] == float(stands) == float(margin > 0.0)
 
 
-def test_without_a_margin_the_reach_is_the_harmonic_sum():
+def test_reach_without_a_margin():
     """Four blocks reach L/2 (1 + 1/2 + 1/3) beyond the one that stands on the floor: 11/12 of a block."""
     _, scene = made("overhang", margin=0.0)
     assert scene.bodies[-1].pose[0] - scene.bodies[1].pose[0] == pytest.approx(LENGTH * 11 / 12)

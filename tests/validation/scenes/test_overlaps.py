@@ -77,7 +77,7 @@ def coming_up(scene, share=0.2, kept=0.0, dt=DT):
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("depth", [0.01, 0.1, 0.3])
 @pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
-def test_a_box_that_is_set_up_on_the_floor_passes(depth, share, dt):
+def test_box_set_up_on_the_floor(depth, share, dt):
     canonical, scene = made("position_correction", depth=depth)
     assert failing(canonical, scene, coming_up(scene, share, dt=dt)) == set()
 

@@ -129,7 +129,7 @@ def test_pivoting_fall_with_wrong_gravity_inertia_slip_or_twist(size):
     assert failing(canonical, scene, twisting) == {"twisted"}
 
 
-def test_box_that_stops_before_the_edge_has_no_time():
+def test_box_that_stops_before_the_edge():
     canonical, scene = made("pivot")
     still = fallen(scene)
     still = replace(still, pose=np.repeat(still.pose[:1], len(still.t), axis=0))
@@ -145,7 +145,7 @@ def test_motion_other_than_a_fall_over_an_edge_refused(params, named):
         made("pivot", **params)
 
 
-def test_friction_that_an_edge_needs_is_what_moves_the_centre():
+def test_friction_at_an_edge_by_the_centre_s_motion():
     """The force on the centre from its acceleration, differenced from the path, over the weight."""
     on, start, h = Pivot(0.5, 1.0, 9.81), 0.1, 1e-4
     for angle in (0.3, 0.6, 0.9):
@@ -289,6 +289,6 @@ def test_lying_block_without_landings():
 
 
 @pytest.mark.parametrize(("params", "named"), [({"mu": 0.1}, "rocking_block.mu")])
-def test_a_block_that_would_slide_where_it_lands_is_refused(params, named):
+def test_refusal_of_a_block_that_slides_where_it_lands(params, named):
     with pytest.raises(SceneError, match=named):
         made("rocking_block", **params)

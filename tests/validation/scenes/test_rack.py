@@ -52,7 +52,7 @@ def broken(scene, dt=DT, e=1.0):
 
 
 @pytest.mark.parametrize("params", [{"rows": 1.0}, {"apart": 0.05}, {"rows": 3.0, "apart": 0.2, "v": 5.0}])
-def test_rack_collisions_in_pairs_keep_momentum_energy_and_mirror(params):
+def test_momentum_energy_and_mirror_of_a_rack(params):
     canonical, scene = made("rack", **params)
     trajectory = broken(scene)
     assert failing(canonical, scene, trajectory) == set()
@@ -86,7 +86,7 @@ def test_cue_ball_that_passes_through_fails():
     assert failing(canonical, scene, Trajectory(free.t, pose, twist, None, DT, "completed")) == {"penetration"}
 
 
-def test_the_bound_of_an_overlap_shrinks_with_the_step():
+def test_bound_of_an_overlap_by_step():
     canonical, scene = made("rack")
     bounds = [{c.metric: c.bound for c in canonical.checks(scene, dt)}["penetration"] for dt in (1 / 60, 1 / 240)]
     assert bounds[0] == pytest.approx(4.0 * bounds[1]) and bounds[0] < 0.1

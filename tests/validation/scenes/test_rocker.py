@@ -65,7 +65,7 @@ def integrated(scene, dt=DT, drag=0.0, g=None, slip=0.0, heavy=1.0):
     ("dimension", "params"),
     [(2, {}), (3, {}), (2, {"tilt": 2.0}), (2, {"thickness": 0.4}), (2, {"tilt": 30.0, "mu": 2.0})],
 )
-def test_a_board_swings_as_forces_at_its_contact_move_it(dimension, params):
+def test_board_by_forces_at_its_contact(dimension, params):
     canonical, scene = made("rocker", dimension, **params)
     trajectory = integrated(scene)
     measured, truth = canonical.measure(scene, trajectory), canonical.exact(scene)

@@ -116,7 +116,7 @@ def test_rod_gas_by_fixed_steps_within_the_bounds(dt, k):
     assert failing(canonical, scene, stepped(scene, dt)) == set()
 
 
-def test_late_method_uses_a_good_part_of_the_bound():
+def test_share_of_the_bound_for_a_late_method():
     """A bound of which nothing is used would see nothing."""
     canonical, used = CATALOGUE["rod_gas"], []
     for params in phases(DT):

@@ -100,7 +100,7 @@ CELLS = [
 
 
 @pytest.mark.parametrize(("name", "dimension", "params"), CELLS)
-def test_integrated_friction_moves_a_ball_as_the_formula_says(name, dimension, params):
+def test_formula_against_integrated_friction(name, dimension, params):
     canonical, scene = made(name, dimension, **params)
     measured = canonical.measure(scene, integrated(scene))
     for metric, truth in canonical.exact(scene).items():
@@ -134,7 +134,7 @@ def test_wrong_friction_inertia_and_resistance_fail(size):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_a_spin_that_decays_a_bend_and_a_hop_fail(size):
+def test_decaying_spin_bend_and_hop(size):
     canonical, scene = made("rolling_spin", 3)
     assert failing(canonical, scene, integrated(scene, resistance=size)) == {"spin", "speed"}
     good = integrated(scene)

@@ -81,7 +81,7 @@ def test_a_seam_that_stops_the_box_fails():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("plate", [0.25, 1.0])
-def test_plates_lie_flush_and_reach_beyond_where_the_box_stops(plate, dimension):
+def test_start_and_length_of_plates(plate, dimension):
     canonical, scene = made("seam", dimension, plate=plate)
     *plates, box = scene.bodies
     for body in plates:

@@ -64,7 +64,7 @@ CELLS = [{}, {"ratio": 20.0}, {"ratio": 0.5}, {"angle": 60.0}, {"mass": 5.0, "g"
 
 @pytest.mark.parametrize("offset", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("params", CELLS)
-def test_boxes_move_as_five_contacts_that_hold_make_them(params, offset):
+def test_boxes_with_five_holding_contacts(params, offset):
     canonical, scene = made("shove", **params)
     _, forces = held(scene)
     assert (forces > 0.0).all(), "nothing tips: every corner pushes"

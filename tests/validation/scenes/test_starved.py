@@ -92,7 +92,7 @@ def test_displacement_of_a_row_with_too_few_iterations(sweeps, warm):
     assert {"displacement", "penetration"} <= found
 
 
-def test_forty_sweeps_are_a_factor_of_e_for_ten_balls():
+def test_error_of_ten_balls_after_forty_sweeps():
     assert math.cos(0.5 * math.pi / 10) ** (2 * 40) == pytest.approx(math.exp(-1.0), rel=0.02)
 
 

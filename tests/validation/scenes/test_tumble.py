@@ -48,7 +48,7 @@ def integrated(scene, dt=DT, own=None, braking=0.0):
 
 
 @pytest.mark.parametrize("params", CELLS)
-def test_the_period_is_jacobi_s_and_the_integrated_one(params):
+def test_period_by_jacobi_and_by_integration(params):
     canonical, scene = made("tumble", 3, **params)
     p, (i1, i2, i3) = scene.params, OWN
     twice_energy, square = p["spin"] ** 2 * np.array([i2 + i3 * p["delta"] ** 2, i2**2 + i3**2 * p["delta"] ** 2])

@@ -57,7 +57,7 @@ def changed(trajectory, table=1.0, stop=1.0, axes=None):
     return replace(trajectory, contacts=replace(trajectory.contacts, rows=replace(rows, impulse=share * rows.impulse)))
 
 
-def test_the_hand_lies_on_the_table_and_against_the_stop():
+def test_start_of_the_hand_on_the_table():
     for dimension in (2, 3):
         _, scene = made("wipe", dimension, v=0.5, mu=0.25, mass=2.0)
         table, stop, hand = scene.bodies

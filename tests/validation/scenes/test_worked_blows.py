@@ -76,7 +76,7 @@ def test_measures_of_an_overlap(dimension):
     }
 
 
-def test_balls_of_two_sizes_overlap_as_their_own_radii_do():
+def test_overlap_of_balls_of_two_sizes():
     canonical, scene = made("overlap", **INSIDE)
     small = replace(scene.bodies[0], shape=replace(scene.bodies[0].shape, radius=0.4))
     record = still(scene, 2)
@@ -135,7 +135,7 @@ def test_wall_plate_and_ball_stand_in_a_row(dimension):
     assert (scene.pairs[0].restitution, scene.pairs[0].friction) == (1.0, 0.0)
 
 
-def test_closing_plate_allowance_grows_by_four_steps_a_blow():
+def test_allowance_of_a_closing_plate_by_blows():
     canonical, scene = made("closing_wall", **CLOSING)
     assert stated(canonical.checks(scene, DT)) == {
         "speed[1]": ("m/s", near(7e-12)),
@@ -189,14 +189,14 @@ def thrown_once(scene, places, velocities):
         ((6.0, 6.0 - 5.0 / 64), (1.0, -1.0), 2.0 / 64),  # and earlier ones at its start
     ],
 )
-def test_a_ball_turns_back_where_its_straight_ways_meet(places, velocities, time):
+def test_turning_point_of_a_ball(places, velocities, time):
     canonical, scene = made("closing_wall", **CLOSING)
     found = canonical.measure(scene, thrown_once(scene, places, velocities))
     assert found["time[1]"] == (pytest.approx(2.0 + time - 2.0 / 64, abs=1e-12), "")
     assert found["time[2]"] == (None, "the plate does not throw it back 2 times")
 
 
-def test_a_ball_that_stands_between_two_ways_has_turned_once():
+def test_ball_that_stands_between_two_ways():
     canonical, scene = made("closing_wall", **CLOSING)
     found = canonical.measure(scene, thrown_once(scene, (6.0,) * 4, (1.0, 0.0, 0.0, -1.0)))
     assert found["time[1]"][0] == pytest.approx(2.0) and found["time[2]"][0] is None

@@ -84,7 +84,7 @@ def test_initial_spin_allowance_of_a_turning_start():
 @pytest.mark.parametrize(
     ("start", "angle", "top"), [(-0.4, 0.2, 0.0), (-0.2, 0.4, 0.0), (-0.4, -0.1, -0.1), (0.1, 0.5, 0.1)]
 )
-def test_box_too_slow_for_the_top_has_no_time(start, angle, top):
+def test_box_too_slow_for_the_top(start, angle, top):
     """The spin that just gets over the top, and what a step may take of it: from there on the time is finite."""
     needed = math.sqrt(24.0 * (math.cos(top) - math.cos(start)))
     dt = 1e-4
@@ -103,7 +103,7 @@ def test_box_too_slow_for_the_top_has_no_time(start, angle, top):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_block_stands_on_the_table_as_gravity_is_tilted(dimension):
+def test_block_on_the_table_under_tilted_gravity(dimension):
     """tan(theta) = 3/4 where both limits are 1: gravity is (6, -8) of 10."""
     _, scene = made("tilt_table", dimension, ratio=0.75, mu=1.0, aspect=1.0, height=2.0, g=10.0, mass=3.0)
     floor, block = scene.bodies
@@ -115,7 +115,7 @@ def test_the_block_stands_on_the_table_as_gravity_is_tilted(dimension):
     assert (scene.pairs[0].restitution, scene.pairs[0].friction) == (0.0, 1.0)
 
 
-def test_block_at_one_limit_stays_and_at_both_is_refused():
+def test_block_at_one_limit_and_at_both():
     assert set(CATALOGUE["tilt_table"].exact(made("tilt_table", ratio=1.0, mu=0.5, aspect=0.5)[1])) == {"moved"}
     with pytest.raises(SceneError, match=r"tilt_table\.ratio: at 2 "):
         made("tilt_table", ratio=2.0, mu=0.5, aspect=0.25)
@@ -139,7 +139,7 @@ def test_allowance_on_a_tilted_table():
 
 
 @pytest.mark.parametrize(("ratio", "aspect"), [(1.1, 0.3), (1.3, 0.1), (1.5, 0.2), (1.3, 0.06), (1.05, 0.05)])
-def test_friction_that_a_toppling_block_needs_is_asked_for(ratio, aspect):
+def test_friction_for_a_toppling_block(ratio, aspect):
     """Force of the table from the acceleration of the centre, differenced from the path; 2 % of it decide."""
     theta, height = math.atan(ratio * aspect), 1.0
     alpha, arm, h = math.atan(aspect), 0.5 * math.hypot(aspect, height), 1e-4
@@ -236,7 +236,7 @@ def test_round_off_allowed_of_a_zero_step():
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.5])
-def test_friction_of_a_tilted_table_is_asked_along_the_table(monkeypatch, ratio):
+def test_friction_along_a_tilted_table(monkeypatch, ratio):
     """What a force across and up in space is along and against a table that falls to the right by its angle."""
     canonical = CATALOGUE["tilt_table"]
     p = canonical.complete({"ratio": ratio})

@@ -18,7 +18,7 @@ THETA, R, H, SQUARE = math.radians(20.0), 0.6, 0.2, (1.8**2 + 0.4**2) / 12.0
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_board_touches_the_log_where_it_has_rolled_to(dimension):
+def test_contact_of_a_rolled_board(dimension):
     canonical, scene = made("rocker", dimension, **BOARD)
     log, board = scene.bodies
     assert (scene.name, scene.version, log.name, log.motion, board.name) == ("rocker", 1, "log", "fixed", "board")
@@ -67,7 +67,7 @@ def swung(theta=THETA, r=R, h=H, square=SQUARE, g=8.0):
     return t, found.sol(t)[0], ((path[0] - 2.0 * path[1] + path[2]) / e**2).T
 
 
-def test_friction_that_a_rocking_board_needs_is_asked_for():
+def test_friction_for_a_rocking_board():
     """Along and across the board, from the acceleration of its centre; a per cent of it decides."""
     _, phi, a = swung()
     force = a + [0.0, 8.0]
@@ -198,7 +198,7 @@ def test_the_amplitude_is_that_of_the_last_side():
     assert found["amplitude"] == (pytest.approx(0.75, rel=1e-3), "")
 
 
-def test_board_level_at_a_wrong_time_has_no_swings():
+def test_board_level_at_a_wrong_time():
     """In three quarters of its time it is level the third time before the last swing has begun; then no more."""
     canonical, scene = made("rocker", **BOARD)
     fast = swinging(scene, 0.75 * canonical.exact(scene)["swing_time"], np.ones_like)

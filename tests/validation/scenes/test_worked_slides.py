@@ -73,7 +73,7 @@ def test_slide_allowance_of_one_step():
     assert {check.source for check in canonical.checks(scene, DT)} == {SOURCE} | of_forces
 
 
-def test_a_slide_of_two_steps_is_told_over_one():
+def test_slide_of_two_steps():
     canonical, scene = made("slide", v=0.125)
     found = stated(canonical.checks(scene, DT))
     assert found["braking"] == ("m/s^2", near(64 / 800))
