@@ -218,20 +218,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
-    made = (
-        error,
-        growth,
-        horizon,
-        until,
-        unique,
-        two < np.inf,
-        moved / size,
-        settings.dt,
-        gap,
-        grazed,
-        record.pose,
-    )
-    found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, *made)
+    rest = (unique, two < np.inf, moved / size, settings.dt, gap, grazed, record.pose)
+    found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, error, growth, horizon, until, *rest)
     if found.holds:
         otherwise, rounded = _misplaced(model, settings, found, steps, stride)
         reasons += otherwise
