@@ -119,6 +119,7 @@ publish: $(STAMP)
 # Optional engines, in a matrix of their own: ten minutes on two busy cores.
 apart: extras
 	@test -z "$$(git status --porcelain)" || { echo "commit first: the matrix names the commit"; exit 2; }
+	mkdir -p $(OUT)
 	$(BIN)/crosscheck run --quick $(foreach name,$(subst $(comma), ,$(EXTRAS),$(BESIDE)),--engine $(name)) --out $(OUT) \
 		--markdown $(OUT)/engines.md
 	@{ echo "# Optional engines"; echo; \

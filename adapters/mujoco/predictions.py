@@ -64,7 +64,7 @@ def solver_error(profile: str, scene: Scene, dt: float) -> float:
 # ---- a ball on a floor -------------------------------------------------------------------------------------------
 
 
-def _ball_metrics(scene: Scene, measure: Measure, law: ContactLaw, moved: float) -> dict[str, Measured]:
+def ball_metrics(scene: Scene, measure: Measure, law: ContactLaw, moved: float) -> dict[str, Measured]:
     """All metrics of the scene for a start ``moved`` [m] higher."""
     body, up = scene.bodies[1], scene.dimension - 1
     assert isinstance(body.shape, Disc | Sphere)
@@ -92,7 +92,7 @@ def ball_law(profile: str, metric: str) -> Law:
             return None
         contact = law_of(profile, scene, dt)
         value, *others = (
-            _ball_metrics(scene, measure, contact, k * GAP_ROUND_OFF)[metric][0] for k in (0.0, *PERTURBATIONS)
+            ball_metrics(scene, measure, contact, k * GAP_ROUND_OFF)[metric][0] for k in (0.0, *PERTURBATIONS)
         )
         if value is None or None in others:
             return None

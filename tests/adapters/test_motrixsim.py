@@ -9,7 +9,7 @@ from driven import FLOOR, driven, struck
 from adapters.conformance import items
 from adapters.mujoco.motrixsim import MotrixSimEngine, shipped
 from adapters.mujoco.motrixsim.simulation import imported
-from adapters.mujoco.motrixsim.springs import OFF, rebound
+from adapters.mujoco.motrixsim.springs import OFF, Spring
 from adapters.scene import Body, Box, Pair, Scene
 from validation.catalogue import CATALOGUE
 from validation.scenes import pinch
@@ -51,7 +51,8 @@ def test_rebound_of_a_hard_contact(e, erp):
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240, 1 / 1000])
 def test_rebound_of_a_spring(phase, dt):
     """Figure by figure by the recurrence of a spring and a damper, whatever the restitution."""
-    said = rebound(shipped.SOLREF, shipped.SOLIMP, dt, phase)
+    spring = {"solref": shipped.SOLREF, "solimp": shipped.SOLIMP, "margin": 0.0}
+    said = Spring.of_settings(spring, dt).rebound_ratio(1.0, phase)
     for e in (0.0, 0.8):
         ball = struck(e, 1.0, (2.0 - phase) * dt, steps=math.ceil(0.2 / dt), dt=dt)
         assert DRIVE(ball, dt=dt).twist[-1, 1, 2] == pytest.approx(said, abs=OFF)

@@ -18,7 +18,7 @@ OURS = [
     *("mujoco", "bullet", "chipmunk"),
     *(
         pytest.param(name, marks=pytest.mark.optional(name))
-        for name in ("box2d", "box2d3", "rapier", "dart", "physx", "drake", "newton", "box3d")
+        for name in ("box2d", "box2d3", "rapier", "dart", "physx", "drake", "newton", "box3d", "motrixsim")
     ),
 ]
 WITH_SCRIPT = [each for each in OURS if each != "box2d3" and getattr(each, "values", ("",))[0] != "box2d3"]

@@ -14,7 +14,7 @@ from adapters.checked_engine import CheckedEngine
 from adapters.engine import Declared, EngineFacts, Expected, Quirk, Scheme
 from adapters.mujoco.motrixsim.profiles import KINDS, PROFILES
 from adapters.mujoco.motrixsim.simulation import MotrixSimulation, imported
-from adapters.mujoco.motrixsim.springs import OFF, rebound
+from adapters.mujoco.motrixsim.springs import OFF, Spring
 from adapters.needs import Needs
 
 #: Phases of a step over which a rebound is declared.
@@ -86,7 +86,8 @@ class MotrixSimEngine(CheckedEngine):
         settings = {each.name: each.value for each in self.settings(profile, needs, dt)}
         share = settings["erp"]
         if share is None:
-            ratios = [rebound(settings["solref"], settings["solimp"], dt, (k + 0.5) / PHASES) for k in range(PHASES)]
+            spring = Spring.of_settings(settings, dt)
+            ratios = [spring.rebound_ratio(1.0, (k + 0.5) / PHASES) for k in range(PHASES)]
             return {"restitution": Declared.over(ratios, OFF, SPRING)}
         half = 0.5 * share  # of an overlap between none and the way of a step
         return {"restitution": Declared(needs.restitution + half, half + self.facts.round_off, OVERLAP)}
