@@ -30,6 +30,8 @@ from adapters.trajectory import ContactRecord, Trajectory
 
 #: Relative round-off in single precision.
 UNIT = 2.0**-24
+#: Round-off of a place after a thousand steps, as a share of the distance.
+PLACES = 1000.0 * UNIT
 #: Roundings of a velocity or an impulse in one blow: a relative speed of two bodies with their spins (8 operations), a
 #: mass (8), an impulse and what it does to both (8); as much again for iterations that correct last digits.
 ROUNDINGS = 48

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
 from adapters.law.single_motions import standstills
-from adapters.law.single_precision import UNIT, Method, plane_law, rounded_law
+from adapters.law.single_precision import PLACES, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
 from adapters.newton.profiles import PROFILES
 from adapters.newton.shipped import ITERATIONS
@@ -44,8 +44,6 @@ DEVIATIONS: tuple[Deviation, ...] = deviations(
     "xpbd/restitution_kernels.py, built for floats; motion in adapters/law/single_precision.py",
     CHECKED_ON,
 )
-#: Round-off of a place after a thousand steps, as a share of the distance.
-PLACES = 1000.0 * UNIT
 DEVIATIONS += deviations(
     "newton",
     ("default",),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, exactly
 from adapters.law.single_motions import rounded_motions, standstills
-from adapters.law.single_precision import UNIT, Method, Threshold, plane_law, rounded_law
+from adapters.law.single_precision import PLACES, Method, Threshold, plane_law, rounded_law
 from adapters.law.unswept import passing_law, wall_law
 from adapters.needs import needs
 from adapters.physx.profiles import PROFILES, least_rebound
@@ -27,8 +27,6 @@ BLOWS: Mapping[str, tuple[str, ...]] = {
 }
 #: Blows that `tuned` finds so early that they overlap with the blow before.
 CROWDED = ("galperin",)
-#: Round-off of a place after a thousand steps, as a share of the distance.
-PLACES = 1000.0 * UNIT
 _RELEASES = ("3.0.",)
 
 

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from driven import FLOOR, driven, struck
+from driven import FLOOR, driven, measured_of, struck
 
 from adapters.conformance import items
+from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.mujoco.motrixsim import MotrixSimEngine, shipped
 from adapters.mujoco.motrixsim.simulation import imported
 from adapters.mujoco.motrixsim.springs import OFF, Spring
@@ -58,13 +59,17 @@ def test_rebound_of_a_spring(phase, dt):
         assert DRIVE(ball, dt=dt).twist[-1, 1, 2] == pytest.approx(said, abs=OFF)
 
 
-@pytest.mark.parametrize("heading, factor", [(0, 1.0), (45, math.sqrt(2.0))])
-def test_friction_of_a_square(heading, factor):
-    """Along an axis mu, between two of them as much along each."""
+@pytest.mark.parametrize(
+    "heading, solver, factor", [(0, "PGS", 1.0), (45, "PGS", math.sqrt(2.0)), (45, "Newton", 0.92)]
+)
+def test_friction_of_a_square(heading, solver, factor):
+    """Along an axis mu, between two of them as much along each; with Newton's solver a cone, and a hopping box."""
     a, mu, speed = math.radians(heading), 0.4, 3.0
     twist = (speed * math.cos(a), speed * math.sin(a), 0.0, 0.0, 0.0, 0.0)
     box = Body("box", Box((0.5, 0.5, 0.1)), 1.0, (1 / 6,) * 3, (0, 0, 0.0995, 1, 0, 0, 0), twist)
-    found = DRIVE(Scene("slide", 1, 3, (FLOOR, box), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.3)).twist[:, 1, :2]
+    found = DRIVE(
+        Scene("slide", 1, 3, (FLOOR, box), (Pair(friction=mu),), (0.0, 0.0, -9.81), 0.3), solver=solver
+    ).twist[:, 1, :2]
     late = np.linalg.norm(found[[24, 71]], axis=1)
     assert (late[0] - late[1]) / (47 * DT) == pytest.approx(factor * mu * 9.81, rel=0.02)
 
@@ -84,3 +89,50 @@ def test_loads_in_world_axes_on_a_body_that_turns():
     box = Body("box", Box((0.5, 0.5, 0.5)), 2.0, (0.4,) * 3, (0, 0, 0, 1, 0, 0, 0), (0, 0, 0, 0, 0, 9), force=(2, 0, 0))
     found = DRIVE(Scene("pushed", 1, 3, (box,), (), (0.0, 0.0, 0.0), 0.5)).twist[-1, 0]
     assert found == pytest.approx([0.5, 0, 0, 0, 0, 9], abs=1e-5)
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+@pytest.mark.parametrize(
+    "scene, dimension, params, size",
+    [
+        ("edge_drop", 3, {"e": 0.5, "tilt": 20}, {"twisted": 2.0}),
+        ("rolling_spin", 3, {}, {"spin": 10.0}),
+    ],
+)
+def test_errors_that_rounding_explains(scene, dimension, params, size, profile):
+    """As many halves of a last place of single precision as there are steps."""
+    canonical = CATALOGUE[scene]
+    posed = canonical.scene(dimension, params)
+    found, truth = measured_of(ENGINE, scene, profile, dimension, params), canonical.exact(posed)
+    for metric, scale in size.items():
+        assert abs(found[metric] - truth.get(metric, 0.0)) <= posed.duration / DT * UNIT * scale
+
+
+@pytest.mark.parametrize("e, tilt", [(0.5, 20), (1.0, 30)])
+def test_edge_struck_by_a_hard_contact(e, tilt):
+    """The textbook's blow but for roundings, also in space."""
+    params = {"e": e, "tilt": tilt}
+    found, truth = (
+        measured_of(ENGINE, "edge_drop", "tuned", 3, params),
+        CATALOGUE["edge_drop"].exact(CATALOGUE["edge_drop"].scene(3, params)),
+    )
+    for metric in ("rise", "spin", "impulse"):
+        assert found[metric] == pytest.approx(truth[metric], abs=ROUNDINGS * UNIT)
+
+
+@pytest.mark.parametrize(
+    "scene, params, metric",
+    [("rack", {}, "energy_defect"), ("rack", {}, "asymmetry"), ("overlap", {"depth": 0.01, "ratio": 100}, "thrown")],
+)
+def test_hard_balls_but_for_roundings(scene, params, metric):
+    assert abs(measured_of(ENGINE, scene, "tuned", 2, params)[metric]) <= ROUNDINGS * UNIT
+
+
+@pytest.mark.parametrize("profile", ENGINE.profiles)
+def test_distant_box_without_any_motion(profile):
+    """A motion of a step below half the spacing of places is lost, and no overlap is found: it only gets faster."""
+    far = CATALOGUE["far_origin"]
+    scene = far.scene(3, {})
+    found = DRIVE(scene, profile)
+    assert np.ptp(found.pose[:, 1], axis=0).max() == 0.0
+    assert found.twist[-1, 1, 2] == pytest.approx(-9.81 * found.t[-1], rel=1e-4)

@@ -94,6 +94,13 @@ MEASURED_ONLY = {
     },
     "bullet": {"arch-hull-grid"},
     "drake": {"shove-slanted-edge"},
+    "motrixsim": {
+        "edge-drop-in-singles",
+        "far-origin-in-singles",
+        "overlap-in-singles",
+        "rack-in-singles",
+        "rolling-spin-in-singles",
+    },
     "mujoco": {"kane-struck-half-way", "kane-struck-half-way-by-a-cone", "rack-short-rebounds"},
     "newton": {
         "bounce-late-blows",

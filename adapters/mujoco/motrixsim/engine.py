@@ -56,8 +56,8 @@ class MotrixSimEngine(CheckedEngine):
             ),
             Quirk(
                 "friction is a square: 1.41 times mu g at 45 degrees between its axes",
-                "unchanged; another one (friction_model) ends the process as not yet implemented",
-                "msd.ContactPair, friction; measured",
+                "unchanged; solver = Newton has a cone, on which boxes hop",
+                "msd.ContactPair, friction; measured: another friction_model ends the process as not yet implemented",
             ),
             Quirk("forces act for one step", "they are added in every step", "Link.add_external_force; measured"),
         ),

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from adapters.law import Deviation, deviations
 from adapters.law.single_motions import corner_law, rounded_motions, standstills
-from adapters.law.single_precision import Method, plane_law, rounded_law
-from adapters.law.unswept import PLACES, passing_law
+from adapters.law.single_precision import PLACES, Method, plane_law, rounded_law
+from adapters.law.unswept import passing_law
 from adapters.mujoco.motrixsim.profiles import PROFILES
 from adapters.mujoco.motrixsim.springs import spring_law
 
