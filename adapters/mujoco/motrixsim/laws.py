@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from adapters.law import Deviation, deviations
+from adapters.law import Deviation, Law, Measure, Prediction, deviations
 from adapters.law.single_motions import corner_law, rounded_motions, standstills
 from adapters.law.single_precision import PLACES, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
 from adapters.mujoco.motrixsim.profiles import PROFILES
 from adapters.mujoco.motrixsim.springs import spring_law
+from adapters.scene import Scene
 
 _SOURCE, _RELEASES = "motrixsim.real_dtype(): float32", ("0.10.",)
 #: Metrics of blows without gravity, by scene, of hard contacts that correct no overlap.
@@ -31,11 +32,25 @@ SPRINGS: Mapping[str, tuple[str, ...]] = {
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
     "head_on": BLOWS["head_on"][:-1],
 }
+
+
+def blow_law(metric: str, profile: str) -> Law:
+    """Blows of hard contacts; none with friction across both of its axes, whose limits are a square."""
+    rounded = rounded_law(metric, Method(lambda e, speed: e))
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        slanted = scene.dimension == 3 and any(body.twist[0] and body.twist[1] for body in scene.bodies)
+        rough = any(friction for _, friction in scene.materials())
+        return None if slanted and rough else rounded(scene, dt, measure)
+
+    return law
+
+
 DEVIATIONS: tuple[Deviation, ...] = deviations(
     "motrixsim",
     ("tuned",),
     BLOWS,
-    lambda metric, profile: rounded_law(metric, Method(lambda e, speed: e)),
+    blow_law,
     "single precision, 2^-24 relative",
     f"{_SOURCE}; motion in adapters/law/single_precision.py",
     _RELEASES,
@@ -80,7 +95,7 @@ DEVIATIONS += deviations(
     "motrixsim",
     ("default",),
     {"head_on": ("momentum_defect",)},
-    lambda metric, profile: rounded_law(metric, Method(lambda e, speed: e)),
+    blow_law,
     "single precision, 2^-24 relative",
     f"{_SOURCE}; motion in adapters/law/single_precision.py",
     _RELEASES,
