@@ -10,23 +10,28 @@ from adapters.mujoco.releases import silence
 from adapters.unset import FRICTIONS, HALF_HEIGHT, HALF_WIDTH, RADIUS, Asked, Told, Unset
 
 
+def bare_model(asked: Asked) -> str:
+    """One free body above a plane, in minimal MJCF."""
+    size = f"{RADIUS}" if asked.shape == "ball" else f"{HALF_WIDTH} {HALF_WIDTH} {HALF_HEIGHT}"
+    kind = {"ball": "sphere", "box": "box"}[asked.shape]
+    option = "" if asked.gravity is None else f'<option gravity="0 0 {-asked.gravity!r}"/>'
+    ground, body = [f'friction="{mu!r}"' for mu in asked.friction] if asked.friction else ["", ""]
+    return (
+        f'<mujoco>{option}<worldbody><geom type="plane" size="0 0 1" {ground}/>'
+        f'<body pos="0 0 {asked.height!r}"><freejoint/><geom type="{kind}" size="{size}" {body}/></body>'
+        "</worldbody></mujoco>"
+    )
+
+
 class Bare:
-    """A model of one free body above a plane, in minimal MJCF."""
+    """A world of `bare_model`."""
 
     def __init__(self, asked: Asked) -> None:
         import mujoco
 
         silence(mujoco)
-        size = f"{RADIUS}" if asked.shape == "ball" else f"{HALF_WIDTH} {HALF_WIDTH} {HALF_HEIGHT}"
-        kind = {"ball": "sphere", "box": "box"}[asked.shape]
-        option = "" if asked.gravity is None else f'<option gravity="0 0 {-asked.gravity!r}"/>'
-        ground, body = [f'friction="{mu!r}"' for mu in asked.friction] if asked.friction else ["", ""]
         self._mujoco = mujoco
-        self._model = mujoco.MjModel.from_xml_string(
-            f'<mujoco>{option}<worldbody><geom type="plane" size="0 0 1" {ground}/>'
-            f'<body pos="0 0 {asked.height!r}"><freejoint/><geom type="{kind}" size="{size}" {body}/></body>'
-            "</worldbody></mujoco>"
-        )
+        self._model = mujoco.MjModel.from_xml_string(bare_model(asked))
         self._data = mujoco.MjData(self._model)
         self._data.qvel[:] = (asked.along, 0.0, asked.up, 0.0, 0.0, asked.spin)
         self._lowest = asked.height - asked.gap
