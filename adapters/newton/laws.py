@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
-from adapters.law.single_motions import standstills
+from adapters.law.single_motions import rounded_motions, standstills
 from adapters.law.single_precision import PLACES, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
 from adapters.newton.profiles import PROFILES
@@ -56,6 +56,20 @@ DEVIATIONS += deviations(
 )
 DEVIATIONS += standstills(
     "newton", PROFILES, {"far_origin": ("stopping_distance",)}, "xpbd/kernels.py, built for floats", CHECKED_ON
+)
+DEVIATIONS += rounded_motions(
+    "newton",
+    PROFILES,
+    {
+        "flown": {
+            "flight": (
+                *("fall", "fall_speed", "throw_speed", "throw_way", "heading_spread"),
+                *("drift_across", "ball_spin", "momentum_drift"),
+            )
+        }
+    },
+    "xpbd/kernels.py, built for floats",
+    CHECKED_ON,
 )
 #: A blow of a face in free space, after which the motion is planar to round-off.
 DEVIATIONS += deviations(

@@ -57,8 +57,5 @@ def of_matrix() -> Iterator[tuple[str, str, str, str, int, int, int]]:
     for row in table[1:]:
         scene, _, dimension = row[0].partition(" ")
         for (engine, profile, release), cell in zip(columns, row[1:], strict=True):
-            numbers = [int(number) for number in re.findall(r"\d+", cell)]
-            if cell.startswith("pass") and numbers:
-                yield engine, release, profile, scene, int(dimension[0]), 0, numbers[0]
-            elif cell.startswith("FAIL"):
-                yield engine, release, profile, scene, int(dimension[0]), numbers[0], numbers[1]
+            if told := re.fullmatch(r"(?:(\d+) of )?(\d+) (?:fail|pass)\b.*", cell):
+                yield engine, release, profile, scene, int(dimension[0]), int(told[1] or 0), int(told[2])
