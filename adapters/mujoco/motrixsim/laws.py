@@ -35,13 +35,13 @@ SPRINGS: Mapping[str, tuple[str, ...]] = {
 
 
 def blow_law(metric: str, profile: str) -> Law:
-    """Blows of hard contacts; none with friction across both of its axes, whose limits are a square."""
+    """Blows of hard contacts; with friction across both of its axes, whose limits are a square, only the rebound."""
     rounded = rounded_law(metric, Method(lambda e, speed: e))
 
     def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
         slanted = scene.dimension == 3 and any(body.twist[0] and body.twist[1] for body in scene.bodies)
         rough = any(friction for _, friction in scene.materials())
-        return None if slanted and rough else rounded(scene, dt, measure)
+        return None if slanted and rough and metric != "rebound_ratio" else rounded(scene, dt, measure)
 
     return law
 
