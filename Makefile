@@ -116,7 +116,7 @@ publish: $(STAMP)
 	cp $(OUT)/report.html reports/published/report.html
 	$(BIN)/python -m reports.pictures $(OUT)/report.html reports/published
 
-# Optional engines, in a matrix of their own: ten minutes on two busy cores.
+# Optional engines, in a matrix of their own: half an hour on two busy cores.
 apart: extras
 	@test -z "$$(git status --porcelain)" || { echo "commit first: the matrix names the commit"; exit 2; }
 	mkdir -p $(OUT)

@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 #: What mutants are drawn from; optional engines are left out, whose tests are skipped where they are not installed.
 PACKAGES = ("adapters", "validation", "reports")
 OPTIONAL = tuple(
-    f"adapters/{name}/" for name in ("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "newton")
+    f"adapters/{name}/"
+    for name in ("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "newton", "mujoco/motrixsim")
 )
 #: Rooms of the solver that have kernels, and how kernels are marked.
 ROOMS = ("textbook", "textbook2", "textbook3", "direct")
