@@ -264,7 +264,8 @@ def start_of(model: Model) -> State:
     pose = np.array([body.pose for body in model.bodies], float)
     s = len(GENERATORS[d])
     twist = [body.twist if body.twist is not None else (0.0,) * (d + s) for body in model.bodies]
-    return State(0.0, pose[:, :d], pose[:, d:], np.array(twist, float))
+    # Contiguous as all later ones: a view would be another type, for which kernels would be compiled once more.
+    return State(0.0, np.ascontiguousarray(pose[:, :d]), pose[:, d:], np.array(twist, float))
 
 
 def _table(rows: Sequence[NDArray[Any]], width: int | None) -> Array:

@@ -1,5 +1,6 @@
 """Machine code is kept per state of the sources, and a missing cache costs time only."""
 
+import ast
 import os
 import shutil
 import subprocess
@@ -114,3 +115,46 @@ def test_imports_of_the_solver():
     rest = {"adapters", "validation", "reports"}
     code = f"import sys, reference_solver.textbook2; print({rest} & {{name.split('.')[0] for name in sys.modules}})"
     assert run(code, NUMBA_DISABLE_JIT="1") == "set()"
+
+
+def test_kernels_without_a_wrapper_are_called_by_kernels_alone():
+    """Python that calls one ends in a crash of the process."""
+    folder = Path(compilation.__file__).parent / "exact"
+    inner = {
+        function.name
+        for path in (folder / "kernels").glob("*.py")
+        for function in ast.parse(path.read_text()).body
+        if isinstance(function, ast.FunctionDef) and "inner_kernel" in map(ast.unparse, function.decorator_list)
+    }
+    assert len(inner) > 20
+    for path in [*folder.glob("*.py"), *(Path(__file__).parent / "exact").glob("*.py")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and "exact.kernels" in (node.module or ""):
+                assert not inner & {each.name for each in node.names}, path
+
+
+#: A box that falls on a floor, in both dimensions; then the kernels of the loop that were compiled more than once.
+TWICE = """
+from importlib import import_module
+from pkgutil import iter_modules
+
+from reference_solver import Body, Box, HalfSpace, Model, Settings, Simulation
+from reference_solver.exact import kernels
+
+floors = HalfSpace((0.0, 1.0)), HalfSpace((0.0, 0.0, 1.0))
+boxes = Box((0.5, 0.5)), Box((0.5, 0.5, 0.5))
+for d, turn in ((2, (0.2,)), (3, (1.0, 0.1, 0.0, 0.0))):
+    above = (*(0.0,) * (d - 1), 1.0, *turn)
+    floor = Body(floors[d - 2], motion="fixed", pose=(*(0.0,) * d, *((0.0,), (1.0, 0.0, 0.0, 0.0))[d - 2]))
+    bodies = [floor, Body(boxes[d - 2], 1.0, 0.2 if d == 2 else (0.2,) * 3, above, (0.5,) * (3 * d - 3))]
+    Simulation(Model(d, bodies, (*(0.0,) * (d - 1), -9.81), 0.5, 0.5), Settings.reference(1 / 240)).advance(240)
+modules = [import_module(f"{kernels.__name__}.{each.name}") for each in iter_modules(kernels.__path__)]
+found = {name: each for module in modules for name, each in vars(module).items() if hasattr(each, "signatures")}
+print([len(found) > 30, *sorted(name for name, each in found.items() if len(each.signatures) > 1)])
+"""
+
+
+@pytest.mark.long  # 40 s of CPU: nothing is kept in the folder
+@pytest.mark.skipif(bool(compilation.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: nothing is compiled")
+def test_kernels_of_the_loop_are_compiled_once_for_plane_and_space(tmp_path):
+    assert run(TWICE, NUMBA_CACHE_DIR=str(tmp_path)) == "[True]"

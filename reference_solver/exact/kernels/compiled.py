@@ -39,16 +39,26 @@ def _imported(path: Path) -> set[Path]:
     return {path}.union(*(_imported(path.with_name(f"{name}.py")) for name in names))
 
 
-def kernel(function: F) -> F:
-    """Compile a function when it is first called; machine code is kept where a folder can be written."""
+def _compiled(function: F, **options: bool) -> F:
     before = config.CACHE_DIR
     folder = base_folder() / f"exact-{source_hash(Path(inspect.getfile(function)))}"
+    options |= {"no_cfunc_wrapper": True}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         config.CACHE_DIR = str(folder)
-        result: F = njit(function, cache=True, error_model="numpy")
+        result: F = njit(function, cache=True, error_model="numpy", **options)
     except OSError:
-        result = njit(function, error_model="numpy")
+        result = njit(function, error_model="numpy", **options)
     finally:
         config.CACHE_DIR = before
     return result
+
+
+def kernel(function: F) -> F:
+    """Compile a function when it is first called; machine code is kept where a folder can be written."""
+    return _compiled(function)
+
+
+def inner_kernel(function: F) -> F:
+    """Compile likewise what kernels alone call: without what unpacks arguments of Python's, which must not call it."""
+    return _compiled(function, no_cpython_wrapper=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.compiled import inner_kernel, kernel
 from reference_solver.exact.kernels.rotation import cross, dot
 
 POINT, LINE, FACE = 0, 1, 2
@@ -27,7 +27,7 @@ def place_features(bodies, place, axes, point, normal):
                 normal[i, k, p] = s
 
 
-@kernel
+@inner_kernel
 def ends(bodies, i, kind, number):
     """Return the numbers of the points at both ends of a line of body i, of a point twice its own."""
     if kind == LINE:
@@ -35,7 +35,7 @@ def ends(bodies, i, kind, number):
     return number, number
 
 
-@kernel
+@inner_kernel
 def beyond(bodies, point, i, kind, number, direction):
     """Return how far the farthest other point of body i lies beyond a point or line along ``direction`` (d,) [m]."""
     d = len(direction)
@@ -51,7 +51,7 @@ def beyond(bodies, point, i, kind, number, direction):
     return most
 
 
-@kernel
+@inner_kernel
 def within(bodies, axes, place, o, face, where, out):
     """Write how far a place (d,) is from the sides of a face of body o, < 0 outside; return the least of it [m]."""
     d = len(where)
@@ -66,7 +66,7 @@ def within(bodies, axes, place, o, face, where, out):
     return least
 
 
-@kernel
+@inner_kernel
 def nearest_on_lines(start, along, other_start, other_along, share):
     """Write where two lines (d,) are nearest, as shares of their lengths (2,); return sin^2 of their angle."""
     aa, bb, ab, aw, bw = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -84,7 +84,7 @@ def nearest_on_lines(start, along, other_start, other_along, share):
     return spread / (aa * bb)
 
 
-@kernel
+@inner_kernel
 def nearest(bodies, point, feature, share, lines, apart):
     """Write where two points or lines are nearest to each other, which a row (a, b, kind, number, kind, number) names.
 
@@ -110,7 +110,7 @@ def nearest(bodies, point, feature, share, lines, apart):
     return long_a, long_b, spread
 
 
-@kernel
+@inner_kernel
 def touching_faces(bodies, place, axes, world, pair, found, tol):
     """Write contacts of faces of body a or b with points of the other from row ``pair[2]`` on; return the next row."""
     point, normal = world
@@ -144,7 +144,7 @@ def touching_faces(bodies, place, axes, world, pair, found, tol):
     return count
 
 
-@kernel
+@inner_kernel
 def touching_points(bodies, world, pair, found, tol):
     """Write contacts of points or lines with points, and of lines that cross, as `touching_faces` does.
 
@@ -178,7 +178,7 @@ def touching_points(bodies, world, pair, found, tol):
             if kind_a == LINE and kind_b == LINE and r == 0.0:
                 n[:] = cross(lines[0], lines[1])
                 size = np.sqrt(dot(n, n))
-                if beyond(bodies, point, a, LINE, ia, n) > tol[0] * size:
+                if beyond(bodies, point, a, kind_a, ia, n) > tol[0] * size:
                     n *= -1.0
                 n /= size
             elif gap == 0.0:
@@ -200,7 +200,7 @@ def touching_points(bodies, world, pair, found, tol):
 def touching(bodies, place, axes, world, found, tol):
     """Write the contacts of all pairs into ``found`` (m, 6), faces first; return how many there are."""
     n, d = place.shape
-    count = 0
+    count = np.int64(0)  # a 0 of Python's is a constant, for which what is called would be compiled anew
     for a in range(n):
         for b in range(a + 1, n):
             if bodies.free[a] == 0 and bodies.free[b] == 0:

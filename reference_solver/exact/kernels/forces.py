@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.compiled import inner_kernel, kernel
 from reference_solver.exact.kernels.rotation import dot
 
 OPEN, STICK, SLIP = 0, 1, 2
@@ -49,7 +49,7 @@ def solve_near(matrix, wanted, start, scale):
     return x
 
 
-@kernel
+@inner_kernel
 def write_push(modes, directions, friction, yields, push):
     """Write how forces move bodies (m, d, 2, q): along the frame, but the load of a slip together with its friction."""
     push[:] = yields

@@ -2,16 +2,19 @@
 
 import numpy as np
 
-from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.compiled import inner_kernel, kernel
 from reference_solver.exact.kernels.rotation import cross, dot, turn_axes
 
+#: Which point of a pair: none, and no body's turn is left out. Numbers of numpy's: a kernel is compiled anew for a
+#: constant of Python's.
+PAIR, TURNS = np.int64(-1), np.int64(0)
 #: A share that no piece has.
 NEVER = 2.0
 #: Steps after which a search stops: the piece is cut there, and the search goes on from its end.
 MOST_STEPS = 400
 
 
-@kernel
+@inner_kernel
 def safe(h, h1, h2, third, ahead):
     """Return for how long, up to ``ahead``, a gap stays above zero for certain."""
     best = 0.0
@@ -33,7 +36,7 @@ def safe(h, h1, h2, third, ahead):
     return best
 
 
-@kernel
+@inner_kernel
 def write_seen(course, generator, who, point, s, seen):
     """Write a point of body ``who[1]`` in the axes of body ``who[0]``, and its first two derivatives by s (3, d).
 
@@ -107,7 +110,7 @@ def write_seen(course, generator, who, point, s, seen):
             seen[2, p] += axes[k, p] * (apart[2, k] + twice[k])
 
 
-@kernel
+@inner_kernel
 def holds_all(bodies, course, who, s, normal):
     """Return whether no point of body ``who[1]`` lies deeper along a normal (d,) in axes of ``who[0]`` than the first.
 
@@ -122,7 +125,7 @@ def holds_all(bodies, course, who, s, normal):
     return True
 
 
-@kernel
+@inner_kernel
 def clear(bodies, course, who, s, seen, bounds):
     """Return the gap of a point from body ``who[0]`` grown by both radii, and how far it stays clear.
 
@@ -190,7 +193,7 @@ def clear(bodies, course, who, s, seen, bounds):
     return gap, far
 
 
-@kernel
+@inner_kernel
 def write_bounds(course, bounds):
     """Write bounds of the first three derivatives by s of every body's position and orientation (n, 2, 3)."""
     n, d = course.place.shape
@@ -212,7 +215,7 @@ def write_bounds(course, bounds):
         bounds[i, 1, 0], bounds[i, 1, 1], bounds[i, 1, 2] = w, w1 + w * w, w2 + 3.0 * w * w1 + w * w * w
 
 
-@kernel
+@inner_kernel
 def write_rates(bounds, o, w, arm, apart, out):
     """Write bounds of |rho'|, |rho''|, T of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
     d0 = apart + bounds[o, 0, 0] + bounds[w, 0, 0] + arm
@@ -224,7 +227,7 @@ def write_rates(bounds, o, w, arm, apart, out):
     out[2] = d0 * bounds[o, 1, 2] + 3.0 * d1 * bounds[o, 1, 1] + 3.0 * d2 * bounds[o, 1, 0] + d3
 
 
-@kernel
+@inner_kernel
 def write_directions(bodies, o, w, seen, out):
     """Write directions (m, 3, d) along which cores may be apart, in axes of o; ``seen`` (p, 3, d) are points of w.
 
@@ -286,7 +289,7 @@ def write_directions(bodies, o, w, seen, out):
     return count
 
 
-@kernel
+@inner_kernel
 def clear_of_pair(bodies, course, who, s, bounds, rates, room):
     """Return the gap of two bodies at a share s, and how far they stay clear of each other.
 
@@ -304,7 +307,7 @@ def clear_of_pair(bodies, course, who, s, bounds, rates, room):
             continue
         r = bodies.radius[o] + bodies.radius[w]
         for k in range(bodies.points[w]):
-            write_seen(course, bodies.generator, (o, w, 0, -1), bodies.point[w, k], s, seen[k])
+            write_seen(course, bodies.generator, (o, w, TURNS, PAIR), bodies.point[w, k], s, seen[k])
         count = write_directions(bodies, o, w, seen, directions)
         for m in range(count):
             n, n1, n2 = directions[m, 0], directions[m, 1], directions[m, 2]
@@ -341,7 +344,7 @@ def clear_of_pair(bodies, course, who, s, bounds, rates, room):
     return gap, best
 
 
-@kernel
+@inner_kernel
 def clear_at(bodies, course, who, s, bounds, rates, room):
     """Return the gap and how far it stays clear: of point ``who[3]`` (`clear`), or of two bodies if that is -1.
 
@@ -356,7 +359,7 @@ def clear_at(bodies, course, who, s, bounds, rates, room):
     return clear(bodies, course, who, s, seen, (lift, slow, rates[0, 2], ahead, runs))
 
 
-@kernel
+@inner_kernel
 def meeting(bodies, course, who, limits, rates, room):
     """Return the first share below ``limits[0]`` at which a point or a body meets body ``who[0]``, or `NEVER`.
 
@@ -483,7 +486,7 @@ def first_meeting_of_pairs(bodies, course, pairs, scales, none):
             write_rates(bounds, o, w, reach_w, apart, rates[0])
             write_rates(bounds, w, o, reach_o, apart, rates[1])
             limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-15 * (apart + r))
-            s, ended = meeting(bodies, course, (o, w, 0, -1), limits, rates, room)
+            s, ended = meeting(bodies, course, (o, w, TURNS, PAIR), limits, rates, room)
             if s < first:
                 first, stopped = s, ended
     return first, stopped

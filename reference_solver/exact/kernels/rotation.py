@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.compiled import inner_kernel
 
 
-@kernel
+@inner_kernel
 def dot(a, b):
     """Return a . b."""
     s = 0.0
@@ -14,7 +14,7 @@ def dot(a, b):
     return s
 
 
-@kernel
+@inner_kernel
 def cross(a, b):
     """Return a x b."""
     out = np.empty(3)
@@ -24,7 +24,7 @@ def cross(a, b):
     return out
 
 
-@kernel
+@inner_kernel
 def turn_axes(axes, turn, out):
     """Write body axes (d, d), as columns, after a turn (1 | 3,) into ``out`` (d, d).
 
@@ -47,7 +47,7 @@ def turn_axes(axes, turn, out):
         out[2, j] = z + s * w + c * (turn[0] * v - turn[1] * u)
 
 
-@kernel
+@inner_kernel
 def write_turn_rate(turn, spin, out):
     """Write the rate (1 | 3,) of a turn under a spin (1 | 3,) into ``out``.
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from reference_solver.exact.kernels.compiled import kernel
+from reference_solver.exact.kernels.compiled import inner_kernel, kernel
 from reference_solver.exact.kernels.features import FACE, LINE, POINT, ends
 from reference_solver.exact.kernels.rotation import cross, dot
 
 
-@kernel
+@inner_kernel
 def write_inverse_inertia(bodies, axes, i, out):
     """Write the inverse inertia (s, s) of body i in world axes."""
     s = len(out)
@@ -22,7 +22,7 @@ def write_inverse_inertia(bodies, axes, i, out):
                         out[p, q] += axes[i, p, k] * axes[i, q, k] / bodies.moment[i, k]
 
 
-@kernel
+@inner_kernel
 def write_motion(bodies, state, i, arm, spin, out):
     """Write place, velocity (2, d) of the point of body i with the lever ``axes @ arm``, and its spin matrix (d, d)."""
     place, axes, velocity = state
@@ -44,7 +44,7 @@ def write_motion(bodies, state, i, arm, spin, out):
         out[0, p] += place[i, p]
 
 
-@kernel
+@inner_kernel
 def write_tangents(frame):
     """Complete a frame (d, d) whose first row is a normal: planar by a quarter turn, in space from the second row."""
     d = len(frame)
