@@ -90,6 +90,8 @@ class PortEngine(Engine):
     profiles = MappingProxyType({name: PROFILES[name] for name in ("default", "tuned")})
     #: Name by which the port is imported.
     module: str
+    #: Package with the release number of MuJoCo; the port's own unless told.
+    numbered = ""
     simulation: Callable[[Scene, float, Mapping[str, Any]], Simulation]
     #: Settings of the port alone.
     own: Mapping[str, Check] = MappingProxyType({})
@@ -113,11 +115,12 @@ class PortEngine(Engine):
         ImportError
             If it is not installed, or MuJoCo C of another release is.
         """
-        found, here = version(self.facts.package), ORIGINAL.version()
+        stepped = self.numbered or self.facts.package
+        found, here = version(stepped), ORIGINAL.version()
         if found.split(".")[:2] != here.split(".")[:2]:
-            raise ImportError(f"{self.facts.package} {found} is no port of MuJoCo {here}, which is installed")
+            raise ImportError(f"{stepped} {found} is no port of MuJoCo {here}, which is installed")
         import_module(self.module)
-        return found
+        return version(self.facts.package)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:
         """See `MujocoEngine.refuses`."""

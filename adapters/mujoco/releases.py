@@ -116,8 +116,6 @@ class Mjcf:
     def add_pair(self, *, geomname1: str, geomname2: str, **attributes: Any) -> None:
         """Add a pair of geoms by their names."""
         given = {"geom1": geomname1, "geom2": geomname2, **attributes}
-        if not any(given.get("solreffriction", ())):
-            given.pop("solreffriction", None)  # MuJoCo's own way of saying: as solref
         ElementTree.SubElement(self._contact, "pair", _text(given))
 
     def add_load(self, name: str, wrench: tuple[float, ...]) -> None:

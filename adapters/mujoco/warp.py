@@ -25,7 +25,6 @@ def _imported() -> tuple[Any, Any]:
     return warp, mujoco_warp
 
 
-@final
 class WarpSimulation(PortSimulation):
     """One model of MuJoCo Warp on the CPU."""
 
@@ -50,15 +49,18 @@ class WarpSimulation(PortSimulation):
         with self._warp.ScopedDevice("cpu"):
             for _ in range(steps):
                 if self._recorded is None:
-                    self._port.step(self._ported, state)  # compiles what is recorded afterwards
+                    self._step()  # compiles what is recorded afterwards
                     with self._warp.ScopedCapture(device="cpu") as made:
-                        self._port.step(self._ported, state)
+                        self._step()
                     self._recorded = made.graph
                 else:
                     self._warp.capture_launch(self._recorded)
         self._data.qpos[:], self._data.qvel[:] = state.qpos.numpy()[0], state.qvel.numpy()[0]
         if state.nacon.numpy()[0] > state.naconmax or state.nefc.numpy()[0] > state.njmax:
             raise EngineError("memory: contacts do not fit, so some were dropped")
+
+    def _step(self) -> None:
+        self._port.step(self._ported, self._state)
 
     def _copy(self) -> None:
         self._port.get_data_into(self._data, self._model, self._state)

@@ -168,12 +168,22 @@ def ported(engine: str, ports: Sequence[str], version: str = "") -> Release:
             raise EngineError(f"ports: {name} is no port of {engine}; ports: {', '.join(known)}")
     facts = registry.facts(engine)
     bad = facts.known_bad_versions if facts else {}
-    every = [{each.version for each in offered(name)} for name in (engine, *ports)]
-    found = sorted((each for each in set.intersection(*every) - set(bad) if version in ("", each)), key=Version)
+    own = known_releases(engine)
+    every = {name: {_beside(own, each): each for each in offered(name)} for name in (engine, *ports)}
+    common = set.intersection(*map(set, every.values())) - set(bad)
+    found = sorted((each for each in common if version in ("", each)), key=Version)
     if not found:
         raise EngineError(f"ports: {', '.join((engine, *ports))} have no release {version or 'in common'}")
-    own = release(engine, known_releases(engine), found[-1])
-    return replace(own, needs=(*own.needs, *(f"{known[name]}=={found[-1]}" for name in ports)))
+    chosen = release(engine, own, found[-1])
+    needs = [need for name in ports for need in every[name][found[-1]].requirements]
+    return replace(chosen, needs=tuple(dict.fromkeys((*chosen.needs, *needs))))
+
+
+def _beside(own: Releases, port: Release) -> str:
+    """Release of an engine beside which a port runs: the one that the port requires, or the one of the same number."""
+    names = {distribution.name for distribution in own.distributions}
+    asked = [Requirement(need) for need in port.needs]
+    return next((pinned for each in asked if each.name in names for pinned in each.specifier), port).version
 
 
 def ports_of(engine: str) -> dict[str, str]:
