@@ -50,6 +50,8 @@ class NewtonMujocoSimulation(WarpSimulation):
         written, builder = Mjcf(self._mujoco), newton.ModelBuilder(gravity=self._scene.gravity)
         Spec(self._scene, self._dt, self._settings, written)
         written.option.disableflags = self._model.opt.disableflags
+        order = {self._model.pair(row).name: row for row in range(self._model.npair)}
+        written.contact[:] = sorted(written.contact, key=lambda pair: order[pair.get("name")])
         builder.rigid_gap = 0.0
         multiccd = not self._model.opt.disableflags & int(self._mujoco.mjtDisableBit.mjDSBL_MULTICCD)
         with warnings.catch_warnings():
@@ -61,6 +63,7 @@ class NewtonMujocoSimulation(WarpSimulation):
                 nconmax=most,
                 njmax=4 * most,
                 enable_multiccd=multiccd,
+                skip_visual_only_geoms=False,
                 kinematic_switchable_roots=False,
             )
         self._ported, self._state = self._solver.mjw_model, self._solver.mjw_data
@@ -77,21 +80,22 @@ class NewtonMujocoSimulation(WarpSimulation):
                 self._now.body_f.numpy()[row] = (*body.force, *body.torque)
 
     def _carry(self, theirs: Any) -> None:
-        """Take the numbers of Newton's model over into that of C.
+        """Take the numbers of Newton's model, and of what MuJoCo Warp steps, over into that of C.
 
         Raises
         ------
         EngineError
             If one differs by more than single precision.
         """
-        ours = self._model
-        told = [(f"option {name}", ours.opt, theirs.opt, name) for name in dir(ours.opt) if name[0] != "_"]
-        for what, own, other, name in told + [(name, ours, theirs, name) for name in CARRIED]:
-            here, there = getattr(own, name), getattr(other, name)
-            if name in GIVEN or callable(here):
-                continue
+        ours, stepped = self._model, self._ported
+        names = [name for name in dir(ours.opt) if name[0] != "_" and name not in GIVEN]
+        told = [("option ", ours.opt, name, getattr(theirs.opt, name)) for name in names]
+        told += [("", ours, name, getattr(stepped, name).numpy()) for name in CARRIED]
+        for kind, own, name, there in told:
+            here = getattr(own, name)
+            there = there[0] if np.ndim(there) > np.ndim(here) else there  # of the first of its worlds
             if np.shape(here) != np.shape(there) or not np.allclose(here, there, 4.0 * UNIT, 0.0):
-                raise EngineError(f"{what}: Newton has {np.ravel(there)[:3]} for {np.ravel(here)[:3]}")
+                raise EngineError(f"{kind}{name}: Newton has {np.ravel(there)} for {np.ravel(here)}")
             setattr(own, name, there)
 
     def _step(self) -> None:
@@ -158,6 +162,7 @@ class NewtonMujocoEngine(PortEngine):
         (Distribution("newton"),),
         known=">=1.8,<1.9",
         requirements=(
+            Requirement("~=1.8.0", "scipy", "its importer of MJCF makes hulls with it, and does not ask for it"),
             Requirement("~=1.8.0", "mujoco==3.17.0", "its extra sim asks for mujoco ~=3.17.0"),
             Requirement("~=1.8.0", "mujoco-warp==3.17.0", "its extra sim asks for mujoco-warp ~=3.17.0"),
         ),

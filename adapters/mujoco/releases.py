@@ -108,7 +108,7 @@ class Mjcf:
         self.option = SimpleNamespace()
         self._root = ElementTree.Element("mujoco")
         self.worldbody = _Body(mujoco, ElementTree.Element("worldbody"))
-        self._contact = ElementTree.Element("contact")
+        self.contact = ElementTree.Element("contact")
         self._actuator = ElementTree.Element("actuator")
         self._meshes: list[ElementTree.Element] = []
         self._keys: list[ElementTree.Element] = []
@@ -116,7 +116,7 @@ class Mjcf:
     def add_pair(self, *, geomname1: str, geomname2: str, **attributes: Any) -> None:
         """Add a pair of geoms by their names."""
         given = {"geom1": geomname1, "geom2": geomname2, **attributes}
-        ElementTree.SubElement(self._contact, "pair", _text(given))
+        ElementTree.SubElement(self.contact, "pair", _text(given))
 
     def add_load(self, name: str, wrench: tuple[float, ...]) -> None:
         """Push a free body with a constant force and torque, (6,) world axes [N, N m].
@@ -168,8 +168,8 @@ class Mjcf:
             ElementTree.SubElement(self._root, "asset").extend(self._meshes)
         self.worldbody.finish()
         self._root.append(self.worldbody.element)
-        if len(self._contact):
-            self._root.append(self._contact)
+        if len(self.contact):
+            self._root.append(self.contact)
         if len(self._actuator):
             self._root.append(self._actuator)
         if self._keys:
