@@ -8,30 +8,34 @@ What the importer and the solver do not carry over is refused: their `MjModel` i
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 
-from adapters.engine import EngineError, ProfileRule, Quirk, Setting
+from adapters.engine import Array, EngineError, ProfileRule, Quirk, Setting
 from adapters.law.single_precision import UNIT
 from adapters.mujoco.port import PortEngine, port_facts
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.releases import Mjcf, no_autoreset
-from adapters.mujoco.spec import Spec
+from adapters.mujoco.shipped import SOLIMP
+from adapters.mujoco.spec import Spec, rotation
 from adapters.mujoco.warp import CONTACTS, MujocoWarpEngine, WarpSimulation
 from adapters.needs import Needs
 from adapters.newton.simulation import imported
 from adapters.releases import Distribution, Releases, Requirement
+from adapters.settings import Check, whole
 
 #: Numbers of a model that its motion depends on. Newton turns the frames of meshes, and has other sizes of planes.
 CARRIED = (
-    *(f"body_{name}" for name in ("mass", "inertia", "gravcomp")),
+    *(f"body_{name}" for name in ("mass", "gravcomp")),
     *(f"geom_{name}" for name in ("bodyid", "type", "contype", "conaffinity")),
     *(f"geom_{name}" for name in ("friction", "condim", "solref", "solimp", "margin", "gap")),
     *(f"pair_{name}" for name in ("geom1", "geom2", "friction", "dim")),
     *(f"pair_{name}" for name in ("solref", "solreffriction", "solimp", "margin", "gap")),
 )
+MARGIN = "SolverMuJoCo, _zero_margins_for_native_ccd"
 #: Options that are no settings, are given with each step, or say nothing without no-slip iterations, which are refused.
 GIVEN = ("timestep", "disableflags", "noslip_tolerance")
 
@@ -58,12 +62,14 @@ class NewtonMujocoSimulation(WarpSimulation):
             warnings.simplefilter("ignore")  # what they tell is compared below
             builder.add_mjcf(written.text())
             world = builder.finalize(device="cpu")
+            world.joint_qd.numpy()[:] = np.ravel([self._scene.bodies[index].twist for index in self._moving])
             self._solver = newton.solvers.SolverMuJoCo(
                 world,
                 nconmax=most,
                 njmax=4 * most,
                 enable_multiccd=multiccd,
                 skip_visual_only_geoms=False,
+                update_data_interval=self._settings["update_data_interval"],
                 kinematic_switchable_roots=False,
             )
         self._ported, self._state = self._solver.mjw_model, self._solver.mjw_data
@@ -71,11 +77,8 @@ class NewtonMujocoSimulation(WarpSimulation):
         start, self._data = self._data, self._mujoco.MjData(self._solver.mj_model)
         self._data.qpos[:], self._data.qvel[:] = start.qpos, start.qvel
         self._now, self._next, self._control = world.state(), world.state(), world.control()
-        places, speeds = self._now.joint_q.numpy().reshape(-1, 7), self._now.joint_qd.numpy().reshape(-1, 6)
-        places[:] = self._data.qpos.reshape(-1, 7)[:, [0, 1, 2, 4, 5, 6, 3]]
         for row, index in enumerate(self._moving):
             body = self._scene.bodies[index]
-            speeds[row] = body.twist
             if body.motion == "free":
                 self._now.body_f.numpy()[row] = (*body.force, *body.torque)
 
@@ -97,6 +100,9 @@ class NewtonMujocoSimulation(WarpSimulation):
             if np.shape(here) != np.shape(there) or not np.allclose(here, there, 4.0 * UNIT, 0.0):
                 raise EngineError(f"{kind}{name}: Newton has {np.ravel(there)} for {np.ravel(here)}")
             setattr(own, name, there)
+        here = _moments(ours.body_inertia, ours.body_iquat)
+        if not np.allclose(here, _moments(theirs.body_inertia, theirs.body_iquat), 0.0, 8.0 * UNIT * here.max()):
+            raise EngineError("body_inertia: that of Newton is another")
 
     def _step(self) -> None:
         self._solver.step(self._now, self._next, self._control, None, self._dt)
@@ -107,11 +113,18 @@ class NewtonMujocoSimulation(WarpSimulation):
         self._port.get_data_into(self._data, self._solver.mj_model, self._state)
 
 
-def _without_margin(rule: ProfileRule) -> ProfileRule:
+def _moments(principal: Array, frame: Array) -> Array:
+    """Tensors of inertia (n, 3, 3) of principal moments (n, 3) in frames (n, 4): Newton orders its axes otherwise."""
+    turn = rotation(frame)
+    return np.asarray(turn * principal[:, None] @ turn.transpose(0, 2, 1))
+
+
+def _as_newton(rule: ProfileRule) -> ProfileRule:
     def settings(needs: Needs, dt: float) -> list[Setting]:
-        because = "Newton sets it to 0 where a shape is a box"
-        own = Setting("margin", 0.0, because, "SolverMuJoCo, _zero_margins_for_native_ccd")
-        return [own if each.name == "margin" else each for each in rule(needs, dt)]
+        none = Setting("margin", 0.0, "a margin is not carried over where a shape is a box", MARGIN)
+        because = "as shipped: each step converts Newton's state to MuJoCo's and back; with 0 only back"
+        converted = Setting("update_data_interval", 1, because, "SolverMuJoCo, update_data_interval")
+        return [*(none if each.name == "margin" else each for each in rule(needs, dt)), converted]
 
     return settings
 
@@ -139,7 +152,7 @@ class NewtonMujocoEngine(PortEngine):
         Quirk(
             "it sets margins to 0 in a model with a box",
             "`tuned` has none; a setting that is not carried over is refused",
-            "SolverMuJoCo, _zero_margins_for_native_ccd",
+            MARGIN,
         ),
         Quirk(
             "gravity of MJCF is not read: it stays 9.81 m/s^2; a pair without solreffriction gets (0.02, 1)",
@@ -155,9 +168,16 @@ class NewtonMujocoEngine(PortEngine):
     module = "newton"
     numbered = "mujoco-warp"
     simulation = NewtonMujocoSimulation
-    profiles = MappingProxyType({**PortEngine.profiles, "tuned": _without_margin(PROFILES["tuned"])})
+    profiles = MappingProxyType({name: _as_newton(PROFILES[name]) for name in PortEngine.profiles})
+    own: Mapping[str, Check] = MappingProxyType({"update_data_interval": whole(0, 1)})
     expected = MujocoWarpEngine.expected
-    switches = ({"margin": 0.0}, *PortEngine.switches)
+    switches = (
+        *PortEngine.switches,
+        {"margin": 0.0},
+        {"margin": 0.0, "solimp": SOLIMP},
+        {"update_data_interval": 0},
+        {"margin": 0.0, "update_data_interval": 0},
+    )
     releases = Releases(
         (Distribution("newton"),),
         known=">=1.8,<1.9",

@@ -134,7 +134,8 @@ def ask(slot: Slot, port: str) -> Compared:
 def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: Mapping[str, Any]) -> Compared:
     def ran(engine: Engine, start: Scene) -> Trajectory:
         settings = {each.name: each.value for each in settings_of(engine, slot, scene)}
-        return run(engine, start, slot.dt, {**settings, **switched})
+        known = engine.settable()  # a port may have settings of its own
+        return run(engine, start, slot.dt, settings | {k: v for k, v in switched.items() if k in known})
 
     slot = blank.slot
     scene = prepare(slot).scene
