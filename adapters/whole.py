@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and the folder of those that can be made again."""
 
 from __future__ import annotations
 
@@ -22,3 +22,10 @@ def write(path: Path, content: str | bytes) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def cache_folder() -> Path:
+    """Folder for data that can be made again (``XDG_CACHE_HOME``, else ``~/.cache``)."""
+    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"

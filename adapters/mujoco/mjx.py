@@ -18,6 +18,7 @@ from adapters.mujoco.port import PortEngine, PortSimulation, port_facts
 from adapters.mujoco.profiles import PROFILES
 from adapters.needs import Needs
 from adapters.settings import word
+from adapters.whole import cache_folder
 
 #: States that one call records.
 RECORDED = 256
@@ -32,6 +33,10 @@ def _steps() -> Any:
     import jax
     from jax import numpy as jnp
     from mujoco import mjx
+
+    if jax.config.jax_compilation_cache_dir is None:  # the user has chosen none, and JAX keeps nothing by itself
+        jax.config.update("jax_compilation_cache_dir", str(cache_folder() / "jax"))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
     def steps(model: Any, data: Any, samples: int, stride: int) -> Any:
         def step(_: Any, now: Any) -> Any:
@@ -130,8 +135,8 @@ class MujocoMjxEngine(PortEngine):
         ),
         Quirk(
             "a step is compiled for each layout of a model, anew in each process",
-            "unchanged",
-            "measured: 5 s of CPU for a ball, 19 s for five boxes",
+            "JAX keeps what it compiles in our cache folder, or in the user's",
+            "JAX documentation: jax_compilation_cache_dir; measured: 6.3 s of CPU for a ball, then 1.2 s",
         ),
     )
     module = "mujoco.mjx"

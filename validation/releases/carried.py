@@ -20,8 +20,9 @@ from pathlib import Path
 
 from adapters import registry
 from adapters.engine import EngineError
+from adapters.whole import cache_folder
 from validation import catalogue
-from validation.releases.environments import UNFINISHED, cache_folder
+from validation.releases.environments import UNFINISHED
 
 #: Our packages that run and measure a cell; reports are made in the calling process.
 PACKAGES = ("reference_solver", "adapters", "validation")

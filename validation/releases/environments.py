@@ -27,6 +27,7 @@ from typing import Any
 
 from adapters.engine import EngineError
 from adapters.plain import one_line
+from adapters.whole import cache_folder
 from validation.releases.choosing import Release
 
 RECEIPT = "receipt.json"
@@ -58,13 +59,6 @@ class Environment:
     def python(self) -> Path:
         """Its interpreter."""
         return _python(self.path)
-
-
-def cache_folder() -> Path:
-    """Folder for data that can be made again (``XDG_CACHE_HOME``, else ``~/.cache``)."""
-    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
-        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
 
 
 def folder() -> Path:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from adapters.engine import EngineError
 from adapters.engine_folder import PORTS, folder_of, rows_of
+from adapters.whole import cache_folder
 from validation.cells import format_dt
-from validation.releases.environments import cache_folder, locked
+from validation.releases.environments import locked
 from validation.releases.ports import Compared
 
 #: Columns of the kept table: what says which case it is, then what was found.
