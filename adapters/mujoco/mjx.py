@@ -1,4 +1,4 @@
-"""MJX (`mujoco-mjx`): MuJoCo in JAX, in double precision or, by a setting, in JAX's own single; here on the CPU.
+"""MJX (`mujoco-mjx`): MuJoCo in JAX, in double precision, or in JAX's own single as another engine; here on the CPU.
 
 A model is compiled when it makes its first step. One compiled function makes all steps, however many are asked for: a
 call for each would take longer than the steps.
@@ -7,6 +7,7 @@ call for each would take longer than the steps.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 from typing import Any, final
@@ -100,45 +101,50 @@ class MjxSimulation(PortSimulation):
         return float(self._ported.opt.tolerance)
 
 
-def _with_precision(rule: ProfileRule) -> ProfileRule:
+def _with_precision(rule: ProfileRule, precision: str) -> ProfileRule:
     def settings(needs: Needs, dt: float) -> list[Setting]:
-        because = "as MuJoCo C; JAX alone computes in single precision"
-        return [*rule(needs, dt), Setting("precision", "double", because, "JAX documentation: jax_enable_x64")]
+        because = "as MuJoCo C" if precision == "double" else "as JAX computes unless told otherwise"
+        return [*rule(needs, dt), Setting("precision", precision, because, "JAX documentation: jax_enable_x64")]
 
     return settings
 
 
-@final
-class MujocoMjxEngine(PortEngine):
-    """Adapter of MJX."""
+def _profiles(precision: str) -> Mapping[str, ProfileRule]:
+    return MappingProxyType({name: _with_precision(PROFILES[name], precision) for name in PortEngine.profiles})
 
-    facts = port_facts(
-        "mujoco_mjx",
-        "MJX",
-        "mujoco-mjx",
-        "double",
-        Quirk(
-            "JAX computes in single precision unless told otherwise",
-            "profiles are in double precision, so that differences from MuJoCo C are none of round-off; "
-            "precision=single is JAX's own",
-            "JAX documentation: jax_enable_x64",
-        ),
-        Quirk(
-            "a pair without friction, which keeps rows of friction, has 0 in them where C has 1e-5",
-            "unchanged; with smooth_condim=1 it has no such rows, and moves as in C",
-            "measured with 3.17.0: after a blow a ball is 2 mm elsewhere, with friction 1e-5 it is not",
-        ),
-        Quirk(
-            "elliptic cones stop a scene of which no pair has friction rows: an index is no integer",
-            "such a scene, which has no cones, is given to MJX with pyramidal ones; it moves as in C",
-            "mujoco/mjx/_src/solver.py, _update_constraint; measured with 3.17.0: 1e-13 m",
-        ),
-        Quirk(
-            "a step is compiled for each layout of a model, anew in each process",
-            "JAX keeps what it compiles in our cache folder, or in the user's",
-            "JAX documentation: jax_compilation_cache_dir; measured: 6.3 s of CPU for a ball, then 1.2 s",
-        ),
-    )
+
+#: Facts of both engines.
+FACTS = port_facts(
+    "mujoco_mjx",
+    "MJX",
+    "mujoco-mjx",
+    "double",
+    Quirk(
+        "JAX computes in single precision unless told otherwise",
+        "double precision, so that differences from MuJoCo C are none of round-off; mujoco_mjx_single is JAX's own",
+        "JAX documentation: jax_enable_x64",
+    ),
+    Quirk(
+        "a pair without friction, which keeps rows of friction, has 0 in them where C has 1e-5",
+        "unchanged; with smooth_condim=1 it has no such rows, and moves as in C",
+        "measured with 3.17.0: after a blow a ball is 2 mm elsewhere, with friction 1e-5 it is not",
+    ),
+    Quirk(
+        "elliptic cones stop a scene of which no pair has friction rows: an index is no integer",
+        "such a scene, which has no cones, is given to MJX with pyramidal ones; it moves as in C",
+        "mujoco/mjx/_src/solver.py, _update_constraint; measured with 3.17.0: 1e-13 m",
+    ),
+    Quirk(
+        "a step is compiled for each layout of a model, anew in each process",
+        "JAX keeps what it compiles in our cache folder, or in the user's",
+        "JAX documentation: jax_compilation_cache_dir; measured: 6.3 s of CPU for a ball, then 1.2 s",
+    ),
+)
+
+
+class MjxPort(PortEngine):
+    """What both engines share: the model and its steps, in the precision that a setting tells."""
+
     module = "mujoco.mjx"
     simulation = MjxSimulation
     expected = (
@@ -148,6 +154,21 @@ class MujocoMjxEngine(PortEngine):
             "measured with 3.17.0: with friction 1e-5 or smooth_condim=1 it rebounds as in C within 1e-4",
         ),
     )
-    profiles = MappingProxyType({name: _with_precision(PROFILES[name]) for name in PortEngine.profiles})
     switches = PortEngine.switches[:2]  # others are compiled again
     own: Mapping[str, Any] = MappingProxyType({"precision": word("double", "single")})
+
+
+@final
+class MujocoMjxEngine(MjxPort):
+    """Adapter of MJX in double precision."""
+
+    facts = FACTS
+    profiles = _profiles("double")
+
+
+@final
+class MujocoMjxSingleEngine(MjxPort):
+    """Adapter of MJX in single precision."""
+
+    facts = replace(FACTS, name="mujoco_mjx_single", title="MJX (single)", precision="single")
+    profiles = _profiles("single")

@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 
 from adapters.conformance import items
-from adapters.mujoco.mjx import MujocoMjxEngine
+from adapters.engine import EngineError
+from adapters.mujoco import newton as of_newton
+from adapters.mujoco.mjx import MujocoMjxEngine, MujocoMjxSingleEngine
+from adapters.mujoco.newton import NewtonMujocoEngine
 from adapters.mujoco.port import ORIGINAL
 from adapters.mujoco.warp import MujocoWarpEngine
 from adapters.needs import needs
-from adapters.scene import Body, HalfSpace, Pair, Scene, Sphere
+from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import run
 from adapters.trajectory import Sampling
 
 UPRIGHT, DT = (1.0, 0.0, 0.0, 0.0), 1.0 / 240.0
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT))
-PORTS = [
-    pytest.param(engine, marks=pytest.mark.optional(engine.name)) for engine in (MujocoWarpEngine(), MujocoMjxEngine())
-]
+ENGINES = (MujocoWarpEngine(), NewtonMujocoEngine(), MujocoMjxEngine(), MujocoMjxSingleEngine())
+PORTS = [pytest.param(engine, marks=pytest.mark.optional(engine.name)) for engine in ENGINES]
 
 
 def ball(mu, speed=1.0):
@@ -37,7 +39,7 @@ def ran(engine, scene, profile="default", **changes):
     "item",
     [
         pytest.param(item, marks=pytest.mark.optional(engine.name), id=f"{engine.name}-{item}")
-        for engine in (MujocoWarpEngine(), MujocoMjxEngine())
+        for engine in ENGINES[:-1]  # the last has the steps of the one before
         for item in items(engine)
     ],
 )
@@ -54,10 +56,9 @@ def test_rough_ball_as_in_c(engine):
     assert np.allclose(there.contacts.rows.impulse, here.contacts.rows.impulse, atol=10.0 * within)
 
 
-@pytest.mark.optional("mujoco_warp")
-def test_flat_pyramid_in_warp():
+@pytest.mark.parametrize("engine", PORTS[:2])
+def test_flat_pyramid_in_warp(engine):
     """In single precision its edges are alike; C moves the ball by its law."""
-    engine = MujocoWarpEngine()
     for mu in (0.0, 1e-5, 1e-3):
         assert ran(engine, ball(mu, 0.0)).finish == "diverged"
         assert ran(ORIGINAL, ball(mu, 0.0)).finish == "completed"
@@ -90,7 +91,88 @@ def test_elliptic_cones_of_pairs_without_friction_in_mjx(rough):
 
 @pytest.mark.optional("mujoco_mjx")
 def test_precision_of_mjx():
-    engine = MujocoMjxEngine()
-    double, single = (ran(engine, ball(0.3), precision=word) for word in ("double", "single"))
+    double, single = (ran(engine, ball(0.3)) for engine in (MujocoMjxEngine(), MujocoMjxSingleEngine()))
     assert 1e-9 < np.abs(double.pose - single.pose).max() < 1e-5
     assert math.isclose(double.readback["tolerance"], 1e-8)
+
+
+# ---- Newton's MuJoCo solver ------------------------------------------------------------------------------------------
+
+BOX = Body("box", Box((0.2, 0.2, 0.2)), 1.0, (0.1,) * 3, (3.0, 0.0, 0.3, *UPRIGHT))
+
+
+@pytest.mark.optional("mujoco_newton")
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"margin": 0.01}, "geom_margin: "),
+        ({"noslip_iterations": 5}, "option noslip_iterations: Newton has [0] for [5]"),
+    ],
+)
+def test_setting_that_newton_does_not_carry_over(changes, line):
+    scene = ball(0.3)
+    with pytest.raises(EngineError) as caught:
+        ran(NewtonMujocoEngine(), replace(scene, bodies=(*scene.bodies, BOX)), **changes)
+    assert str(caught.value).startswith(line)
+
+
+@pytest.mark.optional("mujoco_newton")
+def test_order_of_pairs_in_newton(monkeypatch):
+    """After MuJoCo has sorted pairs, Newton enters their materials in the order of the file."""
+    scene, engine = ball(0.3), NewtonMujocoEngine()
+    bodies = (BOX, *reversed(scene.bodies))
+    scene = replace(scene, bodies=bodies, pairs=(Pair("floor", "ball", friction=0.3), Pair("box", "*", friction=0.1)))
+    here, there = ran(ORIGINAL, scene), ran(engine, scene)
+    assert np.abs(here.pose - there.pose).max() < 1e-5
+    monkeypatch.setattr(of_newton, "sorted", lambda pairs, key: list(pairs), raising=False)
+    with pytest.raises(EngineError, match=r"^pair_friction: Newton has"):
+        ran(engine, scene)
+
+
+@pytest.mark.optional("mujoco_newton")
+def test_spin_in_newton():
+    """Each step converts the state to that of MuJoCo and back, in single precision; a free ball gains speed."""
+    scene = replace(ball(0.0), bodies=(replace(ball(0.0).bodies[1], twist=(0.0, 0.0, 0.0, 3.0, -2.0, 4.0)),), pairs=())
+    scene, gained = replace(scene, gravity=(0.0,) * 3, duration=1000.0 * DT), []
+    for engine, changes in (
+        (MujocoWarpEngine(), {}),
+        (NewtonMujocoEngine(), {}),
+        (NewtonMujocoEngine(), {"update_data_interval": 0}),
+    ):
+        spin = np.linalg.norm(ran(engine, scene, **changes).twist[:, 0, 3:], axis=1)
+        gained.append(spin[-1] / spin[0] - 1.0)
+    assert 1e-4 < gained[1] < 1e-3 and max(abs(gained[0]), abs(gained[2])) < 1e-5
+
+
+@pytest.mark.optional("mujoco_newton")
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_restitution_of_newtons_shapes(e):
+    """A public report (isaac-sim/IsaacSim, discussion 698): e = 1 falls as e = 0 does; true is a rebound to e^2 h."""
+    import newton
+    import warp
+
+    builder = newton.ModelBuilder()
+    config = newton.ModelBuilder.ShapeConfig(restitution=e)
+    builder.add_ground_plane(cfg=config)
+    place = warp.transform((0.0, 0.0, 1.5), warp.quat_identity())
+    builder.add_shape_sphere(builder.add_body(xform=place), radius=0.5, cfg=config)
+    model = builder.finalize(device="cpu")
+    solver, heights = newton.solvers.SolverMuJoCo(model), []
+    now, after, control = model.state(), model.state(), model.control()
+    for _ in range(round(1.0 / DT)):
+        solver.step(now, after, control, None, DT)
+        now, after = after, now
+        heights.append(float(now.body_q.numpy()[0, 2]))
+    lowest = int(np.argmin(heights))
+    assert lowest < len(heights) - 100 and max(heights[lowest:]) < 0.5
+
+
+@pytest.mark.optional("mujoco_newton")
+def test_body_without_mass_in_newton():
+    """A public report (newton-physics/newton#2301): such a wall let bodies through; now MuJoCo refuses it."""
+    import newton
+
+    builder = newton.ModelBuilder()
+    builder.add_shape_box(builder.add_body(mass=0.0), cfg=newton.ModelBuilder.ShapeConfig(density=0.0))
+    with pytest.raises(ValueError, match="mass and inertia of moving bodies"):
+        newton.solvers.SolverMuJoCo(builder.finalize(device="cpu"))

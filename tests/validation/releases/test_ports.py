@@ -140,23 +140,37 @@ def test_result_as_plain_data():
 def offers(monkeypatch):
     """Releases of each engine."""
     of = {"mujoco": ["3.16.0", "3.17.0", "4.0.0"], "mujoco_warp": ["3.16.0", "3.17.0", "4.0.0"],
-          "mujoco_mjx": ["3.16.0", "3.18.0"]}  # fmt: skip
-    monkeypatch.setattr(choosing, "offered", lambda name: [Release(name, version, name, ()) for version in of[name]])
+          "mujoco_mjx": ["3.16.0", "3.18.0"], "mujoco_newton": ["1.7.0", "1.8.0"]}  # fmt: skip
+    needs = {"1.7.0": ("mujoco==3.16.0",), "1.8.0": ("scipy", "mujoco==3.17.0")}
+    monkeypatch.setattr(
+        choosing, "offered", lambda name: [Release(name, each, name, needs.get(each, ())) for each in of[name]]
+    )
     return of
 
 
 def test_newest_common_release_that_is_not_known_to_be_bad(offers):
     assert "4.0.0" in ENGINE.facts.known_bad_versions
-    assert ported("mujoco", ["mujoco_warp"]).requirements == ("mujoco==3.17.0", "numpy", "mujoco-warp==3.17.0")
+    assert ported("mujoco", ["mujoco_warp"]).requirements == ("mujoco==3.17.0", "numpy", "mujoco_warp==3.17.0")
     both = ported("mujoco", ["mujoco_warp", "mujoco_mjx"])
-    assert both.version == "3.16.0" and "mujoco-mjx==3.16.0" in both.needs
+    assert both.version == "3.16.0" and "mujoco_mjx==3.16.0" in both.needs
+
+
+def test_port_with_release_numbers_of_its_own(offers):
+    """It runs beside the release that it requires."""
+    found = ported("mujoco", ["mujoco_warp", "mujoco_newton"])
+    assert found.version == "3.17.0" and {"mujoco_newton==1.8.0", "mujoco_warp==3.17.0"} < set(found.needs)
+    assert "mujoco_newton==1.7.0" in ported("mujoco", ["mujoco_newton"], "3.16.0").needs
 
 
 @pytest.mark.parametrize(
     ("ports", "version", "line"),
     [
         (["mujoco_mjx"], "3.17.0", "ports: mujoco, mujoco_mjx have no release 3.17.0"),
-        (["bullet"], "", "ports: bullet is no port of mujoco; ports: mujoco_mjx, mujoco_warp"),
+        (
+            ["bullet"],
+            "",
+            "ports: bullet is no port of mujoco; ports: mujoco_mjx, mujoco_mjx_single, mujoco_newton, mujoco_warp",
+        ),
     ],
 )
 def test_releases_that_are_not_compared(offers, ports, version, line):
@@ -171,7 +185,8 @@ def test_releases_that_are_not_compared(offers, ports, version, line):
 def test_engine_without_ports(name, said):
     with pytest.raises(EngineError) as caught:
         ported(name, [])
-    assert str(caught.value) == f"ports: {said}; these can be compared: mujoco with mujoco_mjx, mujoco_warp"
+    known = "mujoco with mujoco_mjx, mujoco_mjx_single, mujoco_newton, mujoco_warp"
+    assert str(caught.value) == f"ports: {said}; these can be compared: {known}"
 
 
 def test_port_beside_another_release(monkeypatch):
