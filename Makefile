@@ -143,8 +143,8 @@ releases: $(STAMP)
 
 # Ports of MuJoCo, tested beside MuJoCo C of their release, then compared with it for the page Ports; an hour of CPU.
 ports: $(STAMP)
-	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco_warp,mujoco_mjx,dev
-	CROSSCHECK_REQUIRE_ENGINES=mujoco_warp,mujoco_mjx .venv-ports/bin/python -m pytest -m optional tests/adapters/test_ports_of_mujoco.py
+	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco_warp,mujoco_mjx,mujoco_newton,dev
+	CROSSCHECK_REQUIRE_ENGINES=mujoco_warp,mujoco_mjx,mujoco_mjx_single,mujoco_newton .venv-ports/bin/python -m pytest -m optional tests/adapters/test_ports_of_mujoco.py
 	$(BIN)/crosscheck ports mujoco --keep
 
 # Are the tuned settings of an engine still the best? `make tune ENGINE=bullet`; minutes of CPU.
