@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, final
 
 from adapters.engine import EngineError, Expected, Quirk
+from adapters.isolation.quiet import quiet
 from adapters.mujoco.port import PortEngine, PortSimulation, port_facts
 from adapters.mujoco.releases import no_autoreset
 
@@ -15,11 +16,13 @@ MEASURED = (
 CONTACTS = 32
 
 
-def _imported() -> tuple[Any, Any]:
+def imported() -> tuple[Any, Any]:
     """Import Warp, which then reports errors only, and the port."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
+    with quiet():  # about a missing GPU
+        warp.init()
     import mujoco_warp
 
     return warp, mujoco_warp
@@ -29,7 +32,7 @@ class WarpSimulation(PortSimulation):
     """One model of MuJoCo Warp on the CPU."""
 
     def _put(self) -> None:
-        self._warp, self._port = _imported()
+        self._warp, self._port = imported()
         self._recorded: Any = None
         self._model.opt.disableflags &= ~no_autoreset(self._mujoco)
         most = CONTACTS * self._model.ngeom
@@ -49,6 +52,7 @@ class WarpSimulation(PortSimulation):
         with self._warp.ScopedDevice("cpu"):
             for _ in range(steps):
                 if self._recorded is None:
+                    self._ported.opt.warn_overflow = 0  # which kernels print; what is dropped is found below
                     self._step()  # compiles what is recorded afterwards
                     with self._warp.ScopedCapture(device="cpu") as made:
                         self._step()

@@ -21,9 +21,8 @@ from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.releases import Mjcf, no_autoreset
 from adapters.mujoco.shipped import SOLIMP
 from adapters.mujoco.spec import Spec, rotation
-from adapters.mujoco.warp import CONTACTS, MujocoWarpEngine, WarpSimulation
+from adapters.mujoco.warp import CONTACTS, MujocoWarpEngine, WarpSimulation, imported
 from adapters.needs import Needs
-from adapters.newton.simulation import imported
 from adapters.releases import Distribution, Releases, Requirement
 from adapters.settings import Check, whole
 
@@ -45,10 +44,10 @@ class NewtonMujocoSimulation(WarpSimulation):
     """One model of Newton, its MuJoCo solver, and two states: a step reads one and writes the other."""
 
     def _put(self) -> None:
-        self._warp, newton = imported()
-        import mujoco_warp
+        self._warp, self._port = imported()
+        import newton
 
-        self._port, self._recorded = mujoco_warp, None
+        self._recorded = None
         self._model.opt.disableflags &= ~no_autoreset(self._mujoco)
         most = CONTACTS * self._model.ngeom
         written, builder = Mjcf(self._mujoco), newton.ModelBuilder(gravity=self._scene.gravity)
@@ -182,8 +181,8 @@ class NewtonMujocoEngine(PortEngine):
         (Distribution("newton"),),
         known=">=1.8,<1.9",
         requirements=(
-            Requirement("~=1.8.0", "scipy", "its importer of MJCF makes hulls with it, and does not ask for it"),
-            Requirement("~=1.8.0", "mujoco==3.17.0", "its extra sim asks for mujoco ~=3.17.0"),
-            Requirement("~=1.8.0", "mujoco-warp==3.17.0", "its extra sim asks for mujoco-warp ~=3.17.0"),
+            Requirement("~=1.8.0", "scipy", "its importer of MJCF makes hulls with it, and does not require it"),
+            Requirement("~=1.8.0", "mujoco==3.17.0", "its extra sim requires mujoco ~=3.17.0"),
+            Requirement("~=1.8.0", "mujoco-warp==3.17.0", "its extra sim requires mujoco-warp ~=3.17.0"),
         ),
     )
