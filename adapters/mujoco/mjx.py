@@ -109,7 +109,7 @@ def _with_precision(rule: ProfileRule, precision: str) -> ProfileRule:
     return settings
 
 
-def _profiles(precision: str) -> Mapping[str, ProfileRule]:
+def _profiles(precision: str) -> MappingProxyType[str, ProfileRule]:
     return MappingProxyType({name: _with_precision(PROFILES[name], precision) for name in PortEngine.profiles})
 
 
