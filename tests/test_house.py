@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tokenize
+import tomllib
 from difflib import SequenceMatcher
 from functools import cache
 from graphlib import TopologicalSorter
@@ -157,6 +158,17 @@ def test_engine_folder_imports_the_vocabulary_alone(engine):
         assert not others & named, path
         if engine != SOLVER:
             assert "reference_solver" not in set(imported(path)), path
+
+
+def test_packages_of_the_solver_without_extras():
+    """It runs where only the dependencies of the project are installed; llvmlite is numba's."""
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    known = {re.match(r"[\w-]+", each)[0] for each in stated} | {
+        *sys.stdlib_module_names,
+        "reference_solver",
+        "llvmlite",
+    }
+    assert [path for path in (ROOT / "reference_solver").rglob("*.py") if set(imported(path)) - known] == []
 
 
 def test_imports_without_circles():
