@@ -17,8 +17,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import config as numba_config
-
-from reference_solver.structures import KNOWN
+from numba.core.caching import UserProvidedCacheLocator
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -34,7 +33,7 @@ WITHOUT_KERNELS = ("certificate", "exact", "geometry.py", "piles.py")
 def source_hash() -> str:
     """Return 16 hex digits: a hash of all sources that can have kernels, and of the versions of Python and numba."""
     root = Path(__file__).parent
-    digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__} {KNOWN}".encode())
+    digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__}".encode())
     for path in sorted(root.rglob("*.py")):
         if path.relative_to(root).parts[0] in WITHOUT_KERNELS:
             continue
@@ -66,35 +65,35 @@ def cache_folder() -> Path | None:
 CACHE_FOLDER = cache_folder()
 
 
-# On a release of numba that nobody tried, kernels are compiled by its public means alone: several times as slowly.
-if KNOWN:
-    from reference_solver.linking import INNER, KERNEL, LOCATION, once_for_all_constants
-else:
-    KERNEL, INNER, LOCATION = {}, {}, {}
+class PerModule(UserProvidedCacheLocator):
+    """Keeps a kernel below its module's name: checkouts and installations of the same sources share machine code.
 
-    def once_for_all_constants(function: Any) -> Any:
-        """Return a function as it is."""
-        return function
+    numba keeps it below a hash of where the source lies. What decides here is what the source says, and the folder's
+    name covers all of that.
+    """
 
-
-#: No hidden branches for divisions by zero: zero denominators are excluded by validation.
-OPTIONS: Any = {"error_model": "numpy"}
-#: How kernels are compiled that only kernels call.
-INNER_OPTIONS: Any = OPTIONS | INNER
+    def __init__(self, function: Callable[..., object], file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(Path(config.CACHE_DIR) / function.__module__)
 
 
-def _compiled(function: F, *, inner: bool, inline: bool = False) -> F:
+#: How numba is told of `PerModule`, by its settings.
+LOCATION = {"CACHE_LOCATOR_CLASSES": f"{PerModule.__module__}.{PerModule.__qualname__}"}
+
+#: What numba is told of kernels: no hidden branches for divisions by zero, since zero denominators are excluded by
+#: validation, and no counting of references to arrays, which cost two thirds of the time: kernels allocate nothing.
+KERNEL: Any = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+#: The same for what only kernels call: without what unpacks arguments of Python's, which must not call it.
+INNER: Any = KERNEL | {"no_cpython_wrapper": True}
+
+
+def _compiled(function: F, *, cache: bool, **options: bool) -> F:
     told = {} if CACHE_FOLDER is None else {"CACHE_DIR": str(CACHE_FOLDER)} | LOCATION
     before = {name: getattr(config, name) for name in told}
     try:
         vars(config).update(told)
-        result: F = njit(
-            function,
-            cache=CACHE_FOLDER is not None and not inner,
-            **(INNER_OPTIONS if inner else OPTIONS | KERNEL),
-            inline="always" if inline else "never",
-        )
-        return once_for_all_constants(result)
+        result: F = njit(function, cache=cache and CACHE_FOLDER is not None, **options)
+        return result
     finally:
         vars(config).update(before)
 
@@ -106,7 +105,7 @@ def kernel(function: F) -> F:
     nothing, and call other kernels as module globals: a closure over a compiled function would miss the cache in
     every run.
     """
-    return _compiled(function, inner=False)
+    return _compiled(function, cache=True, **KERNEL)
 
 
 def inner_kernel(function: F) -> F:
@@ -114,16 +113,17 @@ def inner_kernel(function: F) -> F:
 
     Without the wrapper that unpacks Python arguments they compile in two thirds of the time.
     """
-    return _compiled(function, inner=True)
+    return _compiled(function, cache=False, forceinline=False, **INNER)
 
 
 def spliced_kernel(function: F) -> F:
     """Compile like `inner_kernel`, as part of each caller.
 
-    A compiled function carries all code it calls, optimised once more at every level of calls. What stands high
-    above the solvers is therefore spliced into one function at the top: their code is then carried once.
+    numba passes a named tuple by value, each array of it as some nine numbers: a call of a function that is handed
+    bodies and rows moves a hundred and fifty of them. Of functions that a step calls for each contact this cost up to
+    half of its time.
     """
-    return _compiled(function, inner=True, inline=True)
+    return _compiled(function, cache=False, forceinline=True, **INNER)
 
 
 def from_python(function: F) -> F:

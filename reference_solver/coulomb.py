@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.compilation import kernel, spliced_kernel
 
 
-@inner_kernel
+@spliced_kernel
 def into_interval(impulse: float, bound: float) -> float:
     """Nearest friction impulse of the plane within +-bound."""
     return min(max(impulse, -bound), bound)
 
 
-@inner_kernel
+@spliced_kernel
 def into_disc(p1: float, p2: float, radius: float) -> tuple[float, float]:
     """Nearest point of the disc of that radius."""
     size = math.sqrt(p1 * p1 + p2 * p2)
@@ -22,7 +22,7 @@ def into_disc(p1: float, p2: float, radius: float) -> tuple[float, float]:
     return radius * p1 / size, radius * p2 / size
 
 
-@inner_kernel
+@spliced_kernel
 def back_into_disc(p1: float, p2: float, radius: float) -> tuple[float, float]:
     """The same for impulses that are remembered, by one factor, as the textbook's bits have it."""
     size = (p1**2 + p2**2) ** 0.5

@@ -12,7 +12,6 @@ import numpy as np
 
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
-from reference_solver.structures import structure
 
 #: Room for rows of a contact and velocities of a body.
 ROWS, VELOCITIES = 3, 6
@@ -75,7 +74,6 @@ BODY = np.dtype(
 Records: TypeAlias = Any
 
 
-@structure
 class Problem(NamedTuple):
     """A contact problem and the room to solve it. Unknown i is velocity i % D of the body with node i // D."""
 

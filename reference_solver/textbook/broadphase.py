@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.model import Array, Model
 from reference_solver.needs import ALL_PAIRS_LIMIT
 from reference_solver.pieces import Indices
-from reference_solver.structures import structure
 
 #: Levels of the grid, of cells half as wide each: one bit each of an integer. All smaller bodies are on the last.
 LEVELS = 62
@@ -23,7 +22,6 @@ FARTHEST = 2.0**30
 PRIMES = (73856093, 19349663, 83492791)
 
 
-@structure
 class Boxes(NamedTuple):
     """Bounding boxes of n bodies in d dimensions, room for the pairs that may touch, and the grid that finds them."""
 
@@ -61,19 +59,19 @@ def doubled(boxes: Boxes) -> Boxes:
     return boxes._replace(candidate=np.zeros(room, np.int64), found=np.zeros(room, np.int64))
 
 
-@inner_kernel
+@spliced_kernel
 def pair_of(a: int, b: int) -> int:
     """Bodies a < b as one integer that sorts like the pair."""
     return (a << 32) | b
 
 
-@inner_kernel
+@spliced_kernel
 def bodies_of(pair: int) -> tuple[int, int]:
     """Bodies of `pair_of`."""
     return pair >> 32, pair & 0xFFFFFFFF
 
 
-@inner_kernel
+@spliced_kernel
 def bound_along(boxes: Boxes, i: int, axis: int, component: float, place: float) -> None:
     """Bound half-space i along an axis that is its normal, to the last bit, by the place of its face there."""
     noise = 1e-15 * abs(place)
@@ -83,7 +81,7 @@ def bound_along(boxes: Boxes, i: int, axis: int, component: float, place: float)
         boxes.low[i, axis] = place - noise
 
 
-@inner_kernel
+@spliced_kernel
 def may_touch(boxes: Boxes, i: int, j: int) -> bool:
     """Bounds overlap and at least one body can respond."""
     for d in range(boxes.low.shape[1]):
@@ -92,7 +90,7 @@ def may_touch(boxes: Boxes, i: int, j: int) -> bool:
     return bool(boxes.free[i] or boxes.free[j])
 
 
-@inner_kernel
+@spliced_kernel
 def pair_bodies(boxes: Boxes, grid: int) -> int:
     """Fill `candidate` in ascending order; the number of pairs, one more than its length if there is no room."""
     n = len(boxes.low)
@@ -112,7 +110,7 @@ def pair_bodies(boxes: Boxes, grid: int) -> int:
     return count
 
 
-@inner_kernel
+@spliced_kernel
 def width_of(boxes: Boxes, i: int) -> float:
     """Longest side of a box; infinite of an unbounded body, and where a corner is no number."""
     widest = 0.0
@@ -123,20 +121,20 @@ def width_of(boxes: Boxes, i: int) -> float:
     return widest
 
 
-@inner_kernel
+@spliced_kernel
 def cell_at(place: float, size: float) -> int:
     """Cell of a coordinate."""
     cells = place / size
     return math.floor(math.copysign(min(abs(cells), FARTHEST), cells))
 
 
-@inner_kernel
+@spliced_kernel
 def bucket_of(boxes: Boxes, level: int, x: int, y: int, z: int) -> int:
     """Bucket of a cell; the number of buckets is a power of two."""
     return ((x * PRIMES[0]) ^ (y * PRIMES[1]) ^ (z * PRIMES[2]) ^ level) & (len(boxes.bucket) - 1)
 
 
-@inner_kernel
+@spliced_kernel
 def fill_grid(boxes: Boxes) -> tuple[float, int]:
     """Put each bounded body into the cell of its lower corner, at the last level whose cells are wider than it.
 
@@ -170,7 +168,7 @@ def fill_grid(boxes: Boxes) -> tuple[float, int]:
     return widest, occupied
 
 
-@inner_kernel
+@spliced_kernel
 def find_in_grid(boxes: Boxes, grid: tuple[float, int]) -> int:
     """Fill `found`: each body with those of its own level and of wider cells, and unbounded ones with all others.
 
@@ -209,14 +207,14 @@ def find_in_grid(boxes: Boxes, grid: tuple[float, int]) -> int:
     return count
 
 
-@inner_kernel
+@spliced_kernel
 def in_cell(boxes: Boxes, j: int, level: int, x: int, y: int, z: int) -> bool:
     """Whether body j lies in this cell: others may share its bucket."""
     same = boxes.cell[j, 0] == level and boxes.cell[j, 1] == x and boxes.cell[j, 2] == y
     return same and (boxes.low.shape[1] == 2 or boxes.cell[j, 3] == z)
 
 
-@inner_kernel
+@spliced_kernel
 def enter_pair(boxes: Boxes, count: int, i: int, j: int) -> int:
     """Enter a pair if there is room; return how many have been found, at most one more than there is room for."""
     if count < len(boxes.found):
@@ -224,7 +222,7 @@ def enter_pair(boxes: Boxes, count: int, i: int, j: int) -> int:
     return min(count + 1, len(boxes.found) + 1)
 
 
-@inner_kernel
+@spliced_kernel
 def sort_pairs(boxes: Boxes, count: int) -> None:
     """Copy the pairs found to `candidate` in ascending order: by the first body by counting, then by the second.
 

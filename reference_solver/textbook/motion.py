@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 
 FIXED, FREE, PRESCRIBED = 0, 1, 2
 MOTION_CODE = {"fixed": FIXED, "free": FREE, "prescribed": PRESCRIBED}
 
 
-@inner_kernel
+@spliced_kernel
 def share_of_gap(first: int, second: int) -> float:
     """Where a contact point lies across the gap of two bodies that move like this: 0 on the first, 1 on the second.
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.needs import Needs
 from reference_solver.settings import Settings
-from reference_solver.structures import structure
 from reference_solver.textbook.noise import ROUND_OFF
 
 SCALAR, BLOCK = 0, 1
 NO_CORRECTION, SPLIT, BAUMGARTE = 0, 1, 2
 
 
-@structure
 class Options(NamedTuple):
     """Numbers and flags of `Settings` and `Needs`."""
 
@@ -37,13 +35,13 @@ class Options(NamedTuple):
     certified: int  # whether each contact solve is measured (E14, E60 to E63)
 
 
-@inner_kernel
+@spliced_kernel
 def pushes_along(options: Options) -> bool:
     """Whether positions are corrected in the sweeps of velocities (E16)."""
     return options.solver == SCALAR and options.residual < 0.0 and options.correction == SPLIT
 
 
-@inner_kernel
+@spliced_kernel
 def push_speed(gap: float, parting: float, extent: float, options: Options) -> float:
     """Pseudo-velocity that a contact needs (E16) [m/s], beyond the speed ``parting`` with which it parts by itself.
 

@@ -6,15 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
 from reference_solver.records import Contacts
-from reference_solver.structures import structure
 from reference_solver.textbook.vectors import copy_vectors
 
 
-@structure
 class Buffer(NamedTuple):
     """Samples of a run; `names` and `real` of length 0 where contacts are not recorded."""
 
@@ -46,7 +44,7 @@ def contacts_of(buffer: Buffer, count: int) -> Contacts:
     return Contacts(body_a, body_b, feature, point, normal, impulse, real[:, 3 * d].copy())
 
 
-@inner_kernel
+@spliced_kernel
 def lacks_room(buffer: Buffer, k: int, stride: int, most: int) -> bool:
     """Whether the sample after step k may not take the ``most`` contacts that there can be."""
     if stride == 0 or (k + 1) % stride > 0 or len(buffer.real) == 0:
@@ -54,7 +52,7 @@ def lacks_room(buffer: Buffer, k: int, stride: int, most: int) -> bool:
     return bool(buffer.offset[k // stride] + most > len(buffer.real))
 
 
-@inner_kernel
+@spliced_kernel
 def end_step(pose: Array, twist: Array, buffer: Buffer, k: int, stride: int) -> int:
     """Write poses and twists if a sample follows step k; its number if contacts are to follow, else -1."""
     if stride == 0 or (k + 1) % stride > 0:

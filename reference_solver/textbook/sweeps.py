@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.direct.problem import FACTORISATIONS as OF_STEP
 from reference_solver.direct.problem import HELD, Problem
 from reference_solver.model import Array
@@ -32,7 +32,7 @@ DIRECT_BUDGET = 100
 DIRECT_KEEP = 0.02
 
 
-@inner_kernel
+@spliced_kernel
 def better_relaxation(relaxation: float, rate: float, limit: float = LARGEST_RELAXATION) -> float:
     """Factor that suits a contraction ``rate`` per sweep measured at ``relaxation`` (E13).
 
@@ -47,7 +47,7 @@ def better_relaxation(relaxation: float, rate: float, limit: float = LARGEST_REL
     return min(max(best, relaxation), limit)
 
 
-@inner_kernel
+@spliced_kernel
 def sweeps_ahead(goal: float, residual: float, before: float) -> float:
     """Sweeps until the goal at the rate of the last `RATE_INTERVAL`; 0 if it is reached, infinite without progress."""
     if residual <= goal:
@@ -57,7 +57,7 @@ def sweeps_ahead(goal: float, residual: float, before: float) -> float:
     return RATE_INTERVAL * math.log(goal / residual) / math.log(residual / before)
 
 
-@inner_kernel
+@spliced_kernel
 def enter_direct(problem: Problem, residual: float, options: Options, tally: Array) -> None:
     """Add a call of the direct solver to the tally, and whether it finished the step."""
     problem.size[HELD] = 1 if residual <= options.residual else 0
@@ -65,7 +65,7 @@ def enter_direct(problem: Problem, residual: float, options: Options, tally: Arr
     tally[DIRECT] += 1.0 if residual <= options.residual else 0.0
 
 
-@inner_kernel
+@spliced_kernel
 def enter(tally: Array, residual: float, sweeps: int) -> None:
     """Add one step to the tally of the run."""
     tally[RESIDUAL] = max(tally[RESIDUAL], residual)

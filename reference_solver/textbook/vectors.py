@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.model import Array
 
 
-@inner_kernel
+@spliced_kernel
 def copy_vectors(source: Array, target: Array) -> None:
     """Copy all numbers of every body; a slice assignment would allocate."""
     for i in range(len(source)):
@@ -16,7 +16,7 @@ def copy_vectors(source: Array, target: Array) -> None:
             target[i, k] = source[i, k]
 
 
-@inner_kernel
+@spliced_kernel
 def are_finite(vectors: Array) -> bool:
     """Whether every entry is a number: comparisons with what is not would be silently false."""
     for i in range(len(vectors)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.model import Array
 from reference_solver.textbook.options import Options
@@ -34,7 +34,7 @@ from reference_solver.textbook2.pair_modes import (
 from reference_solver.textbook2.state import MANIFOLDS, Bodies, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def prepare_blocks(bodies: Bodies, rows: Rows) -> None:
     """Matrix W of every two-point manifold (E12)."""
     for m in range(rows.counts[MANIFOLDS]):
@@ -71,7 +71,7 @@ def sweep_blocks(bodies: Bodies, rows: Rows, options: Options, relaxation: float
             relax_point(bodies, rows, first + i, 2 * i, options, relaxation)
 
 
-@inner_kernel
+@spliced_kernel
 def relax_point(bodies: Bodies, rows: Rows, c: int, row: int, options: Options, relaxation: float) -> None:
     """Go from the old impulse through the block's solution by the factor, stay in the cone, apply the change."""
     old = rows.real[c, PN]
@@ -86,7 +86,7 @@ def relax_point(bodies: Bodies, rows: Rows, c: int, row: int, options: Options, 
         apply_tangent(bodies, bodies.twist, rows, c, new - old)
 
 
-@inner_kernel
+@spliced_kernel
 def solve_point(rows: Rows, c: int, options: Options) -> None:
     """Exact solution of one contact point (E11): open, sticking, or sliding either way."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]
@@ -114,7 +114,7 @@ def solve_pair(rows: Rows, m: int, options: Options) -> None:
         slide_row(w, p, u, 3, mu2 * p[2])
 
 
-@inner_kernel
+@spliced_kernel
 def change_impulse(w: Array, p: Array, u: Array, row: int, new: float) -> None:
     """Set one impulse of the block and update its four velocities."""
     step = new - p[row]
@@ -123,13 +123,13 @@ def change_impulse(w: Array, p: Array, u: Array, row: int, new: float) -> None:
         u[i] += w[i, row] * step
 
 
-@inner_kernel
+@spliced_kernel
 def slide_row(w: Array, p: Array, u: Array, row: int, bound: float) -> None:
     """Friction row of the block by itself (E11)."""
     change_impulse(w, p, u, row, into_interval(p[row] - u[row] / w[row, row], bound))
 
 
-@inner_kernel
+@spliced_kernel
 def press_normals(w: Array, p: Array, u: Array) -> None:
     """Both normal rows with friction held: enumeration of the 2 x 2 complementarity problem (E12)."""
     k1, k2, k12 = w[0, 0], w[2, 2], w[0, 2]
@@ -149,7 +149,7 @@ def press_normals(w: Array, p: Array, u: Array) -> None:
     change_impulse(w, p, u, 2, n2)
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_block_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows, two points of a manifold together (E12, E16)."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.textbook.motion import share_of_gap
 from reference_solver.textbook2.closing_axis import lasting_axis
 from reference_solver.textbook2.columns import COS, EXTENT, MOTION, SIN, SIZE
@@ -16,7 +16,7 @@ from reference_solver.textbook2.separating_axis import AXIS_ADVANTAGE, EXACT_ADV
 from reference_solver.textbook2.state import Bodies, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def axis_separation(bodies: Bodies, a: int, b: int, dx: float, dy: float, axis: int) -> tuple[float, float]:
     """Separation of b from the face of a along a's own ``axis``, and the side (+-1) on which b lies."""
     ca, sa = bodies.real[a, COS], bodies.real[a, SIN]
@@ -29,7 +29,7 @@ def axis_separation(bodies: Bodies, a: int, b: int, dx: float, dy: float, axis: 
     return abs(offset) - bodies.real[a, SIZE + axis] - spread, math.copysign(1.0, offset)
 
 
-@inner_kernel
+@spliced_kernel
 def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Rows, c: int) -> int:
     """Up to two points of boxes a < b; ``ahead`` as in `collide`."""
     dx = bodies.pose[b, 0] - bodies.pose[a, 0]
@@ -57,7 +57,7 @@ def box_box(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: Ro
     return clip_edge(bodies, b, a, (-dx, -dy), axis, side, reach, rows, c)
 
 
-@inner_kernel
+@spliced_kernel
 def clip_edge(
     bodies: Bodies, r: int, i: int, way: tuple[float, float], axis: int, side: float, reach: float, rows: Rows, c: int
 ) -> int:
@@ -102,7 +102,7 @@ def clip_edge(
     return found
 
 
-@inner_kernel
+@spliced_kernel
 def face_vector(co: float, si: float, axis: int, length: float, nx: float, ny: float) -> tuple[float, float]:
     """Vector of ``length`` along an own ``axis`` of a body turned by (co, si): parts along n and its tangent."""
     x, y = length * co, length * si

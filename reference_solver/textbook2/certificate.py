@@ -6,7 +6,7 @@ the impulses. Every contact solve opens with `open_solve` and ends with `certify
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.compilation import kernel, spliced_kernel
 from reference_solver.coulomb import cone_defect
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.model import Array
@@ -104,7 +104,7 @@ def certify(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     check_momentum(bodies, rows, options, tally)
 
 
-@inner_kernel
+@spliced_kernel
 def is_unique(bodies: Bodies, rows: Rows, options: Options) -> bool:
     """Whether the velocities are proven to be the only answer (E66); uses up ``pressed``."""
     if not options.friction:
@@ -127,7 +127,7 @@ def is_unique(bodies: Bodies, rows: Rows, options: Options) -> bool:
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def inspect_row(bodies: Bodies, rows: Rows, c: int, options: Options, tally: Array) -> None:
     """Law and limits of one row."""
     pn, pt, mu = rows.real[c, PN], rows.real[c, PT], rows.real[c, FRICTION] if options.friction else 0.0
@@ -144,7 +144,7 @@ def inspect_row(bodies: Bodies, rows: Rows, c: int, options: Options, tally: Arr
     enter_share(tally, PENETRATION, -rows.real[c, GAP], extent)
 
 
-@inner_kernel
+@spliced_kernel
 def row_work(bodies: Bodies, rows: Rows, c: int) -> tuple[float, float, float]:
     """Work on the relative motion, work of surfaces that move as prescribed, and the size of both (E62) [J].
 
@@ -165,14 +165,14 @@ def row_work(bodies: Bodies, rows: Rows, c: int) -> tuple[float, float, float]:
     return normal + tangent, by_a + by_b, usual + abs(normal) + abs(tangent) + abs(by_a) + abs(by_b)
 
 
-@inner_kernel
+@spliced_kernel
 def surface_power(bodies: Bodies, i: int, x: float, y: float, px: float, py: float) -> float:
     """Impulse (px, py) times the velocity of the point of body i at the arm (x, y) [J]."""
     w = bodies.twist[i, 2]
     return px * (bodies.twist[i, 0] - w * y) + py * (bodies.twist[i, 1] + w * x)
 
 
-@inner_kernel
+@spliced_kernel
 def kinetic_change(bodies: Bodies) -> tuple[float, float]:
     """Change of kinetic energy from v* to v+, and what its round-off is a share of: that energy itself [J]."""
     gained, size = 0.0, 0.0
@@ -187,7 +187,7 @@ def kinetic_change(bodies: Bodies) -> tuple[float, float]:
     return gained, size
 
 
-@inner_kernel
+@spliced_kernel
 def check_momentum(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> None:
     """Defect of v+ = v* + M^-1 J^T p, linear and angular part of each body by itself (E61); uses up ``start``."""
     for i in range(len(bodies.kind)):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.textbook.noise import COORDINATE_NOISE, ROUND_OFF
 from reference_solver.textbook2.columns import EXTENT, VERTICES
 from reference_solver.textbook2.separating_axis import (
@@ -29,7 +29,7 @@ SAME_TIME = 1e-6
 SAME_AXIS = 1.0 - 5e-7
 
 
-@inner_kernel
+@spliced_kernel
 def corner_speed(bodies: Bodies, i: int, nx: float, ny: float, noise: float) -> float:
     """Least rate along n of the corners of body i that reach farthest against n [m/s]."""
     far = -support(bodies, i, -nx, -ny)
@@ -41,13 +41,13 @@ def corner_speed(bodies: Bodies, i: int, nx: float, ny: float, noise: float) -> 
     return slowest + nx * bodies.twist[i, 0] + ny * bodies.twist[i, 1]
 
 
-@inner_kernel
+@spliced_kernel
 def separation_along(bodies: Bodies, a: int, b: int, nx: float, ny: float, dx: float, dy: float) -> float:
     """Separation of the cores along n, from a to b; (dx, dy) leads from a to b [m]."""
     return nx * dx + ny * dy - support(bodies, a, nx, ny) - support(bodies, b, -nx, -ny)
 
 
-@inner_kernel
+@spliced_kernel
 def closing_time(bodies: Bodies, a: int, b: int, nx: float, ny: float, gap: float, noise: float, ahead: float) -> float:
     """Time after which n, from a to b, no longer separates, at the present velocities; at most ``ahead`` [s].
 
@@ -57,7 +57,7 @@ def closing_time(bodies: Bodies, a: int, b: int, nx: float, ny: float, gap: floa
     return min(ahead, max(gap, noise) / -rate) if rate < 0.0 else ahead
 
 
-@inner_kernel
+@spliced_kernel
 def axis_normal(
     bodies: Bodies, a: int, b: int, reference: int, k: int, l: int, dx: float, dy: float
 ) -> tuple[float, float]:

@@ -6,7 +6,7 @@ to the reference edge; two corners, or a disc and anything, in one.
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.shapes import MOST_VERTICES
 from reference_solver.textbook.motion import share_of_gap
 from reference_solver.textbook2.closing_axis import lasting_axis
@@ -27,7 +27,7 @@ from reference_solver.textbook2.state import Bodies, Rows
 SAME_SLOPE = 1e-9
 
 
-@inner_kernel
+@spliced_kernel
 def facing_edge(bodies: Bodies, i: int, nx: float, ny: float) -> int:
     """Edge of core i that looks most against (nx, ny); the vertex that lies deepest is one of its ends."""
     best, edge = 2.0, 0
@@ -40,7 +40,7 @@ def facing_edge(bodies: Bodies, i: int, nx: float, ny: float) -> int:
     return edge
 
 
-@inner_kernel
+@spliced_kernel
 def over_half_space(bodies: Bodies, f: int, s: int) -> tuple[float, float, float, float, float]:
     """Normal of half-space f, way from its centre to that of s, and height of the latter over its face [m]."""
     co, si = bodies.real[f, COS], bodies.real[f, SIN]
@@ -99,7 +99,7 @@ def core_core(bodies: Bodies, a: int, b: int, reach: float, ahead: float, rows: 
     return clip_facing_edge(bodies, b, a, -dx, -dy, k, reach, rows, c)
 
 
-@inner_kernel
+@spliced_kernel
 def clip_facing_edge(
     bodies: Bodies, r: int, i: int, dx: float, dy: float, k: int, reach: float, rows: Rows, c: int
 ) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.direct.problem import CONTACTS, Problem
 from reference_solver.direct.rounds import solve_problem
 from reference_solver.textbook.noise import MENDED
@@ -70,7 +70,7 @@ def mend_velocities(bodies: Bodies, rows: Rows, options: Options) -> None:
                 return
 
 
-@inner_kernel
+@spliced_kernel
 def load(bodies: Bodies, rows: Rows, options: Options, problem: Problem) -> None:
     """Bodies and rows in the direct solver's form."""
     contact, body = problem.contact, problem.body

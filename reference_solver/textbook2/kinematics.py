@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.model import Array
 from reference_solver.textbook2.columns import (
     AN,
@@ -27,7 +27,7 @@ from reference_solver.textbook2.columns import (
 from reference_solver.textbook2.state import Bodies, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def normal_velocity(twist: Array, rows: Rows, c: int) -> float:
     """u_n of row c (E2) [m/s]; ``twist`` may hold velocities or pseudo-velocities."""
     a, b = rows.integer[c, A], rows.integer[c, B]
@@ -35,7 +35,7 @@ def normal_velocity(twist: Array, rows: Rows, c: int) -> float:
     return along + rows.real[c, BN] * twist[b, 2] - rows.real[c, AN] * twist[a, 2]
 
 
-@inner_kernel
+@spliced_kernel
 def tangent_velocity(twist: Array, rows: Rows, c: int) -> float:
     """u_t of row c (E2) [m/s]."""
     a, b = rows.integer[c, A], rows.integer[c, B]
@@ -43,7 +43,7 @@ def tangent_velocity(twist: Array, rows: Rows, c: int) -> float:
     return along + rows.real[c, BT] * twist[b, 2] - rows.real[c, AT] * twist[a, 2]
 
 
-@inner_kernel
+@spliced_kernel
 def apply_normal(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> None:
     """Add normal impulse p of row c to B and its opposite to A (E4)."""
     a, b = rows.integer[c, A], rows.integer[c, B]
@@ -56,7 +56,7 @@ def apply_normal(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> 
     twist[b, 2] += bodies.real[b, INVERSE_INERTIA] * (rows.real[c, BN] * p)
 
 
-@inner_kernel
+@spliced_kernel
 def apply_tangent(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) -> None:
     """Add tangential impulse p of row c to B and its opposite to A (E4)."""
     a, b = rows.integer[c, A], rows.integer[c, B]
@@ -69,7 +69,7 @@ def apply_tangent(bodies: Bodies, twist: Array, rows: Rows, c: int, p: float) ->
     twist[b, 2] += bodies.real[b, INVERSE_INERTIA] * (rows.real[c, BT] * p)
 
 
-@inner_kernel
+@spliced_kernel
 def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
     """Size of the velocities that the speed of a point of body i at arm (x, y) is the sum of [m/s].
 
@@ -79,7 +79,7 @@ def speed_at(bodies: Bodies, i: int, x: float, y: float) -> float:
     return math.sqrt(vx * vx + vy * vy) + abs(w) * math.sqrt(x * x + y * y)
 
 
-@inner_kernel
+@spliced_kernel
 def load_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
     """Largest relative speed that the loads can give the two points of row c within dt [m/s]."""
     speed = 0.0
@@ -91,7 +91,7 @@ def load_speed(bodies: Bodies, rows: Rows, c: int, dt: float) -> float:
     return dt * speed
 
 
-@inner_kernel
+@spliced_kernel
 def add_pressure(bodies: Bodies, rows: Rows, c: int) -> None:
     """Add what the impulses of row c, or its usual ones, can at most do to the velocities of its bodies.
 

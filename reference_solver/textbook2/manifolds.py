@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.textbook.broadphase import bodies_of
 from reference_solver.textbook.noise import TOUCHING
 from reference_solver.textbook.options import BLOCK, Options
@@ -22,7 +22,7 @@ from reference_solver.textbook2.state import (
 )
 
 
-@inner_kernel
+@spliced_kernel
 def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     """Fill the geometry of all rows; False if an array is too small (nothing but rows has changed then).
 
@@ -51,13 +51,13 @@ def detect(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> bool:
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def contact_key(rows: Rows, c: int) -> int:
     """(a, b, feature) of row c as one integer that sorts like the triple."""
     return (rows.integer[c, A] * MOST_BODIES + rows.integer[c, B]) * FEATURES + rows.integer[c, FEATURE]
 
 
-@inner_kernel
+@spliced_kernel
 def recall(rows: Rows, options: Options) -> None:
     """Give each row the impulse of the same feature one step before: a merge of two ascending lists."""
     old = 0
@@ -73,7 +73,7 @@ def recall(rows: Rows, options: Options) -> None:
             rows.real[c, PT] = rows.old_impulse[old, 1]
 
 
-@inner_kernel
+@spliced_kernel
 def remember(rows: Rows) -> None:
     """Keep the impulses for the next step, but not those of an impact: it will not repeat."""
     for c in range(rows.counts[CONTACTS]):

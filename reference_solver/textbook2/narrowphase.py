@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.textbook.motion import share_of_gap
 from reference_solver.textbook2.box_box import box_box
 from reference_solver.textbook2.columns import COS, EXTENT, MOTION, SHAPE, SIN, SIZE
@@ -20,7 +20,7 @@ from reference_solver.textbook2.points import write_point
 from reference_solver.textbook2.state import CAPSULE, DISC, HALF_SPACE, Bodies, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def collide(bodies: Bodies, a: int, b: int, margin: float, ahead: float, rows: Rows, c: int) -> int:
     """Write the contact points of bodies a < b at rows c, c + 1 and return how many.
 
@@ -45,7 +45,7 @@ def collide(bodies: Bodies, a: int, b: int, margin: float, ahead: float, rows: R
     return box_box(bodies, first, second, reach, ahead, rows, c)
 
 
-@inner_kernel
+@spliced_kernel
 def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and disc s: one point under the centre."""
     nx, ny, dx, dy, height = over_half_space(bodies, f, s)
@@ -58,7 +58,7 @@ def half_space_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c:
     return 1
 
 
-@inner_kernel
+@spliced_kernel
 def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Half-space f and box s: the two corners of the face that looks most against the normal."""
     nx, ny, dx, dy, height = over_half_space(bodies, f, s)
@@ -80,7 +80,7 @@ def half_space_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: 
     return found
 
 
-@inner_kernel
+@spliced_kernel
 def disc_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Discs f and s: one point on the line of centres; concentric discs separate along x."""
     dx = bodies.pose[s, 0] - bodies.pose[f, 0]
@@ -98,7 +98,7 @@ def disc_disc(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) 
     return 1
 
 
-@inner_kernel
+@spliced_kernel
 def disc_box(bodies: Bodies, f: int, s: int, reach: float, rows: Rows, c: int) -> int:
     """Disc f and box s: nearest point of the box, or its nearest face if the centre is inside."""
     dx = bodies.pose[f, 0] - bodies.pose[s, 0]

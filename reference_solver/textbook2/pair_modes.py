@@ -8,7 +8,7 @@ points is free, and chosen in proportion to their normal impulses.
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.model import Array
 from reference_solver.textbook.elimination import eliminate
@@ -56,7 +56,7 @@ def solve_modes(w: Array, local: Array, mu1: float, mu2: float) -> bool:
     return False
 
 
-@inner_kernel
+@spliced_kernel
 def accept(w: Array, local: Array, mu1: float, mu2: float) -> bool:
     """Take the trial if it solves the block's contact problem (E14)."""
     p, q = local[TRIAL], local[FREE_VELOCITY]
@@ -79,7 +79,7 @@ def accept(w: Array, local: Array, mu1: float, mu2: float) -> bool:
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def try_sticking(w: Array, local: Array, mu1: float, mu2: float) -> bool:
     """Both points pressed, their mean friction row at rest."""
     p, q = local[TRIAL], local[FREE_VELOCITY]
@@ -100,7 +100,7 @@ def try_sticking(w: Array, local: Array, mu1: float, mu2: float) -> bool:
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def try_one_point(w: Array, local: Array, row: int, mu: float) -> None:
     """The other point open, this one solved exactly."""
     q, p = local[FREE_VELOCITY], local[TRIAL]
@@ -108,7 +108,7 @@ def try_one_point(w: Array, local: Array, row: int, mu: float) -> None:
     p[row], p[row + 1] = coulomb_point(q[row], q[row + 1], w[row, row], w[row + 1, row + 1], w[row, row + 1], mu)
 
 
-@inner_kernel
+@spliced_kernel
 def try_mode(w: Array, local: Array, mu1: float, mu2: float, first: int, second: int) -> bool:
     """Both points pressed, each sticking (0) or sliding with (+1) or against (-1) the tangent; False if singular."""
     system = local[SYSTEM:]
@@ -132,7 +132,7 @@ def try_mode(w: Array, local: Array, mu1: float, mu2: float, first: int, second:
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def coulomb_point(qn: float, qt: float, kn: float, kt: float, kx: float, mu: float) -> tuple[float, float]:
     """Normal and tangential impulse of one point (E11), q the velocities (minus target) without them.
 

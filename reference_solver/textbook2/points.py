@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.textbook2.columns import ARM_A, ARM_B, FEATURE, GAP, NX, NY, A, B
 from reference_solver.textbook2.state import Rows
 
 
-@inner_kernel
+@spliced_kernel
 def write_point(
     rows: Rows,
     c: int,

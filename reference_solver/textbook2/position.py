@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.model import Array
 from reference_solver.tally import PROJECTED
 from reference_solver.textbook.options import BLOCK, SPLIT, Options, push_speed, pushes_along
@@ -19,7 +19,7 @@ PUSH_TOLERANCE = 1e-4
 PUSH_SWEEPS = 1000
 
 
-@inner_kernel
+@spliced_kernel
 def missing_push(bodies: Bodies, rows: Rows) -> float:
     """Largest shortfall of a pseudo-velocity [m/s]."""
     worst = 0.0
@@ -28,7 +28,7 @@ def missing_push(bodies: Bodies, rows: Rows) -> float:
     return worst
 
 
-@inner_kernel
+@spliced_kernel
 def begin_pushes(bodies: Bodies, rows: Rows, options: Options, tally: Array) -> float:
     """Set the pseudo-velocity each contact needs beyond its motion, and start at rest; the largest, 0 without any push.
 

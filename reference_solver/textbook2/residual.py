@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.direct.problem import IMPULSE_SHARE
 from reference_solver.textbook.options import Options
@@ -21,7 +21,7 @@ def natural_map(bodies: Bodies, rows: Rows, options: Options) -> float:
     return worst
 
 
-@inner_kernel
+@spliced_kernel
 def row_residual(rows: Rows, c: int, normal_speed: float, slip: float, options: Options) -> float:
     """Larger of the normal and the friction defect of row c, each over its scale."""
     worst = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.textbook.noise import COORDINATE_NOISE, ROUND_OFF, SPEED_SHARE, STILL
 from reference_solver.textbook.options import BAUMGARTE, Options
@@ -46,7 +46,7 @@ from reference_solver.textbook2.kinematics import (
 from reference_solver.textbook2.state import CONTACTS, Bodies, Pairs, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
     """Fill all rows from the poses and velocities at the start of the step, before forces act."""
     for c in range(rows.counts[CONTACTS]):
@@ -60,7 +60,7 @@ def prepare(bodies: Bodies, pairs: Pairs, rows: Rows, options: Options) -> None:
         set_speed(bodies, rows, c, options)
 
 
-@inner_kernel
+@spliced_kernel
 def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
     """Levers (E2) and effective masses (E3)."""
     a, b = rows.integer[c, A], rows.integer[c, B]
@@ -77,7 +77,7 @@ def prepare_masses(bodies: Bodies, rows: Rows, c: int) -> None:
     rows.real[c, COUPLING] = ia * (an * at) + ib * (bn * bt)
 
 
-@inner_kernel
+@spliced_kernel
 def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Options) -> None:
     """Normal velocity b_n to reach (E7, E8, E15).
 
@@ -98,7 +98,7 @@ def set_target(bodies: Bodies, pairs: Pairs, rows: Rows, c: int, options: Option
     rows.real[c, TARGET] = target
 
 
-@inner_kernel
+@spliced_kernel
 def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
     """Speed that the residual is measured against (E14), and which impulses may be warm started.
 
@@ -121,7 +121,7 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
         rows.real[c, PN] = rows.real[c, PT] = 0.0
 
 
-@inner_kernel
+@spliced_kernel
 def warm_start(bodies: Bodies, rows: Rows, options: Options) -> None:
     """Apply the remembered impulses, the tangential ones inside the cone of the row's friction (E9)."""
     for c in range(rows.counts[CONTACTS]):

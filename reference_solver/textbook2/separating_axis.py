@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import inner_kernel, spliced_kernel
 from reference_solver.textbook2.columns import COS, EXTENT, FIRST_VERTEX, SIN, VERTICES
 from reference_solver.textbook2.state import Bodies
 
@@ -23,7 +23,7 @@ EXACT_ADVANTAGE = 1e-9
 CORNERS = -1
 
 
-@inner_kernel
+@spliced_kernel
 def corner(bodies: Bodies, i: int, k: int) -> tuple[float, float]:
     """Vertex k of body i (k up to the count, which is vertex 0 again) minus its centre, world axes [m]."""
     v = bodies.kind[i, FIRST_VERTEX] + (k if k < bodies.kind[i, VERTICES] else 0)
@@ -32,7 +32,7 @@ def corner(bodies: Bodies, i: int, k: int) -> tuple[float, float]:
     return c * x - s * y, s * x + c * y
 
 
-@inner_kernel
+@spliced_kernel
 def edge_normal(bodies: Bodies, i: int, k: int) -> tuple[float, float]:
     """Outward unit normal of edge k of body i, from vertex k to the next; a capsule's core has two edges."""
     px, py = corner(bodies, i, k)
@@ -42,7 +42,7 @@ def edge_normal(bodies: Bodies, i: int, k: int) -> tuple[float, float]:
     return ey / length, -ex / length
 
 
-@inner_kernel
+@spliced_kernel
 def support(bodies: Bodies, i: int, nx: float, ny: float) -> float:
     """Largest n . v over the vertices v of body i, from its centre [m]."""
     farthest = -math.inf
@@ -52,7 +52,7 @@ def support(bodies: Bodies, i: int, nx: float, ny: float) -> float:
     return farthest
 
 
-@inner_kernel
+@spliced_kernel
 def best_edge(bodies: Bodies, r: int, i: int, dx: float, dy: float, advantage: float) -> tuple[float, int]:
     """Separation of core i from the edge of core r that separates best, and that edge; (dx, dy) leads from r to i.
 
@@ -69,7 +69,7 @@ def best_edge(bodies: Bodies, r: int, i: int, dx: float, dy: float, advantage: f
     return best, edge
 
 
-@inner_kernel
+@spliced_kernel
 def nearest_corners(bodies: Bodies, a: int, b: int, dx: float, dy: float, advantage: float) -> tuple[float, int, int]:
     """Separation of the cores along the line through their nearest two corners, and these corners."""
     nearest, k, l = math.inf, 0, 0
@@ -86,7 +86,7 @@ def nearest_corners(bodies: Bodies, a: int, b: int, dx: float, dy: float, advant
     return nx * dx + ny * dy - support(bodies, a, nx, ny) - support(bodies, b, -nx, -ny), k, l
 
 
-@inner_kernel
+@spliced_kernel
 def corner_line(bodies: Bodies, a: int, b: int, k: int, l: int, dx: float, dy: float) -> tuple[float, float]:
     """Unit vector from corner k of a to corner l of b."""
     ax, ay = corner(bodies, a, k)

@@ -11,7 +11,7 @@ sweep would do as well, but solves the same row twice in a row, which changes no
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.coulomb import into_interval
 from reference_solver.textbook.options import Options
 from reference_solver.textbook2.columns import (
@@ -38,7 +38,7 @@ from reference_solver.textbook2.columns import (
 from reference_solver.textbook2.state import MANIFOLDS, Bodies, Rows
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, backwards: int, push: int) -> None:
     """One sweep over all manifolds in canonical order, at each point the normal row and then the friction row.
 
@@ -57,7 +57,7 @@ def sweep_rows(bodies: Bodies, rows: Rows, options: Options, relaxation: float, 
                 push_pair(bodies, rows, first + backwards, first + 1 - backwards, relaxation)
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation: float) -> None:
     """Rows of a manifold of one point."""
     a, b, row = rows.integer[c, A], rows.integer[c, B], rows.real[c]
@@ -83,7 +83,7 @@ def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation
     vb[2] = vb[2] + ib * bn * pn + ib * bt * pt
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Options, relaxation: float) -> None:
     """Rows of a manifold of two points, which share their normal; ``backwards``: 1 where the second point comes first.
 
@@ -130,7 +130,7 @@ def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Opti
     vb[2] = wb + ib * (bn1 * pn1 + bn2 * pn2 + bt1 * pt1) + ib * bt2 * pt2
 
 
-@inner_kernel
+@spliced_kernel
 def push_point(bodies: Bodies, rows: Rows, c: int, relaxation: float) -> None:
     """Pseudo-velocity row of a manifold of one point (E16)."""
     a, b, row = rows.integer[c, A], rows.integer[c, B], rows.real[c]
@@ -148,7 +148,7 @@ def push_point(bodies: Bodies, rows: Rows, c: int, relaxation: float) -> None:
     vb[2] += bodies.real[b, INVERSE_INERTIA] * (row[BN] * p)
 
 
-@inner_kernel
+@spliced_kernel
 def push_pair(bodies: Bodies, rows: Rows, c: int, d: int, relaxation: float) -> None:
     """Pseudo-velocity rows of a manifold of two points (E16)."""
     a, b, one, two = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d]
@@ -175,7 +175,7 @@ def push_pair(bodies: Bodies, rows: Rows, c: int, d: int, relaxation: float) -> 
     vb[2] += ib * (bn1 * p1 + bn2 * p2)
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_pushes(bodies: Bodies, rows: Rows, relaxation: float) -> None:
     """One sweep over the pseudo-velocity rows alone."""
     for m in range(rows.counts[MANIFOLDS]):

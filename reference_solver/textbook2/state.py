@@ -27,7 +27,6 @@ from reference_solver.model import (
 from reference_solver.needs import Needs
 from reference_solver.pieces import Indices
 from reference_solver.shapes import MOST_VERTICES
-from reference_solver.structures import structure
 from reference_solver.textbook.broadphase import Boxes, allocate_boxes
 from reference_solver.textbook.motion import MOTION_CODE
 from reference_solver.textbook.options import Options
@@ -68,7 +67,6 @@ COUNTS = 4
 MOST_BODIES = 1 << 24
 
 
-@structure
 class Bodies(NamedTuple):
     """Bodies i = 0 .. n-1."""
 
@@ -82,7 +80,6 @@ class Bodies(NamedTuple):
     pressed: Array  # (n, 2): sum of the sizes of those impulses over mass [m/s], and over inertia [rad/s]
 
 
-@structure
 class Pairs(NamedTuple):
     """Laws of the pairs and room for candidates of the broadphase."""
 
@@ -91,7 +88,6 @@ class Pairs(NamedTuple):
     boxes: Boxes
 
 
-@structure
 class Wide(NamedTuple):
     """Room for manifolds in blocks of `LANES` (`wide.py`), or none. A block has one slot for each lane."""
 
@@ -111,7 +107,6 @@ class Wide(NamedTuple):
     manifold: Indices  # (blocks + 1,): first row of each block
 
 
-@structure
 class Rows(NamedTuple):
     """Contact points c of the current step, and what is remembered of the step before."""
 
@@ -123,16 +118,15 @@ class Rows(NamedTuple):
     local: Array  # (LOCAL_ROWS, LOCAL_COLUMNS): scratch of the block being solved, see pair_modes.py
     old_key: Indices  # (c,): (a, b, feature) of the step before, ascending
     old_impulse: Array  # (c, 2)
-    wide: Wide
 
 
-@structure
 class Plane(NamedTuple):
     """What a step works on."""
 
     bodies: Bodies
     pairs: Pairs
     rows: Rows
+    wide: Wide
     problem: Problem
     options: Options
     tally: Array  # (SIZE,)
@@ -221,8 +215,8 @@ def allocate_wide(n: int, capacity: int) -> Wide:
     )
 
 
-def allocate_rows(capacity: int, wide: int = 0) -> Rows:
-    """Return room for ``capacity`` contact points; ``wide``: bodies, where manifolds shall be swept several at once."""
+def allocate_rows(capacity: int) -> Rows:
+    """Return room for ``capacity`` contact points."""
     return Rows(
         counts=np.zeros(COUNTS, np.int64),
         integer=np.zeros((capacity, ROW_INTEGERS), np.int64),
@@ -232,13 +226,12 @@ def allocate_rows(capacity: int, wide: int = 0) -> Rows:
         local=np.zeros((LOCAL_ROWS, LOCAL_COLUMNS)),
         old_key=np.zeros(capacity, np.int64),
         old_impulse=np.zeros((capacity, 2)),
-        wide=allocate_wide(wide, capacity if wide else 0),
     )
 
 
 def grown(rows: Rows) -> Rows:
     """Return twice the room, with what is remembered of the step before; the current step must be redone."""
-    bigger = allocate_rows(2 * len(rows.real), len(rows.wide.last))
+    bigger = allocate_rows(2 * len(rows.real))
     bigger.counts[:] = rows.counts
     bigger.old_key[: len(rows.old_key)] = rows.old_key
     bigger.old_impulse[: len(rows.old_impulse)] = rows.old_impulse

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from reference_solver.compilation import inner_kernel, kernel
+from reference_solver.compilation import kernel, spliced_kernel
 from reference_solver.textbook.iteration import sweep_often, sweep_to_residual
 from reference_solver.textbook.motion import FIXED, FREE
 from reference_solver.textbook.options import BLOCK, Options, pushes_along
@@ -25,7 +25,7 @@ from reference_solver.textbook2.state import CONTACTS, DISC, Bodies, Plane, Rows
 from reference_solver.textbook2.wide import solve_at_once
 
 
-@inner_kernel
+@spliced_kernel
 def accelerate(bodies: Bodies, options: Options) -> None:
     """v* = v + h M^-1 f (E5)."""
     for i in range(len(bodies.kind)):
@@ -34,14 +34,14 @@ def accelerate(bodies: Bodies, options: Options) -> None:
                 bodies.twist[i, k] += options.dt * bodies.real[i, LOAD + k]
 
 
-@inner_kernel
+@spliced_kernel
 def way(bodies: Bodies, i: int, k: int, dt: float, pushed: bool) -> float:
     """How far coordinate k of body i goes (E17)."""
     own = dt * bodies.twist[i, k]
     return own + dt * bodies.pseudo[i, k] if pushed else own
 
 
-@inner_kernel
+@spliced_kernel
 def move(bodies: Bodies, dt: float, pushed: bool) -> None:
     """Advance x += h (v + pseudo-velocity) for everything that is not fixed (E17); a disc has no use for its angle."""
     for i in range(len(bodies.kind)):
@@ -53,7 +53,7 @@ def move(bodies: Bodies, dt: float, pushed: bool) -> None:
             bodies.real[i, COS], bodies.real[i, SIN] = math.cos(bodies.pose[i, 2]), math.sin(bodies.pose[i, 2])
 
 
-@inner_kernel
+@spliced_kernel
 def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float, backwards: int, push: int) -> None:
     """One sweep of the solver chosen; ``backwards``, ``push``: see `sweep_rows`."""
     if options.solver == BLOCK:
@@ -62,7 +62,7 @@ def sweep(bodies: Bodies, rows: Rows, options: Options, relaxation: float, backw
         sweep_rows(bodies, rows, options, relaxation, backwards, push)
 
 
-@inner_kernel
+@spliced_kernel
 def step(plane: Plane) -> bool:
     """One step; False, with bodies untouched, if an array is too small."""
     bodies, pairs, rows, options, tally = plane.bodies, plane.pairs, plane.rows, plane.options, plane.tally
@@ -83,7 +83,7 @@ def step(plane: Plane) -> bool:
             sweep_to_residual(
                 bodies, rows, plane.problem, options, tally, sweep, natural_map, solve_directly, mend_velocities
             )
-        elif not solve_at_once(bodies, rows, options, tally, int(pushed)):
+        elif not solve_at_once(plane.wide, bodies, rows, options, tally, int(pushed)):
             sweep_often(bodies, rows, options, tally, int(pushed), sweep, natural_map)
         if options.certified:
             certify(bodies, rows, options, tally)

@@ -8,7 +8,7 @@ manifolds are laid out once a step. Worth it where levels are wide, as in piles;
 
 from __future__ import annotations
 
-from reference_solver.compilation import inner_kernel
+from reference_solver.compilation import spliced_kernel
 from reference_solver.lanes import LANES, from_lanes, into_lanes, lanes
 from reference_solver.model import Array
 from reference_solver.textbook.motion import FREE
@@ -28,16 +28,16 @@ INERTIA = MASS + INVERSE_INERTIA - INVERSE_MASS
 SOLVED = 8
 
 
-@inner_kernel
-def solve_at_once(bodies: Bodies, rows: Rows, options: Options, tally: Array, push: int) -> bool:
+@spliced_kernel
+def solve_at_once(wide: Wide, bodies: Bodies, rows: Rows, options: Options, tally: Array, push: int) -> bool:
     """See `iteration.sweep_often`; False, with nothing done, where that is faster."""
-    if not sweep_at_once(rows.wide, bodies, rows, options, push):
+    if not sweep_at_once(wide, bodies, rows, options, push):
         return False
     enter(tally, natural_map(bodies, rows, options) if options.certified else 0.0, options.iterations)
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_at_once(wide: Wide, bodies: Bodies, rows: Rows, options: Options, push: int) -> bool:
     """Make all sweeps with `LANES` manifolds at once; False, with nothing done, where that is not worth it."""
     if len(wide.last) == 0 or rows.counts[MANIFOLDS] < LEAST_MANIFOLDS or rows.counts[CONTACTS] == len(rows.real):
@@ -53,7 +53,7 @@ def sweep_at_once(wide: Wide, bodies: Bodies, rows: Rows, options: Options, push
     return True
 
 
-@inner_kernel
+@spliced_kernel
 def find_blocks(wide: Wide, bodies: Bodies, rows: Rows) -> int:
     """Give each manifold a slot; the number of blocks, 0 where more than half of their lanes would be empty."""
     count, levels = rows.counts[MANIFOLDS], 0
@@ -84,7 +84,7 @@ def find_blocks(wide: Wide, bodies: Bodies, rows: Rows) -> int:
     return slots // LANES
 
 
-@inner_kernel
+@spliced_kernel
 def lay_out(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
     """Copy what a sweep needs: velocities in a row for each body, rows and W in a lane for each manifold."""
     n = len(bodies.kind)
@@ -115,7 +115,7 @@ def lay_out(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
                 into_lanes(rows.block[:, k:], wide.order[q], block[q, k:])
 
 
-@inner_kernel
+@spliced_kernel
 def sweep_blocks(wide: Wide, blocks: int, options: Options, relaxation: float, backwards: int, push: int) -> None:
     """See `sequential_impulses.sweep_rows`: bodies 0 and 1 are those of a block, row 2 q is the first of block q."""
     pair = lanes(wide.pair)
@@ -136,15 +136,15 @@ def sweep_blocks(wide: Wide, blocks: int, options: Options, relaxation: float, b
         from_lanes(pair[1], wide.body[q, 1], wide.velocity)
 
 
-@inner_kernel
+@spliced_kernel
 def rows_of_blocks(wide: Wide) -> Rows:
     """Rows of all blocks, as a sweep takes them."""
     none, impulse = wide.points, wide.velocity
     point, block = lanes(wide.point), lanes(wide.block)
-    return Rows(none, wide.integer, point, wide.manifold, block, impulse, none, impulse, wide)
+    return Rows(none, wide.integer, point, wide.manifold, block, impulse, none, impulse)
 
 
-@inner_kernel
+@spliced_kernel
 def put_back(wide: Wide, bodies: Bodies, rows: Rows, blocks: int) -> None:
     """Copy velocities and impulses back."""
     for i in range(len(bodies.kind)):

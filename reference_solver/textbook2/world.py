@@ -18,6 +18,7 @@ from reference_solver.textbook2.state import (
     allocate_bodies,
     allocate_pairs,
     allocate_rows,
+    allocate_wide,
     grown,
 )
 from reference_solver.textbook2.step import copy_contacts, run
@@ -36,7 +37,8 @@ class World(SteppedWorld):
         self._bodies = allocate_bodies(model, needs)
         self._pairs = allocate_pairs(model, room)
         wide = settings.is_textbook and n > ALL_PAIRS_LIMIT and not config.DISABLE_JIT
-        self._rows = allocate_rows(room, n if wide else 0)
+        self._rows = allocate_rows(room)
+        self._wide = allocate_wide(n if wide else 0, room if wide else 0)
         self._laws = self._pairs.restitution, self._pairs.friction
 
     def step_problem(self) -> StepProblem:
@@ -47,7 +49,7 @@ class World(SteppedWorld):
         return assemble(trial._bodies, trial._rows, trial._options)
 
     def _run(self, buffer: Buffer, done: int, steps: int, stride: int) -> int:
-        plane = Plane(self._bodies, self._pairs, self._rows, self._problem, self._options, self.tally)
+        plane = Plane(self._bodies, self._pairs, self._rows, self._wide, self._problem, self._options, self.tally)
         return int(run(plane, buffer, done, steps, stride))
 
     def _most_contacts(self) -> int:
@@ -65,4 +67,6 @@ class World(SteppedWorld):
 
     def _grow_rows(self) -> None:
         self._rows = grown(self._rows)
+        n = len(self._wide.last)
+        self._wide = allocate_wide(n, len(self._rows.real) if n else 0)
         self._problem = allocate_problem(2, len(self.pose), len(self._rows.real), bool(self._options.direct))

@@ -28,7 +28,6 @@ from reference_solver.model import (
 )
 from reference_solver.needs import Needs
 from reference_solver.pieces import Indices
-from reference_solver.structures import structure
 from reference_solver.textbook.broadphase import Boxes, allocate_boxes
 from reference_solver.textbook.motion import MOTION_CODE
 from reference_solver.textbook.options import Options
@@ -127,7 +126,6 @@ Manifolds: TypeAlias = Any
 Memory: TypeAlias = Any
 
 
-@structure
 class Detection(NamedTuple):
     """Laws of the pairs, room for candidates of the broadphase, and working space of the polygon clipper."""
 
@@ -192,7 +190,6 @@ def allocate_detection(model: Model, capacity: int) -> Detection:
     )
 
 
-@structure
 class Space(NamedTuple):
     """What a step works on."""
 

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from reference_solver.compilation import KERNEL, OPTIONS
+from reference_solver.compilation import KERNEL
 from reference_solver.model import Body, Disc, HalfSpace, Model, Sphere
 from reference_solver.needs import ALL_PAIRS_LIMIT
 from reference_solver.textbook.broadphase import allocate_boxes, pair_bodies
@@ -26,7 +26,7 @@ def world(dimension, n):
     return Model(dimension, bodies, (0.0,) * dimension, 0.0, 0.0)
 
 
-@numba.njit(**OPTIONS, **KERNEL)
+@numba.njit(**KERNEL)
 def find(boxes):
     return pair_bodies(boxes, 1)
 
