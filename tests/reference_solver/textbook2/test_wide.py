@@ -11,7 +11,7 @@ import pytest
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation
 from reference_solver.compilation import config
 from reference_solver.lanes import LANES, lanes
-from reference_solver.textbook2.state import MANIFOLDS, allocate_rows
+from reference_solver.textbook2.state import MANIFOLDS, allocate_wide
 
 pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: there are no lanes")
 
@@ -51,9 +51,8 @@ def narrow(model, settings, certified):
     """A simulation that sweeps one manifold after the other."""
     simulation = Simulation(model, settings, certified=certified)
     world = simulation._world
-    assert len(world._rows.wide.last) == len(model.bodies)
-    world._rows = allocate_rows(len(world._rows.real))
-    assert len(world._rows.wide.last) == 0
+    assert len(world._wide.last) == len(model.bodies)
+    world._wide = allocate_wide(0, 0)
     return simulation
 
 
@@ -81,7 +80,7 @@ def test_bits_of_manifolds_in_turn(model, changes, certified):
         for name in ("impulse", "gap", "feature", "body_a"):
             assert getattr(wide.contacts(), name).tobytes() == getattr(plain.contacts(), name).tobytes()
         assert wide.certificate == plain.certificate
-        blocks += wide._world._rows.wide.points.any()
+        blocks += wide._world._wide.points.any()
     assert blocks > 0  # it was used
 
 
@@ -89,7 +88,7 @@ def test_bodies_and_order_of_manifolds_in_a_block():
     simulation = Simulation(heap(6), Settings.classical(DT), certified=False)
     simulation.advance(150)
     rows, kind = simulation._world._rows, simulation._world._bodies.kind
-    wide, count = rows.wide, int(rows.counts[MANIFOLDS])
+    wide, count = simulation._world._wide, int(rows.counts[MANIFOLDS])
     slots, done = [], []
     for block in wide.order.tolist():
         if len(done) < count:  # slots without a manifold repeat the first of their block
@@ -109,7 +108,7 @@ def test_bodies_and_order_of_manifolds_in_a_block():
 def test_room_of_small_scenes_and_solves_to_a_residual():
     small = Simulation(wall(4), Settings.classical(DT))
     exact = Simulation(wall(13), Settings.fixed_step(DT))
-    assert all(len(each._world._rows.wide.order) == 0 for each in (small, exact))
+    assert all(len(each._world._wide.order) == 0 for each in (small, exact))
 
 
 #: Numbers on which operations differ that are nearly the same.
