@@ -47,6 +47,8 @@ class Held:
         How long they hold, where that is known [s]; else 0.
     opened
         What touched as well when these were found, and carries nothing.
+    begins
+        Features of contacts that stuck up to here and begin to slip.
     """
 
     contacts: Contacts
@@ -54,6 +56,7 @@ class Held:
     acceleration: Array
     lasts: float = 0.0
     opened: tuple[Contacts, ...] = ()
+    begins: frozenset[tuple[int, ...]] = frozenset()
 
     @property
     def pressure(self) -> Array:
@@ -204,6 +207,7 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
         return None
     now_held = held_by(contacts, found, free)
     now_held.opened += held.opened
+    now_held.begins = held.begins | {contacts.names[k] for k, mode in modes.items() if mode == SLIP}
     after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
     force, load = np.abs(found.forces).max(), found.forces[:, 0]
     least = -NONE * (LEAST * contacts.world.load + force)

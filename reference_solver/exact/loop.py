@@ -238,6 +238,10 @@ class Loop:
             self.ended_features |= event.ended
             return None
         modes = dict(event.modes)
+        neither = held.begins & {held.contacts.names[k] for k, mode in modes.items() if mode == STICK}
+        if neither:  # friction is used up, and would turn a slip back: forces jump, and these open
+            self.ended_features |= neither
+            return None
         found = changed(held, modes, self._free_acceleration())
         if found is None and STICK in modes.values():  # no forces hold it, and none let it go
             self._jam(held.contacts)

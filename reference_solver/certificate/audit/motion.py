@@ -135,10 +135,12 @@ def _spin(run: Run) -> float:
     unseen = UNSEEN * load * time**2 * pulled * (turned_by(run)[run.owner] ** 2 + passing)
     # A body that spins about nothing has the momentum that its speed gives to a point at its outermost.
     arm = np.where(np.isfinite(run.reach), run.reach, 0.0)[body]
-    speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1) + run.still[body]
+    still = run.still[body]
+    speed = np.linalg.norm(first, axis=1) + np.linalg.norm(last, axis=1) + still
     parts = (np.linalg.norm(x, axis=1) for x in (before, after, torque))
     scale = sum(parts) + moment_size + arm * (run.mass[body] * speed + size)
-    defect = np.linalg.norm(gained, axis=1) - np.where(frozen, 0.0, unseen)
+    # A body whose outermost points are so slow stands still, as in `_momentum`.
+    defect = np.linalg.norm(gained, axis=1) - np.where(frozen, 0.0, unseen) - arm * run.mass[body] * still
     return _worst(np.maximum(defect, 0.0), scale, run.free[body])
 
 
