@@ -382,11 +382,18 @@ class Engine(ABC):
         """
 
     def certify(
-        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+        self,
+        scene: Scene,
+        dt: float,
+        settings: Mapping[str, Any],
+        steps: int,
+        final_pose: Array,
+        others: Sequence[Array] = (),
     ) -> dict[str, Any] | None:
         """Certify independently the run of ``steps`` steps that ended in ``final_pose``; None if the engine cannot.
 
-        The dictionary has ``holds``, ``reasons`` and the numbers behind them.
+        ``others``: poses after each step of the runs `at_other_tolerances`, where these are known. The dictionary has
+        ``holds``, ``reasons`` and the numbers behind them.
         """
         return None
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import math
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -137,7 +137,13 @@ class ReferenceEngine(Engine):
             raise EngineError(f"{', '.join(wrong) or 'scene'}: {error}") from None
 
     def certify(
-        self, scene: Scene, dt: float, settings: Mapping[str, Any], steps: int, final_pose: Array
+        self,
+        scene: Scene,
+        dt: float,
+        settings: Mapping[str, Any],
+        steps: int,
+        final_pose: Array,
+        others: Sequence[Array] = (),
     ) -> dict[str, Any] | None:
         """Full certificate (`reference_solver.certificate.truth`) of a certified profile."""
         from reference_solver import Settings
@@ -146,7 +152,7 @@ class ReferenceEngine(Engine):
         chosen = Settings(dt=dt, **settings)
         if chosen.tolerance is None:
             return None
-        found = certify(solver_model(as_moving(scene)), chosen, steps)
+        found = certify(solver_model(as_moving(scene)), chosen, steps, others=others)
         reasons = list(found.reasons)
         free = [i for i, body in enumerate(scene.bodies) if body.motion == "free"]  # others' motion is given
         same = np.array_equal(found.pose[-1][free], final_pose[free])
@@ -177,7 +183,7 @@ class ReferenceEngine(Engine):
         """See `Engine.at_other_tolerances`: a tenth of the tolerance and ten times it."""
         from reference_solver.certificate.truth import TOLERANCES
 
-        shares = () if certificate["closed"] else TOLERANCES
+        shares = () if certificate.get("closed", True) else TOLERANCES  # steps have none
         return [{**settings, "tolerance": share * settings["tolerance"]} for share in shares]
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:

@@ -21,6 +21,7 @@ touch each other meet in one instant and round-off decides which of them comes f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import sqrt
@@ -166,8 +167,10 @@ SLIP_ENDS = 1e-11
 SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 
 
-def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Certificate:
-    """Run ``model`` and certify the run; costs seven runs, and the audit.
+def certify(model: Model, settings: Settings, steps: int, stride: int = 1, others: Sequence[Array] = ()) -> Certificate:
+    """Run ``model`` and certify the run; costs seven runs, five if all motion is in closed form, and the audit.
+
+    ``others``: poses (s, n, 3 | 7) of the runs to `TOLERANCES`, which else are made here.
 
     Raises
     ------
@@ -203,7 +206,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1) -> Ce
     findings = [*audit(model, record, settings.dt), shared]
     reasons = [str(finding) for finding in findings if not finding.holds]
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
-    error = _error(model, run, record, steps, stride) + round_off
+    error = _error(model, run, record, steps, stride, others) + round_off
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
     # Bodies meet within the units in which coordinates are known, each time, and go on from there.
     assert record.pieces is not None
@@ -344,13 +347,15 @@ def _grazed_there(model: Model, settings: Settings, found: Certificate, steps: i
     return grazes(model, record, settings.dt, gap, np.minimum(found.growth, GROWTH))
 
 
-def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int) -> Array:
+def _error(model: Model, run: Simulation, record: Record, steps: int, stride: int, others: Sequence[Array]) -> Array:
     """Bound (s,) of what a run is off for its tolerance [m]; the largest so far."""
     settings = run.settings
     assert settings.tolerance is not None
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
-    for share in () if run.is_closed else TOLERANCES:
-        other = poses_of(model, replace(settings, tolerance=share * settings.tolerance), steps, stride)
+    if not (run.is_closed or others):
+        tolerances = [share * settings.tolerance for share in TOLERANCES]
+        others = [poses_of(model, replace(settings, tolerance=each), steps, stride) for each in tolerances]
+    for other in others:
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))
     return _with_ends(model, record, settings.dt, error)
 

@@ -189,6 +189,12 @@ class World:
         return np.array(np.nonzero(np.triu(free[:, None] | free, 1)))
 
     @cached_property
+    def edged(self) -> NDArray[np.bool_]:
+        """(n, n) whether edges of two bodies can meet: in the plane, and where one is round, points are all that do."""
+        edged = (self.bodies.points > 1) & (self.dimension == 3)
+        return np.asarray(edged[:, None] & edged)
+
+    @cached_property
     def mass(self) -> Array:
         """(f, d + s): masses and principal moments of free bodies [kg], [kg m^2]."""
         free = self.bodies.free == 1

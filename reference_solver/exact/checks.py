@@ -11,6 +11,7 @@ import numpy as np
 from reference_solver.exact.bodies import World
 from reference_solver.exact.motion import Piece
 from reference_solver.exact.refusals import EnergyGrows, Overlap
+from reference_solver.exact.rotation import turned
 from reference_solver.geometry import gap, rotation
 from reference_solver.model import Array
 
@@ -18,7 +19,7 @@ from reference_solver.model import Array
 #: how many tolerances of a step either may be, where those are coarse.
 DEEP, GROWS, TOLERATED = 1e-8, 1e-9, 1e2
 #: Shares of a piece at which bodies are looked at.
-LOOK = (0.0, 0.25, 0.5, 0.75, 1.0)
+LOOK = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 def check(world: World, piece: Piece, tolerance: float) -> None:
@@ -32,8 +33,8 @@ def check(world: World, piece: Piece, tolerance: float) -> None:
     if depth > max(DEEP, TOLERATED * tolerance) * world.size:
         raise Overlap(a=a, b=b, depth=depth, t=piece.start.t + share * piece.length)
     if world.dimension == 2 and not _is_driven(world, piece):
-        before, size = energy(world, piece, 0.0)
-        after, _ = energy(world, piece, 1.0)
+        before, size = energy(world, np.zeros(world.shape), piece.start.velocity)
+        after, _ = energy(world, piece.way.sum(axis=2), piece.velocity.sum(axis=2))
         if after - before > max(GROWS, TOLERATED * tolerance) * (size + abs(before)):
             raise EnergyGrows(amount=after - before, t=piece.start.t)
 
@@ -43,14 +44,14 @@ def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
 
     What balls around bodies show to be apart is not looked at: -inf where that is everything.
     """
-    poses, _ = piece.looked_at(np.array(LOOK))
-    a, b = world.pairs
-    near = (_balls_apart(world, poses) < -0.5 * DEEP * world.size).any(axis=0)
-    pairs = zip(a[near].tolist(), b[near].tolist(), strict=True)
-    alike: dict[tuple[object, object], list[tuple[int, int]]] = {}
-    for a, b in pairs:
-        alike.setdefault((world.shapes[a], world.shapes[b]), []).append((a, b))
     found = (0, 0, 0.0, -np.inf)
+    near = (_balls_apart(world, piece) < -0.5 * DEEP * world.size).any(axis=0)
+    if not near.any():
+        return found
+    poses, _ = piece.looked_at(LOOK)
+    alike: dict[tuple[object, object], list[tuple[int, int]]] = {}
+    for a, b in world.pairs[:, near].T.tolist():
+        alike.setdefault((world.shapes[a], world.shapes[b]), []).append((a, b))
     for (shape_a, shape_b), same in alike.items():
         first, second = np.array(same).T
         many = [poses[:, each].swapaxes(0, 1).reshape(-1, poses.shape[2]) for each in (first, second)]
@@ -58,18 +59,23 @@ def deepest(world: World, piece: Piece) -> tuple[int, int, float, float]:
         worst = int(gaps.min(axis=1).argmin())
         least = int((gaps[worst] < gaps[worst].min() + DEEP * world.size).argmax())  # the first that is as deep
         if -gaps[worst, least] > found[3]:
-            found = (*same[worst], LOOK[least], -float(gaps[worst, least]))
+            found = (*same[worst], float(LOOK[least]), -float(gaps[worst, least]))
     return found
 
 
-def _balls_apart(world: World, poses: Array) -> Array:
-    """Return how far apart the balls around two bodies are, or a ball and a half-space (k, pairs) at poses [m]."""
+def _balls_apart(world: World, piece: Piece) -> Array:
+    """Return how far apart the balls around two bodies are, or a ball and a half-space (k, pairs), at `LOOK` [m]."""
     bodies, (a, b), d = world.bodies, world.pairs, world.dimension
-    place, reach = poses[:, :, :d], bodies.reach + bodies.radius
-    apart = np.linalg.norm(place[:, a] - place[:, b], axis=2) - reach[a] - reach[b]
+    way, reach = (
+        (piece.way @ LOOK ** np.arange(piece.way.shape[2])[:, None]).transpose(2, 0, 1),
+        bodies.reach + bodies.radius,
+    )
+    place = piece.start.place + way[..., :d]
+    apart = np.sqrt(((place[:, a] - place[:, b]) ** 2).sum(axis=2)) - reach[a] - reach[b]
     for h in np.flatnonzero(bodies.points == 0):
-        normal = rotation(poses[:, h]) @ bodies.normal[h, 0]
-        above = np.einsum("knp,kp->kn", place - place[:, h, None], normal) - bodies.offset[h, 0] - reach
+        orientation = turned(piece.start.orientation[h], way[:, h, d:])
+        normal = rotation(np.concatenate([place[:, h], orientation], axis=1)) @ bodies.normal[h, 0]
+        above = ((place - place[:, h, None]) * normal[:, None]).sum(axis=2) - bodies.offset[h, 0] - reach
         for one, other in ((a, b), (b, a)):
             apart[:, one == h] = above[:, other[one == h]]
     return np.asarray(apart)
@@ -77,16 +83,13 @@ def _balls_apart(world: World, poses: Array) -> Array:
 
 def _is_driven(world: World, piece: Piece) -> bool:
     """Whether a body touches one that moves whatever it meets."""
-    touched = np.unique(piece.held.contacts.features[:, :2])
     moved = (world.bodies.free == 0) & (np.abs(piece.start.velocity).max(axis=1) > 0.0)
-    return bool(moved[touched].any())
+    return bool(moved.any() and moved[piece.held.contacts.features[:, :2]].any())
 
 
-def energy(world: World, piece: Piece, share: float) -> tuple[float, float]:
-    """Return the energy of free bodies at a share, less the work of loads in the piece, and its size [J]."""
+def energy(world: World, way: Array, velocity: Array) -> tuple[float, float]:
+    """Return the energy of free bodies with twists (n, q), less the work of loads on ways (n, q), and its size [J]."""
     free, mass = world.bodies.free == 1, world.mass
-    velocity = (piece.velocity @ share ** np.arange(piece.velocity.shape[2]))[free]
-    way = (piece.way @ share ** np.arange(piece.way.shape[2]))[free]
-    load = world.bodies.load[free]
-    kinetic, work = 0.5 * (mass * velocity**2).sum(), (mass * load * way).sum()
-    return float(kinetic - work), float(kinetic + world.size * np.abs(mass * load).sum())
+    force = mass * world.bodies.load[free]
+    kinetic, work = 0.5 * (mass * velocity[free] ** 2).sum(), (force * way[free]).sum()
+    return float(kinetic - work), float(kinetic + world.size * np.abs(force).sum())

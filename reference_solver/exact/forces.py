@@ -97,11 +97,11 @@ class Held:
 
     def onward(self, contacts: Contacts) -> Array:
         """Return directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
-        if contacts.world.dimension == 2:
-            return self.answer.directions
-        before = self.answer.directions
+        before, slips = self.answer.directions, self.answer.modes == SLIP
+        if contacts.world.dimension == 2 or not slips.any():
+            return before
         now = directed(contacts.rows.speed[:, 1:], contacts.world.slipping, before)
-        return np.where((self.answer.modes == SLIP)[:, None], now, before)
+        return np.where(slips[:, None], now, before)
 
     @property
     def slips_end(self) -> bool:

@@ -70,9 +70,7 @@ def next_meeting(world: World, piece: Piece, contacts: Contacts, after_instant: 
         if kind_a == POINT:
             held[b, a, i] = True
     course = course_of(piece)
-    # In the plane, and where a body is round, points are all that meets.
-    round_ = (bodies.points == 1) | (bodies.points == 0)
-    edges = ~(round_[:, None] | round_[None, :]) & ~touch if world.dimension == 3 else np.zeros((n, n), np.bool_)
+    edges = world.edged & ~touch
     none = no_gap(world, piece.start.place)
     if after_instant:
         none = np.maximum(none, NOISE * world.size)

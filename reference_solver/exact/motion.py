@@ -127,13 +127,14 @@ def constant(world: World, state: State, held: Held, length: float) -> Piece | N
     They are if no body precesses, no slip turns, and no row of a free body does: neither now (gamma, E36), nor
     half-way, nor at the end.
     """
-    d = world.dimension
-    # A heavy body goes along with what round-off makes of a light one that it presses on; errors of all contacts of a
-    # pile add up towards its top.
-    most = max(map(len, held.contacts.groups), default=0)
-    noise = np.maximum(REST * held.pressure, most * ROUND_OFF * held.pressure.max(axis=0))
-    acceleration = np.where(np.abs(held.acceleration) < noise, 0.0, held.acceleration)
-    if d == 3 and not _turns_steadily(world, state, acceleration):
+    acceleration = held.acceleration
+    if len(held.contacts):
+        # A heavy body goes along with what round-off makes of a light one that it presses on; errors of all contacts of
+        # a pile add up towards its top.
+        most, pressure = max(map(len, held.contacts.groups)), held.pressure
+        noise = np.maximum(REST * pressure, most * ROUND_OFF * pressure.max(axis=0))
+        acceleration = np.where(np.abs(acceleration) < noise, 0.0, acceleration)
+    if world.dimension == 3 and not _turns_steadily(world, state, acceleration):
         return None
     piece = steady(state, held, acceleration, length)
     if not len(held.contacts):
@@ -163,7 +164,7 @@ def _turns_steadily(world: World, state: State, acceleration: Array) -> bool:
     """Whether spins keep their directions, and those of bodies with different moments are none."""
     spin, change, moment = state.velocity[:, 3:], acceleration[:, 3:], world.bodies.moment
     free = world.bodies.free == 1
-    bent = np.abs(np.cross(spin, change)).max() > 1e-14 * np.abs(spin).max() * np.abs(change).max()
+    bent = change.any() and np.abs(np.cross(spin, change)).max() > 1e-14 * np.abs(spin).max() * np.abs(change).max()
     torque = (world.bodies.torque[free] != 0.0).any()
     unequal = free & (np.ptp(np.where(free[:, None], moment, 1.0), axis=1) > 0.0)
     return not bent and not torque and not (spin[unequal] != 0.0).any() and not (change[unequal] != 0.0).any()

@@ -54,11 +54,12 @@ class Acting(NamedTuple):
         return np.concatenate(self[2:], axis=-1)
 
     @classmethod
-    def of(cls, contacts: Contacts, impulse: Array, moment: Array | None = None) -> Acting:
-        """Return what contacts did with impulses in world axes, which act where they are unless moments are told."""
-        rows = contacts.rows
-        own = moments(rows.place, impulse) if moment is None else moment
-        return cls(contacts.features, rows.gap.copy(), rows.place.copy(), rows.frame[:, 0].copy(), impulse, own)
+    def of(cls, contacts: Contacts, impulse: Array) -> Acting:
+        """Return what contacts did with impulses in world axes, which act where they are."""
+        gap, place, normal = (
+            each.copy() for each in (contacts.rows.gap, contacts.rows.place, contacts.rows.frame[:, 0])
+        )
+        return cls(contacts.features, gap, place, normal, impulse, moments(place, impulse))
 
     @classmethod
     def between(cls, piece: Piece, begin: Array, end: Array) -> list[Acting]:
@@ -82,8 +83,9 @@ class Acting(NamedTuple):
         """Return what contacts did between shares of a piece in which they turn."""
         contacts = piece.own_contacts.at(*piece.at(begin))
         whole, own = begin == 0.0 and end == 1.0, Held(contacts, piece.held.answer, piece.held.acceleration)
-        first, length = contacts.rows.place.copy(), end - begin
-        impulse, moment = np.zeros(first.shape), np.zeros(())
+        length, nothing = end - begin, np.zeros(contacts.rows.place.shape)
+        acting = cls.of(contacts, nothing)
+        first, impulse, moment = acting.point, nothing, np.zeros(())
         for node, weight in zip(*GAUSS, strict=True):
             share = begin + length * node
             place, axes, velocity = piece.at(share)
@@ -96,7 +98,7 @@ class Acting(NamedTuple):
             impulse = impulse + length * weight * rate
             # Far from the origin the way of a place is known to more digits than the place.
             moment = moment + length * weight * moments(contacts.rows.place - first, rate)
-        return cls.of(contacts.at(*piece.at(begin)), impulse, moment + moments(first, impulse))
+        return acting._replace(impulse=impulse, moment=moment + moments(first, impulse))
 
 
 @dataclass(frozen=True)

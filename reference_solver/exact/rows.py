@@ -122,16 +122,21 @@ class Contacts:
 
     def along_way(self, way: Array, velocity: Array, start: State) -> tuple[Array, Array, Array]:
         """Return gaps (k, m), places (k, m, d), frames (k, m, d, d) after ways (k, n, q) from a start, with twists."""
-        k, d = len(way), self.world.dimension
-        found = np.empty((k, len(self))), np.empty((k, len(self), d)), np.empty((k, len(self), d, d))
+        count, m, d = len(way), len(self), self.world.dimension
+        k = count if way.any() else 1  # bodies at rest are looked at once
+        way, velocity = way[:k], velocity[:k]
+        found = np.empty((k, m)), np.empty((k, m, d)), np.empty((k, m, d, d))
         write_along(
             self.world.bodies, start.place, start.axes, way, velocity, (self.features, self.along), self.rows, found
         )
         self._matrices = None
-        return found
+        gap, place, frame = (np.broadcast_to(each, (count, *each.shape[1:])) for each in found)
+        return gap, place, frame
 
     def chosen(self, which: NDArray[Any]) -> Contacts:
         """Return some of the contacts, by numbers or by a mask, with their rows."""
+        if not len(self):
+            return self
         rows = Rows(*(each[which] for each in self.rows))
         return Contacts(self.world, self.features[which], self.along[which], rows)
 
@@ -210,6 +215,8 @@ def touching_contacts(world: World, state: State, ended: frozenset[tuple[int, ..
     """
     features = find(world, state, ended)
     contacts = Contacts.of(world, features).at_state(state)
+    if not len(features):
+        return contacts
     crosses = (features[:, 2] == LINE) & (features[:, 4] == LINE)
     place = contacts.rows.place
     # At corners of three degrees or more places are off by less than twenty gaps.

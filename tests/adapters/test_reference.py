@@ -21,6 +21,7 @@ from adapters.scene import Body, Box, Disc, HalfSpace, Pair, Scene, Sphere
 from adapters.settings.own import given, own
 from adapters.stepping import run
 from adapters.trajectory import Sampling, Trajectory
+from reference_solver.model import Array
 from reference_solver.simulation import UNCERTIFIED
 
 ENGINE = ReferenceEngine()
@@ -235,6 +236,23 @@ def test_both_ends_of_the_tolerance_certified(tolerance: float) -> None:
     end = run(ENGINE, scene, DT, settings, Sampling(1, 0.0)).pose[-1]
     found = ENGINE.certify(scene, DT, settings, round(scene.duration / DT), end)
     assert found is not None and found["holds"], found["reasons"]
+
+
+def test_error_from_runs_to_other_tolerances_that_are_known() -> None:
+    """The same X as from runs that the certificate makes itself; and one of them that is off by 1 um shows in X."""
+    brick = body("brick", 3, (0.0, 0.0), box=True, inertia=(0.1, 0.2, 0.3))
+    scene = make(replace(brick, twist=(0.0, 0.0, 0.0, 2.0, 0.01, 1.0)), T=1.0)
+    settings = {"tolerance": 1e-11}
+    asked = ENGINE.at_other_tolerances(settings, {"closed": False})
+    runs = [run(ENGINE, scene, DT, each, Sampling(1, 0.0)).pose for each in (settings, *asked)]
+
+    def error(*others: Array) -> float:
+        found = ENGINE.certify(scene, DT, settings, round(scene.duration / DT), runs[0][-1], others)
+        assert found is not None
+        return float(found["error"])
+
+    assert 0.0 < error() == error(*runs[1:])
+    assert error(runs[1], runs[2] + 1e-6) > 2e-6
 
 
 @pytest.mark.parametrize(("spins", "others"), [((0.0, 0.0, 0.0), 0), ((2.0, 0.01, 1.0), 2)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,10 +27,16 @@ def fully_certified(
         return trajectory
     try:
         steps = step_count(prepared.scene.duration, slot.dt)
-        full = engine.certify(prepared.scene, slot.dt, settings, steps, trajectory.pose[-1])
+        sampling = prepared.canonical.sampling(prepared.scene)
+        others = [
+            run(engine, prepared.scene, slot.dt, other, sampling)
+            for other in engine.at_other_tolerances(settings, light)
+        ]
+        known = [other.pose for other in others] if sampling.stride == 1 else []
+        full = engine.certify(prepared.scene, slot.dt, settings, steps, trajectory.pose[-1], known)
         if full is None:
             return trajectory
-        entries = {"full": full, "metric_errors": _metric_errors(engine, prepared, slot, settings, trajectory)}
+        entries = {"full": full, "metric_errors": _metric_errors(prepared, trajectory, others)}
     except Exception as error:  # a run that cannot be certified is not certified
         full = {"holds": False, "reasons": [f"{type(error).__name__}: {error}".splitlines()[0]]}
         entries = {"full": full}
@@ -40,20 +46,17 @@ def fully_certified(
     return replace(trajectory, certificate={**light, **entries, **both})
 
 
-def _metric_errors(
-    engine: Engine, prepared: Prepared, slot: Slot, settings: Mapping[str, Any], trajectory: Trajectory
-) -> dict[str, float | None]:
+def _metric_errors(prepared: Prepared, trajectory: Trajectory, others: Sequence[Trajectory]) -> dict[str, float | None]:
     """Error of each metric: twice its largest difference from the same run to other tolerances.
 
     An error that goes with a power of the tolerance of at least .31 is at most half as large at a tenth of it: twice
     the difference covers it. None where only one of two runs has the metric.
     """
     canonical, scene = prepared.canonical, prepared.scene
-    sampling = canonical.sampling(scene)
     here = {name: value for name, (value, _) in canonical.measure(scene, trajectory).items()}
     found: dict[str, float | None] = dict.fromkeys(here, 0.0)
-    for other in engine.at_other_tolerances(settings, trajectory.certificate):
-        there = canonical.measure(scene, run(engine, scene, slot.dt, other, sampling))
+    for other in others:
+        there = canonical.measure(scene, other)
         for name, value in here.items():
             found[name] = _larger(found[name], _difference(value, there[name][0]))
     return found
