@@ -149,12 +149,14 @@ def _by_pivots(yields: Array, free: Array, friction: Array, slips: Array) -> Arr
     rates = matrix[speeds] @ by
     total = m + 3 * k
     table, right = np.zeros((total, total)), np.zeros(total)
+    # Unknown: loads, friction onward and backward, the speed |u_t| of the slip. Each has a row that is zero where it is
+    # not: u_n, u_t + |u_t|, |u_t| - u_t, and mu p_n less all friction.
+    onward, backward, speed = (m + turn * k + np.arange(k) for turn in range(3))
     table[: m + k, : m + 2 * k], right[: m + k] = rates, wanted[speeds] / size
-    table[m + k : m + 2 * k, : m + 2 * k], right[m + k : m + 2 * k] = -rates[m:], -wanted[2 * rubs + 1] / size
-    slip_rows = np.arange(k)
-    table[m + slip_rows, m + 2 * k + slip_rows] = table[m + k + slip_rows, m + 2 * k + slip_rows] = 1.0
-    table[m + 2 * k + slip_rows, rubs] = friction[rubs]
-    table[m + 2 * k + slip_rows, m + slip_rows] = table[m + 2 * k + slip_rows, m + k + slip_rows] = -1.0
+    table[backward, : m + 2 * k], right[backward] = -rates[m:], -wanted[2 * rubs + 1] / size
+    table[onward, speed] = table[backward, speed] = 1.0
+    table[speed, rubs] = friction[rubs]
+    table[speed, onward] = table[speed, backward] = -1.0
     for attempt in range(6):  # pivots that round-off spoils: by another way
         cover = np.asarray(1.0 + attempt * (0.37 + 0.61 * np.arange(total)) % 1.7, np.float64)
         found = complementary(table, right, cover)

@@ -137,7 +137,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
             kind = monitors.kind(column)
             if before[k, column] > monitors.noise[k, column]:
                 share = brentq(_component(monitors, k, column), last, now, xtol=1e-16, rtol=1e-15, maxiter=MOST_ROUNDS)
-            elif last > 0.0:
+            elif last > 0.0:  # it was none but for round-off when it was last looked at
                 share = last
             else:  # it is at its end from the beginning
                 if kind is Kind.FEATURE:

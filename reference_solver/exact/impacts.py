@@ -49,9 +49,10 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
             return blows
         fastest.append(-float(speeds.min()))
         answer, scheme = closing, FROZEN  # all points of a pair that meets answer together
-        if count % (2 * LOOK_BACK) >= LOOK_BACK:
+        look = count % (2 * LOOK_BACK)  # the second half of these impacts is compared with the first
+        if look >= LOOK_BACK:
             cycle |= closing
-        if count % (2 * LOOK_BACK) == 2 * LOOK_BACK - 1:
+        if look == 2 * LOOK_BACK - 1:
             # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22).
             # With friction no proof is known that there is no end: they are followed until none approaches.
             slows = max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK])
@@ -59,7 +60,8 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
                 answer, stopped, scheme = cycle, stopped | cycle, CHAIN
             cycle = np.zeros(len(known), bool)
         lies = speeds < np.where(contacts.restitution == 0.0, max(world.still, SLOW * fastest[-1]), world.still)
-        which = np.flatnonzero((answer[pair] | lies & (scheme == FROZEN)) & (speeds < FAST * fastest[-1]))
+        takes_part = answer[pair] | lies if scheme == FROZEN else answer[pair]
+        which = np.flatnonzero(takes_part & (speeds < FAST * fastest[-1]))
         part, rebounds = contacts.chosen(which), np.where(stopped[pair], 0.0, contacts.restitution)[which]
         try:
             blow = _struck(state, part, rebounds)

@@ -150,9 +150,10 @@ class Loop:
             held = settling(self.world, self.state, self._closed(contacts))
             if held is not None:
                 return held
-        none, still = no_gap(self.world, self.state.place), self.world.still
-        speed = contacts.rows.speed[:, 0]  # what approaches and has a gap meets later
-        contacts = contacts.chosen((speed < still) & (contacts.touch(none) | (speed > -still)))
+        speed, still = contacts.rows.speed[:, 0], self.world.still
+        parts, approaches = speed >= still, speed <= -still
+        closed = contacts.touch(no_gap(self.world, self.state.place))
+        contacts = contacts.chosen(~parts & (closed | ~approaches))  # what approaches and has a gap meets later
         try:
             held = decide(self.world, self.state, contacts, self._free_acceleration())
         except NoSolution:

@@ -229,6 +229,7 @@ class Turning:
             length *= max(SHORTER, factor)
         for k, row in enumerate(DOP853.A_EXTRA, 13):
             rates[k] = self._rates(start + length * (row[:k] @ rates[:k]))
+        # The interpolant: coefficients of the terms of `_powers`.
         dense = np.zeros((7, len(start)))
         dense[0] = change
         dense[1] = length * rates[0] - change

@@ -133,8 +133,8 @@ class Problem:
         still = NONE * self.size
         directions, given = directed(u[:, 1:], still), self.slipping
         slides = np.asarray(directions.any(axis=1))
-        # Friction is known to more digits than what it leaves of a slip, but for what carries nothing, of all forces or
-        # of what would undo the free velocities.
+        # A slip leads against its friction, which is known to more digits than what it leaves of the slip; but for what
+        # carries nothing, of all forces or of what would undo the free velocities.
         stiffest = float(np.einsum("ij,ji->i", self.rows, self.yields).max())
         least = NONE * max(float(np.abs(forces).max()), self.size / stiffest)
         directions = np.where(slides[:, None], directed(-forces[:, 1:], least, directions), 0.0)

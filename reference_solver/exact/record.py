@@ -232,8 +232,10 @@ class Recorder:
         label = np.zeros((k, len(groups), 5), np.int64)
         label[:, :, 0], label[:, :, 1] = steps[:, None], FORCES
         label[:, :, 2] = [scheme if each[:held].any() else FROZEN for each in own]
-        label[:, :, 3] = np.cumsum([0, *(len(each) for each, _ in groups[:-1])]) + len(bodies) * np.arange(k)[:, None]
-        label[:, :, 4] = np.cumsum([0, *map(np.sum, own[:-1])]) + len(contacts) * np.arange(k)[:, None]
+        # Where bodies and contacts of a group begin: behind those of the groups before it, and of the parts before.
+        part, first_body = np.arange(k)[:, None], np.cumsum([0, *(len(each) for each, _ in groups[:-1])])
+        label[:, :, 3] = first_body + len(bodies) * part
+        label[:, :, 4] = np.cumsum([0, *map(np.sum, own[:-1])]) + len(contacts) * part
         # Times are counted from their steps, and lengths known to more digits than times have.
         begin = piece.start.t + shares[:-1] * piece.length - steps * dt
         time = np.repeat(np.column_stack([begin, np.diff(shares) * piece.length]), len(groups), axis=0)
@@ -248,7 +250,8 @@ class Recorder:
     def _shares(self, piece: Piece, first: float, last: float) -> list[float]:
         """Return shares where a part ends in so many that cubic polynomials through their ends are close to it.
 
-        The audit follows these.
+        The audit follows these. Half-way a cubic polynomial is the mean of its ends and an eighth of how much its rate
+        changes.
         """
         s = np.array([first, 0.5 * (first + last), last])[:, None]
         way, rate = (each @ (s ** np.arange(each.shape[2])).T for each in (piece.way, piece.velocity))

@@ -226,9 +226,8 @@ def touching_contacts(world: World, state: State, ended: frozenset[tuple[int, ..
     gap = np.where(contacts.touch(no_gap(world, state.place)), 0.0, contacts.rows.gap)
     closes = np.maximum(-contacts.rows.speed[:, 0], world.still)
     pairs = contacts.pairs
-    for k in np.lexsort((closes, -gap)).tolist():
-        pair = pairs[k]
-        others = of.setdefault(pair, [])
+    for k in np.lexsort((closes, -gap)).tolist():  # the widest gap first; of those that are none, what closes last
+        others = of.setdefault(pairs[k], [])
         if all((crosses[j] and crosses[k]) or np.abs(place[j] - place[k]).max() >= tol for j in others):
             others.append(k)
             keep.append(k)

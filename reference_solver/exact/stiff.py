@@ -95,6 +95,7 @@ class Stiff(Turning):
             moved, now, pushes, turn, slip, across = (np.array(each) for each in zip(*found, strict=True))
             rest = now - accelerations
             # Slips are to lie along their directions: across (v + change of v) = |s| z, where z is how far they turn.
+            # At point i, by slip l's turn z at point j, the velocity changes by length UP_TO[i, j] turn[j, l] z.
             wanted = (slip[:, :, 1] / length + np.einsum("ikn,in->ik", across, UP_TO @ rest)).ravel()
             matrix = np.diag(slip[:, :, 0].ravel() / length) - np.einsum(
                 "ikn,ij,jln->ikjl", across, UP_TO, turn
@@ -106,7 +107,8 @@ class Stiff(Turning):
             change = rest + np.einsum("ik,ikn->in", z, turn)
             before, changes = shift, np.array([UP_TO @ change, UP_TO @ (moved - rates)])
             shift = length * float(np.abs(changes / scale).max())
-            if shift < CLOSE or 0.5 * before < shift < 1.0:  # round-off is all that still changes
+            at_noise = 0.5 * before < shift < 1.0  # it no longer halves: round-off is all that still changes
+            if shift < CLOSE or at_noise:
                 accelerations = now
                 break
             accelerations = accelerations + change

@@ -6,9 +6,9 @@ import pytest
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.exact import cones, events, forces, impacts, loop, refusals
 from reference_solver.exact.bodies import start_of, world_of
-from reference_solver.exact.checks import check
+from reference_solver.exact.checks import check, deepest
 from reference_solver.exact.kernels.meeting import NEVER
-from reference_solver.exact.motion import Piece, free_acceleration
+from reference_solver.exact.motion import Piece, free_acceleration, steady
 from reference_solver.exact.problem import Answer, Problem
 from reference_solver.exact.rows import touching_contacts
 from reference_solver.settings import TOLERANCE
@@ -37,6 +37,22 @@ def test_ball_between_closing_walls_is_crushed():
 def test_overlap_at_the_start():
     with pytest.raises(refusals.Overlap, match="bodies 0 and 1 overlap"):
         advance([FLOOR, Body(Box((0.5, 0.5)), 1.0, 0.2, (0.0, 0.4, 0.0))])
+
+
+@pytest.mark.parametrize("sunk", [2e-8, 1e-3, -1e-3])
+@pytest.mark.parametrize("order", [1, -1])
+def test_overlap_of_a_ball_with_a_half_space_or_a_ball(sunk, order):
+    """A ball sunk into a turned half-space or into another ball is found; one that is clear is not looked at."""
+    angle, at = 0.7, np.array((3.0, -2.0))
+    normal = np.array((-np.sin(angle), np.cos(angle)))
+    plane = Body(HalfSpace((0.0, 1.0), 0.25), pose=(*at, angle), motion="fixed")
+    for other, gap in ((plane, 0.25), (Body(Disc(0.25), pose=(*at, 0.0), motion="fixed"), 0.25)):
+        disc = Body(Disc(0.5), 1.0, 0.1, (*(at + (gap + 0.5 - 0.5 * sunk) * normal), 0.0))
+        world = world_of(model := Model(2, [other, disc][::order], (0.0, 0.0), 0.0, 0.0))
+        state = start_of(model)
+        held = forces.decide(world, state, touching_contacts(world, state).chosen(np.zeros(0, int)), state.velocity)
+        found = deepest(world, steady(state, held, state.velocity, 1.0))
+        assert found[3] == (pytest.approx(0.5 * sunk, rel=1e-6) if sunk > 0.0 else -np.inf)
 
 
 def test_missed_meeting_of_edges_in_space(monkeypatch):
