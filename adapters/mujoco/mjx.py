@@ -170,5 +170,5 @@ class MujocoMjxEngine(MjxPort):
 class MujocoMjxSingleEngine(MjxPort):
     """Adapter of MJX in single precision."""
 
-    facts = replace(FACTS, name="mujoco_mjx_single", title="MJX (single)", precision="single")
+    facts = replace(FACTS, name="mujoco_mjx_single", title="MJX single (MuJoCo on JAX)", precision="single")
     profiles = _profiles("single")

@@ -54,9 +54,7 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
             cycle |= closing
         if look == 2 * LOOK_BACK - 1:
             # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22).
-            # With friction no proof is known that there is no end: they are followed until none approaches.
-            slows = max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK])
-            if slows and not contacts.friction[cycle[pair]].any():
+            if max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK]):
                 answer, stopped, scheme = cycle, stopped | cycle, CHAIN
             cycle = np.zeros(len(known), bool)
         lies = speeds < np.where(contacts.restitution == 0.0, max(world.still, SLOW * fastest[-1]), world.still)

@@ -118,9 +118,9 @@ def test_matched_profile_without_contacts_equal_to_tuned(monkeypatch):
 
 
 def ball_paths(monkeypatch, values):
-    """`_ball_metrics` gives these values, start by start."""
+    """`ball_metrics` gives these values, start by start."""
     left = list(values)
-    monkeypatch.setattr(predictions, "_ball_metrics", lambda *asked: {"rebound_speed": (left.pop(0),)})
+    monkeypatch.setattr(predictions, "ball_metrics", lambda *asked: {"rebound_speed": (left.pop(0),)})
 
 
 def test_ball_band_grows_with_its_widest_path(monkeypatch):
@@ -142,7 +142,7 @@ def test_ball_band_grows_with_its_widest_path(monkeypatch):
     assert law(spoilt(scene, force=(0.5, 0.0, 0.0)), DT, None) is None
     assert law(spoilt(scene, shape=Box((0.5,) * 3)), DT, None) is None
     for metric, more in (("impulse", True), ("momentum_defect", True), ("rebound_speed", False)):
-        monkeypatch.setattr(predictions, "_ball_metrics", lambda *asked: dict.fromkeys(
+        monkeypatch.setattr(predictions, "ball_metrics", lambda *asked: dict.fromkeys(
             ("impulse", "momentum_defect", "rebound_speed"), (2.0,)))  # fmt: skip
         _, band = predictions.ball_law("default", metric)(scene, DT, None)
         assert (band > 1.1 * SUM_ROUND_OFF * scale_of(scene, metric)) == more

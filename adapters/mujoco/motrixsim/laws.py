@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from adapters.law import Deviation, Law, Measure, Prediction, deviations
+from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law.moved_starts import PERTURBATIONS, scale_of
 from adapters.law.single_motions import corner_law, rounded_motions, standstills
-from adapters.law.single_precision import PLACES, Method, plane_law, rounded_law
+from adapters.law.single_precision import PLACES, ROUNDINGS, UNIT, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
+from adapters.mujoco.blows import blow_of, metrics_of
+from adapters.mujoco.motions import is_vertical
 from adapters.mujoco.motrixsim.profiles import PROFILES
-from adapters.mujoco.motrixsim.springs import spring_law
-from adapters.scene import Scene
+from adapters.mujoco.motrixsim.springs import Spring
+from adapters.mujoco.predictions import ball_metrics
+from adapters.scene import Disc, Scene, Sphere
+from adapters.stepping import step_count
 
 _SOURCE, _RELEASES = "motrixsim.real_dtype(): float32", ("0.10.",)
 #: Metrics of blows without gravity, by scene, of hard contacts that correct no overlap.
@@ -32,6 +37,38 @@ SPRINGS: Mapping[str, tuple[str, ...]] = {
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
     "head_on": BLOWS["head_on"][:-1],
 }
+#: Part of a metric's scale by which moved starts may change it for a prediction.
+EITHER = 1e-2
+
+
+def spring_law(metric: str, profile: str) -> Law:
+    """A ball on a floor, or a blow without rotation, from several starts that differ by round-off."""
+
+    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+        settings, blow, steps = (
+            settings_of(PROFILES[profile], scene, dt),
+            blow_of(scene),
+            step_count(scene.duration, dt),
+        )
+        ball = len(scene.bodies) == 2 and isinstance(scene.bodies[1].shape, Disc | Sphere) and is_vertical(scene)
+        if settings["erp"] is not None or not (ball or blow):
+            return None
+        spring = Spring.of_settings(settings, dt)
+        fastest = max(max(map(abs, body.twist)) for body in scene.bodies)
+
+        def read(moved: float) -> float | None:
+            if ball:
+                return ball_metrics(scene, measure, spring, moved)[metric][0]
+            return metrics_of(scene, blow, blow.after(spring, steps, moved)).get(metric) if blow else None
+
+        # Places are up to a metre and a half.
+        value, *others = (read(k * ROUNDINGS * UNIT) for k in (0.0, *PERTURBATIONS))
+        spread = [abs(other - value) for other in others if value is not None and other is not None]
+        if value is None or len(spread) < len(others) or max(spread) > EITHER * scale_of(scene, metric):
+            return None
+        return value, 2.0 * max(spread) + ROUNDINGS * UNIT * max(scale_of(scene, metric), fastest)
+
+    return law
 
 
 def blow_law(metric: str, profile: str) -> Law:

@@ -134,7 +134,7 @@ class NewtonMujocoEngine(PortEngine):
 
     facts = port_facts(
         "mujoco_newton",
-        "Newton (MuJoCo)",
+        "Newton MJ (MuJoCo's solver)",
         "newton",
         "single",
         *MujocoWarpEngine.facts.quirks,

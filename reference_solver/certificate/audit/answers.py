@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certificate.audit.contact import SLIP_NOISE, speeds
+from reference_solver.certificate.audit.contact import ROUNDED, SLIP_NOISE, speeds
 from reference_solver.certificate.audit.rolling import accelerations
 from reference_solver.certificate.audit.run import Indices, Run
 from reference_solver.certificate.audit.sharing import (
@@ -48,8 +48,6 @@ BUDGET = 4e5
 #: Wrong sign, as a share of the largest speed or acceleration of a problem, that is round-off; difference from which
 #: two answers are two; and share to which a problem is that of another instant.
 SIGN, TWO, ALIKE = 1e-10, 1e-6, 1e-8
-#: Speed, as a share of the fastest of the run, that impacts and phases leave by round-off: a hundred last places.
-LEFT_OVER = 2e-14
 #: Condition of a mode's equations beyond which its contacts are redundant, and only a sum of forces is known.
 REDUNDANT = 1e9
 #: Share of that difference up to which a velocity is none.
@@ -162,7 +160,7 @@ def _instants(run: Run) -> _Instants:
     pieces, owner, d = run.pieces, run.contact_owner, run.d
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
     speed, impact = speeds(run), run.is_impact[owner]
-    noise = LEFT_OVER * float(speed[np.isfinite(speed)].max(initial=0.0))
+    noise = ROUNDED * float(speed[np.isfinite(speed)].max(initial=0.0))
     row = np.column_stack([np.where(run.free[i], side, -1) for i, side in zip((a, b), run.side, strict=True)])
     axes = np.concatenate([n[:, None], tangents_of(n)], axis=1)
     u = np.einsum("cj,ckj->ck", run.meeting_velocity(after=False), axes)
