@@ -168,8 +168,10 @@ def test_our_engines_are_registered_under_their_own_names() -> None:
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     entries = project["entry-points"][registry.GROUP]
-    # A folder in another engine's folder is called by both, or by its own name if it is not that engine's package.
+    # A folder in another engine's folder is called by both, or by its own name if it is not that engine's package. An
+    # engine in single precision is beside that in double.
     modules = {name: value.partition(":")[0].removeprefix("adapters.") for name, value in entries.items()}
+    modules = {name.removesuffix("_single"): module for name, module in modules.items()}
     assert all(name in (module.replace(".", "_"), module.rpartition(".")[2]) for name, module in modules.items())
     names = registry.names()
     ours = [name for name in names if name in entries]
