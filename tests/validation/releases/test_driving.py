@@ -187,7 +187,7 @@ def test_processes_in_an_environment_ended_with_a_killed_run(toy, copied, tmp_pa
     process.send_signal(signal.SIGKILL)
     process.communicate()
     # Its first step takes a minute: it must end because its parent has, not because it is done.
-    ends = time.monotonic() + 15.0
+    ends = time.monotonic() + 45.0
     while driven(place) and time.monotonic() < ends:
         time.sleep(0.1)
     left = driven(place)
