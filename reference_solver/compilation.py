@@ -77,13 +77,13 @@ class PerModule(UserProvidedCacheLocator):
         self._cache_path = str(Path(config.CACHE_DIR) / function.__module__)
 
 
-#: How numba is told of `PerModule`, by its settings.
+#: Setting of numba that makes it use `PerModule`.
 LOCATION = {"CACHE_LOCATOR_CLASSES": f"{PerModule.__module__}.{PerModule.__qualname__}"}
 
-#: What numba is told of kernels: no hidden branches for divisions by zero, since zero denominators are excluded by
-#: validation, and no counting of references to arrays, which cost two thirds of the time: kernels allocate nothing.
+#: Options of numba for kernels. "numpy": no branch for divisions by zero, since validation excludes zero denominators.
+#: "_nrt": arrays are not counted, which cost two thirds of the time; kernels allocate nothing. It is not documented.
 KERNEL: Any = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-#: The same for what only kernels call: without what unpacks arguments of Python's, which must not call it.
+#: The same for functions that only kernels call: Python has no access to them.
 INNER: Any = KERNEL | {"no_cpython_wrapper": True}
 
 
@@ -113,7 +113,7 @@ def inner_kernel(function: F) -> F:
 
     Without the wrapper that unpacks Python arguments they compile in two thirds of the time.
     """
-    return _compiled(function, cache=False, forceinline=False, **INNER)
+    return _compiled(function, cache=False, **INNER)
 
 
 def spliced_kernel(function: F) -> F:

@@ -33,7 +33,7 @@ from reference_solver.tally_summary import columns, summary
 
 
 class World(Protocol):
-    """What `Simulation` asks of both; of the textbooks alone `tally`, of the loop alone `recorded` and `is_closed`."""
+    """A world in motion. Steps have a `tally`; the loop of events has `recorded` and `is_closed`."""
 
     pose: Array
     twist: Array

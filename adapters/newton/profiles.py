@@ -72,7 +72,7 @@ def tuned_profile(needs: Needs, dt: float) -> list[Setting]:
     changed = {
         "iterations": (
             TUNED_ITERATIONS,
-            "two iterations correct only a part of each overlap and each slip; the rest moves the body in later steps",
+            "two iterations do not remove overlap and slip fully; the rest moves the body in the next steps",
             "derived",
         ),
         "torsional": (0.0, "the scene has no such friction", f"{_SHAPE}, mu_torsional"),

@@ -17,7 +17,7 @@ GAP_AS_SHIPPED = Setting(
     "gap", GAP, "as shipped: shapes are tested for contact when their distance is below the sum of their gaps [m]", _GAP
 )
 FRICTION_UNSET = Unset("friction of a pair", "1: mu", SHAPE, 1.0)
-GAP_UNSET = Unset("gap below which contacts are sought [m]", f"{2.0 * GAP:g}: {GAP:g} of each shape", _GAP)
+GAP_UNSET = Unset("detection gap of a pair [m]", f"{2.0 * GAP:g}: {GAP:g} for each shape", _GAP)
 
 # ---- contacts that are springs ---------------------------------------------------------------------------------------
 

@@ -156,5 +156,5 @@ print([len(found) > 30, *sorted(name for name, each in found.items() if len(each
 
 @pytest.mark.long  # 40 s of CPU: nothing is kept in the folder
 @pytest.mark.skipif(bool(compilation.config.DISABLE_JIT), reason="NUMBA_DISABLE_JIT: nothing is compiled")
-def test_kernels_of_the_loop_are_compiled_once_for_plane_and_space(tmp_path):
+def test_compilations_of_the_loop_in_plane_and_space(tmp_path):
     assert run(TWICE, NUMBA_CACHE_DIR=str(tmp_path)) == "[True]"

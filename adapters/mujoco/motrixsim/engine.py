@@ -20,7 +20,7 @@ from adapters.needs import Needs
 #: Phases of a step over which a rebound is declared.
 PHASES = 128
 SPRING = "contacts are springs and dampers: the rebound depends on the phase of the step, not on e"
-OVERLAP = "a step corrects the share erp of an overlap with an additional speed, which the rebound keeps"
+OVERLAP = "a step removes the share erp of an overlap by adding velocity, which remains after the rebound"
 
 
 @final

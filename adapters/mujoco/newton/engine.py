@@ -159,7 +159,7 @@ class NewtonMujocoEngine(PortEngine):
             "newton/_src/utils/import_mjcf.py; SolverMuJoCo, pair_solreffriction; measured with 1.8.0",
         ),
         Quirk(
-            "shapes of MJCF get Newton's gap of 0.1 m, within which contacts are told that do not push",
+            "shapes from MJCF get Newton's detection gap of 0.1 m: contacts without force are reported up to it",
             "the gap is 0, as in MuJoCo",
             "ModelBuilder.rigid_gap",
         ),

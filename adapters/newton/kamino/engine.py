@@ -81,7 +81,7 @@ class KaminoEngine(NewtonFamily):
                 "MaterialManagerConfig, restitution_mix_mode",
             ),
             Quirk(
-                "a step corrects a hundredth of each overlap with an additional speed, which a rebound keeps",
+                "each step removes 1 % of an overlap by adding velocity, which remains after a rebound",
                 "unchanged: rebounds are up to e + 0.01",
                 "ConstraintStabilizationConfig, gamma; measured",
             ),
@@ -106,7 +106,5 @@ class KaminoEngine(NewtonFamily):
         if needs.regime != "impact":
             return {}
         half = 0.5 * next(x.value for x in self.settings(profile, needs, dt) if x.name == "recovery")
-        because = (
-            "the step of a blow corrects a hundredth of the overlap with an additional speed, which the rebound keeps"
-        )
+        because = "the step of a blow removes 1 % of the overlap by adding velocity, which remains after the rebound"
         return {"restitution": Declared(needs.restitution + half, half + SOLVED, because)}

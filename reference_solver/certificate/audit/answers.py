@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certificate.audit.contact import ROUNDED, SLIP_NOISE, speeds
+from reference_solver.certificate.audit.contact import ROUNDED, SLIP_NOISE, fastest_of, speeds
 from reference_solver.certificate.audit.rolling import accelerations
 from reference_solver.certificate.audit.run import Indices, Run
 from reference_solver.certificate.audit.sharing import (
@@ -160,7 +160,7 @@ def _instants(run: Run) -> _Instants:
     pieces, owner, d = run.pieces, run.contact_owner, run.d
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
     speed, impact = speeds(run), run.is_impact[owner]
-    noise = ROUNDED * float(speed[np.isfinite(speed)].max(initial=0.0))
+    noise = ROUNDED * fastest_of(speed)
     row = np.column_stack([np.where(run.free[i], side, -1) for i, side in zip((a, b), run.side, strict=True)])
     axes = np.concatenate([n[:, None], tangents_of(n)], axis=1)
     u = np.einsum("cj,ckj->ck", run.meeting_velocity(after=False), axes)

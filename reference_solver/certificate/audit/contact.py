@@ -228,7 +228,7 @@ def _laws(run: Run) -> Iterator[float]:
     taken_out = np.where(frozen, 0.0, SLIP_NOISE * mass * speed)
     pulls = -pressed - unseen - taken_out - over.lean * held_back
     # What came to rest without loads still has round-off of the speeds that it had.
-    left_over = mass * (LEFT_OVER * speed + SLIP_NOISE * speed.max(initial=0.0))
+    left_over = mass * (LEFT_OVER * speed + SLIP_NOISE * fastest_of(speed))
     yield _worst(np.where(correction, np.abs(pressed) - left_over, pulls), scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning - taken_out
@@ -264,7 +264,7 @@ def _laws(run: Run) -> Iterator[float]:
     # What is not pressed and is not an impact may part, or come closer: a gap is a matter of geometry.
     parting = ~impact & (pressed <= 0.0)
     # What came to rest without loads still comes closer or parts by round-off of the speeds that it had.
-    defect -= np.where(impact, 0.0, mass * ROUNDED * speed.max(initial=0.0))
+    defect -= np.where(impact, 0.0, mass * ROUNDED * fastest_of(speed))
     yield _worst(np.where(parting | coarse, 0.0, defect.clip(min=0.0)), scale)
 
     # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
@@ -371,6 +371,11 @@ def _momentum_at_hand(run: Run) -> float:
         speeds[i] = np.linalg.norm(twist[: run.d]) + arm[i] * np.linalg.norm(twist[run.d :])
     fastest = float(speeds.max()) + run.pull * max(duration, run.dt)
     return float(run.mass[free].sum() * fastest) if free.any() and fastest > 0.0 else 1.0
+
+
+def fastest_of(speed: Array) -> float:
+    """Largest of `speeds` [m/s], of those at places that are known."""
+    return float(speed[np.isfinite(speed)].max(initial=0.0))
 
 
 def _worst(defect: Array, scale: Array) -> float:

@@ -60,5 +60,5 @@ def kernel(function: F) -> F:
 
 
 def inner_kernel(function: F) -> F:
-    """Compile likewise what kernels alone call: without what unpacks arguments of Python's, which must not call it."""
+    """Compile a function that only kernels call: Python has no access to it."""
     return _compiled(function, no_cpython_wrapper=True)

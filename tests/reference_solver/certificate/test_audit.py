@@ -487,3 +487,36 @@ def test_corrections_of_more_than_round_off(share):
         impulse[j] = whole * along
         changed = replace(record, pieces=replace(record.pieces, impulse=impulse))
         assert name in {finding.name for finding in audit(drawn.model, changed, dt) if not finding.holds}
+
+
+def at_rest_after_a_blow():
+    """A box that strikes a wall with e = 0 at 1 m/s and rests there without loads, and the last piece of its record."""
+    box = Body(Box((0.5, 0.5)), 1.0, 1.0 / 6.0, (0.6, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    model = Model(2, [Body(HalfSpace((1.0, 0.0)), motion="fixed"), box], (0.0, 0.0), 0.0, 0.5)
+    record = Simulation(model, Settings.reference(DT)).record(60, pieces=True)
+    assert [finding for finding in audit(model, record, DT) if not finding.holds] == []
+    return model, record, len(record.pieces) - 1
+
+
+@pytest.mark.parametrize(("speed", "seen"), [(1e-15, False), (1e-13, True)])
+def test_approach_of_what_rests_without_loads(speed, seen):
+    """A hundred last places of the speed that it had are round-off: 2e-14 m/s of 1 m/s."""
+    model, record, last = at_rest_after_a_blow()
+    pieces, row = record.pieces, record.pieces.first_body[last]
+    before, after, impulse = pieces.twist_before.copy(), pieces.twist_after.copy(), pieces.impulse.copy()
+    before[row, 0] = after[row, 0] = -speed
+    impulse[pieces.first_contact[last]] = (1e-30, 0.0)
+    changed = replace(record, pieces=replace(pieces, twist_before=before, twist_after=after, impulse=impulse))
+    assert ("normal" in {finding.name for finding in audit(model, changed, DT) if not finding.holds}) is seen
+
+
+@pytest.mark.parametrize(("share", "seen"), [(0.5, False), (5.0, True)])
+def test_spin_of_what_stands_still(share, seen):
+    """A change of spin that moves no point of a body faster than its last places allow is round-off."""
+    model, record, last = at_rest_after_a_blow()
+    pieces, run = record.pieces, Run(model, record.pieces, DT)
+    after = pieces.twist_after.copy()
+    # Of the box I = m (a^2 + a^2)/3 with half width a, and its corners are at a sqrt(2): I = m reach^2/3.
+    after[pieces.first_body[last], 2] = 3.0 * share * run.still[1] / run.reach[1]
+    changed = replace(record, pieces=replace(pieces, twist_after=after))
+    assert ("spin" in {finding.name for finding in audit(model, changed, DT) if not finding.holds}) is seen
