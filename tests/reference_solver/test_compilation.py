@@ -143,7 +143,7 @@ from reference_solver.exact import kernels
 
 floors = HalfSpace((0.0, 1.0)), HalfSpace((0.0, 0.0, 1.0))
 boxes = Box((0.5, 0.5)), Box((0.5, 0.5, 0.5))
-for d, turn in ((2, (0.2,)), (3, (1.0, 0.1, 0.0, 0.0))):
+for d, turn in ((2, (0.2,)), (3, (0.8, 0.6, 0.0, 0.0))):
     above = (*(0.0,) * (d - 1), 1.0, *turn)
     floor = Body(floors[d - 2], motion="fixed", pose=(*(0.0,) * d, *((0.0,), (1.0, 0.0, 0.0, 0.0))[d - 2]))
     bodies = [floor, Body(boxes[d - 2], 1.0, 0.2 if d == 2 else (0.2,) * 3, above, (0.5,) * (3 * d - 3))]

@@ -259,13 +259,24 @@ def test_all_workers_compile_where_all_cells_need_kernels(compiled):
     assert [kind for kind, _ in log[:2]] == ["compile"] * 2
 
 
-def test_parts_of_one_profile_one_after_the_other(compiled):
+def two_parts_each():
+    return [replace(slot, dimension=dim) for slot in MIXED[:2] for dim in (3, 2)]
+
+
+def test_parts_of_one_profile_beside_cells_that_can_run(compiled):
     """They share kernels, which two processes side by side would both compile; another profile's part goes first."""
-    slots = [replace(slot, dimension=dim) for slot in MIXED[:2] for dim in (3, 2)]
-    done = {}
+    slots, done = [*two_parts_each(), *(slot for slot in MIXED if not needs_kernels(slot))], {}
     log = compiled(slots, 4, compiled=lambda part: done.setdefault(part.key[1:], len(Compiler.log)))
     assert log[:2] == [("compile", [slots[0]]), ("compile", [slots[2]])]
-    assert all(log.index(("compile", [slots[k + 1]])) >= done[slots[k].profile, 3] for k in (0, 2))
+    assert log[2][0] == "cell"
+
+
+@pytest.mark.parametrize("jobs", [2, 4])
+def test_parts_of_one_profile_without_other_work(compiled, jobs):
+    """No seat is idle while parts are left; those of another profile are the first to go."""
+    slots = two_parts_each()
+    log = compiled(slots, jobs)
+    assert log[:jobs] == [("compile", [slots[k]]) for k in (0, 2, 1, 3)[:jobs]]
 
 
 def test_compilation_once_and_retry_after_failure(compiled):

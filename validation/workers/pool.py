@@ -90,13 +90,15 @@ class _Waiting:
     def next(self, seat: _Seat, seats: Sequence[_Seat]) -> Slot | warming.Part | None:
         """Take the next work of a free seat: kernels, as long as another seat is left for cells that can run.
 
-        Parts of one profile share kernels: side by side, both would compile these. Else a cell of its engine while
+        Parts of one profile share kernels, which both compile if they are made side by side: another profile's part
+        goes first, and only a seat with nothing else to do takes the same profile's. Else a cell of its engine while
         there are any, then of the engine with the most cells left.
         """
         compiling = [other.work.key[:2] for other in seats if isinstance(other.work, warming.Part)]
         while True:
             self._ready = {engine: queue for engine, queue in self._ready.items() if queue}
-            part = next((part for part in self._parts if part.key[:2] not in compiling), None)
+            apart = (part for part in self._parts if part.key[:2] not in compiling)
+            part = next(apart, self._parts[0] if self._parts and not self._ready else None)
             if part and (not self._ready or len(compiling) < len(seats) - 1):
                 self._parts.remove(part)
                 return part
