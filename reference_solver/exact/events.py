@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fminbound
 
 from reference_solver.exact.bodies import World
 from reference_solver.exact.features import margins, width_of_margins
 from reference_solver.exact.forces import LEAST, NONE
+from reference_solver.exact.kernels.features import FACE
 from reference_solver.exact.meeting import next_meeting
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
 from reference_solver.model import Array
 
-#: Shares at which monitors are looked at: of a step, and of a piece of any length, whose beginning counts.
-OF_STEP, OF_CONSTANT = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 1e-6, *np.linspace(0.125, 1.0, 8))
+#: Parts of a step, and of a piece of any length, between which monitors are looked at: so many, and more where a face
+#: turns by more than this in one [rad]. Of a piece of any length its beginning counts as well.
+OF_STEP, OF_CONSTANT, TURN, BEGINNING = 4, 8, 0.5, 1e-6
+#: Where a parabola through three looks leaves less than this share of a monitor, its least is sought, to this share of
+#: the piece: a dip that lasts less is as shallow as round-off.
+DIPS, CLOSE = 0.5, 1e-7
 #: Share of the smallest half width below which margins are round-off.
 MARGIN = 1e-12
 #: Most rounds of Brent's method: where a monitor steps in its last places at its root it needs more than a hundred.
@@ -107,6 +113,19 @@ class Monitors:
         ends = margins(self._world, place, axes, self._contacts.features)
         return np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
 
+    def shares(self) -> list[float]:
+        """Return the shares at which to look."""
+        parts, beginning = (OF_STEP, []) if self._piece.turns else (OF_CONSTANT, [BEGINNING])
+        features, bodies = self._contacts.features, self._world.bodies
+        for turn in range(2):
+            owner, kind, face = features[:, turn], features[:, 2 + 2 * turn], features[:, 3 + 2 * turn]
+            ends = owner[(kind == FACE) & (bodies.sides[owner, np.where(kind == FACE, face, 0)] > 0)]
+            spin = self._piece.velocity[ends, self._world.dimension :]
+            fastest = max(np.abs(each).max(initial=0.0) for each in (spin[..., 0], spin.sum(axis=2)))
+            parts = max(parts, int(np.ceil(fastest * self._piece.length / TURN)))
+        first, *others = np.linspace(0.0, 1.0, parts + 1).tolist()
+        return [first, *beginning, *others]
+
     def kind(self, column: int) -> Kind:
         """Return what happens where a column falls below zero."""
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
@@ -128,11 +147,8 @@ def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
 
 
 def _first_end(piece: Piece, monitors: Monitors) -> Event:
-    shares = OF_STEP if piece.turns else OF_CONSTANT
     event, ended, modes = Event(Kind.LOOK, 1.0), set(), {}
-    before = monitors(shares[0])
-    for last, now in pairwise(shares):
-        values = monitors(now)
+    for (last, before), (now, values) in pairwise(_looks(monitors, monitors.shares())):
         for k, column in np.argwhere(values < -monitors.noise).tolist():
             kind = monitors.kind(column)
             if before[k, column] > monitors.noise[k, column]:
@@ -153,8 +169,40 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
             return Event(event.kind, event.share, event.contact, frozenset(ended), tuple(modes.items()))
         if event.kind is not Kind.LOOK:
             return event
-        before = values
     return event
+
+
+def _looks(monitors: Monitors, shares: Sequence[float]) -> Iterator[tuple[float, Array]]:
+    """Yield shares and monitors there; between two shares also where one is below zero that is so at neither."""
+    seen = [(share, monitors(share)) for share in shares[:3]]
+    yield seen[0]
+    yield from _dips(monitors, seen, 0)
+    yield seen[1]
+    for share in [*shares[3:], None]:
+        yield from _dips(monitors, seen, 1)
+        yield seen[2]
+        if share is not None:
+            seen = [*seen[1:], (share, monitors(share))]
+
+
+def _dips(monitors: Monitors, seen: list[tuple[float, Array]], k: int) -> list[tuple[float, Array]]:
+    """Return looks below zero between the looks k and k + 1 of three, by the parabola through these."""
+    (t0, v0), (t1, v1), (t2, v2) = seen
+    (begin, before), (end, after) = seen[k : k + 2]
+    with np.errstate(invalid="ignore", divide="ignore"):  # infinite is what cannot end
+        slope = (v1 - v0) / (t1 - t0)
+        bend = ((v2 - v1) / (t2 - t1) - slope) / (t2 - t0)
+        vertex = 0.5 * (t0 + t1 - slope / bend)
+        left = v0 + (vertex - t0) * (slope + bend * (vertex - t1)) + monitors.noise
+        low = np.minimum(before, after) + monitors.noise
+        falls = (bend > 0.0) & (begin < vertex) & (vertex < end) & (low >= 0.0) & (left < DIPS * low)
+    found = []
+    for contact, column in np.argwhere(falls).tolist():
+        share = float(fminbound(_component(monitors, contact, column), begin, end, xtol=CLOSE))
+        values = monitors(share)
+        if values[contact, column] < -monitors.noise[contact, column]:
+            found.append((share, values))
+    return sorted(found, key=itemgetter(0))
 
 
 def _component(monitors: Monitors, k: int, column: int) -> Callable[[float], float]:
