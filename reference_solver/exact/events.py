@@ -36,6 +36,7 @@ class Kind(Enum):
     """What happens at the end of a piece."""
 
     LOOK = "nothing: it is as long as it may be"
+    SEARCH = "nothing: the search for a meeting stopped and goes on"
     FEATURE = "a contact comes to the end of a feature"
     SLIDE = "a slide ends"
     LIFT = "a load ends"
@@ -143,11 +144,11 @@ def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
     if event.at_start:
         return event
     share, stopped = next_meeting(world, piece, piece.held.contacts, after_instant)
-    return Event(Kind.LOOK if stopped else Kind.MEET, share) if share < event.share else event
+    return Event(Kind.SEARCH if stopped else Kind.MEET, share) if share < event.share else event
 
 
 def _first_end(piece: Piece, monitors: Monitors) -> Event:
-    event, ended, modes = Event(Kind.LOOK, 1.0), set(), {}
+    event, at_start, ended, modes = Event(Kind.LOOK, 1.0), Kind.LOOK, set(), {}
     for (last, before), (now, values) in pairwise(_looks(monitors, monitors.shares())):
         for k, column in np.argwhere(values < -monitors.noise).tolist():
             kind = monitors.kind(column)
@@ -156,6 +157,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
             elif last > 0.0:  # it was none but for round-off when it was last looked at
                 share = last
             else:  # it is at its end from the beginning
+                at_start = kind
                 if kind is Kind.FEATURE:
                     ended.add(tuple(piece.held.contacts.features[k].tolist()))
                 elif kind is not Kind.SLIDE:
@@ -166,7 +168,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
             if share < event.share:
                 event = Event(kind, share, k)
         if ended or modes:
-            return Event(event.kind, event.share, event.contact, frozenset(ended), tuple(modes.items()))
+            return Event(at_start, 0.0, ended=frozenset(ended), modes=tuple(modes.items()))
         if event.kind is not Kind.LOOK:
             return event
     return event

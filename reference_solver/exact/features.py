@@ -22,8 +22,8 @@ TOUCH = 1e-11
 UNITS = 8.0
 #: Cores may be this deep in each other along a face that touches; along other faces they are far deeper.
 DEEP = 1e-3
-#: Room for the contacts of a world.
-MOST_CONTACTS = 2048
+#: Room for the contacts of a world, and more where it has more.
+ROOM = 2048
 
 
 def no_gap(world: World, place: Array) -> Array:
@@ -59,9 +59,11 @@ def find(world: World, state: State, ended: frozenset[tuple[int, ...]] = frozens
         Contacts whose features are known to end here.
     """
     tol = TOUCH * world.size
-    found = np.zeros((MOST_CONTACTS, 6), np.int64)
-    placed = features_of(world, state.place, state.axes)
-    count = touching(world.bodies, state.place, state.axes, placed, found, np.array([tol, DEEP * world.size]))
+    placed, limits, count = features_of(world, state.place, state.axes), np.array([tol, DEEP * world.size]), ROOM
+    found = np.zeros((0, 6), np.int64)
+    while count > len(found):
+        found = np.zeros((count, 6), np.int64)
+        count = touching(world.bodies, state.place, state.axes, placed, found, limits)
     found = found[:count]
     if not count:
         return found

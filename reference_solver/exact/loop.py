@@ -110,7 +110,7 @@ class Loop:
             if event.at_start:
                 self.held = self._with_modes_ended(held, event)
                 continue
-            piece = self._cut(piece, event)
+            piece, event = self._cut(piece, event)
             check(self.world, piece, self.tolerance)
             blows, self.blows = self.blows, []
             self._enter(piece, event)
@@ -186,26 +186,30 @@ class Loop:
                 return piece
             self.next_length = FIRST_STEP * self.world.time
         self.steps += 1
-        tolerance = self.tolerance * (FREE if self._turns_freely(held) else 1.0)
-        piece, self.next_length = step(self.world, self.state, held, tolerance, min(self.next_length, self.longest))
+        length = min(self.next_length, self.longest)
+        piece, self.next_length = step(self.world, self.state, held, self._tolerance_of(held), length)
         return piece
 
-    def _turns_freely(self, held: Held) -> bool:
-        """Whether a body in space turns that nothing touches."""
+    def _tolerance_of(self, held: Held) -> float:
+        """Return the tolerance of a step from here on: finer where a body in space turns that nothing touches."""
         d = self.world.dimension
         loose = self.world.bodies.free == 1
         loose[held.contacts.features[:, :2]] = False
         turns = (self.state.velocity[:, d:] != 0.0) | (held.acceleration[:, d:] != 0.0)
-        return d == 3 and bool(turns[loose].any())
+        return self.tolerance * (FREE if d == 3 and turns[loose].any() else 1.0)
 
-    def _cut(self, piece: Piece, event: Event) -> Piece:
-        """Return the piece up to its event: a step is made anew with that length, so that its end is exact."""
+    def _cut(self, piece: Piece, event: Event) -> tuple[Piece, Event]:
+        """Return the piece up to its event, and that: a step is made anew with that length, so that its end is exact.
+
+        If the new step is shorter than asked for, it ends before the event.
+        """
         if event.share >= 1.0:
-            return piece
-        if piece.turns and event.share > 0.0:
-            shorter, _ = step(self.world, piece.start, piece.held, self.tolerance, event.share * piece.length)
-            return shorter
-        return piece.cut(event.share)
+            return piece, event
+        if not piece.turns or event.share == 0.0:
+            return piece.cut(event.share), event
+        length = event.share * piece.length
+        shorter, _ = step(self.world, piece.start, piece.held, self._tolerance_of(piece.held), length)
+        return shorter, event if shorter.length == length else Event(Kind.LOOK, 1.0)
 
     def _enter(self, piece: Piece, event: Event) -> None:
         """Move the world to the end of a piece, and keep its contacts if forces do not jump there."""
@@ -230,7 +234,7 @@ class Loop:
         held = held.at(self.state, self._free_acceleration())
         if event.kind in GO_ON:
             return changed(held, {event.contact: GO_ON[event.kind]}, self._free_acceleration())
-        return held if event.kind is Kind.LOOK and not held.slips_end else None
+        return held if event.kind in (Kind.LOOK, Kind.SEARCH) and not held.slips_end else None
 
     def _with_modes_ended(self, held: Held, event: Event) -> Held | None:
         """Return contacts with what ends as their piece begins changed; None where all is to be found anew."""

@@ -12,6 +12,7 @@ from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import Held, accelerations
 from reference_solver.exact.kernels.motion import write_free_acceleration, write_moved
 from reference_solver.exact.problem import ROUND_OFF, SLIP
+from reference_solver.exact.refusals import NoStep
 from reference_solver.exact.rotation import turned
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
@@ -24,6 +25,8 @@ STEADY, REST = 1e-13, 1e-12
 LEAST = 1e-2
 #: How much shorter or longer than the last a step may be, and what is left to safety.
 SHORTER, LONGER, SAFE = 0.2, 5.0, 0.9
+#: Shortest step that is tried, as a share of the world's time: it moves nothing by a last place.
+SHORTEST = 1e-20
 
 
 def free_acceleration(world: World, axes: Array, velocity: Array) -> Array:
@@ -202,6 +205,11 @@ class Turning:
 
         E. Hairer, S. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 1993, II.10: order 8, with an
         interpolant of order 7.
+
+        Raises
+        ------
+        NoStep
+            If steps become shorter than `SHORTEST`.
         """
         count = self._state.velocity.size
         each = np.tile(self._world.per_length, len(self._state.velocity))
@@ -216,17 +224,18 @@ class Turning:
                 rates[k] = self._rates(start + length * (DOP853.A[k, :k] @ rates[:k]))
             change = length * (DOP853.B @ rates[:12])
             rates[12] = self._rates(start + change)
-            if not np.isfinite(rates).all():  # so far ahead that there are no numbers
-                length *= SHORTER
-                continue
-            scale, moves = self._tolerance * (least + np.abs(change[: 2 * count])), rates[:13, : 2 * count]
-            fifth = ((DOP853.E5 @ moves / scale) ** 2).sum()
-            third = ((DOP853.E3 @ moves / scale) ** 2).sum()
-            error = length * fifth / np.sqrt((fifth + 0.01 * third) * len(scale)) if fifth > 0.0 else 0.0
+            error = np.inf  # where that is so far ahead that there are no numbers
+            if np.isfinite(rates).all():
+                scale, moves = self._tolerance * (least + np.abs(change[: 2 * count])), rates[:13, : 2 * count]
+                fifth = ((DOP853.E5 @ moves / scale) ** 2).sum()
+                third = ((DOP853.E3 @ moves / scale) ** 2).sum()
+                error = length * fifth / np.sqrt((fifth + 0.01 * third) * len(scale)) if fifth > 0.0 else 0.0
             factor = min(LONGER, SAFE * error**-0.125) if error > 0.0 else LONGER
             if error <= 1.0:
                 break
             length *= max(SHORTER, factor)
+            if length < SHORTEST * self._world.time:
+                raise NoStep(t=self._state.t)
         for k, row in enumerate(DOP853.A_EXTRA, 13):
             rates[k] = self._rates(start + length * (row[:k] @ rates[:k]))
         # The interpolant: coefficients of the terms of `_powers`.

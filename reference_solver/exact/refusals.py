@@ -48,6 +48,12 @@ class Unlawful(Refused):
     sentence = "forces or impulses break the laws of contact at {t:.9g} s by {share:.0e} of their size"
 
 
+class NoStep(Refused):
+    """Steps of a motion that turns become ever shorter without reaching their tolerance."""
+
+    sentence = "no step from {t:.9g} s on reaches its tolerance, however short"
+
+
 class NoProgress(Refused):
     """Events follow each other in no time, or in hardly any."""
 

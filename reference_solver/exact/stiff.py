@@ -40,10 +40,9 @@ def step(world: World, state: State, held: Held, tolerance: float, length: float
         smooth = tolerance**0.125 * world.time
         if stiff.rate * smooth > STABLE:
             while stiff.rate * length > SHORTER * STABLE:
-                found = stiff.implicit_step(length)
+                found, length = stiff.implicit_step(length)
                 if found is not None:
-                    return found
-                length *= SHORTER
+                    return found, length
     return Turning(world, state, held, tolerance).step(length)
 
 
@@ -77,8 +76,8 @@ class Stiff(Turning):
             slip[out] = first * speed[0] + second * speed[1], first * speed[1] - second * speed[0]
         return rate.ravel().copy(), acceleration.ravel(), held.pushes, turn, slip, across
 
-    def implicit_step(self, length: float) -> tuple[Piece, float] | None:
-        """Return a piece of at most a length [s] and the next length; None where the iteration does not converge."""
+    def implicit_step(self, length: float) -> tuple[Piece | None, float]:
+        """Return a piece of a length [s] and the next length; None and a shorter length where that is too long."""
         start = self._state.velocity
         shape, count, k = start.shape, start.size, len(self._slips)
         scale = self._tolerance * (
@@ -103,7 +102,7 @@ class Stiff(Turning):
             try:
                 z = np.linalg.solve(matrix, wanted).reshape(COUNT, k)
             except np.linalg.LinAlgError:  # a slip that does not yield has no direction
-                return None
+                return None, SHORTER * length
             change = rest + np.einsum("ik,ikn->in", z, turn)
             before, changes = shift, np.array([UP_TO @ change, UP_TO @ (moved - rates)])
             shift = length * float(np.abs(changes / scale).max())
@@ -117,15 +116,15 @@ class Stiff(Turning):
             directions[:, self._slips] = new / np.linalg.norm(new, axis=2, keepdims=True)
             rates = moved
         else:
-            return None
+            return None, SHORTER * length
         if slip[:, :, 0].min() < 0.0:  # it would have turned round before
-            return None
+            return None, SHORTER * length
         last, least = np.abs(SERIES[-1] @ accelerations), np.abs(SERIES[-2] @ accelerations)
         # The next term of the series, if terms go on to fall as they do.
         error = float((length * last * np.minimum(1.0, last / np.maximum(least, 1e-300)) / scale).max())
         factor = min(LONGER, SAFE * error ** (-1.0 / (COUNT + 1))) if error > 0.0 else LONGER
         if error > 1.0:
-            return self.implicit_step(length * max(SHORTER, factor))
+            return None, length * max(SHORTER, factor)
         every = np.concatenate([rates, accelerations, pushes.reshape(COUNT, -1)], axis=1)
         out = np.zeros((every.shape[1], COUNT + 1))
         out[:, 1:] = length * (THROUGH @ every).T / (POWERS + 1)

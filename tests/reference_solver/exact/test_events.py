@@ -1,14 +1,20 @@
 """When pieces end, and why."""
 
+import copy
 import math
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from reference_solver import Body, Box, Disc, Model, Settings, Simulation, Sphere
+from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
+from reference_solver.exact import events, features, loop
 from reference_solver.exact.bodies import start_of, world_of
+from reference_solver.exact.forces import decide
+from reference_solver.exact.kernels.features import FACE, POINT
 from reference_solver.exact.loop import Loop
+from reference_solver.exact.motion import constant, free_acceleration
+from reference_solver.exact.rows import Contacts
 
 G, DT = 10.0, 1.0 / 240.0
 UPRIGHT = {2: (0.0,), 3: (1.0, 0.0, 0.0, 0.0)}
@@ -89,3 +95,106 @@ def test_disc_that_is_drawn_back_between_two_looks_at_a_step(leaves):
 
     piece = first_piece(Model(2, [box, disc], (0.0, -G), 0.0, 0.0))
     assert piece.turns and piece.length == pytest.approx(brentq(left, 0.0, leaves + 0.0005, xtol=1e-16), abs=1e-8)
+
+
+def edge_to_be_left():
+    """World, state and contact of a ball on the edge of a box that it leaves: `find` would leave it out."""
+    model = on_a_box(2, 0.0, 1.0, 0.0)
+    world = world_of(model)
+    contacts = Contacts.of(world, np.array([[0, 1, FACE, face, POINT, 0] for face in range(4)]))
+    state = start_of(model)
+    gap = contacts.at_state(state).rows.gap
+    return world, state, contacts.chosen((np.abs(gap) < 1e-12) & (contacts.rows.frame[:, 0, 1] == 1.0))
+
+
+def test_kind_of_an_event_at_the_start_of_a_piece():
+    world, state, contacts = edge_to_be_left()
+    free = free_acceleration(world, state.axes, state.velocity)
+    piece = constant(world, state, decide(world, state, contacts, free), 1.0)
+    event = events.first_event(world, piece, after_instant=False)
+    assert event.at_start and event.kind is events.Kind.FEATURE and event.ended == set(contacts.names)
+
+
+def falling_ball(e):
+    floor = Body(HalfSpace((0.0, 1.0)), motion="fixed")
+    return Model(2, [floor, Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5 + 1e-5, 0.0))], (0.0, -G), e, 0.0)
+
+
+def test_search_that_stops_in_a_sum_of_rebounds(monkeypatch):
+    """The series goes on: speeds are not taken off before its end."""
+    model = falling_ball(0.5)
+    moving = Loop(world_of(model), start_of(model), 1e-11, 1.0)
+    while (piece := moving.next_piece()[1]).held.lasts == 0.0:
+        begin = copy.deepcopy(moving)
+    assert piece.held.lasts == piece.length
+    monkeypatch.setattr(events, "next_meeting", lambda *_: (0.5, True))
+    piece = begin.next_piece()[1]
+    assert piece.length == 0.5 * piece.held.lasts and not begin.blows
+
+
+def free_plate():
+    """A plate that turns about all three axes and falls on the ground."""
+    ground = Body(HalfSpace((0.0, 0.0, 1.0)), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT[3]))
+    plate = Body(
+        Box((0.5, 0.3, 0.1)), 1.0, (0.03, 0.09, 0.11), (0.0, 0.0, 0.8, *UPRIGHT[3]), (0.0, 0.0, 0.0, 3.0, 1.0, 2.0)
+    )
+    return Model(3, [ground, plate], (0.0, 0.0, -G), 0.5, 0.3)
+
+
+def test_tolerance_of_a_step_that_is_cut(monkeypatch):
+    """A step up to an event is made to the tolerance of the one in which the event was found."""
+
+    def told(world, state, held, tolerance, length):
+        asked.append((state.t, tolerance))
+        return made(world, state, held, tolerance, length)
+
+    asked, made, model = [], loop.step, free_plate()
+    monkeypatch.setattr(loop, "step", told)
+    moving = Loop(world_of(model), start_of(model), 1e-11, 1.0)
+    while len(asked) == len({t for t, _ in asked}):
+        moving.next_piece()
+    assert {tolerance for _, tolerance in asked} == {1e-11 * loop.FREE}
+
+
+def first_blow(model):
+    moving = Loop(world_of(model), start_of(model), 1e-11, 1.0)
+    while not (blows := moving.next_piece()[0]):
+        pass
+    return blows[0].after
+
+
+def test_step_that_is_cut_and_becomes_shorter_still(monkeypatch):
+    """It ends before its event, which is found again."""
+
+    def half(world, state, held, tolerance, length):
+        begins.append(state.t)
+        return made(
+            world,
+            state,
+            held,
+            tolerance,
+            length * (0.5 if len(begins) - len(set(begins)) == 1 and begins.count(state.t) == 2 else 1.0),
+        )
+
+    begins, made, model = [], loop.step, free_plate()
+    truth = first_blow(model)
+    monkeypatch.setattr(loop, "step", half)
+    moving = Loop(world_of(model), start_of(model), 1e-11, 1.0)
+    while len(begins) == len(set(begins)):
+        moving.next_piece()
+    assert moving.held is not None  # nothing happens there
+    begins.clear()
+    found = first_blow(model)
+    assert len(begins) > len(set(begins)) and abs(found.t - truth.t) < 1e-11
+    assert np.abs(found.velocity - truth.velocity).max() < 1e-9
+
+
+def test_more_contacts_than_there_is_room_for(monkeypatch):
+    """A floor of boxes below a box that lies on all of them."""
+    tiles = [Body(Box((0.5, 0.5)), motion="fixed", pose=(float(k), -0.5, 0.0)) for k in range(6)]
+    model = Model(2, [*tiles, Body(Box((2.7, 0.5)), 1.0, 1.0, (2.5, 0.5, 0.0))], (0.0, -G), 0.0, 0.0)
+    world, state = world_of(model), start_of(model)
+    every = features.find(world, state)
+    assert len(every) > 8
+    monkeypatch.setattr(features, "ROOM", 3)
+    assert np.array_equal(features.find(world, state), every)

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.exact import cones, events, forces, impacts, loop, refusals
+from reference_solver.exact import cones, events, forces, impacts, loop, motion, refusals
 from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.checks import check, deepest
 from reference_solver.exact.kernels.meeting import NEVER
 from reference_solver.exact.motion import Piece, free_acceleration, steady
 from reference_solver.exact.problem import Answer, Problem
 from reference_solver.exact.rows import touching_contacts
+from reference_solver.exact.stiff import step
 from reference_solver.settings import TOLERANCE
 
 G = 9.81
@@ -94,6 +95,15 @@ def test_events_that_take_hardly_any_time(monkeypatch):
     monkeypatch.setattr(loop, "ROW", 10.0)
     with pytest.raises(refusals.NoProgress, match="4 events follow each other"):
         advance([FLOOR, ball(1.0)], e=1.0, steps=2400)
+
+
+def test_motion_without_numbers(monkeypatch):
+    """A step from where accelerations are no numbers."""
+    monkeypatch.setattr(motion, "free_acceleration", lambda _world, _axes, velocity: np.full(velocity.shape, np.nan))
+    world, state = world_of(model := Model(2, [ball(1.0)], (0.0, -G), 0.0, 0.0)), start_of(model)
+    held = forces.decide(world, state, touching_contacts(world, state), np.zeros((1, 3)))
+    with pytest.raises(refusals.NoStep, match="no step from 0 s on reaches its tolerance"):
+        step(world, state, held, TOLERANCE, 0.1)
 
 
 def test_contacts_that_create_energy():
@@ -184,7 +194,7 @@ def test_friction_that_presses_a_sliding_rod_into_the_floor(mu):
 
 def test_every_refusal_is_one_sentence():
     kinds = refusals.Refused.__subclasses__()
-    assert len(kinds) == 11
+    assert len(kinds) == 12
     facts = {"t": 0.5, "share": 1e-3, "count": 50, "last": "bodies meet", "a": 1, "b": 2, "depth": 1e-3, "amount": 1e-3}
     for kind in kinds:
         said = str(kind(**facts))
