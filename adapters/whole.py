@@ -25,7 +25,7 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def cache_folder() -> Path:
-    """Folder for data that can be made again (``XDG_CACHE_HOME``, else ``~/.cache``)."""
-    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
-        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
+    """Folder for data that can be made again (`reference_solver.caches`)."""
+    from reference_solver.caches import base_folder
+
+    return base_folder()

@@ -1,23 +1,24 @@
-"""The one decorator of all kernels, and the folder that keeps their machine code.
+"""The decorators of kernels, and the folders that keep their machine code.
 
 numba's own cache key covers only the file a kernel stands in: after an edit elsewhere a caller would run stale
-code. The folder is therefore named after a hash of *all* solver sources and the versions of numba and Python. If no
+code. A folder is therefore named after a hash of *all* its sources and the versions of numba and Python. If no
 folder is writable, kernels compile anew in every process: slower, never wrong, and an import never fails for it.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba.core import config as numba_config
 from numba.core.caching import UserProvidedCacheLocator
+
+from reference_solver.caches import base_folder
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -27,39 +28,44 @@ njit: Any = numba.njit
 
 
 #: What stands beside the solver and holds none of its kernels: an edit there compiles nothing anew.
-WITHOUT_KERNELS = ("certificate", "exact", "geometry.py", "piles.py")
+WITHOUT_KERNELS = ("certificate", "geometry.py", "piles.py")
+#: The same, and the loop over events, whose kernels call no others and have a folder of their own.
+APART = (*WITHOUT_KERNELS, "exact")
 
 
-def source_hash() -> str:
-    """Return 16 hex digits: a hash of all sources that can have kernels, and of the versions of Python and numba."""
-    root = Path(__file__).parent
+def source_hash(place: str = "", without: Sequence[str] = APART) -> str:
+    """Return 16 hex digits: a hash of the sources below ``place``, and of the versions of Python and numba."""
+    root = Path(__file__).parent / place
     digest = hashlib.sha256(f"{sys.implementation.cache_tag} {numba.__version__}".encode())
     for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] in WITHOUT_KERNELS:
+        if path.relative_to(root).parts[0] in without:
             continue
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def base_folder() -> Path:
-    """Folder for caches: ``NUMBA_CACHE_DIR`` where set, else the user's cache folder."""
-    if config.CACHE_DIR:
-        return Path(config.CACHE_DIR)
-    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
-        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
+def cache_folder(place: str = "", without: Sequence[str] = APART) -> Path | None:
+    """Return the folder for this state of the sources, created and proved writable; None if there is none.
 
-
-def cache_folder() -> Path | None:
-    """Return the folder for this state of the sources, created and proved writable; None if there is none."""
+    It is below ``NUMBA_CACHE_DIR`` where that is set.
+    """
     try:
-        folder = base_folder() / f"kernels-{source_hash()}"
+        folder = Path(config.CACHE_DIR or base_folder()) / f"kernels-{source_hash(place, without)}"
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except (OSError, RuntimeError):  # RuntimeError: no home directory can be determined
         return None
+
+
+def cache_folders() -> tuple[Path, ...]:
+    """Return the folders of the solver's and of the loop's kernels; the first is named after the sources of both.
+
+    It is for marks that all are compiled.
+    """
+    found = cache_folder(without=WITHOUT_KERNELS), cache_folder(), cache_folder("exact/kernels")
+    return tuple(folder for folder in found if folder is not None)
 
 
 CACHE_FOLDER = cache_folder()
@@ -87,12 +93,13 @@ KERNEL: Any = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 INNER: Any = KERNEL | {"no_cpython_wrapper": True}
 
 
-def _compiled(function: F, *, cache: bool, **options: bool) -> F:
-    told = {} if CACHE_FOLDER is None else {"CACHE_DIR": str(CACHE_FOLDER)} | LOCATION
+def compiled(function: F, folder: Path | None, *, cache: bool, **options: Any) -> F:
+    """Compile a function; ``folder`` keeps its machine code."""
+    told = {} if folder is None else {"CACHE_DIR": str(folder)} | LOCATION
     before = {name: getattr(config, name) for name in told}
     try:
         vars(config).update(told)
-        result: F = njit(function, cache=cache and CACHE_FOLDER is not None, **options)
+        result: F = njit(function, cache=cache and folder is not None, **options)
         return result
     finally:
         vars(config).update(before)
@@ -105,7 +112,7 @@ def kernel(function: F) -> F:
     nothing, and call other kernels as module globals: a closure over a compiled function would miss the cache in
     every run.
     """
-    return _compiled(function, cache=True, **KERNEL)
+    return compiled(function, CACHE_FOLDER, cache=True, **KERNEL)
 
 
 def inner_kernel(function: F) -> F:
@@ -113,7 +120,7 @@ def inner_kernel(function: F) -> F:
 
     Without the wrapper that unpacks Python arguments they compile in two thirds of the time.
     """
-    return _compiled(function, cache=False, **INNER)
+    return compiled(function, CACHE_FOLDER, cache=False, **INNER)
 
 
 def spliced_kernel(function: F) -> F:
@@ -123,7 +130,7 @@ def spliced_kernel(function: F) -> F:
     bodies and rows moves a hundred and fifty of them. Of functions that a step calls for each contact this cost up to
     half of its time.
     """
-    return _compiled(function, cache=False, forceinline=True, **INNER)
+    return compiled(function, CACHE_FOLDER, cache=False, forceinline=True, **INNER)
 
 
 def from_python(function: F) -> F:

@@ -214,16 +214,11 @@ class ReferenceEngine(Engine):
         return {"friction": told, "friction_impulse": told}
 
     def kernels(self) -> Path | None:
-        """Folder of the solver's kernels; None without compilation, or without a writable folder.
+        """Folder for marks, named after all sources; None without compilation, or without a writable folder.
 
-        Damaged files, as after a power cut, are thrown away.
+        Damaged files of kernels, as after a power cut, are thrown away.
         """
-        from reference_solver import compilation
-
-        folder = None if compilation.config.DISABLE_JIT else compilation.cache_folder()
-        if folder is not None:
-            _heal(folder)
-        return folder
+        return next(iter(_heal_kernels()), None)
 
     def snippet(self, settings: Mapping[str, Any], names: Collection[str], scene: Scene, dt: float) -> str:
         """Python: the solver's settings."""
@@ -231,23 +226,28 @@ class ReferenceEngine(Engine):
         return f"from reference_solver import Settings\n\nSettings(dt={dt:.9g}, {changed})"
 
 
-@cache
-def _heal_once() -> None:
-    """Look at the kernels before the first world of this process."""
+def _heal_kernels() -> tuple[Path, ...]:
+    """Heal the folders of these sources, and return them."""
     from reference_solver import compilation
 
-    if compilation.CACHE_FOLDER is not None and not compilation.config.DISABLE_JIT:
-        _heal(compilation.CACHE_FOLDER)
+    folders = () if compilation.config.DISABLE_JIT else compilation.cache_folders()
+    _heal(*folders)
+    return folders
 
 
-def _heal(folder: Path) -> None:
-    """Delete damaged files of kernels, and the marks in ``folder`` that say that all are compiled.
+#: Looks at the kernels before the first world of this process.
+_heal_once = cache(_heal_kernels)
+
+
+def _heal(*folders: Path) -> None:
+    """Delete damaged files of kernels, and the marks that say that all are compiled.
 
     numba renames files that are complete, so none is damaged because it is being written.
     """
     with suppress(OSError):
-        damaged = [path for path in folder.rglob("*.nb[ic]") if not _is_whole(path)]
-        for path in damaged + [path for path in folder.iterdir() if damaged and path.is_file()]:
+        damaged = [path for folder in folders for path in folder.rglob("*.nb[ic]") if not _is_whole(path)]
+        marks = [path for folder in folders for path in folder.iterdir() if path.is_file()]
+        for path in damaged and damaged + marks:
             path.unlink(missing_ok=True)
         if damaged:
             count = "1 damaged file" if len(damaged) == 1 else f"{len(damaged)} damaged files"

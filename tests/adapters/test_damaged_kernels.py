@@ -1,4 +1,4 @@
-"""Files of compiled kernels that a power cut has damaged are thrown away, with the marks that all are there."""
+"""Marks that all kernels are compiled are of these sources; files that a power cut has damaged take them away."""
 
 import os
 import subprocess
@@ -8,8 +8,10 @@ from pickletools import genops
 
 import pytest
 
+from adapters import registry
 from adapters.plain import Notice, is_visible
 from adapters.reference import engine
+from reference_solver import compilation
 
 KERNEL = "import numba\n\n@numba.njit(cache=True)\ndef double(x):\n    return x + x\n\nprint(double(1.5))\n"
 
@@ -82,3 +84,30 @@ def test_kernel_with_an_empty_index(called):
         engine._heal(folder)
     (folder / "small.py").write_text(KERNEL)
     assert call().stdout.strip() == "3.0" and index.stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("file", "covered"),
+    [("coulomb.py", True), ("exact/kernels/rows.py", True), ("exact/cones.py", True), ("certificate/truth.py", False)],
+)
+def test_marks_of_compiled_kernels_after_an_edit(tmp_path, monkeypatch, file, covered):
+    """A run looks for marks: with one of other sources it would compile without a word."""
+    source = tmp_path / file
+    source.parent.mkdir(parents=True, exist_ok=True)
+    source.write_text("x = 1")
+    monkeypatch.setattr(compilation, "__file__", str(tmp_path / "compilation.py"))
+    monkeypatch.setattr(compilation.config, "CACHE_DIR", str(tmp_path / "kept"))
+    before = registry.load("reference").kernels()
+    source.write_text("x = 2")
+    assert (registry.load("reference").kernels() != before) == covered
+
+
+def test_damaged_kernels_of_the_event_loop(tmp_path, monkeypatch):
+    monkeypatch.setattr(compilation.config, "CACHE_DIR", str(tmp_path))
+    damaged = compilation.cache_folder("exact/kernels") / "sweep.nbi"
+    mark = registry.load("reference").kernels() / "compiled-0"
+    for path in (damaged, mark):
+        path.write_text("")
+    with pytest.warns(Notice):
+        assert registry.load("reference").kernels() == mark.parent
+    assert not damaged.exists() and not mark.exists()
