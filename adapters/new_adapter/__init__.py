@@ -10,9 +10,12 @@ tests/test_conformance.py       one test for each check
 
 from __future__ import annotations
 
+import builtins
 import keyword
 import re
+import sys
 from importlib.resources import files
+from importlib.util import find_spec
 from inspect import cleandoc
 from pathlib import Path
 
@@ -71,15 +74,17 @@ def write_package(name: str, into: Path, pipe: bool = False) -> list[Path]:
     Raises
     ------
     EngineError
-        If that is no name for a module, if an engine has it already, or if there is such a folder.
+        If that is no name for a module, if Python, an engine or a package has it already, or if there is such a folder.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or len(name) > NAME:
         raise EngineError(f"name: {one_line(name, NAME)!r} must be made of a-z, 0-9 and _, and begin with a letter")
-    if keyword.iskeyword(name):
-        raise EngineError(f"name: {name!r} is a word of Python")
+    if name in {*keyword.kwlist, *sys.stdlib_module_names, *dir(builtins), "nan", "inf", "infinity"}:
+        raise EngineError(f"name: {name!r} is a word, module or number of Python")
     if name in registry.names():
         raise EngineError(f"name: there is an engine called {name!r} already")
     folder, package = into / name, f"crosscheck_{name}"
+    if find_spec(package):
+        raise EngineError(f"name: there is a package {package!r} already")
     if folder.exists():
         raise EngineError(f"name: {folder} is there already")
     words = {

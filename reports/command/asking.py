@@ -12,7 +12,7 @@ import click
 
 from reports.command.group import AS_JSON, main
 from reports.symptoms import OUTSIDE
-from reports.symptoms.answers import COMMAND, NOTHING, PAGE, SCENE, SEVERAL, answer
+from reports.symptoms.answers import COMMAND, NOTHING, PAGE, SCENE, SEVERAL, answer, near
 
 Plain = Mapping[str, Any]
 #: How a situation of one's own is posed.
@@ -39,7 +39,9 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     for line in _LINES[told["answer"]](told, text):
         click.echo(line)
     if told["missed"]:
-        click.echo(click.style(_wrapped(f"no match for: {', '.join(told['missed'])}"), dim=True))
+        meant = near(told["missed"])
+        missed = [f"{word} (did you mean {meant[word]!r}?)" if word in meant else word for word in told["missed"]]
+        click.echo(click.style(_wrapped(f"no match for: {', '.join(missed)}"), dim=True))
     if told["strangers"]:
         click.echo(_wrapped(f"no adapter for: {', '.join(told['strangers'])}; crosscheck list engines"))
 

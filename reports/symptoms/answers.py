@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,8 @@ from reports.symptoms import OUTSIDE, Found, Match, search, table
 SCENE, COMMAND, SEVERAL, PAGE, NOTHING = "scene", "command", "several", "page", "nothing"
 #: Candidates where no match is clear, and lines about what an engine does where nothing is set.
 CANDIDATES, LINES = 3, 4
+#: Share of a word that another one has at least, where that one may be meant: four letters of five.
+ALIKE = 0.8
 
 Plain = dict[str, Any]
 
@@ -58,6 +61,13 @@ def answer(question: str) -> Plain:
     if first.name in kept["topics"]:
         return told | _of_topic(first.name, found.engines) | {"answer": COMMAND, "missed": [], "unset": unset}
     return told | {"answer": PAGE, "title": first.line, "page": f"{first.name}.md"}
+
+
+def near(words: Sequence[str]) -> dict[str, str]:
+    """Of words that nothing has those that may be a misspelt engine, scene or topic, each with that name."""
+    known = [name for kind in ("names", "scenes", "topics") for name in table()[kind]]
+    close = {word: difflib.get_close_matches(word.lower(), known, n=1, cutoff=ALIKE) for word in words}
+    return {word: found[0] for word, found in close.items() if found}
 
 
 def _is_number(word: str, source: str) -> bool:

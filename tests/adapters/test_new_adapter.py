@@ -30,7 +30,7 @@ def test_json_names_the_files_that_were_written(tmp_path):
     assert told["name"] == "mine" and [Path(file).is_file() for file in told["files"]] == [True] * 3
 
 
-@pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "a" * 200])
+@pytest.mark.parametrize("name", ["", "My Engine", "../out", "class", "7up", "chipmunk", "nan", "json", "a" * 200])
 def test_invalid_name_of_an_adapter_refused(tmp_path, name):
     done = make(tmp_path, name)
     assert done.exit_code == 2 and "name: " in done.output and not list(tmp_path.iterdir())
@@ -38,7 +38,13 @@ def test_invalid_name_of_an_adapter_refused(tmp_path, name):
 
 def test_word_of_python_as_a_name(tmp_path):
     """It said that 'class' must be made of letters."""
-    assert "name: 'class' is a word of Python" in make(tmp_path, "class").output
+    assert "name: 'class' is a word, module or number of Python" in make(tmp_path, "class").output
+
+
+def test_name_of_a_package_that_is_installed(tmp_path, monkeypatch):
+    (tmp_path / "crosscheck_mine.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "name: there is a package 'crosscheck_mine' already" in make(tmp_path, "mine").output
 
 
 def test_existing_folder_of_an_adapter_unchanged(tmp_path):

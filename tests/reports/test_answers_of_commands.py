@@ -334,7 +334,7 @@ def test_bench_options_refused_before_the_run(tmp_path):
 # ---- cells that are chosen -------------------------------------------------------------------------------------------
 
 
-def test_options_become_a_request_field_by_field_and_its_words():
+def test_request_and_its_words_of_each_option():
     options = selection.Cases(
         scenes=("stack", "imp*", "stack"), engine=("chipmunk",), profile=("tuned", "default"), dim=(3, 2),
         dt=("1/60", "0.01"), iterations=(4, 7), param=("n=2",), full=True, set=("damping=0.5",),

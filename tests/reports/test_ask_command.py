@@ -73,12 +73,17 @@ def test_scenes_of_public_reports():
     assert len(REPORTS) == 39 and not wrong
 
 
+def test_misspelt_names_in_a_symptom():
+    assert asked("bulet").endswith("no match for: bulet (did you mean 'bullet'?)\n")
+    assert "(did you mean 'bounce'?)" in asked("bonce") and "did you mean" not in asked("helicopter")
+
+
 def test_contact_force_that_reads_zero():
     for question in ("contact force reads zero", "contact forces of a block at rest on a slope do not balance"):
         assert "crosscheck forces ENGINE" in asked(*question.split())
 
 
-def test_ball_at_a_seam_without_the_fix_of_a_sliding_box():
+def test_ball_at_a_seam_without_a_fix():
     """That fix makes the ball hop higher."""
     said = " ".join(asked("ball", "hops", "at", "the", "seam", "of", "two", "boxes", "bullet").split())
     assert "crosscheck cure bullet my-scene.toml" in said and "linearDamping" not in said
@@ -189,11 +194,11 @@ def test_reason_of_an_engine_that_cannot_run_the_scene():
      ("falling body stops accelerating rapier", SCENE, "limit of speed [m/s]: 400"),
      ("damping slows down the ball mujoco", SEVERAL, "linear damping [1/s]: 0")],
 )  # fmt: skip
-def test_defaults_of_a_named_engine_in_each_kind_of_answer(words, kind, row):
+def test_defaults_of_a_named_engine_in_every_answer(words, kind, row):
     assert answer(words)["answer"] == kind and row in " ".join(asked(*words.split()).split())
 
 
-def test_name_of_the_engine_in_the_command_of_a_topic():
+def test_engine_in_the_command_of_a_topic():
     assert "crosscheck forces rapier" in asked("contact", "force", "reads", "zero", "rapier")
 
 

@@ -319,7 +319,7 @@ def test_missing_run_refused_without_creating_a_folder(tmp_path):
     assert not (tmp_path / "not there").exists()
 
 
-def test_side_of_a_comparison_by_last_run_and_last_bench(page_folder, monkeypatch):
+def test_comparison_of_last_run_with_last_bench(page_folder, monkeypatch):
     kept = Store.run
     monkeypatch.setattr(Store, "run", lambda self, name: replace(found := kept(self, name), commit=f"at {found.id}"))
     store = Store(page_folder, create=False)

@@ -29,7 +29,7 @@ TOLD = Observation(FLAT, "cell-1", VERSION, "7.2.0", Outcome.OK, "", METRICS, "h
 LOST = Observation(SOLID, "cell-2", VERSION, "3.2.7", Outcome.CRASHED, "signal 11")
 
 
-def test_metric_lines_per_cell_and_for_a_cell_without_metrics():
+def test_parquet_lines_of_cells_with_and_without_metrics():
     lines = list(parquet._metrics([(RUN, [TOLD, LOST]), (EARLIER, [LOST])]))
     cell = {
         "run": "20260102-030405", "date": "2026-01-02T03:04:05", "commit": "abc+", "engine": "chipmunk",

@@ -174,7 +174,7 @@ def test_list_describe_and_doctor_speak_json(one_run):
     assert set(json.loads(doctor.stdout)["packages"]) == {"reference_solver", "adapters", "validation", "reports"}
 
 
-def test_equal_bits_in_fresh_folders_with_any_number_of_jobs(tmp_path):
+def test_bits_of_results_with_any_number_of_jobs(tmp_path):
     tables = []
     for name, jobs in (("a", 1), ("b", 2)):
         result = call("run", "impact", "--dim", 2, "--engine", "chipmunk", "--out", tmp_path / name,

@@ -140,7 +140,7 @@ def refused(call, *given):
     return str(error.value)
 
 
-def test_file_in_place_of_a_folder_and_folder_not_empty():
+def test_output_to_a_file_or_a_full_folder():
     parameter = click.Option(["--junit", "junit_path"])
     assert files.FILE.convert("a/b.xml", None, None) == Path("a/b.xml")
     assert refused(files.FILE.convert, "a/", parameter, None) == "junit_path: a/ is a folder, not a file"

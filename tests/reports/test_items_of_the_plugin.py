@@ -60,7 +60,7 @@ def test_plugin_items_after_the_existing_tests(monkeypatch):
     assert asked == [("a session", {"name": "crosscheck", "nodeid": "crosscheck", "plugin": plugin})]
 
 
-def test_report_of_a_failed_check_and_place_of_an_error(monkeypatch):
+def test_plugin_report_of_a_failure_and_an_error(monkeypatch):
     item = SimpleNamespace(name="a cell::speed")
     assert _Check.repr_failure(item, SimpleNamespace(value=Failed("its report"))) == "its report"
     monkeypatch.setattr(pytest.Item, "repr_failure", lambda self, excinfo, style=None: f"trace of {excinfo.value}")

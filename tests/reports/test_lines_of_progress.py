@@ -26,7 +26,7 @@ def asked(monkeypatch):
     return slots
 
 
-def test_progress_line_of_a_cell_and_alarm_for_a_new_break(asked, capsys):
+def test_progress_lines_of_a_cell_and_a_break(asked, capsys):
     assert posing.compare_and_show(SLOTS, True) is False and asked == SLOTS
     said = re.sub(r"\x1b\[([0-9;]*)m", r"{\1}", capsys.readouterr().err)
     assert said.splitlines() == [f"{{2}}{s.engine}/tuned stack {s.dimension}-D{{0}}" for s in SLOTS]

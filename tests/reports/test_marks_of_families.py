@@ -45,7 +45,7 @@ def judged_row(**changed):
     return {**row, **changed}
 
 
-def test_worst_row_of_a_column_with_place_error_and_passes():
+def test_worst_row_of_each_column():
     """A cell at its scene's defaults is called so; what stands in brackets is which of the same kind it is."""
     other = judged_row(metric="apex", value=0.64, error=1e-6, physics="pass", standing=None)
     asked = judged_row(metric="apex", params={"e": 0.8}, iterations=7, error=-0.2)

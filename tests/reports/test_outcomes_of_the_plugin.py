@@ -127,7 +127,7 @@ def test_report_of_value_truth_and_reproduction():
     assert _report(found).splitlines()[::3] == ["no value   signal 11", "standing   crashed: signal 11"]
 
 
-def test_completion_of_row_names_by_the_worst_of_each_family(monkeypatch, tmp_path):
+def test_completion_of_row_names(monkeypatch, tmp_path):
     import reports.exports
     import reports.findings
     import reports.wording

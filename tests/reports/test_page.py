@@ -631,7 +631,7 @@ def test_equal_cures_told_once_with_references():
     assert [c.paste for c in found[1:4]] == ["", other.paste, "iterations = 31"]  # lines of its own stay with a scene
 
 
-def test_page_of_a_run_without_an_engine_of_the_last_bench(page_source):
+def test_page_without_an_engine_of_the_bench(page_source):
     """The run is of later, of one engine less than the bench of the same folder: the page shows both all the same."""
     gone = page_source.engines[-1]
     assert any(observation.slot.engine == gone for observation in page_source.bench.observations)

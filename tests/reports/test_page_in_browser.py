@@ -111,7 +111,7 @@ def test_what_a_link_leads_to_opens_without_javascript(browser, page_file):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_reason_and_cure_of_the_worst_value_in_the_findings(browser, page_file):
+def test_reason_and_cure_in_the_findings(browser, page_file):
     with opened(browser, page_file, "#bounce-2") as page:
         page.locator("#bounce-2 details.check").first.evaluate("node => node.open = true")
         page.locator("#bounce-2 .worst li", has_text="bullet/default").first.locator("a").click()
@@ -276,7 +276,7 @@ def test_the_explorer_follows_its_slider_and_its_presets(browser, page_file):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_switched_off_engine_left_out_and_kept_in_the_address(browser, page_file):
+def test_switched_off_engine_in_the_address(browser, page_file):
     who, other = "bullet/default", "bullet/tuned"
     charts, rows = f".canvas [data-who='{who}']", f"#impact-2 tr[data-who='{who}']"
 
@@ -327,7 +327,7 @@ def test_tables_and_plots_can_be_saved(browser, page_file, kind):
 
 
 @pytest.mark.usefixtures("bullet")
-def test_heading_of_a_group_of_rows_in_a_saved_table(browser, page_file):
+def test_headings_of_groups_in_a_saved_table(browser, page_file):
     with opened(browser, page_file, "#forces") as page:
         with page.expect_download() as found:
             page.locator("#forces-bullet ~ button.save").first.click()

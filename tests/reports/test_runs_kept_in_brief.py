@@ -52,7 +52,7 @@ def test_judged_run_not_judged_again(stored, monkeypatch):
     assert none == (pytest.approx(0.25), 0, 0, 0), "no row is not the same as not judged"
 
 
-def test_run_judged_once_and_again_after_changed_code_or_results(stored, monkeypatch):
+def test_judgement_kept_until_code_or_results_change(stored, monkeypatch):
     store, run, _ = stored
     asked = []
     monkeypatch.setattr(brief, "rows_of", lambda *given: asked.append(given) or rows_of(*given))

@@ -265,7 +265,7 @@ def test_script_with_the_loop_of_a_matched_profile(scene, params, tmp_path):
 
 @pytest.mark.parametrize("engine", cases((name,) for name in (*USUAL, *sorted(OPTIONAL))))
 @pytest.mark.parametrize("values", [PLANAR, SPATIAL], ids=["planar", "spatial"])
-def test_script_of_a_scene_file_with_loads_and_a_driven_body(engine, values, tmp_path):
+def test_script_of_loads_and_a_driven_body(engine, values, tmp_path):
     found = installed(engine)
     if values["d"] == 3 and found.facts.dimensions == {2}:
         pytest.skip(f"{engine} is planar: it has no spatial script")
@@ -381,7 +381,7 @@ def test_script_of_other_shapes(engine, values, tmp_path):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("profile", ["default", "tuned"])
-def test_mjcf_from_its_keyframe_to_the_bits_of_its_cell(dimension, profile):
+def test_bits_of_an_exported_mjcf(dimension, profile):
     mujoco = pytest.importorskip("mujoco")
     slot = slot_of("mujoco", "masse", {}, profile, dimension) if dimension == 3 else slot_of(
         "mujoco", "off_centre", {}, profile, 2

@@ -131,7 +131,7 @@ def test_binding_cost_per_engine_in_table_order():
         (0, False, "no case of the same"),
     ],
 )
-def test_two_benches_agree_where_nearly_all_of_their_ratios_do(monkeypatch, count, enough, said):
+def test_agreement_of_two_benches(monkeypatch, count, enough, said):
     both = pd.DataFrame(
         {**NAMES, "dt": 1 / 240, "iterations": 10, "params_text": f"n={k}", "ratio_1": 1.0 + k, "ratio_low_1": 0.9 + k,
          "ratio_high_1": 1.125 + k, "ratio_2": 1.25 + k, "ratio_low_2": 1.2 + k, "ratio_high_2": 1.4 + k,
@@ -336,7 +336,7 @@ def test_tile_of_a_sinking_stack_with_its_depth():
      (f"full: {' '.join(CATALOGUE)} --dim 3 --engine bullet", "--dim 3 --engine bullet --full"),
      (f"standard: {' '.join(CATALOGUE)}", "--standard")],
 )  # fmt: skip
-def test_a_page_says_how_it_is_cited_and_made_again(monkeypatch, title, again):
+def test_citation_and_command_on_a_page(monkeypatch, title, again):
     monkeypatch.setattr(page, "package_version", lambda: "1.2.3")
     bench = SimpleNamespace(run=SimpleNamespace(title="bench quick: impact --dim 2"))
 

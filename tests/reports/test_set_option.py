@@ -50,7 +50,7 @@ def ran(tmp_path_factory):
     return out, rows
 
 
-def test_rows_are_of_a_profile_of_that_name_without_standing(ran):
+def test_profile_of_rows_with_own_settings(ran):
     _, rows = ran
     assert {(row["engine"], row["profile"]) for row in rows} == {("chipmunk", PROFILE)}
     assert {row["outcome"] for row in rows} == {"ok"} and {row["standing"] for row in rows} == {None}
@@ -85,7 +85,7 @@ def test_lines_per_setting_under_a_long_scene_name():
         assert "".join(text.split("mujoco")[1].split()).startswith(name.partition("+")[0])
 
 
-def test_row_with_own_settings_found_by_name_and_by_set(ran):
+def test_search_of_a_row_with_own_settings(ran):
     out, rows = ran
     (failing, *_) = [row for row in rows if row["physics"] == "fail"]
     found = json.loads(call("findings", "--profile", PROFILE, "--json", "--out", out, status=0).output)
@@ -130,7 +130,7 @@ def test_command_that_runs_a_row_again(ran):
         assert again == slot_from_dict(row["slot"])
 
 
-def test_the_same_command_resumes_and_another_value_is_another_run(ran, tmp_path):
+def test_resumed_run_with_the_same_settings(ran, tmp_path):
     _, rows = ran
     call("run", "bounce", "--param", "e=0.5", "--dim", 2, "--set", "damping=0.25", "--out", tmp_path, status=0)
     store = Store(tmp_path)

@@ -80,7 +80,7 @@ def test_a_results_folder_without_a_name_is_refused(command):
     assert one_line(result).startswith("crosscheck: out: is empty")
 
 
-def test_a_side_of_a_comparison_without_a_name_is_refused(tmp_path):
+def test_comparison_without_a_name(tmp_path):
     """It was the folder that one was in."""
     result = call("compare", "", str(tmp_path))
     assert result.exit_code == statuses.WRONG_CALL

@@ -68,7 +68,7 @@ def shown(rows, width, **more):
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
-def test_matrix_in_the_first_thirty_lines_of_the_quick_suite(width):
+def test_matrix_in_thirty_lines_of_the_quick_suite(width):
     lines = shown(quick_suite(), width)
     assert max(map(len, lines)) <= width
     head = lines[:30]
@@ -89,7 +89,7 @@ def test_scenes_that_do_not_fit_make_a_further_table():
     assert max(map(len, lines)) <= 60
 
 
-def test_a_sweep_over_iterations_is_counted_apart_from_the_profile():
+def test_counts_of_a_sweep_over_iterations():
     rows = [row("stack", 2, "bullet", "tuned", "known" if k < 3 else "pass", n=k) for k in range(9)]
     rows += [row("stack", 2, "bullet", "tuned", "known", iterations=count, n=10) for count in (1, 4)]
     found = matrix_of(rows)
@@ -108,7 +108,7 @@ def test_constant_answer_in_one_clause_with_its_cure():
 
 
 @pytest.mark.parametrize(("shipped", "told"), [("pass", False), ("known", True)])
-def test_cost_of_a_profile_shown_only_where_it_is_recommended(shipped, told):
+def test_cost_of_a_recommended_profile(shipped, told):
     """Beside "Every check passes" it read as a failure of the run."""
     rows = [row("impact", 2, "mujoco", "default", shipped, 0.5), row("impact", 2, "mujoco", "tuned")]
     rows += [row("impact", 2, "bullet", "default"), row("impact", 2, "bullet", "tuned")]
@@ -134,7 +134,7 @@ def test_bounce_told_as_restitution():
     assert answer.cure == "no other profile was run in this case; crosscheck cure bullet bounce searches for settings"
 
 
-def test_number_of_a_scene_file_with_name_and_search_command(tmp_path):
+def test_numbers_of_scene_files_in_a_summary(tmp_path):
     """A file has no parameters that a truth could follow."""
     path = tmp_path / "a.toml"
     path.write_text(FALL)
@@ -258,7 +258,7 @@ def test_time_cut_off_by_the_end_not_shown():
     assert answer.wrong == "never settles (n=10)"
 
 
-def test_a_ratio_has_no_unit_and_everything_else_has_one():
+def test_units_of_ratios_and_other_values():
     assert quantity(0.102934, "1", 6) == "0.102934"
     assert quantity(5.4, "N s") == "5.4 N s"
     assert quantity(None, "m") == "-"
@@ -306,7 +306,7 @@ def shown_only(rows):
             for each in rows]  # fmt: skip
 
 
-def test_numbers_that_are_shown_without_a_truth_are_no_failures():
+def test_numbers_without_a_truth_in_a_summary():
     judged, shown_beside = [row("impact", 2, "bullet", "tuned")], shown_only([row("impact", 2, "bullet", "tuned")])
     assert "Every check passes" in shown(judged + shown_beside, 100)
     text = "\n".join(shown(shown_beside, 100))
@@ -316,7 +316,7 @@ def test_numbers_that_are_shown_without_a_truth_are_no_failures():
     assert any(line.startswith("Only checks at other iteration counts fail") for line in shown(judged + starved, 100))
 
 
-def test_refusals_of_the_catalogue_are_not_repeated_where_others_answer():
+def test_refusals_beside_answers_of_others():
     rows = [row("impact", 3, "chipmunk", "tuned", "unsupported") | REFUSED, row("impact", 3, "bullet", "tuned")]
     text = "\n".join(shown(rows, 100))
     assert "chipmunk is planar" not in text and "Nothing was judged" not in text
@@ -495,7 +495,7 @@ def test_explain_with_truth_tolerance_reason_and_cure(two_engines):
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize("e", [1.0, 0.7])
-def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
+def test_explanation_without_a_profile_of_no_rank(e, tmp_path):
     """MuJoCo's `matched` rebounds by a loop around the solver, which no settings have: pasted without it, they do not.
 
     e = 0.7 is no standard case, of which nothing is listed.
@@ -511,7 +511,7 @@ def test_explain_tells_no_profile_without_a_rank_as_a_cure(e, tmp_path):
 
 
 @pytest.mark.parametrize(("outcome", "physics"), [("invalid", None), ("ok", "pass")])
-def test_explain_gives_the_reason_of_a_row_that_fails_nothing(outcome, physics, two_engines, monkeypatch):
+def test_explanation_of_a_row_without_failures(outcome, physics, two_engines, monkeypatch):
     """One that is not certified, or one that passes alone after it ended a process of others."""
     out, _ = two_engines
     why = "certificate: a contact pulls"
@@ -521,7 +521,7 @@ def test_explain_gives_the_reason_of_a_row_that_fails_nothing(outcome, physics, 
     assert [line.split(None, 1)[1].strip() for line in lines if line.startswith("reason")] == [why]
 
 
-def test_explain_says_how_far_a_planar_scene_left_its_plane(two_engines, monkeypatch):
+def test_explanation_of_a_departure_from_the_plane(two_engines, monkeypatch):
     out, _ = two_engines
     row = ("explain", "mujoco/default/bounce/apex", "--out", out)
     assert "off plane" not in call(*row).stdout
@@ -589,7 +589,7 @@ def test_a_run_is_judged_once_for_all_commands(two_engines, monkeypatch):
         ("toy/tuned/my/a b", {"scene": "my", "metric": "a b"}),
     ],
 )  # fmt: skip
-def test_row_named_by_path_or_name_of_its_scene_file(name, found):
+def test_row_by_path_or_name_of_its_file(name, found):
     """Paths have slashes, and a hash that nobody types."""
     scenes = {"bounce", "/my/a b.toml@0123abcd", "drop.json@89abcdef", "/my/bounce.toml@11111111",
               "two.toml@22222222", "/my/two.toml@33333333"}  # fmt: skip
@@ -602,7 +602,7 @@ def test_ambiguous_scene_file_name_refused_with_paths():
         showing.named_by("toy/tuned/ball/energy_growth", scenes)
 
 
-def test_rows_of_a_scene_file_are_shown_by_its_path(tmp_path):
+def test_rows_of_a_scene_file_by_path(tmp_path):
     pytest.importorskip("pymunk")
     path = tmp_path / "a b.toml"
     path.write_text(
@@ -653,7 +653,7 @@ def test_refusal_of_a_missing_row(two_engines, name):
         (-1e-6, "moves on with 1.0e-6 of its speed; true: rebounds at 1"),
     ],
 )
-def test_values_below_a_millionth_of_the_truth_told_as_zero(value, words):
+def test_values_below_a_millionth_of_the_truth(value, words):
     (answer,) = answers([row("impact", 2, "bullet", "default", "known", value, 1.0, e=1.0, v=1.0)])
     assert answer.wrong == f"{words} (e=1 v=1)"
 

@@ -31,7 +31,7 @@ def test_unsupported_dimension_absent_from_the_summary(tmp_path):
     assert set(pd.read_csv(tmp_path / "sweep.csv").dimension) == {2, 3}
 
 
-def test_grids_and_lists_are_crossed_and_points_are_drawn_together():
+def test_points_of_crossed_grids_and_lists():
     study = Study(dict([grid("e=0:1:3"), listed("v=1,2")]), [{"mass": 1.0}, {"mass": 2.0}])
     cells = list(study)
     assert len(cells) == len(study) == 12
@@ -134,7 +134,7 @@ def test_an_interrupted_sweep_is_resumed(tmp_path, monkeypatch):
     results.close()
 
 
-def test_failure_of_a_study_without_alarm_and_crash_with_one(tmp_path, plugins):
+def test_failure_and_crash_in_a_study(tmp_path, plugins):
     pytest.importorskip("pybullet")
     words = ("sweep", "impact", "--list", "v=3", "--dim", "2", "--jobs", 1)
     call(*words, "--engine", "bullet", "--profile", "default", "--out", tmp_path / "a")

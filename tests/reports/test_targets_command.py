@@ -60,7 +60,7 @@ def test_targets_table_by_opponent_within_a_hundred_columns():
     )
 
 
-def test_json_has_a_row_for_each_ratio_with_both_errors(measured, tmp_path):
+def test_json_rows_of_ratios_with_both_errors(measured, tmp_path):
     result = call("--json", "--seed", 7, "--out", tmp_path / "none")
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
@@ -84,7 +84,7 @@ def test_scene_outside_the_table_refused(measured):
     assert refused.exit_code == 2 and "the table has no scene 'hilltop', only bounce, stack" in refused.output
 
 
-def test_without_a_stored_benchmark_there_is_no_row_of_it(measured, tmp_path):
+def test_targets_without_a_stored_benchmark(measured, tmp_path):
     for made in (False, True):
         if made:
             Store(tmp_path).close()

@@ -123,7 +123,7 @@ def test_settings_and_habits_of_a_plugin(monkeypatch):
     assert flat(result.stdout).count(said) >= 6
 
 
-def test_reasons_of_settings_have_room_beside_half_a_hundred_scenes(monkeypatch):
+def test_room_for_reasons_beside_many_scenes(monkeypatch):
     """Four settings of forty of fifty scenes: named once, as all but ten, and a reason of 30 letters stays whole."""
     data = listing.describe("chipmunk")
     if data["status"] != "installed":
@@ -173,7 +173,7 @@ def test_a_reason_that_checks_share_is_listed_once(monkeypatch):
     assert ["as above" in lines[check["name"]] for check in plain[1:]] == shared
 
 
-def test_one_line_per_check_with_the_place_of_its_reason():
+def test_line_of_a_check_with_its_reason():
     """At 80 columns the reasons made 1801 lines of some 300."""
     plain = json.loads(call("list", "checks", "--json").stdout)
     told = CliRunner(env={"COLUMNS": "80"}).invoke(main, ["list", "checks"]).stdout.splitlines()

@@ -37,7 +37,7 @@ def shown(run, observations, plan, width=80, terminal=False):
     return counts, text.getvalue().splitlines(), verdicts.rows(run)
 
 
-def test_rows_in_the_order_of_the_plan_whatever_ends_first(kept):
+def test_order_of_rows_while_running(kept):
     run, observations = kept
     plan = [observation.slot for observation in observations]
     whole = rows_of(run.id, observations, plan)
@@ -70,7 +70,7 @@ def test_a_wide_terminal_has_profiles_below_each_other(kept):
     assert len(own) > 5 and len({line.index("tuned") for line in own}) == 1 and " of " in "".join(own)
 
 
-def test_no_control_characters_without_a_terminal_and_colours_with_one(kept):
+def test_control_characters_with_and_without_a_terminal(kept):
     run, observations = kept
     plan = [observation.slot for observation in observations]
     _, lines, _ = shown(run, observations, plan)

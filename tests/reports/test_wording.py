@@ -75,7 +75,7 @@ def test_first_of_many_names():
     assert first_of(list("abcdef")) == "a, b, c, d and 2 more"
 
 
-def test_a_plain_number_keeps_the_digits_it_was_asked_for():
+def test_digits_of_a_plain_number():
     assert number(1.234567891, 9) == "1.23456789"
 
 
@@ -121,7 +121,7 @@ def test_parameters_are_named_and_parted_by_a_space():
 
 
 @pytest.mark.parametrize("outcome", ["crashed", "timed_out", "missing", "invalid", "not_installed"])
-def test_a_cell_without_an_answer_is_marked_by_its_outcome(outcome):
+def test_mark_of_a_cell_without_an_answer(outcome):
     assert mark_of({"outcome": outcome, "physics": None, "standing": None}) == outcome
 
 
@@ -141,12 +141,12 @@ def test_command_with_every_question_of_a_row():
 
 
 @pytest.mark.parametrize("value", [0.1 + 0.2, 1 / 3, 0.8, 6.0, 1e-300])
-def test_a_parameter_in_a_command_is_the_same_number_again(value):
+def test_exact_parameter_in_a_command(value):
     _, options = options_of(reproduce({**SLOT, "params": {"e": value}}))
     assert float(dict(options)["--param"].partition("=")[2]) == value
 
 
-def test_a_command_without_parameters_names_the_first_with_its_default():
+def test_command_of_default_parameters():
     _, options = options_of(reproduce({**SLOT, "params": {}}))
     first = CATALOGUE["impact"].parameters[0]
     assert [value for name, value in options if name == "--param"] == [f"{first.name}={first.default:.12g}"]

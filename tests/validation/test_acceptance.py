@@ -49,7 +49,7 @@ def test_new_row_before_and_after_acceptance():
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, 0.5, pytest.approx(4e-3))}
 
 
-def test_rows_without_a_family_as_a_draft_that_needs_a_reason():
+def test_draft_for_rows_without_a_family():
     proposal = propose(rows(), "nameless", None)
     (change,) = proposal.changes
     assert change.is_draft and change.family.profiles == ("default",) and change.family.metrics == ("creep",)
@@ -126,7 +126,7 @@ def test_a_divergence_is_listed_as_one():
     assert accepted(proposal, ["creeps"]) == {KEY: Finding(FAMILY, None, diverged=True)}
 
 
-def test_listing_of_a_pass_that_fails_from_a_moved_start():
+def test_pass_that_fails_from_a_moved_start():
     near = 0.9 * TOLERANCE
     wide = propose(rows(creep=near, moved=0.2 * TOLERANCE), "nameless", listed(FAMILY))
     assert list(wide.changes[0].new) == [KEY]
@@ -389,7 +389,7 @@ def test_rows_of_other_families_kept_without_moved_starts():
     assert [finding.value for finding in accepted(proposal, []).values()] == [0.4]
 
 
-def test_new_row_of_another_family_told_or_refused_by_a_law(monkeypatch):
+def test_new_row_of_another_family(monkeypatch):
     """Naming one family must not make silence of what the others would have said."""
     proposal = propose(rows(moved=None), "nameless", None, lambda key: False)
     assert [row.metric for row in proposal.left_out] == ["creep"]
@@ -634,7 +634,7 @@ def test_number_of_starts_of_bands():
         ((2.0, 2.0, 2.0, 2.0, 2.125, 9.0), 0.25, 0.125),  # the sixth was moved further, for another row
     ],
 )  # fmt: skip
-def test_band_half_width_of_four_times_the_moves_or_the_floor(draws, floor, scatter):
+def test_half_width_of_a_band(draws, floor, scatter):
     row = row_of(value=2.0, truth=1.0, tolerance=0.0, floor=floor)
     assert acceptance._width(row, draws) == max(4.0 * scatter, 2e-6)
 

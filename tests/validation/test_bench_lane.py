@@ -228,7 +228,7 @@ def test_error_of_a_fall_from_the_parabola():
     assert own_error(scene, 0.5, start, fallen) == pytest.approx(0.01)
 
 
-def test_pile_error_by_motion_and_not_by_the_declared_start():
+def test_error_of_a_pile_by_its_motion():
     scene = scene_of(Slot("stack", (("n", 3.0),), 2, "reference", "classical", 1 / 240))
     start = np.array([body.pose for body in scene.bodies], float)
     start[1:, 1] -= [5e-4, 1e-3, 1.5e-3]  # overlaps that an adapter made

@@ -87,7 +87,7 @@ def test_bench_run_beside_other_runs(store):
     assert store.run("latest").id == plain.id
 
 
-def test_work_point_with_worst_phase_error_and_cost_per_second(store):
+def test_work_point_of_the_worst_phase(store):
     run = filled(store, {("a", STEPS[0]): 0.4}, {("a", STEPS[0]): 0.02})
     (point,) = work_points(store, run).to_dict("records")
     assert point["error"] == pytest.approx(0.4) and point["cells"] == 16

@@ -27,7 +27,7 @@ def test_opponents_and_floors_from_the_folders_of_engines():
     assert {name for case in ASKED.cases for name in case.against} == folders
 
 
-def test_scene_of_an_engine_that_is_not_in_the_table(monkeypatch, tmp_path):
+def test_scene_of_an_unlisted_engine(monkeypatch, tmp_path):
     file = tmp_path / "targets.toml"
     file.write_text('role = "shipped"\nsweeps = true\nfloor = "10 sweeps"\n[against]\n"a tower" = []\n')
     monkeypatch.setattr(targets, "inside", lambda name, _: file if name == "chipmunk" else None)

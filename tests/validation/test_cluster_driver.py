@@ -215,7 +215,7 @@ def test_slots_returned_once_and_batches_in_the_journal():
     assert all(abs(note["time"] - notes[0]["time"]) < 60.0 for note in notes)
 
 
-def test_repeatedly_lost_cell_asked_alone_and_told_as_a_crash():
+def test_repeatedly_lost_cell_as_a_crash():
     dead = Future({"lines": [], "left": "", "said": "run-cell ended with -9: killed", "worker": "w"})
     client = Busy([lambda slots: dead] * (1 + MOST_LOST))
     (found,), left, notes, _ = driven(client, cells(1))
@@ -347,7 +347,7 @@ class Process:
         (-9, ['{"slot": 1}\n', '{"err'], ""),
     ],
 )
-def test_answers_of_a_batch_at_once_and_end_of_its_process(monkeypatch, code, answers, left):
+def test_answers_and_process_of_a_batch(monkeypatch, code, answers, left):
     import distributed
 
     heard = []

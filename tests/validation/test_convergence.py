@@ -157,7 +157,7 @@ def test_too_few_errors_told():
     assert limit_of(DTS[:3], [1e-12] * 3) == limit_of(DTS[:3], [0.25] * 3, 0.25) == exact
 
 
-def test_error_plateau_of_three_values_over_a_factor_of_four():
+def test_plateau_of_errors_over_three_steps():
     assert said([9.0, 0.54, 0.45, 0.4]) == (Limit.ELSEWHERE, "levels off at an error of 0.4")
     assert said([9.0, 0.541, 0.45, 0.4])[0] is not Limit.ELSEWHERE
     assert said([0.1, 0.54, 0.45, 0.4])[0] is Limit.ELSEWHERE  # what came before the three is no part of the level
@@ -330,7 +330,7 @@ def test_differences_that_are_the_same_do_not_grow():
     assert (found.limit, found.because) == (Limit.NOISY, "differences do not shrink with one sign")
 
 
-def test_values_equal_but_for_round_off_as_the_finest_one():
+def test_values_equal_but_for_round_off():
     """Round-off of the values is 1e-12: the last one is within twice that of the truth, the one before it is not."""
     found = extrapolated(TRUTH + 2.6e-12, TRUTH + 2.4e-12, TRUTH + 1.8e-12)
     assert found.limit is Limit.TRUTH and found.value == TRUTH + 1.8e-12

@@ -55,7 +55,7 @@ def turned(angle):
     return [(c * x - s * y, s * x + c * y, z) for x, y, z in BRICK]
 
 
-def test_own_moments_for_a_free_hull_off_its_main_axes():
+def test_moments_of_a_hull_off_its_axes():
     wrong = r"^b\.shape\.vertices: the main axes of inertia are not the body's; turn it, or give inertia$"
     with pytest.raises(SceneError, match=wrong):
         centre(body("hull", turned(0.3)), [])

@@ -368,7 +368,7 @@ def test_single_best_setting_beside_a_cure_of_several(monkeypatch):
 
 
 @pytest.mark.parametrize("left, told", [(450.0, True), (451.0, False), (899.0, False)])
-def test_single_setting_with_most_of_the_error_left_not_told(monkeypatch, left, told):
+def test_single_setting_that_leaves_most_error(monkeypatch, left, told):
     def off(s):
         return (0.5 if s.get("a") and s.get("c") else left if s.get("c") else 900.0, 0.5 if s.get("c") else 9.0)
 
@@ -548,7 +548,7 @@ def test_scene_in_other_sizes():
     assert [(check.metric, check.truth, check.bound) for check in small.checks(made, 0.002)] == wanted
 
 
-def test_search_of_a_blow_at_both_ends_of_a_step():
+def test_search_at_both_phases_of_a_blow():
     """MuJoCo's contacts are softer below 1 mm of overlap: a fix of solref alone rebounded there at 0.9 instead of 1."""
     assert len(cures.in_other_size(Slot("pinch", (), 3, "toy", "default", 1 / 240))) == 1
     found = cures.in_other_size(Slot("head_on", (("e", 1.0), ("ratio", 1.0)), 3, "mujoco", "default", 1 / 240))
@@ -561,7 +561,7 @@ def test_search_of_a_blow_at_both_ends_of_a_step():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_mujoco_s_fix_of_head_on_at_both_ends_of_a_step(dimension):
+def test_mujoco_s_fix_of_head_on_by_phase(dimension):
     pytest.importorskip("mujoco")
     changes = cures_of("mujoco")["head_on", dimension].changes
     start = Slot("head_on", (("e", 1.0), ("ratio", 1.0)), dimension, "mujoco", "default", 1 / 240)

@@ -147,7 +147,7 @@ def test_blind_spot_with_changed_values_and_step_allowance(detected):
 
 
 @pytest.mark.long
-def test_blind_spots_not_seen_by_a_check_of_the_same_name(whole):
+def test_blind_spots_of_checks_of_one_name(whole):
     sharp = {(e.scene, e.watcher, e.fault) for e in whole.seen if e.size is not None and e.size <= 0.01}
     assert whole.blind and not [b for b in whole.blind if (b.scene, b.metric, b.fault) in sharp]
     assert all(0.0 < b.moved <= 2.0 * b.allowed for b in whole.blind)  # with the fault and without it hold

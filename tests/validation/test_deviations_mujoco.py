@@ -72,7 +72,7 @@ def test_all_five_numbers_of_an_impact_are_predicted(profile, dimension, e, v, d
 
 
 @pytest.mark.parametrize("mu", [0.03, 0.4, 1.3])
-def test_friction_softens_the_pyramid_of_a_central_impact_as_predicted(mu: float) -> None:
+def test_pyramid_of_a_central_impact_with_friction(mu: float) -> None:
     rows = compare("default", DT, "impact", e=0.5, v=3.3, mu=mu)
     assert_predicted(rows, *IMPACT)
     value, smooth = rows["rebound_ratio"][0], compare("default", DT, "impact", e=0.5, v=3.3)["rebound_ratio"][0]

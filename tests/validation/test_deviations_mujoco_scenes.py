@@ -87,7 +87,7 @@ def test_law_of_a_belt_in_the_room():
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("whirl", [-4.0, -2.0, 2.0])
 @pytest.mark.parametrize("delay", [0.0511, 0.0518, 0.0525])
-def test_energy_loss_of_a_spinning_bar_by_the_step_of_the_blow(delay, whirl, dimension):
+def test_energy_loss_of_a_spinning_bar(delay, whirl, dimension):
     canonical, dt = CATALOGUE["off_centre"], 1 / 960
     params = {"whirl": whirl, "delay": delay}
     scene = canonical.scene(dimension, params)
@@ -99,5 +99,5 @@ def test_energy_loss_of_a_spinning_bar_by_the_step_of_the_blow(delay, whirl, dim
     assert spin.law(scene, dt, canonical.measure) is None
 
 
-def test_no_prediction_of_a_bar_turning_under_a_soft_contact():
+def test_no_prediction_of_a_bar_on_soft_contact():
     assert not list(covering("mujoco", "4.0.1", "default", "off_centre", "spin"))

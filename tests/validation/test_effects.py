@@ -70,7 +70,7 @@ LIMITED = Effect(1.0, "stack", "drift", beyond=0.5, because="at least 1")
         (LIMITED, {"base": "a", "set": "a", "beyond": "a"}, NOTHING),
     ],
 )
-def test_verdict_on_a_setting_by_the_bits_of_its_runs(effect, runs, verdict):
+def test_verdict_on_a_setting_by_bits(effect, runs, verdict):
     assert judged("toy", "1.0", "knob", effect, seen(**runs), 1e-9).verdict == verdict
 
 
@@ -157,7 +157,7 @@ def test_line_on_a_value_that_does_nothing(kept):
     assert told({"erp": 0.5}, version="2.0") == []
 
 
-def test_line_on_a_value_that_was_not_seen_to_act(kept):
+def test_line_on_an_idle_value(kept):
     kept(knob=(Effect(scene="stack"), UNSEEN), loose=(Effect(scene="stack"), ROUNDED))
     (line,) = told({"knob": 0.5, "loose": 1})
     assert line == "knob=0.5 may do nothing in toy 1.0: it changes no bit of scene stack, where it was tried"

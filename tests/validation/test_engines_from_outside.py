@@ -206,7 +206,7 @@ BROKEN_LAWS = [
 
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("code", "said"), BROKEN_LAWS)
-def test_unreadable_laws_named_by_the_doctor_with_the_engine_run(site, tmp_path, code, said):
+def test_unreadable_laws_of_an_engine_that_runs(site, tmp_path, code, said):
     (site / "laws.py").write_text(code)
     forget()
     before = len(laws_of("chipmunk"))
@@ -270,7 +270,7 @@ def test_a_plain_module_brings_an_adapter_only(site, tmp_path):
     assert done.exit_code == 2
 
 
-def test_invalid_colour_or_role_as_a_fault_of_the_engine(site):
+def test_invalid_colour_or_role_of_an_engine(site):
     for text, said in (('COLOUR = "red"\n', "colour is 'red'"), ("COLOUR = 7\n", "colour is '7'")):
         (site / "numbers.py").write_text(text)
         forget()

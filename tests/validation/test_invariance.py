@@ -278,7 +278,7 @@ def compared(monkeypatch, answers):
     return {change.relation: change for change in compare(Slot("off_centre", (), 3, "chipmunk", "tuned", 1 / 240))}
 
 
-def test_scatter_in_the_other_pose_as_a_break_unless_rounded(monkeypatch):
+def test_scatter_in_the_other_pose(monkeypatch):
     """Renumbered, an engine that sees no order gets the same numbers from every start."""
 
     def answers(relation, moves, turns):
@@ -376,7 +376,7 @@ def asked_of(monkeypatch, answers, relations=()):
     return asked, compare(Slot("off_centre", (), 3, "chipmunk", "tuned", 1 / 240), relations)
 
 
-def test_starts_moved_once_per_size_and_turned_only_if_needed(monkeypatch):
+def test_number_of_moved_and_turned_starts(monkeypatch):
     canonical = CATALOGUE["off_centre"]
     scene = canonical.scene(3)
     unit = unit_of(scene, 0.0)

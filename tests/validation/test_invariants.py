@@ -340,7 +340,7 @@ def resting(scene, overlaps, dt=STEP, speed=0.0):
     return moved(scene, (pose, twist), dt=dt)
 
 
-def test_allowed_overlap_of_one_approach_step_and_of_the_start():
+def test_allowed_overlap_of_an_approach():
     scene = over_floor(ball())
     step = 2.0 * STEP
 

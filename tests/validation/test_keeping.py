@@ -120,7 +120,7 @@ def test_store_that_cannot_be_merged_unchanged(tmp_path, monkeypatch):
     assert contents(ours) == before
 
 
-def test_id_of_a_run_from_another_machine_and_a_third_refused(tmp_path, monkeypatch):
+def test_run_id_of_another_machine(tmp_path, monkeypatch):
     """The id is that of the run and six digits of what it is, at most 63 characters; which it is does not change."""
     ours = filled(tmp_path / "a", "one", monkeypatch)
     long = "r" * 60

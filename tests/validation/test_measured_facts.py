@@ -165,7 +165,7 @@ def test_columns_of_bullet_drift_along_one_axis_as_measured(n, drift, both):
     assert np.linalg.norm(moved, axis=1).max() == pytest.approx(both, rel=0.005)
 
 
-def test_weight_on_a_shipped_bullet_column_over_half_a_second():
+def test_weight_on_a_shipped_bullet_column():
     found = ran(slot_of("stack", "bullet", "default", 1 / 240, n=10.0))
     load_of_steps = found.contacts.impulse_between(0, 1)[-120:, 2] / (10.0 * 9.81 / 240.0)
     assert abs(load_of_steps.mean() - 1.0) == pytest.approx(7e-9, abs=0.5e-9)

@@ -119,7 +119,7 @@ def test_deepest_overlap_is_never_negative():
     assert metrics.deepest_overlap(scene, planar(t, np.full(2, 0.4), np.zeros(2))) == pytest.approx(0.1)
 
 
-def test_chatter_of_a_resting_ball_not_counted_as_an_arc():
+def test_chatter_of_a_resting_ball():
     t = np.arange(200) / 240
     chatter = 1e-13 * np.sin(40.0 * t)
     assert len(metrics.apexes(t, chatter, chatter, 2 * G / 240)[0]) == 0
@@ -240,7 +240,7 @@ def pile(dimension, *shapes):
     return Scene("s", 1, dimension, (floor, *free), (Pair(),), (0.0,) * dimension, 1.0)
 
 
-def test_speed_of_free_bodies_with_spin_at_the_outermost_point():
+def test_speed_of_bodies_with_spin():
     scene = pile(2, Disc(0.5), Box((3.0, 4.0)))
     assert metrics.free_bodies(scene) == [1, 2]
     twist = np.array([[[9.0, 9.0, 9.0], [3.0, 4.0, -2.0], [0.0, 0.0, 1.0]]])
@@ -285,7 +285,7 @@ def test_overlaps_of_all_pairs_that_meet():
     assert found == {(0, 1): [0.0, 0.125], (1, 3): [0.0, 0.75], (2, 3): [0.0, 0.125]}
 
 
-def test_interface_load_by_mean_and_scatter_of_the_last_window():
+def test_interface_load_of_the_last_window():
     """Samples at .1 to 1 s, the first half of them absurd; windows begin after their first instant."""
     impulses = [(0.0, 100.0)] * 5 + [(5.0, f) for f in (1.0, 2.0, 3.0, 2.0, 2.0)]
     trajectory = recorded(resting(11), [[(0, 1, impulse)] for impulse in impulses])
@@ -505,7 +505,7 @@ def test_largest_turn_from_the_first_pose(angles):
         assert metrics.turned(pose) == pytest.approx(largest, abs=1e-7)
 
 
-def test_rotation_angle_of_half_a_turn_in_space_and_whole_in_plane():
+def test_rotation_angle_of_half_and_whole_turns():
     assert metrics.turned(np.array([(0.0, 0.0, 0.5), (0.0, 0.0, 10.5)])) == 10.0
     pose = np.array([(0.0, 0.0, 0.0, *q) for q in turned((0.6, 0.0, 0.8), (0.0, math.pi, 5.0))])
     assert metrics.turned(pose) == pytest.approx(math.pi)

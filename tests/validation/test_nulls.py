@@ -199,7 +199,7 @@ def judged(*slots):
     return rows_of("r", [execute(slot) for slot in slots])
 
 
-def test_null_rows_shared_by_engines_with_skill_of_each_error():
+def test_null_rows_and_skill_of_engines():
     pytest.importorskip("pymunk")
     slots = [Slot("impact", (), 2, "chipmunk", profile, DT) for profile in ("default", "tuned")]
     rows = judged(*slots)
@@ -248,7 +248,7 @@ def test_null_row_with_its_own_answer_alone():
         assert found[name].as_dict() == wanted.as_dict()
 
 
-def test_no_null_for_combined_rows_and_rows_without_a_truth():
+def test_rows_without_a_null():
     pytest.importorskip("pymunk")
     row = next(r for r in judged(Slot("impact", (), 2, "chipmunk", "tuned", DT)) if r.metric == "rebound_ratio")
     assert null_rows([replace(row, cells=["one", "two"])]) == [] and null_rows([replace(row, truth=None)]) == []

@@ -65,7 +65,7 @@ def test_every_case_that_a_fix_breaks_named():
     assert text.endswith(f"breaks {rest}, {column}, a spinning rebound, a slide at 45 degrees")
 
 
-def test_formula_value_at_the_step_and_gravity_of_a_case():
+def test_formula_at_the_step_of_a_case():
     pytest.importorskip("mujoco")
     here = Slot("stack", (), 3, "mujoco", "default", 1 / 240)
     margin = {"margin": 0.001 * 9.81 / 240**2}
@@ -81,7 +81,7 @@ def test_sinking_contact_without_stiffness():
     assert "penetration" in {each.metric for each in found.breaks} and found.withdrawn
 
 
-def test_fix_of_a_file_tried_in_cases_of_other_groups(tmp_path, monkeypatch):
+def test_panel_of_a_file_s_fix(tmp_path, monkeypatch):
     """It is pasted into a model that has more than this scene: a damper that mends its rebound lets a column sink."""
     pytest.importorskip("mujoco")
     bouncy = panel._FILES / "bouncy_box_at_rest.toml"
@@ -109,7 +109,7 @@ def test_short_cases_of_every_group():
 
 @pytest.mark.few(3)
 @pytest.mark.parametrize("name", sorted(path.name for path in panel._FILES.glob("*.toml")))
-def test_truths_of_the_panel_s_files_by_the_reference_solver(name):
+def test_truths_of_the_panel_s_files(name):
     """All but that of a box that starts in the floor, which rigid bodies do not."""
     slot = Slot(pinned(str(panel._FILES / name)), (), 3, "reference", "reference", 1 / 240)
     (found,) = observe([slot]).values()

@@ -20,7 +20,7 @@ from validation.running.plan import FULL_DT, Request, slots
 
 
 @pytest.mark.parametrize("engine", [name for name in registry.names() if registry.find(name).engine is not None])
-def test_full_suite_of_the_shipped_profile_at_its_usual_step(engine):
+def test_full_suite_at_the_usual_step(engine):
     facts, dts = registry.facts(engine), {}
     for slot in slots(Request(["impact"], [engine], suite="full", dimensions=[max(facts.dimensions)])):
         dts.setdefault(slot.profile, set()).add(slot.dt)

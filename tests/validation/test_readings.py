@@ -86,7 +86,7 @@ def test_a_planted_fault_of_a_reading_fails(situation, fault):
 
 
 @pytest.mark.parametrize("situation", [s for s in SITUATIONS if not s.flies], ids=lambda each: each.name)
-def test_size_of_an_error_where_forces_on_a_body_cancel(situation):
+def test_error_where_forces_on_a_body_cancel(situation):
     scene, run, keeps = made_up(situation)
     more = spoilt(run, scaled(1.25 * np.eye(2)))
     assert judge(situation, scene, more, "vector", keeps).off == pytest.approx(0.25)

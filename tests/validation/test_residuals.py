@@ -148,7 +148,7 @@ def test_common_motion_without_slip_and_with_pair_friction():
     assert (found["slip"], found["cone"], found["separation"]) == (0.0, 0.0, 0.0)
 
 
-def test_no_slip_on_a_belt_and_its_force_as_a_load():
+def test_residuals_of_a_box_on_a_belt():
     """2 m/s on a belt of 2 m/s; a force of 4 N takes it to 2.02 m/s in the step."""
     belt = Body("floor", HalfSpace((0.0, 1.0)), motion="fixed", surface_velocity=(2.0, 0.0))
     rider = Body("ball", Disc(0.5), MASS, 0.25, (0.0, 0.5, 0.0), (2.0, 0.0, 0.0), force=(4.0, 0.0))

@@ -259,7 +259,7 @@ def test_predictions_of_any_row(law):
         assert predictions_of(other) == []
 
 
-def test_law_not_applied_to_a_file_with_a_scene_s_name(law, monkeypatch):
+def test_file_with_the_name_of_a_scene(law, monkeypatch):
     listed = judged(slot=OWN)
     law.clear()
     monkeypatch.setattr(rows, "is_file", lambda scene: scene == "incline")
@@ -423,7 +423,7 @@ def test_alarm_for_a_missed_number_of_a_scene_file(tmp_path, engine):
 
 
 @pytest.mark.parametrize(("profile", "named"), [("default", True), ("tuned", False)])
-def test_cause_of_a_failure_of_a_file_from_its_law(profile, named):
+def test_cause_of_a_file_s_failure(profile, named):
     """A ball without friction falls on the floor: as shipped MuJoCo does not throw it up again, whatever e is."""
     pytest.importorskip("mujoco")
     checks = [{"quantity": "ball.y", "value": 9.0, "tolerance": 0.01}]

@@ -104,7 +104,7 @@ def test_own_code_alone_in_the_identity_of_a_scene(drop, site):
     assert {name for name in before if before[name] != after[name]} == {"drop"}
 
 
-def test_running_and_measuring_code_in_the_identity_of_a_cell(monkeypatch):
+def test_code_in_the_identity_of_a_cell(monkeypatch):
     """Else a cell that was stored stands for one that other code would run or measure."""
     hashed = set()
     monkeypatch.setattr(identity, "_hash_files", lambda paths: hashed.update(map(str, paths)) or "0" * 16)

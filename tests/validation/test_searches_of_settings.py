@@ -208,7 +208,7 @@ def test_cure_with_mended_checks_and_cost(monkeypatch):
     assert {jobs for _, jobs in asked.calls} == {2} and {slot.dt for slot in asked.slots} == {DT, cures.ELSEWHERE[1]}
 
 
-def test_settings_of_a_profile_that_a_fix_needs_on_the_panel(monkeypatch):
+def test_settings_that_a_fix_needs_on_the_panel(monkeypatch):
     """``a`` alone breaks two cases, which ``b`` of the profile mends; its ``d`` and ``e`` do nothing."""
 
     def tried(here, change, jobs):
@@ -263,7 +263,7 @@ def test_passed_cells_not_searched_and_unmeasured_ones_failed(monkeypatch, unmea
         assert (found.failing, found.left, found.metric, found.before) == (3, 3, "creep", None)
 
 
-def test_settings_of_a_profile_without_a_rank_are_no_cure(monkeypatch):
+def test_no_cure_from_a_profile_without_rank(monkeypatch):
     def off(slot):
         return (0.5 if dict(slot.switched).get("b") == 3 else 9.0,)
 

@@ -81,7 +81,7 @@ def test_distances_are_of_centres_in_all_directions():
     assert found.distance == pytest.approx(0.5)
 
 
-def test_spread_against_the_same_scene_and_none_for_our_run():
+def test_spread_against_the_same_scene():
     taller = (("n", 2.0),)
     own, other = slot(*OURS), slot(*OURS, params=taller)
     asked = [slot(), slot(profile="tuned"), slot(params=taller), slot(dimension=3), slot(*OURS[:1], "classical")]

@@ -158,7 +158,7 @@ def test_energy_growth_below_e_of_one():
 OF_ONE_STEP = {"impulse_scatter", "load[least]", "load[greatest]", "unbalanced", "force_in_flight"}
 
 
-def test_bounds_independent_of_the_engine_and_smaller_with_the_step():
+def test_bounds_with_the_step_and_any_engine():
     for name, params in (("bounce", {}), ("stack", {"n": 5}), ("incline", {"ratio": 0.9}), ("incline", {"ratio": 1.1})):
         canonical = CATALOGUE[name]
         scene = canonical.scene(2, params)

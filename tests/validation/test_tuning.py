@@ -35,7 +35,7 @@ def test_sweeps_found_by_tuning(small, monkeypatch):
 
 
 @pytest.mark.long
-def test_setting_that_helps_some_cells_and_harms_others_not_kept(small, monkeypatch):
+def test_setting_that_also_harms_cells(small, monkeypatch):
     monkeypatch.setattr(tuning, "candidates_of", lambda engine: {"iterations": (10, 1000)})
     monkeypatch.setattr(tuning, "_holds", lambda before, after: False)
     assert search("chipmunk", "default", "stand", dimensions=(2,)).changes == {}

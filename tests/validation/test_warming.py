@@ -96,7 +96,7 @@ def toy(monkeypatch, tmp_path):
     return make
 
 
-def test_parts_in_the_order_of_the_profiles_of_a_plan(toy):
+def test_order_of_parts_to_compile(toy):
     parts = toy()
     assert [str(part) for part in parts] == ["toy/tuned 3-D", "toy/tuned 2-D", "toy/default 3-D", "toy/default 2-D"]
     for part in parts:  # one cell a scene
@@ -121,7 +121,7 @@ def test_parts_of_a_profile_with_own_settings(toy):
     assert toy([replace(slot, iterations=9, dt=1 / 60, ulp=1) for slot in PLAN]) == []
 
 
-def test_no_parts_of_engines_that_compile_nothing_or_are_not_installed(toy):
+def test_engines_without_parts_to_compile(toy):
     assert toy(version=None) == [] and toy([SLOT]) == [] and toy([]) == []
 
 

@@ -91,7 +91,7 @@ def test_unwritable_recording_apart_from_an_engine_exception(answer, error, unwr
 
 
 @pytest.mark.parametrize("error", [SystemExit(0), KeyboardInterrupt(), ValueError("no\nnever")])
-def test_engine_exit_as_a_crash_and_a_fresh_process_after(answer, error):
+def test_process_after_an_engine_s_exit(answer, error):
     told, _, _ = answer(error)
     assert told["observation"] == Observation(SLOT, "", 0, "", Outcome.CRASHED, process.said_by(error)).as_dict()
     assert (told["changed"], told["unwritten"], told["recording"]) == ("what was raised", None, None)

@@ -14,7 +14,7 @@ SLOT = Slot("impact", (("e", 0.5), ("v", 4.0)), 2, "toy", "default", 1 / 240)
 
 
 @pytest.mark.parametrize("count", [2, 3, 7, 16, 41, 100])
-def test_a_change_is_found_in_log2_questions_wherever_it_is(count):
+def test_number_of_questions_of_a_bisection(count):
     for first_bad in range(1, count):
         asked = []
 
@@ -72,7 +72,7 @@ def test_three_releases_one_silent_need_two_answers(name):
     assert found.silent == {1: "no wheel"}
 
 
-def test_a_value_that_moves_within_its_floor_has_not_changed():
+def test_value_that_moves_within_its_floor():
     assert isinstance(bisect(3, [SLOT], "rebound_ratio", Engine([0.4, 0.401, 0.402], noise=0.01)), Unchanged)
     found = bisect(3, [SLOT], "rebound_ratio", Engine([0.4, 0.4, 0.402], noise=1e-5))
     assert (found.before, found.after) == (1, 2) and found.change.kind is Kind.ERROR

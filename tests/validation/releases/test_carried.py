@@ -20,7 +20,7 @@ HOUR, MONTH = 3600.0, 30 * 86400.0
         (f"{carried.UNFINISHED}0123", HOUR + 0.5, False),
     ],
 )
-def test_copies_removed_after_a_month_and_unfinished_after_an_hour(tmp_path, monkeypatch, name, age, stays):
+def test_age_of_removed_copies(tmp_path, monkeypatch, name, age, stays):
     copy, then = tmp_path / name, 2.0**30
     (copy / "adapters").mkdir(parents=True)
     os.utime(copy, (then, then))

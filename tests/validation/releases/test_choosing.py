@@ -66,7 +66,7 @@ def test_invalid_version_in_one_line(toy, text):
         chosen("toy", text)
 
 
-def test_an_engine_of_this_project_has_commits_and_no_releases():
+def test_commits_in_place_of_releases():
     with pytest.raises(EngineError, match="reference has no releases"):
         chosen("reference", "latest")
 

@@ -70,7 +70,7 @@ def test_end_without_an_answer_as_incomplete(call):
 
 
 @pytest.mark.long
-def test_releases_says_what_moved_and_that_one_did_not_answer(call):
+def test_output_for_a_silent_release(call):
     done = call("releases", "toy", "1.0.0..1.2.0", "impact", *CELL, status=4)
     assert re.search(r"1\.1\.0 +- +- +- +- +- +cannot be imported", done.stdout)
     assert "changed in 1.2.0, after 1.0.0" in done.stdout and "rebound_ratio" in done.stdout

@@ -56,7 +56,7 @@ def test_release_stored_under_its_version_and_never_latest(toy, store, monkeypat
             assert answered(store, release("1.0.0"), [SLOT]) == {}
 
 
-def test_the_planted_change_shows_in_the_release_that_has_it(toy, store):
+def test_planted_change_in_its_release(toy, store):
     fast = replace(SLOT, params=(("e", 0.5), ("v", 10.0)))
     before, after = (ask(store, version, (fast,))[0].metrics["rebound_speed"][0] for version in ("1.0.0", "1.2.0"))
     assert before == pytest.approx(5.0) and after == pytest.approx(3.0)

@@ -151,7 +151,7 @@ def test_kill_between_receipt_and_name_not_trusted(made):
     assert environments.found() == []
 
 
-def test_two_processes_at_once_install_once_and_both_get_it(own_cache, tmp_path):
+def test_one_installation_for_two_processes(own_cache, tmp_path):
     mark = tmp_path / "installed"
     both = [builder(mark, 1.0), builder(mark, 1.0)]
     told = [process.communicate(timeout=120) for process in both]
@@ -160,7 +160,7 @@ def test_two_processes_at_once_install_once_and_both_get_it(own_cache, tmp_path)
     assert len(mark.read_text().splitlines()) == 1
 
 
-def test_a_folder_of_that_name_without_a_receipt_is_replaced(own_cache):
+def test_folder_of_an_environment_without_a_receipt(own_cache):
     path = environments.folder() / environments.name_of(toy_release())
     (path / "bin").mkdir(parents=True)
     (path / "bin" / "python").write_text("")

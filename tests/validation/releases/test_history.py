@@ -56,7 +56,7 @@ def test_rows_that_move_together_are_one_step():
     assert kinds([told("1", 0.5, (SLOT, OTHER)), told("2", 0.4, (SLOT, OTHER))]) == [("1", "2", Kind.FLIP, 2)]
 
 
-def test_crashed_cell_as_an_answer_and_invalid_one_as_none():
+def test_crashed_and_invalid_cells_in_a_history():
     crashed = told("2", None, outcome=Outcome.CRASHED)
     assert kinds([told("1", 0.5), crashed]) == [("1", "2", Kind.OUTCOME, 1)]
     assert kinds([told("1", 0.5), told("2", 0.4, outcome=Outcome.INVALID), told("3", 0.5)]) == []
@@ -134,7 +134,7 @@ def test_versions_are_in_the_order_of_versions(tmp_path):
 @pytest.mark.parametrize(
     ("value", "releases", "is_mended"), [(0.4, "<2", True), (0.4, ">=2", False), (0.5, "<2", False)]
 )
-def test_pass_beyond_the_band_of_an_older_finding_is_mended(monkeypatch, value, releases, is_mended):
+def test_pass_beyond_an_older_finding_s_band(monkeypatch, value, releases, is_mended):
     """What passes within the band was marginal there, and is the same here."""
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", releases)
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, value, 0.01))
@@ -280,7 +280,7 @@ def test_step_data_with_releases_largest_change_and_count():
     assert step.as_dict() == {"before": "1", "after": "2", "rows": 2, "change": step.family.first.as_dict()}
 
 
-def test_a_slot_is_the_same_however_its_fields_are_ordered():
+def test_slot_with_fields_in_any_order():
     slot = SLOT.as_dict()
     other = dict(reversed(slot.items()))
     assert list(other) != list(slot)
@@ -313,7 +313,7 @@ def test_finding_of_a_row(monkeypatch):
 
 
 @pytest.mark.parametrize(("listed", "found", "is_mended"), [(None, 0.5, True), (0.4, 0.41, False), (0.4, 0.411, True)])
-def test_mended_value_once_missing_or_at_the_band_s_end(monkeypatch, listed, found, is_mended):
+def test_mended_value_once_missing_or_at_a_limit(monkeypatch, listed, found, is_mended):
     family = Family("slow", ("default",), "impact", ("rebound_ratio",), "it is slow", "measured", "<2")
     monkeypatch.setattr(history, "finding_of", lambda row: Finding(family, listed, 0.41 - 0.4))
     row = next(row for row in told("2.5", 0.5).rows if row.metric == "rebound_ratio")

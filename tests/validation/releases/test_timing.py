@@ -32,7 +32,7 @@ def lap(slot=SLOT, round_=0, seconds=0.5, yardstick=0.25, void="", steps=10):
 # ---- what is timed -------------------------------------------------------------------------------------------------
 
 
-def test_one_cell_of_each_scene_dimension_and_profile_is_timed():
+def test_timed_cells_of_a_run():
     spatial, other = replace(SLOT, dimension=3), replace(SLOT, profile="other")
     again = replace(SLOT, params=(("e", 0.8),))
     found = timing.timed_cells(map(seen, (SLOT, again, spatial, other)))
@@ -105,7 +105,7 @@ def test_pace_over_common_scenes():
     assert told(new=1.0).pace(first) is None and told().pace(first) is None
 
 
-def test_lap_by_both_neighbouring_yardsticks_and_no_retry_after_failure(monkeypatch):
+def test_lap_between_two_yardsticks(monkeypatch):
     class FakeLane:
         started = 0
 

@@ -117,7 +117,7 @@ def test_blow_of_two_balls_with_a_fault(size):
 
 
 @pytest.mark.parametrize(("offset", "whirl"), [(0.0, 0.0), (0.3, 0.0), (0.6, 0.0), (0.6, -2.0), (0.6, 2.0), (0.3, 3.0)])
-def test_a_bar_turns_as_if_a_spring_had_pushed_it(offset, whirl):
+def test_struck_bar_against_a_stiff_spring(offset, whirl):
     """A point mass on a stiff spring over a bar that moves and turns in the plane; its face stays the bar's line."""
     _, scene, truth = made("off_centre", offset=offset, e=1.0, whirl=whirl)
     bar, ball = scene.bodies
@@ -278,7 +278,7 @@ def test_momentum_law_of_a_spinning_bar_in_single_precision():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_one_rounded_number_at_a_time_in_the_booking_law(dimension):
+def test_booking_law_with_one_rounded_number(dimension):
     """Every coordinate of both velocities once, by roundings of a single of the fastest, one after another."""
     canonical = CATALOGUE["off_centre"]
     scene, shown = canonical.scene(dimension, {"whirl": -2.0}), []

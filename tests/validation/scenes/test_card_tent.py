@@ -133,7 +133,7 @@ def test_friction_threshold_of_thin_cards():
 
 @pytest.mark.parametrize("params", SHAPES)
 @pytest.mark.parametrize("ratio", [0.5, 0.8])
-def test_sliding_tent_as_forces_at_feet_and_heads_move_it(params, ratio):
+def test_sliding_tent_by_forces_at_its_ends(params, ratio):
     canonical, scene = made("card_tent", ratio=ratio, **params)
     measured, truth = canonical.measure(scene, sliding(scene, 1 / 960)), canonical.exact(scene)
     for name in ("passing_time[left]", "passing_time[right]", "passing_spin[left]", "passing_spin[right]"):

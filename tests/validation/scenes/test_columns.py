@@ -59,7 +59,7 @@ def test_column_loads_of_the_last_second_relative_to_weight():
     assert found["impulse_scatter"] == 0.25  # the largest of all interfaces
 
 
-def test_loads_that_were_not_recorded_are_missing_with_their_reasons():
+def test_reasons_of_unrecorded_loads():
     scene = column()
     measured = columns.measure(scene, resting(scene))
     assert measured["interface_impulse[1]"] == (None, "contacts were not recorded")
@@ -90,7 +90,7 @@ def test_mean_energy_and_rest_time_of_a_column():
     assert found["settle_time"] == 130 * DT
 
 
-def test_rest_by_the_fastest_body_at_a_hundredth_of_a_gravity_step():
+def test_column_at_rest_by_its_fastest_body():
     scene = column()
     trajectory = resting(scene)
     twist = trajectory.twist.copy()
@@ -109,7 +109,7 @@ def test_displacements_of_a_column_detected():
     assert (found["drift"], found["penetration"]) == (0.25, 0.125)
 
 
-def test_contacts_are_recorded_over_the_last_second_at_every_step():
+def test_recorded_contacts_of_the_last_second():
     assert columns.sampling(column()) == Sampling(1, 2.0)
     assert columns.sampling(replace(column(), duration=0.5)) == Sampling(1, 0.0)
 
@@ -188,7 +188,7 @@ def test_side_and_fate_of_bodies_other_than_boxes():
         assert columns.fate(balls, found(9.0, 9.0, 9e9)) == ""
 
 
-def test_overlaps_are_looked_for_between_layers_and_not_within_them():
+def test_overlaps_between_and_within_layers():
     """Two boxes side by side on the floor, one upon both; the two overlap each other by a quarter, the upper one by an
     eighth, and in the list of bodies each is the neighbour of the next."""
     scene = column(n=3)

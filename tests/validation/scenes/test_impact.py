@@ -18,7 +18,7 @@ def scene_of(dimension=2, **params):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_ball_reaches_the_floor_after_its_delay_without_gravity(dimension):
+def test_delay_of_a_blow_without_gravity(dimension):
     scene = scene_of(dimension)
     floor, ball = scene.bodies
     assert (scene.name, scene.version, scene.dimension) == ("impact", 1, dimension)

@@ -95,7 +95,7 @@ def test_blows_that_ignore_the_plate_or_e(size):
     assert speeds <= failing(canonical, scene, thrown(scene, swept=True, gain=size))
 
 
-def test_blow_times_from_one_step_on_and_without_a_rebound():
+def test_blow_times_with_and_without_a_rebound():
     canonical, scene = made("closing_wall")
     late = thrown(scene, swept=True)
     shifted = replace(late, t=late.t + 1.5 * DT)

@@ -51,7 +51,7 @@ def test_overlap_with_throw_growth_or_moved_centre(params, size):
     assert failing(canonical, scene, moved) == {"centre_moved"}
 
 
-def test_throw_by_a_share_of_the_overlap_at_each_step():
+def test_throw_by_a_share_of_the_overlap():
     """One step takes beta depth/dt: the number that the docstring names."""
     canonical, scene = made("overlap")
     for dt in (1 / 60, DT):

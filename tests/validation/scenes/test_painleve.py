@@ -111,7 +111,7 @@ def test_critical_friction_of_the_rod():
 @pytest.mark.parametrize("late", [0.0, 1.0])
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"ratio": 0.6}, {"ratio": 0.2}])
-def test_step_orders_and_a_contact_that_is_found_late_pass(params, dt, late, offset):
+def test_step_orders_with_a_late_contact(params, dt, late, offset):
     canonical, scene = made("painleve", **params)
     assert failing(canonical, scene, moved(scene, dt, offset=offset, late=late)) == set()
 

@@ -55,7 +55,7 @@ def test_cell_outside_the_law_refused_by_name(params, said):
 
 
 @pytest.mark.parametrize("count", [0, 2])
-def test_blow_with_no_answer_or_two_refused_by_its_friction(monkeypatch, count):
+def test_friction_of_a_blow_without_one_answer(monkeypatch, count):
     """Within its limits the rod always has one, so that others are put in the place of what the law finds."""
     law = kane.answers
     monkeypatch.setattr(kane, "answers", lambda *given: law(*given) * count)

@@ -139,7 +139,7 @@ CASES = ({}, {"load": 0.0}, {"load": 9.0, "shear": 4.9}, {"load": 3.0, "shear": 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("params", CASES)
-def test_slide_by_coulomb_s_law_with_the_formula_s_acceleration(params, order, dimension):
+def test_acceleration_of_a_slide_by_coulomb_s_law(params, order, dimension):
     canonical, scene = made("pressed_box", dimension, **params)
     trajectory = pushed(scene, order=order)
     assert failing(canonical, scene, trajectory) == set()

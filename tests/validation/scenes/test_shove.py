@@ -78,7 +78,7 @@ def test_boxes_with_five_holding_contacts(params, offset):
 @pytest.mark.parametrize("dt", [1 / 60, DT])
 @pytest.mark.parametrize("params", CELLS)
 @pytest.mark.parametrize(("share", "fails"), [(0.99, set()), (1.01, {"down", "ahead"})])
-def test_shove_end_speed_a_hundredth_of_a_step_too_fast(params, dt, share, fails):
+def test_shove_a_hundredth_of_a_step_too_fast(params, dt, share, fails):
     """Speeds that go wrong by g dt/100 over the second half of the run, whatever its length, and no more."""
     canonical, scene = made("shove", **params)
     trajectory = moving(scene, dt)

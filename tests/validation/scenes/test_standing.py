@@ -80,7 +80,7 @@ def test_pair_that_carries_its_load_or_not(ratio):
 
 @pytest.mark.parametrize("margin", [1.05, 2.0, 100.0])
 @pytest.mark.parametrize("share", [0.3, 0.5])
-def test_grip_in_balance_with_any_share_of_wall_and_pad(margin, share):
+def test_balance_of_a_grip_at_any_share(margin, share):
     canonical, scene = made("pinch", margin=margin)
     p, force = scene.params, pinch.grip(scene.params)
     weight = p["mass"] * G

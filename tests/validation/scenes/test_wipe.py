@@ -71,7 +71,7 @@ def test_start_of_the_hand_on_the_table():
 @pytest.mark.parametrize("dt", [1 / 60, DT, 1 / 960])
 @pytest.mark.parametrize("params", [{}, {"v": 1.0}, {"mu": 0.1, "mass": 3.0}, {"mu": 1.0, "g": 3.7}])
 @pytest.mark.parametrize("late", [0, 1])
-def test_wipe_by_coulomb_s_law_with_contacts_a_step_late(dimension, dt, params, late):
+def test_wipe_with_contacts_a_step_late(dimension, dt, params, late):
     canonical, scene = made("wipe", dimension, **params)
     trajectory = held(scene, dt, late)
     measured, truth = canonical.measure(scene, trajectory), canonical.exact(scene)

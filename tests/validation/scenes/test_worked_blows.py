@@ -202,7 +202,7 @@ def test_ball_that_stands_between_two_ways():
     assert found["time[1]"][0] == pytest.approx(2.0) and found["time[2]"][0] is None
 
 
-def test_speeds_halfway_to_the_wall_and_at_an_early_end():
+def test_speeds_halfway_and_at_an_early_end():
     canonical, scene = made("closing_wall", **CLOSING)
     record = still(scene, 330)  # 5.156 s: before the middle of the second way back
     record.twist[:, 2, 0] = -np.arange(331.0)

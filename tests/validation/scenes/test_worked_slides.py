@@ -122,7 +122,7 @@ def test_a_slide_within_one_step_has_no_braking():
     assert canonical.measure(scene, moved(long))["braking"] == (None, "the slide lasts less than two steps")
 
 
-def test_truth_of_the_replay_on_a_parabola_to_its_end():
+def test_parabola_of_the_truth_in_a_replay():
     """x = 4 t - 2 t^2 until 1 s."""
     _, scene = made("slide", 3, heading=60.0)
     ghost = CATALOGUE["slide"].track(scene)
