@@ -182,7 +182,7 @@ def _nothing(told: Plain, text: str) -> Iterator[str]:
 
 
 def _page(told: Plain, text: str) -> Iterator[str]:
-    yield _title(f"the docs have a page: {told['title']}")
+    yield _title(f"the docs have a page: {told['title']}".rstrip(": "))
     yield told["page"]
 
 

@@ -54,8 +54,8 @@ def answer(question: str) -> Plain:
         return told | _of_topic(OUTSIDE, ()) | {"answer": OUTSIDE, "missed": [], "candidates": near[:1]}
     own = kept["topics"].get(first.name, {"terms": ()})["terms"] if found.is_clear else ()
     unset = {engine: _unset(engine, found, own) for engine in found.engines}
-    if not found.is_clear:
-        return told | {"answer": SEVERAL, "candidates": _candidates(found), "unset": unset}
+    if candidates := [] if found.is_clear else _candidates(found):
+        return told | {"answer": SEVERAL, "candidates": candidates, "unset": unset}
     if first.name in kept["scenes"]:
         return told | _of_scene(first.name, found.engines, found)
     if first.name in kept["topics"]:

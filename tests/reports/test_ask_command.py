@@ -73,6 +73,11 @@ def test_scenes_of_public_reports():
     assert len(REPORTS) == 39 and not wrong
 
 
+@pytest.mark.parametrize("word", ["python", "file"])
+def test_word_that_pages_of_the_docs_alone_have(word):
+    assert asked(word).startswith("the docs have a page")
+
+
 def test_misspelt_names_in_a_symptom():
     assert asked("bulet").endswith("no match for: bulet (did you mean 'bullet'?)\n")
     assert "(did you mean 'bounce'?)" in asked("bonce") and "did you mean" not in asked("helicopter")
