@@ -14,9 +14,9 @@ import numpy as np
 class World:
     pose: np.ndarray  # (n, 3): x, y [m], angle [rad]
     twist: np.ndarray  # (n, 3)
-    acceleration: np.ndarray  # (n, 3), by loads; zero unless a body is free
-    inverse_mass: np.ndarray  # (n, 3): 1/m, 1/m, 1/I; zero unless a body is free
-    remembered: dict = field(default_factory=dict)  # impulses of the step before
+    acceleration: np.ndarray  # (n, 3), by loads; zero unless free
+    inverse_mass: np.ndarray  # (n, 3): 1/m, 1/m, 1/I; zero unless free
+    remembered: dict = field(default_factory=dict)  # of the step before
 
 
 @dataclass
@@ -43,25 +43,28 @@ def step(world, contacts, dt, slop, beta=0.2, sweeps=10):
     world.twist += dt * world.acceleration  # E5
     for c in contacts:
         warm_start(world, c)
-    push = np.zeros_like(world.twist)  # pseudo-velocities, forgotten after the step
+    push = np.zeros_like(world.twist)  # forgotten after the step
     for k in range(sweeps):
         sweep(world, push, contacts, backwards=k >= sweeps / 2)
     world.pose += dt * (world.twist + push)  # E17
-    world.remembered = {c.name: (c.p_n, c.p_t) for c in contacts if not c.is_impact}
+    repeats = [c for c in contacts if not c.is_impact]
+    world.remembered = {c.name: (c.p_n, c.p_t) for c in repeats}
 
 
 def prepare(world, c, dt, slop, beta):
-    c.mass_n, c.mass_t = effective_mass(world, c, c.normal), effective_mass(world, c, c.tangent)
-    u_n = c.normal @ relative_velocity(world.twist, c)  # before loads act (E6)
-    c.target = -max(c.gap - slop, 0.0) / dt  # a gap may close, but no more (E8)
+    u_n = c.normal @ relative_velocity(world.twist, c)  # before loads (E6)
+    c.target = -max(c.gap - slop, 0.0) / dt  # may close, but no more (E8)
     if u_n < 0.0 < c.restitution:
         c.target = max(c.target, -c.restitution * u_n)  # E7
-    excess = -c.gap - dt * max(c.target, 0.0) - slop  # of the overlap, if nothing is pushed (E16)
+    excess = -c.gap - dt * max(c.target, 0.0) - slop  # overlap left (E16)
     c.push_target = (beta if excess > 0.0 else 1.0) * excess / dt
     c.p_push = 0.0
-    by_loads = dt * sum(np.linalg.norm(velocity(world.acceleration[i], r)) for i, r in c.sides)
+    of_a, of_b = (velocity(world.acceleration[i], r) for i, r in c.sides)
+    by_loads = dt * (np.linalg.norm(of_a) + np.linalg.norm(of_b))
     c.is_impact = abs(u_n) > by_loads
-    c.p_n, c.p_t = world.remembered.get(c.name, (0.0, 0.0)) if u_n <= by_loads else (0.0, 0.0)  # E9
+    c.p_n, c.p_t = world.remembered.get(c.name, (0.0, 0.0))  # E9
+    if u_n > by_loads:
+        c.p_n = c.p_t = 0.0
 
 
 def warm_start(world, c):
@@ -70,18 +73,20 @@ def warm_start(world, c):
 
 
 def sweep(world, push, contacts, backwards):
+    twist = world.twist
     for _, points in groupby(contacts, lambda c: (c.a, c.b)):
         for c in list(points)[:: -1 if backwards else 1]:
-            c.p_n = solve(world, world.twist, c, c.normal, c.mass_n, c.target, c.p_n, 0.0, np.inf)
+            c.p_n = solve(world, twist, c, c.normal, c.target, c.p_n)
             most = c.friction * c.p_n  # Coulomb
-            c.p_t = solve(world, world.twist, c, c.tangent, c.mass_t, 0.0, c.p_t, -most, most)
-            c.p_push = solve(world, push, c, c.normal, c.mass_n, c.push_target, c.p_push, 0.0, np.inf)
+            c.p_t = solve(world, twist, c, c.tangent, 0.0, c.p_t, -most, most)
+            c.p_push = solve(world, push, c, c.normal, c.push_target, c.p_push)
 
 
-def solve(world, twist, c, direction, mass, target, p, least, most):
-    """Relative velocity, impulse, clamp, apply (E10, E11); ``p`` is the sum of all sweeps."""
+def solve(world, twist, c, direction, target, p, least=0.0, most=np.inf):
+    """Relative velocity, impulse, clamp, apply; p is the sum of all sweeps."""
     u = direction @ relative_velocity(twist, c)
-    new = min(max(p - (u - target) * mass, least), most)
+    k = inverse_effective_mass(world, c, direction)
+    new = min(max(p - (u - target) / k, least), most)  # E10, E11
     apply(world, twist, c, (new - p) * direction)
     return new
 
@@ -107,6 +112,9 @@ def apply(world, twist, c, p):
     twist[c.a] -= world.inverse_mass[c.a] * wrench(c.lever_a, p)
 
 
-def effective_mass(world, c, direction):
-    """1/k: the impulse that changes the relative velocity along a direction by 1 (E3)."""
-    return 1.0 / sum(world.inverse_mass[i] @ wrench(r, direction) ** 2 for i, r in c.sides)
+def inverse_effective_mass(world, c, direction):
+    """What an impulse of 1 N s does to u along a direction (E3)."""
+    k = 0.0
+    for i, r in c.sides:
+        k += world.inverse_mass[i] @ wrench(r, direction) ** 2
+    return k

@@ -104,8 +104,9 @@ def after(change):
 
 
 def change_clamped(_):
-    def solve(world, twist, c, direction, mass, target, p, least, most):
-        change = -(direction @ plain_step.relative_velocity(twist, c) - target) * mass
+    def solve(world, twist, c, direction, target, p, least=0.0, most=np.inf):
+        missing = target - direction @ plain_step.relative_velocity(twist, c)
+        change = missing / plain_step.inverse_effective_mass(world, c, direction)
         change = min(max(change, least), most)
         plain_step.apply(world, twist, c, change * direction)
         return p + change
