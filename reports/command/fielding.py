@@ -12,6 +12,7 @@ from rich.text import Text
 from reports.command import statuses
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
+from reports.symptoms.answers import near
 from reports.terminal import print_table, terminal
 from reports.wording import number, reproduce
 from validation.field import CURED, Finding, ask, matching
@@ -30,8 +31,9 @@ def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> N
     by default. Exits with 1 if a report is no longer true.
     """
     chosen = matching(words)
-    if not chosen:
-        raise click.BadParameter(f"no known report has {' or '.join(words)}", param_hint="WORDS")
+    if not chosen or not all(words):
+        hint = "".join(f"; did you mean {name!r}?" for name in near(words).values())
+        raise click.BadParameter(f"no known report has {' or '.join(map(repr, words))}{hint}", param_hint="WORDS")
     found = ask(chosen, jobs)
     if as_json:
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))

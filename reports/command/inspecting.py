@@ -43,13 +43,15 @@ def list_(
     that the reference solver cannot run go to the first tuned engine that can.
     """
     data: list[Any]
-    if reasons and what != "checks":
-        raise SceneError("reasons: belongs to checks, not to " + what)
+    for name, given in (("reasons", reasons), ("sensitivity", sensitivity)):
+        if given and what != "checks":
+            raise SceneError(f"{name}: belongs to checks, not to {what}")
+    for name, text in (("engine", engine), ("profile", profile)):
+        if text is not None and not sensitivity:
+            raise SceneError(f"{name}: belongs to --sensitivity")
     if sensitivity:
         from validation.questions import detection
 
-        if what != "checks":
-            raise SceneError("sensitivity: belongs to checks, not to " + what)
         named, engine = engine is not None, engine or registry.solver()
         profile = profiles_called([profile], [engine])[0] if profile else registry.profile_of(engine, "solution")
         if profile is None:

@@ -11,7 +11,7 @@ from adapters.scene import SceneError
 from reports.brief import Kept
 from reports.command.files import FOLDER
 from reports.command.group import AS_JSON, OUT, main
-from reports.command.selection import gathered
+from reports.command.selection import DAYS, gathered
 from reports.wording import plural
 from validation.records.keeping import Rules, doomed, prune
 from validation.records.keeping import merge as merge_stores
@@ -47,7 +47,7 @@ def merge(sources: tuple[Path, ...], as_json: bool, out: Path) -> None:
 
 @main.command("prune", epilog="Example: crosscheck prune --keep 50 --dry-run")
 @click.option("--keep", type=click.IntRange(1), help="Keep this many of the runs with the same title, the newest.")
-@click.option("--older-than", "days", type=click.FloatRange(0.0), metavar="DAYS", help="Delete runs older than this.")
+@click.option("--older-than", "days", type=DAYS, metavar="DAYS", help="Delete runs older than this.")
 @click.option("--unfinished", is_flag=True, help="Delete interrupted runs, and damaged ones.")
 @click.option("--recordings", is_flag=True, help="Delete replays, except of the newest run of each title.")
 @click.option("--dry-run", is_flag=True, help="Only print what would be deleted.")

@@ -24,27 +24,29 @@ from validation.running.plan import Request, knowing
 Command = Callable[..., None]
 
 
-class _Seconds(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
-    """Time limit: a number of seconds between 1 and `LONGEST`."""
+class _Between(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
+    """A number of units between two; click's own range takes NaN."""
 
-    name = "seconds"
+    def __init__(self, name: str, least: float, most: float) -> None:
+        self.name, self.least, self.most = name, least, most
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
-            seconds = float(value)
+            number = float(value)
         except ValueError:
-            self.fail(f"{value!r} is not a number of seconds", param, ctx)
-        if not 1.0 <= seconds <= LONGEST:  # false for NaN as well
-            self.fail(f"{value} is not between 1 and {LONGEST:g} seconds", param, ctx)
-        return seconds
+            self.fail(f"{value!r} is not a number of {self.name}", param, ctx)
+        if not self.least <= number <= self.most:  # false for NaN as well
+            self.fail(f"{value} is not between {self.least:g} and {self.most:g} {self.name}", param, ctx)
+        return number
 
 
 #: A user's own settings.
 WHAT_SET_IS = "Change a setting of the engine; it is shown as part of the profile's name."
 SET = click.option("--set", multiple=True, metavar="NAME=VALUE", help=WHAT_SET_IS)
-#: Longest time limit of a case [s]: a week.
-LONGEST = 7 * 86400.0
-SECONDS = _Seconds()
+#: Time limit of a case [s]: at most a week.
+SECONDS = _Between("seconds", 1.0, 7 * 86400.0)
+#: Age of a run [days]: at most a century.
+DAYS = _Between("days", 0.0, 36500.0)
 #: More worker processes than any machine has cores are a typing error; the machine decides how many start.
 MOST_JOBS = 4096
 JOBS = click.IntRange(0, MOST_JOBS)

@@ -215,8 +215,9 @@ def test_public_questions_and_an_alarm_for_a_changed_one(monkeypatch):
     assert said("field", "chipmunk", "--commands")[1].count("crosscheck run") >= count
     monkeypatch.setattr(fielding, "ask", lambda chosen, jobs: ask(chosen, jobs, true=len(chosen) == 0))
     assert said("field", "chipmunk")[0] == 1
-    status, out, err = said("field", "nothing", "at-all")
-    assert status == 2 and "no known report has nothing or at-all" in " ".join(err)
+    status, out, err = said("field", "bulet", "at-all")
+    assert status == 2 and "no known report has 'bulet' or 'at-all'; did you mean 'bullet'?" in " ".join(err)
+    assert said("field", "")[0] == 2
 
 
 # ---- findings that are accepted --------------------------------------------------------------------------------------

@@ -95,6 +95,15 @@ def test_rule_and_dry_run_of_prune(out, tmp_path):
     assert len(json.loads(call("list", "runs", "--json", "--out", tmp_path).stdout)) == 2
 
 
+@pytest.mark.parametrize("days", ["nan", "inf", "-1", "old"])
+def test_impossible_age_of_a_run(days):
+    assert "--older-than" in call("prune", "--older-than", days, status=2).stderr
+
+
+def test_name_of_a_run_that_is_no_text(out):
+    assert "run: there is no run" in call("show", "\udcff", "--out", out, status=2).stderr
+
+
 def test_run_unfinished_on_both_machines_after_a_merge(out, tmp_path):
     folders = [shutil.copytree(out, tmp_path / name) for name in ("ours", "theirs")]
     for folder in folders:

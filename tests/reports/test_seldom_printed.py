@@ -83,6 +83,7 @@ def test_sensitivity_of_checks_alone(monkeypatch):
     assert "incline/angle" in call("list", "checks", "--sensitivity").stdout
     assert json.loads(call("list", "checks", "--sensitivity", "--json").stdout) == []
     assert "belongs to checks, not to scenes" in call("list", "scenes", "--sensitivity", status=2).stderr
+    assert "engine: belongs to --sensitivity" in call("list", "scenes", "--engine", "bulet", status=2).stderr
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------

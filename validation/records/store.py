@@ -262,7 +262,7 @@ class Store:
         back = int(latest[1] or 0) if latest else 0
         helps = "(" + " OR ".join(f"title LIKE '{title}%'" for title in HELPERS) + ")"
         order = f"(? OR NOT {helps}) ORDER BY {helps}, rowid DESC"
-        where, args = (order, (not back,)) if latest else ("id = ?", (run_id,))
+        where, args = (order, (not back,)) if latest else ("id = ?", (run_id.encode(errors="replace").decode(),))
         with self._guarded("read"):
             for row in self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE {where}", args):
                 try:
