@@ -1,19 +1,23 @@
 """The adapters of Newton's other solvers: Kamino, VBD and the semi-implicit one, on small scenes with known answers."""
 
 import inspect
+from dataclasses import replace
 
 import pytest
 from driven import FLOOR, driven, measured_of, struck
 
 from adapters.conformance import items
+from adapters.law import metric_of
 from adapters.newton import shipped
 from adapters.newton.kamino import KaminoEngine, profiles
 from adapters.newton.semi_implicit import SemiImplicitEngine, springs
+from adapters.newton.semi_implicit.laws import DEVIATIONS
 from adapters.newton.semi_implicit.profiles import SLOPE, SPIN_DAMPING
 from adapters.newton.simulation import imported
 from adapters.newton.vbd import VbdEngine
 from adapters.newton.vbd.profiles import ITERATIONS
-from adapters.scene import Body, Box, Pair, Scene
+from adapters.scene import Body, Box, Pair, Scene, Sphere
+from validation.catalogue import CATALOGUE
 from validation.field.measured import facts_of
 
 pytestmark = pytest.mark.optional("newton")
@@ -100,6 +104,55 @@ def test_heights_that_users_measured(engine):
     (fact,) = [fact for fact in facts_of(engine.name) if fact.scene]
     found = measured_of(engine, fact.scene, fact.profile, fact.dimension)[fact.metric]
     assert found == pytest.approx(fact.found, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "dimension", "params", "metric"),
+    [("oblique", 3, {"v": 1, "spin": -10, "mu": 1}, "forward_speed"), ("edge_drop", 2, {"e": 1, "tilt": 30}, "spin"),
+     ("slide_to_roll", 3, {"mu": 0.1}, "rolling_place"), ("hilltop", 2, {}, "leaving_angle"),
+     ("tumble", 3, {}, "flip_time"), ("thin_wall", 2, {"v": 20}, "rebound_ratio")],
+)  # fmt: skip
+def test_semi_implicit_motion_by_the_law_of_its_springs(name, dimension, params, metric):
+    canonical = CATALOGUE[name]
+    laws = [law for law in DEVIATIONS if (law.scene, metric_of(law.metric)) == (name, metric)]
+    said, band = laws[0].says(canonical.scene(dimension, params), DT, canonical.measure)
+    assert band < 0.01 and abs(measured_of(ENGINES[2], name, "default", dimension, params)[metric] - said) <= band
+
+
+@pytest.mark.parametrize(("motion", "falls"), [("fixed", True), ("prescribed", False)])
+def test_semi_implicit_fixed_ball_without_its_radius(motion, falls):
+    under = Body("under", Sphere(0.5), 1.0, (0.1,) * 3, (0, 0, 0, *UPRIGHT), motion=motion)
+    ball = Body("ball", Sphere(0.25), 1.0, (0.025,) * 3, (0, 0, 0.75, *UPRIGHT))
+    _, drive = driven(ENGINES[2], "default")
+    end = drive(Scene("on top", 1, 3, (under, ball), (Pair(),), (0.0, 0.0, -9.81), 0.25)).pose[-1, 1, 2]
+    assert (end < 0.5) == falls
+
+
+@pytest.mark.parametrize(("slope", "dt"), [(20.0, DT), (5.0, DT), (1000.0, DT / 40)])
+def test_semi_implicit_creep_by_the_load_over_four_dampers(slope, dt):
+    """A kilogram that sticks slides as fast as four dampers let it, where these do not stop it over in a step."""
+    _, drive = driven(ENGINES[2], "default", dt)
+    scene = replace(sliding(0.0, 1.0, 1.0), gravity=(0.98, 0.0, -9.81))
+    found = drive(scene, slope=slope, damping=20.0).twist[-1, 1, 0]
+    assert found == pytest.approx(0.98 / (4.0 * slope), rel=0.02)
+
+
+def test_semi_implicit_box_shaken_by_dampers_beyond_a_step():
+    """Four dampers of 1 kN s/m on 1 kg: stopped 4 k dt/m = 17 times over at 1/240 s, and 0.4 times at 1/9600 s."""
+    far = []
+    for dt in (DT, DT / 40):
+        _, drive = driven(ENGINES[2], "default", dt)
+        far.append(abs(drive(replace(sliding(0.0, 1.0, 1.0), gravity=(0.98, 0.0, -9.81))).twist[-1, 1]).max())
+    assert far[0] > 10.0 * far[1] and far[1] < 1e-3
+
+
+def test_semi_implicit_distant_box_that_falls():
+    """Far out a motion of a step is lost and no overlap is found: it only gets faster."""
+    _, drive = driven(ENGINES[2], "default")
+    scene = CATALOGUE["far_origin"].scene(3, {})
+    found = drive(scene)
+    assert abs(found.pose[:, 1, 0] - found.pose[0, 1, 0]).max() == 0.0
+    assert found.twist[-1, 1, 2] == pytest.approx(-9.81 * found.t[-1], rel=1e-4)
 
 
 def test_semi_implicit_height_by_the_step():

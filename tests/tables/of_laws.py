@@ -15,7 +15,10 @@ from validation.catalogue import CATALOGUE
 
 ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
 #: Engines that are set apart, whose laws need no engine.
-APART = ("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "newton", "motrixsim")
+APART = (
+    *("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "motrixsim"),
+    *("newton", "newton_semi_implicit"),
+)
 #: Engines whose laws are asked in other worlds: ours, and one whose laws are those of all engines of single numbers.
 ASKED_ELSEWHERE = (*ENGINES, "box2d")
 #: Step of the predictions [s], and cells of a scene in each dimension.

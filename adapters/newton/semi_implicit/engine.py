@@ -57,6 +57,11 @@ class SemiImplicitEngine(NewtonFamily):
                 "impulses are not stated (NaN)",
                 "SolverSemiImplicit.step, observables",
             ),
+            Quirk(
+                "a fixed ball is a point: its radius is left out, and what rolls on it falls through",
+                "unchanged; a ball that is driven at no speed has its radius",
+                "semi_implicit/kernels_contact.py, _eval_body_contact; measured",
+            ),
         ),
     )
     simulation = SemiImplicitSimulation
