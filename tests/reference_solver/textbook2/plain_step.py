@@ -13,7 +13,7 @@ import numpy as np
 @dataclass
 class World:
     pose: np.ndarray  # (n, 3): x, y [m], angle [rad]
-    twist: np.ndarray  # (n, 3)
+    twist: np.ndarray  # (n, 3): vx, vy [m/s], omega [rad/s]
     acceleration: np.ndarray  # (n, 3), by loads; zero unless free
     inverse_mass: np.ndarray  # (n, 3): 1/m, 1/m, 1/I; zero unless free
     remembered: dict = field(default_factory=dict)  # of the step before
