@@ -10,11 +10,13 @@ from adapters.conformance import items
 from adapters.law import metric_of
 from adapters.newton import shipped
 from adapters.newton.kamino import KaminoEngine, profiles
+from adapters.newton.kamino import laws as kamino
 from adapters.newton.semi_implicit import SemiImplicitEngine, springs
 from adapters.newton.semi_implicit.laws import DEVIATIONS
 from adapters.newton.semi_implicit.profiles import SLOPE, SPIN_DAMPING
 from adapters.newton.simulation import imported
 from adapters.newton.vbd import VbdEngine
+from adapters.newton.vbd import laws as vbd
 from adapters.newton.vbd.profiles import ITERATIONS
 from adapters.scene import Body, Box, Pair, Scene, Sphere
 from validation.catalogue import CATALOGUE
@@ -157,3 +159,61 @@ def test_semi_implicit_distant_box_that_falls():
 
 def test_semi_implicit_height_by_the_step():
     assert measured_of(ENGINES[2], "bounce", "default", 3, dt=1 / 480)["apex[1]"] == pytest.approx(0.103, rel=0.05)
+
+
+# ---- Kamino ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", ENGINES[0].profiles)
+@pytest.mark.parametrize(
+    ("name", "params", "metric"),
+    [("impact", {"e": 0.8, "v": 6}, "rebound_ratio"), ("impact", {"e": 1, "v": 6}, "rebound_ratio"),
+     ("head_on", {}, "first_speed"), ("flat_box", {"e": 0.5}, "impulse"), ("galperin", {}, "large_speed")],
+)  # fmt: skip
+def test_kamino_blows_by_the_law_of_their_overlap(name, params, metric, profile):
+    """Where e < 1 a hundredth of the overlap in the step of a blow is added as velocity; none where e = 1."""
+    canonical = CATALOGUE[name]
+    (law,) = [x for x in kamino.DEVIATIONS if (x.scene, x.profiles, metric_of(x.metric)) == (name, (profile,), metric)]
+    said, band = law.says(canonical.scene(3, params), DT, canonical.measure)
+    assert band < 0.02 and abs(measured_of(ENGINES[0], name, profile, 3, params)[metric] - said) <= band
+
+
+# ---- VBD -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "params", "metric"),
+    [("impact", "default", {"e": 1, "v": 6}, "rebound_ratio"), ("bounce", "default", {}, "apex[1]"),
+     ("bounce", "tuned", {}, "apex[1]"), ("head_on", "default", {}, "first_speed")],
+)  # fmt: skip
+def test_vbd_motion_by_the_law_of_an_implicit_spring(name, profile, params, metric):
+    canonical = CATALOGUE[name]
+    (law,) = [x for x in vbd.DEVIATIONS if (x.scene, x.profiles, metric_of(x.metric)) == (name, (profile,), metric)]
+    said, band = law.says(canonical.scene(3, params), DT, canonical.measure)
+    assert band < 0.01 and abs(measured_of(ENGINES[1], name, profile, 3, params)[metric] - said) <= band
+
+
+def error(name, dimension, params, metric, dt):
+    canonical = CATALOGUE[name]
+    truth = canonical.exact(canonical.scene(dimension, params)).get(metric, 0.0)
+    return abs(measured_of(ENGINES[1], name, "tuned", dimension, params, dt=dt)[metric] - truth)
+
+
+@pytest.mark.parametrize(
+    ("name", "dimension", "params", "metric"),
+    [("rolling_spin", 3, {"spin": 10, "v": 1}, "astray"), ("rolling_spin", 3, {"spin": 10, "v": 1}, "spin"),
+     ("masse", 3, {"side": 1, "back": 4}, "final_vx"), ("hilltop", 2, {"mu": 0.5}, "leaving_angle"),
+     ("rocker", 2, {"tilt": 5}, "amplitude"), ("pivot", 2, {"from": 1, "to": 30}, "passing_time"),
+     ("slide_to_roll", 3, {"mu": 0.1}, "final_speed")],
+)  # fmt: skip
+def test_errors_of_vbd_by_the_step(name, dimension, params, metric):
+    """Of the order of a step: half of it leaves about half."""
+    coarse, fine = (error(name, dimension, params, metric, dt) for dt in (DT, DT / 2))
+    assert 0.0 < fine < 0.62 * coarse
+
+
+@pytest.mark.parametrize(("name", "params"), [("incline", {"ratio": 2}), ("pressed_box", {"load": 0, "shear": 0.8})])
+def test_speeds_of_vbd_as_differences_of_places(name, params):
+    """A place of a metre is rounded to 6e-8 m, a speed to that over the step: a smaller one is worse."""
+    coarse, fine = (error(name, 2, params, "acceleration", dt) for dt in (DT, DT / 4))
+    assert fine > 4.0 * coarse

@@ -17,7 +17,7 @@ ENGINES = ("reference", "chipmunk", "bullet", "mujoco")
 #: Engines that are set apart, whose laws need no engine.
 APART = (
     *("box2d", "box2d3", "box3d", "rapier", "dart", "drake", "physx", "motrixsim"),
-    *("newton", "newton_semi_implicit"),
+    *("newton", "newton_kamino", "newton_semi_implicit", "newton_vbd"),
 )
 #: Engines whose laws are asked in other worlds: ours, and one whose laws are those of all engines of single numbers.
 ASKED_ELSEWHERE = (*ENGINES, "box2d")
