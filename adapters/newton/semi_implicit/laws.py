@@ -15,6 +15,8 @@ from adapters.trajectory import Measured
 
 #: Part of a value, or of a metre, a second and so on, by which moved starts may change it for a prediction.
 EITHER = 1e-2
+#: The same for the time of rest [s], whose last blow round-off may add or leave out.
+LAST = 0.1
 #: Metrics by scene: balls and boxes on planes, where round-off does not decide on the motion.
 ROWS: Mapping[str, str] = {
     "impact": "rebound_ratio rebound_speed velocity_change",
@@ -65,7 +67,11 @@ def spring_law(metric: str, profile: str) -> Law:
         if not known or len(known) < len(found):
             return None
         spread, scale = max(abs(value - known[0]) for value in known), max(1.0, abs(known[0]))
-        return (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale) if spread <= EITHER * scale else None
+        return (
+            (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale)
+            if spread <= (LAST if metric == "rest_time" else EITHER * scale)
+            else None
+        )
 
     return law
 
