@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import brentq, fminbound
 
 from reference_solver.exact.bodies import World
-from reference_solver.exact.features import margins, width_of_margins
+from reference_solver.exact.features import features_of, margins, width_of_margins
 from reference_solver.exact.forces import LEAST, NONE
-from reference_solver.exact.kernels.features import FACE
+from reference_solver.exact.kernels.features import FACE, POINT
 from reference_solver.exact.meeting import next_meeting
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
@@ -75,7 +75,11 @@ class Event:
 
 
 class Monitors:
-    """What must not fall below zero while a piece lasts: margins of features, slips onward, loads, friction left."""
+    """What must not fall below zero while a piece lasts.
+
+    Margins of features, slips onward, loads, friction left; and, of a corner on a face in space, heights of the body's
+    other corners over the face: where one falls below it beyond its end, an edge has come down on the end.
+    """
 
     def __init__(self, world: World, piece: Piece) -> None:
         self._world, self._piece, self._contacts, self._answer = world, piece, piece.held.contacts, piece.held.answer
@@ -85,15 +89,23 @@ class Monitors:
         # A slip that may turn ends where hardly anything is left of it; one that begins may have less.
         begun = np.linalg.norm(self._contacts.at_state(piece.start).rows.speed[:, 1:], axis=1)
         self._ended = np.minimum(world.slipping, 0.5 * begun)
-        count = len(modes)
-        self.noise = np.full((count, self.width + 3), MARGIN * world.size)
+        count, points = len(modes), world.bodies.point.shape[1]
+        a, b, kind_a, number_a, kind_b, number_b = self._contacts.features.T
+        lies = world.edged[a, b] & (np.sort([kind_a, kind_b], axis=0) == [[POINT], [FACE]]).all(axis=0)
+        self._corners = np.flatnonzero(lies)
+        up = kind_a == FACE
+        self._face = np.where(up, (a, number_a), (b, number_b))[:, lies]
+        self._corner = np.where(up, (b, number_b), (a, number_a))[:, lies]
+        self._watched = np.arange(points) < world.bodies.points[self._corner[0], None]
+        self.noise = np.full((count, self.width + 3 + points * bool(lies.any())), MARGIN * world.size)
+        self._watched &= self._heights(piece.start.place, piece.start.axes) > MARGIN * world.size
         self.noise[:, self.width] = world.still
-        self.noise[:, self.width + 1 :] = NONE * (
+        self.noise[:, self.width + 1 : self.width + 3] = NONE * (
             LEAST * world.load + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
         )
 
     def __call__(self, share: float) -> Array:
-        """Return the monitors (m, width + 3) at a share of the piece."""
+        """Return the monitors (m, k) at a share of the piece."""
         place, axes, velocity = self._piece.at(share)
         held, answer = self._piece.held, self._answer
         if self._piece.turns:
@@ -112,7 +124,19 @@ class Monitors:
         else:
             slip = (slip * answer.directions).sum(axis=1)
         ends = margins(self._world, place, axes, self._contacts.features)
-        return np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
+        found = np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
+        if not len(self._corners):
+            return found
+        heights = np.full((len(found), self._watched.shape[1]), np.inf)
+        heights[self._corners] = np.where(self._watched, self._heights(place, axes), np.inf)
+        return np.concatenate([found, heights], axis=1)
+
+    def _heights(self, place: Array, axes: Array) -> Array:
+        """Return how high points (c, p) are above the faces that a corner of their body lies on [m]."""
+        point, normal = features_of(self._world, place, axes)
+        body, corner = self._corner
+        apart = point[body] - point[body, corner][:, None]
+        return np.asarray(np.einsum("cpd,cd->cp", apart, normal[tuple(self._face)]))
 
     def shares(self) -> list[float]:
         """Return the shares at which to look."""
@@ -129,6 +153,8 @@ class Monitors:
 
     def kind(self, column: int) -> Kind:
         """Return what happens where a column falls below zero."""
+        if column > self.width + 2:
+            return Kind.MEET
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
 
 

@@ -27,6 +27,9 @@ from reference_solver.pieces import Indices
 #: Loads and accelerations below this share of the largest are round-off where a mode ends. The largest load counts as
 #: this share of the lightest body's weight at least: contacts that carry nothing have no scale of their own.
 NONE, LEAST = 1e-9, 1e-3
+#: Forces of contacts that accelerate a body by so many times the largest load, as those of a heavy body do a light one
+#: below it, leave by round-off what becomes a blow (`record.NO_BLOW`) in the world's time: what is left is solved for.
+UNEVEN = 450.0
 #: Turn of a slip that shows how forces change with it [rad].
 TURN = 1e-6
 
@@ -89,6 +92,14 @@ class Held:
         """(m, d) forces that `follow` found, in world axes."""
         return self.contacts.along_axes(self.forces)
 
+    @property
+    def shares_loads(self) -> bool:
+        """Whether contacts can share their loads in more than one way (E37), where they are now."""
+        slips = np.zeros(self.answer.directions.shape)
+        problem = Problem(self.contacts, np.zeros(self.answer.forces.size), slips)
+        rows, columns = problem.equations(self.answer.modes, self.answer.directions)
+        return bool(np.linalg.matrix_rank(columns) < len(rows))
+
     def at(self, state: State, free: Array) -> Held:
         """Return the same contacts and modes with forces and accelerations at another state."""
         acceleration = self.follow(state.place, state.axes, state.velocity, free)
@@ -123,17 +134,23 @@ class Held:
         """Return forces (m, d) and accelerations (n, q) where the contacts are now."""
         contacts, answer = self.contacts, self.answer
         forces, acceleration = np.zeros(answer.forces.shape), np.empty(free.shape)
-        groups, shared = self._groups
+        groups, shared, uneven = self._groups
         held = answer.modes, directions, contacts.friction, answer.forces, shared
         solve_groups(contacts.features, held, contacts.rows, free, groups, forces, acceleration)
+        if uneven:  # what round-off leaves of accelerations, for which forces have no digits
+            held = answer.modes, directions, contacts.friction, np.zeros(forces.shape), shared
+            left, more = acceleration.copy(), np.zeros(forces.shape)
+            solve_groups(contacts.features, held, contacts.rows, left, groups, more, acceleration)
+            forces += more
         return forces, acceleration
 
     @cached_property
-    def _groups(self) -> tuple[tuple[Indices, Indices], Array]:
-        """Contacts of all groups and where each begins, and how changes of redundant forces are weighed."""
+    def _groups(self) -> tuple[tuple[Indices, Indices], Array, bool]:
+        """Contacts of all groups and where each begins, how changes of redundant forces are weighed, and `UNEVEN`."""
         groups = self.contacts.groups
         ends = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
-        return ends, loads_shared(self.contacts, self.answer.forces)
+        uneven = bool(self.pressure.max() > UNEVEN * self.contacts.world.weight)
+        return ends, loads_shared(self.contacts, self.answer.forces), uneven
 
 
 def accelerations(contacts: Contacts, free: Array) -> Array:

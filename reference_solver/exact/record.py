@@ -82,17 +82,18 @@ class Acting(NamedTuple):
     def _turning(cls, piece: Piece, begin: float, end: float) -> Acting:
         """Return what contacts did between shares of a piece in which they turn."""
         contacts = piece.own_contacts.at(*piece.at(begin))
-        whole, own = begin == 0.0 and end == 1.0, Held(contacts, piece.held.answer, piece.held.acceleration)
+        own = Held(contacts, piece.held.answer, piece.held.acceleration)
+        exact = (begin == 0.0 and end == 1.0) or not own.shares_loads
         length, nothing = end - begin, np.zeros(contacts.rows.place.shape)
         acting = cls.of(contacts, nothing)
         first, impulse, moment = acting.point, nothing, np.zeros(())
         for node, weight in zip(*GAUSS, strict=True):
             share = begin + length * node
             place, axes, velocity = piece.at(share)
-            if whole:  # what moved the bodies, to the last place
+            if exact:  # what moved the bodies, to the last place
                 contacts.at(place, axes, velocity)
                 rate = piece.impulse(share, rate=True)
-            else:  # between its ends a piece is known less well than its forces
+            else:  # how loads are shared is known less well between the ends of a piece than forces are
                 own.follow(place, axes, velocity, free_acceleration(contacts.world, axes, velocity))
                 rate = piece.length * own.pushes
             impulse = impulse + length * weight * rate

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Settings, Simulation
+from reference_solver.certificate.audit import audit
 from reference_solver.geometry import gap
 from reference_solver.pieces import IMPACT
 from tests.verification.known import blows, corners, edges, gates, planar, rubbing, spatial
@@ -97,6 +98,14 @@ def test_box_that_spins_on_a_light_one():
     numbers = np.array([[0.01, 44.0], [0.6, 0.2], [5.0, -6.7], [0.95, -0.27]])
     found = miss(rubbing.spun_down(boxes, *numbers, 0.2), 15)
     assert found.off < 1e-9
+
+
+def test_heavy_slab_on_a_light_one():
+    """77 kg on 0.06 kg: by round-off of its weight both would rise with 1e-11 m/s^2, which their contacts took off."""
+    motion = rubbing.slabs(SPACES[1], np.random.default_rng(2))
+    dt = motion.time / 15
+    found = Simulation(motion.model, Settings.reference(dt)).record(15, 5, pieces=True)
+    assert [finding for finding in audit(motion.model, found, dt) if not finding.holds] == []
 
 
 def test_layers_that_stop_together():

@@ -93,10 +93,11 @@ def test_horizon_of_impacts_of_round_off_beside_a_fast_corner(key):
     assert found.holds and np.isinf(found.horizon)
 
 
-@pytest.mark.parametrize("key", ["fuzz3 8", "standard domino 2-D", "standard seam 3-D", "fuzz2 31"])
+@pytest.mark.parametrize("key", ["fuzz3 8", "standard domino 2-D", "standard seam 3-D", "fuzz2 31", "fuzz2 61017"])
 def test_impulses_that_moved_the_bodies(key):
     """Forces looked at anew are off by a step's error where a slip turns at once, and steps between their ends.
 
+    So are shares of a load between the ends of a step; where none is shared impulses are those of the step.
     A step that an event cuts short has the impulses of its part.
     """
     world = world_of(key)
@@ -127,3 +128,12 @@ def test_error_after_an_impact_within_round_off_of_a_sample():
     found = certify(model, Settings.reference(1 / 64), 32)
     assert found.holds
     assert found.error.max() < 1e-12
+
+
+def test_edge_beside_a_corner_that_lies_on_a_face():
+    """It comes down on the end of the face, where no corner meets anything."""
+    world = world_of("fuzz3 61074")
+    record = Simulation(world.model, Settings.reference(world.dt)).record(
+        world.samples * world.stride, world.stride, pieces=True
+    )
+    assert [finding for finding in audit(world.model, record, world.dt) if not finding.holds] == []
