@@ -36,7 +36,8 @@ class Bodies(NamedTuple):
     normal, offset, faces
         (n, f, d) and (n, f): a core lies in ``normal . x <= offset`` of all its faces (n,).
     side, limit, sides
-        (n, f, k, d) and (n, f, k): a place is over a face where ``side . x <= limit`` for all sides (n, f).
+        (n, f, k, d) and (n, f, k): a place is over a face where ``side . x <= limit`` for all its sides, of which there
+        are (n, f).
     line, lines
         (n, l, 2) numbers of the points that edges join, and how many there are (n,).
     radius, reach
@@ -46,9 +47,9 @@ class Bodies(NamedTuple):
     inverse_mass, moment
         (n,) [1/kg] and (n, s) principal moments [kg m^2]; zero and infinite unless free.
     load
-        (n, d + s) acceleration by gravity, force and torque in world axes; a torque in space is divided later.
+        (n, d + s) accelerations by gravity, force and, in the plane, torque in world axes [m/s^2], [rad/s^2].
     torque
-        (n, s) in world axes [N m].
+        (n, s) in world axes [N m]; in space what it accelerates by turns with the body.
     generator
         (s, d, d): under a spin w a point r has the velocity ``sum_k w_k E_k r``.
     """
@@ -82,7 +83,7 @@ class State:
     place, orientation
         (n, d) [m] and (n, 1 | 4).
     velocity
-        (n, d + s) twists in world axes.
+        (n, d + s) twists in world axes [m/s], [rad/s].
     """
 
     t: float
@@ -107,17 +108,17 @@ class State:
 
     @property
     def numbers(self) -> Array:
-        """(n, 3 + q | 7 + q): pose and twist."""
+        """(n, 3 + q | 7 + q): poses and twists, as the record has them."""
         return np.concatenate([self.place, self.orientation, self.velocity], axis=1)
 
     def moving(self, velocity: Array) -> State:
-        """Return the same places with other twists (n, d + s)."""
+        """Return the same places with other twists (n, d + s) [m/s], [rad/s]."""
         found = State(self.t, self.place, self.orientation, velocity)
         found._axes = self._axes
         return found
 
     def moved(self, way: Array) -> State:
-        """Return the state after displacements and turns (n, d + s)."""
+        """Return the state after displacements and turns (n, d + s) [m], [rad], with the same twists."""
         d = self.place.shape[1]
         return State(self.t, self.place + way[:, :d], turned(self.orientation, way[:, d:]), self.velocity)
 
@@ -135,8 +136,8 @@ class World:
     extent, size
         Half widths of the bodies (n,), and the smallest of them [m].
     weight
-        Largest acceleration by loads [m/s^2], where they turn a body that of points at a distance of ``size``; without
-        loads, the one that reaches the speeds of the start within ``size``, or 1 where nothing moves.
+        Largest acceleration by loads [m/s^2], also of points at a distance of ``size`` from the centre of a body that
+        they turn. Without loads, v^2 / ``size`` with the largest speed v at the start; 1 if nothing moves.
     load
         What the lightest body weighs [N].
     """
@@ -178,7 +179,7 @@ class World:
 
     @cached_property
     def no_gap(self) -> Array:
-        """(n, n): what `NO_GAP` makes of the smaller half width of a pair [m]; 0 where neither has any."""
+        """(n, n): gaps of pairs up to which they count as none [m], `NO_GAP` smaller half widths."""
         least = np.minimum.outer(self.extent, self.extent)
         return np.where(np.isfinite(least), NO_GAP * least, 0.0)
 
@@ -190,7 +191,7 @@ class World:
 
     @cached_property
     def edged(self) -> NDArray[np.bool_]:
-        """(n, n) whether edges of two bodies can meet: in the plane, and where one is round, points are all that do."""
+        """(n, n) whether two bodies can meet edge on edge: in space, if both have edges."""
         edged = (self.bodies.points > 1) & (self.dimension == 3)
         return np.asarray(edged[:, None] & edged)
 

@@ -27,7 +27,10 @@ def check(world: World, piece: Piece, tolerance: float) -> None:
 
     Raises
     ------
-    Overlap, EnergyGrows
+    Overlap
+        If bodies are deeper in each other than `DEEP` half widths, or `TOLERATED` tolerances.
+    EnergyGrows
+        If energy grows by more than `GROWS` of it, or `TOLERATED` tolerances.
     """
     a, b, share, depth = deepest(world, piece)
     if depth > max(DEEP, TOLERATED * tolerance) * world.size:

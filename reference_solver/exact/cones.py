@@ -5,13 +5,16 @@ What that does not find is found by sweeps in space, as where bodies approach ev
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from reference_solver.compilation import kernel
 from reference_solver.direct import problem as direct
 from reference_solver.direct.rounds import solve_problem
 from reference_solver.exact.kernels.sweeps import sweep
-from reference_solver.exact.refusals import Refused, Unconverged
+from reference_solver.exact.refusals import NoSolution, Unconverged
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 
@@ -25,17 +28,13 @@ SOFTER = (1.0, 10.0, 0.1, 100.0, 0.01)
 PRODUCTS = 500_000_000
 
 
-class NoSolution(Refused):
-    """No forces or impulses exist; whoever asked knows what that means."""
-
-    sentence = "a contact problem has no solution"
-
-
 def within_cones(contacts: Contacts, free: Array, slips: Array) -> Array:
-    """Return forces p (m d,) that obey the laws of contact, to about 1e-9.
+    """Return forces p (m d,) that obey the laws of contact, to about 1e-9 of the largest.
 
     Parameters
     ----------
+    contacts
+        m of them, with their rows at the instant.
     free
         (m d,): what contacts would do without forces.
     slips
@@ -44,7 +43,7 @@ def within_cones(contacts: Contacts, free: Array, slips: Array) -> Array:
     Raises
     ------
     NoSolution, Unconverged
-        If there are none, or none is found.
+        If there are no such forces, or if none are found.
     """
     planar = contacts.world.dimension == 2
     if not planar or len(contacts) > FEW:
@@ -55,6 +54,24 @@ def within_cones(contacts: Contacts, free: Array, slips: Array) -> Array:
         return _by_sweeps(contacts, free, slips)
     rows, yields = contacts.matrices
     return _by_pivots(rows @ yields, free, contacts.friction, slips)
+
+
+def loads_with_friction(yields: Array, friction: Array, slips: Array) -> Array:
+    """Return how loads (m,) move bodies, that of a slip together with its friction (N, m).
+
+    Parameters
+    ----------
+    yields
+        (N, m, d): how forces along the frames do.
+    friction, slips
+        (m,) and (m, d - 1) directions of slips, zeros elsewhere.
+    """
+    return np.asarray(yields[:, :, 0] - friction * (yields[:, :, 1:] * slips).sum(axis=2))
+
+
+def add_friction(forces: Array, friction: Array, slips: Array, slides: NDArray[Any]) -> None:
+    """Write into forces (m, d) the friction that loads of contacts bring which slip (m,), against (m, d - 1)."""
+    forces[slides, 1:] = -(friction * forces[:, 0])[slides, None] * slips[slides]
 
 
 @kernel
@@ -75,7 +92,7 @@ def _by_rounds(contacts: Contacts, free: Array, slips: Array) -> tuple[Array, fl
     """
     world, rows, d = contacts.world, contacts.rows, contacts.world.dimension
     n, q = world.shape
-    slides = slips.any(axis=1)
+    slides = np.asarray(slips.any(axis=1))
     push = rows.yields.copy()
     push[:, 0] -= contacts.friction[:, None, None] * np.einsum("mk,mksq->msq", slips, push[:, 1:])
     own = np.einsum("mksq,mksq->mk", rows.row, push)
@@ -106,12 +123,12 @@ def _by_rounds(contacts: Contacts, free: Array, slips: Array) -> tuple[Array, fl
         if residual <= FOUND:
             break
     forces = contact.best[:, :d].copy()
-    forces[slides, 1:] = -(contacts.friction * forces[:, 0])[slides, None] * slips[slides]
+    add_friction(forces, contacts.friction, slips, slides)
     return size * forces.ravel(), float(residual)
 
 
 def _by_sweeps(contacts: Contacts, free: Array, slips: Array) -> Array:
-    """Return forces in space by sweeps.
+    """Return forces (m d,) in space by sweeps.
 
     Raises
     ------
@@ -119,19 +136,27 @@ def _by_sweeps(contacts: Contacts, free: Array, slips: Array) -> Array:
         If they do not settle.
     """
     rows, yields = contacts.matrices
-    slides = slips.any(axis=1)
+    slides = np.asarray(slips.any(axis=1))
     blocks = yields.reshape(len(yields), -1, 3).copy()
-    blocks[:, :, 0] -= contacts.friction * (blocks[:, :, 1:] * slips).sum(axis=2)
+    blocks[:, :, 0] = loads_with_friction(blocks, contacts.friction, slips)
     friction = np.where(slides, 0.0, contacts.friction)
     forces, settled = sweep(rows @ blocks.reshape(yields.shape), free, friction, PRODUCTS // free.size**2)
     if not settled:
         raise Unconverged(count=len(contacts))
-    forces[slides, 1:] = -(contacts.friction * forces[:, 0])[slides, None] * slips[slides]
+    add_friction(forces, contacts.friction, slips, slides)
     return np.asarray(forces.ravel())
 
 
 def _by_pivots(yields: Array, free: Array, friction: Array, slips: Array) -> Array:
-    """Friction in two directions of either sign: a linear complementarity problem (Stewart and Trinkle, E45)."""
+    """Return forces (m d,) of planar contacts: a linear complementarity problem (Stewart and Trinkle, E45).
+
+    Friction has two directions, onward and backward.
+
+    Raises
+    ------
+    NoSolution
+        If pivots end on a ray, by whatever way.
+    """
     m, slip = len(friction), slips[:, 0]
     # Every contact as stiff as any: ties of pivots are then told from round-off.
     stiff = np.maximum(np.diag(yields)[::2], np.diag(yields)[1::2])
@@ -172,7 +197,7 @@ def _solves(table: Array, right: Array, found: Array) -> bool:
 
 
 def complementary(table: Array, right: Array, cover: Array) -> Array | None:
-    """Return z >= 0 with ``w = table @ z + right >= 0`` and ``z . w = 0``; None where a ray is found.
+    """Return z >= 0 (n,) with ``w = table @ z + right >= 0`` and ``z . w = 0``; None where a ray is found.
 
     C. Lemke, *Management Science* 11, 1965, with the artificial column ``cover``; ties are broken in lexicographic
     order (B. Eaves, *Management Science* 17, 1971), so that no basis comes again.

@@ -77,8 +77,15 @@ class Event:
 class Monitors:
     """What must not fall below zero while a piece lasts.
 
-    Margins of features, slips onward, loads, friction left; and, of a corner on a face in space, heights of the body's
-    other corners over the face: where one falls below it beyond its end, an edge has come down on the end.
+    For each of m contacts: ``width`` margins of its features [m], how fast it slips in its direction at the start of
+    the piece [m/s], its load and the friction that it could still bear [N]; infinite where there is none. Of a corner on
+    a face in space also the heights of its body's other corners over the face [m]: where one falls below it beyond its
+    end, an edge has come down on the end.
+
+    Parameters
+    ----------
+    world, piece
+        Rows of the piece's contacts are brought to wherever monitors are asked for.
     """
 
     def __init__(self, world: World, piece: Piece) -> None:
@@ -109,8 +116,7 @@ class Monitors:
         place, axes, velocity = self._piece.at(share)
         held, answer = self._piece.held, self._answer
         if self._piece.turns:
-            held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
-            forces = held.forces
+            forces, _ = held.follow(place, axes, velocity, free_acceleration(self._world, axes, velocity))
             load = forces[:, 0]
             left = self._contacts.friction * load - np.linalg.norm(forces[:, 1:], axis=1)
             grip = np.where(answer.modes == STICK, left, np.inf)
@@ -152,14 +158,14 @@ class Monitors:
         return [first, *beginning, *others]
 
     def kind(self, column: int) -> Kind:
-        """Return what happens where a column falls below zero."""
+        """Return what happens where a column of the monitors falls below zero."""
         if column > self.width + 2:
             return Kind.MEET
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
 
 
 def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
-    """Return the first event of a piece; where something ends as the piece begins, that alone.
+    """Return the first event of a piece; if contacts or modes end as it begins, only these.
 
     ``after_instant``: whether the piece before was an instant; then what is as near as round-off is not met again.
     """

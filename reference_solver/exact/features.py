@@ -27,7 +27,7 @@ ROOM = 2048
 
 
 def no_gap(world: World, place: Array) -> Array:
-    """Return the gaps that count as none (n, n) where bodies are (n, d) [m]."""
+    """Return the gaps of pairs up to which they count as none (n, n) [m], where bodies are (n, d) [m]."""
     return world.no_gap + UNITS * np.spacing(np.abs(place).max())
 
 
@@ -44,14 +44,22 @@ def features_of(world: World, place: Array, axes: Array) -> tuple[Array, Array]:
 
 
 def margins(world: World, place: Array, axes: Array, features: Indices) -> Array:
-    """Return how far contacts are from the ends of their features (m, width) [m]."""
+    """Return how far contacts are from the ends of their features (m, width) [m], 1e300 where there is none.
+
+    Parameters
+    ----------
+    place, axes
+        (n, d) [m] and (n, d, d).
+    features
+        (m, 6).
+    """
     out = np.zeros((len(features), width_of_margins(world)))
     write_margins(world.bodies, place, axes, features_of(world, place, axes), features, out)
     return out
 
 
 def find(world: World, state: State, ended: frozenset[tuple[int, ...]] = frozenset()) -> Indices:
-    """Return the contacts (m, 6) of a state: each place once, without features that end at once.
+    """Return the contacts (m, 6) of a state, without features that end at once.
 
     Parameters
     ----------

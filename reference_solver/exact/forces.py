@@ -16,9 +16,9 @@ from reference_solver.exact.problem import (
     STICK,
     Answer,
     Problem,
+    all_open,
     directed,
     loads_shared,
-    nothing,
 )
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
@@ -47,23 +47,26 @@ class Held:
     acceleration
         (n, q) of all bodies.
     lasts
-        How long they hold, where that is known [s]; else 0.
+        How long a series of rebounds lasts in which they stay closed [s] (E22); None where there is none.
     opened
-        What touched as well when these were found, and carries nothing.
-    begins
-        Features of contacts that stuck up to here and begin to slip.
+        Contacts that touch where the piece begins, and open there: they carry nothing.
+    slipped
+        Features of contacts that stuck until the piece begins and slip from there on.
     """
 
     contacts: Contacts
     answer: Answer
     acceleration: Array
-    lasts: float = 0.0
+    lasts: float | None = None
     opened: tuple[Contacts, ...] = ()
-    begins: frozenset[tuple[int, ...]] = frozenset()
+    slipped: frozenset[tuple[int, ...]] = frozenset()
 
     @property
     def pressure(self) -> Array:
-        """(n, q): how much forces of contacts accelerate bodies along any axis, added up without their signs."""
+        """(n, q): how much forces of contacts accelerate bodies along any axis, their sizes added up.
+
+        [m/s^2] and [rad/s^2], the largest of all axes for each.
+        """
         if not len(self.contacts):
             return np.zeros(self.acceleration.shape)
         d = self.contacts.world.dimension
@@ -72,25 +75,24 @@ class Held:
         found[:, :d], found[:, d:] = (part.max(axis=1, keepdims=True) for part in (found[:, :d], found[:, d:]))
         return np.asarray(found)
 
-    def follow(self, place: Array, axes: Array, velocity: Array, free: Array, directions: Array | None = None) -> Array:
-        """Return accelerations (n, q) with the modes held at another state, and keep the forces there.
+    def follow(
+        self, place: Array, axes: Array, velocity: Array, free: Array, directions: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Bring the contacts to another state; return forces (m, d) along frames and accelerations (n, q) there.
 
         Parameters
         ----------
+        place, axes, velocity
+            (n, d) [m], (n, d, d), (n, q): the state.
+        free
+            (n, q) accelerations without contacts.
         directions
             (m, d - 1) of slips, where they are not those of the velocities.
         """
         if not len(self.contacts):
-            self.forces = self.answer.forces
-            return free
+            return self.answer.forces, free
         contacts = self.contacts.at(place, axes, velocity)
-        self.forces, acceleration = self._solved(free, self.onward(contacts) if directions is None else directions)
-        return acceleration
-
-    @property
-    def pushes(self) -> Array:
-        """(m, d) forces that `follow` found, in world axes."""
-        return self.contacts.along_axes(self.forces)
+        return self._solved(free, self.onward(contacts) if directions is None else directions)
 
     @property
     def shares_loads(self) -> bool:
@@ -101,13 +103,15 @@ class Held:
         return bool(np.linalg.matrix_rank(columns) < len(rows))
 
     def at(self, state: State, free: Array) -> Held:
-        """Return the same contacts and modes with forces and accelerations at another state."""
-        acceleration = self.follow(state.place, state.axes, state.velocity, free)
-        answer = Answer(self.answer.modes, self.onward(self.contacts), self.forces)
-        return Held(self.contacts, answer, acceleration)
+        """Bring the contacts to another state; return them with the same modes, and forces and accelerations there.
+
+        ``free``: (n, q) accelerations without contacts.
+        """
+        forces, acceleration = self.follow(state.place, state.axes, state.velocity, free)
+        return Held(self.contacts, Answer(self.answer.modes, self.onward(self.contacts), forces), acceleration)
 
     def onward(self, contacts: Contacts) -> Array:
-        """Return directions of slips (m, d - 1) where contacts are now: in space a slip turns."""
+        """Return directions of slips (m, d - 1) where contacts are now: in space they turn with their velocities."""
         before, slips = self.answer.directions, self.answer.modes == SLIP
         if contacts.world.dimension == 2 or not slips.any():
             return before
@@ -116,7 +120,7 @@ class Held:
 
     @property
     def slips_end(self) -> bool:
-        """Whether, where the contacts are now, a slip in space is over that its acceleration would turn back."""
+        """Whether a slip in space ends where the contacts are now: hardly any is left, and it is being slowed down."""
         contacts, answer = self.contacts, self.answer
         if not len(contacts) or contacts.world.dimension == 2:
             return False
@@ -125,7 +129,15 @@ class Held:
         return bool((over & ((change * answer.directions).sum(axis=1) < 0.0))[answer.modes == SLIP].any())
 
     def turned(self, slip: int, free: Array, directions: Array) -> Array:
-        """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now."""
+        """Return by how much accelerations (N,) change as one slip in space turns [1/rad], where contacts are now.
+
+        Parameters
+        ----------
+        slip
+            Number of its contact.
+        free, directions
+            (n, q) accelerations without contacts; (m, d - 1) of all slips.
+        """
         turned = directions.copy()
         turned[slip] += TURN * np.array([-directions[slip, 1], directions[slip, 0]])
         return (self._solved(free, turned)[1] - self._solved(free, directions)[1]).ravel() / TURN
@@ -154,12 +166,12 @@ class Held:
 
 
 def accelerations(contacts: Contacts, free: Array) -> Array:
-    """Return what contacts would do (m d,) under accelerations (n, q) [m/s^2]."""
+    """Return accelerations of contacts along their frames (m d,) [m/s^2], under those of bodies (n, q)."""
     return np.asarray(contacts.matrices[0] @ free.ravel() + contacts.rows.rate.ravel())
 
 
 def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
-    """Return the contacts that stay closed, and accelerations under their forces."""
+    """Return the contacts that stay closed, and accelerations under their forces and ``free`` (n, q)."""
     stays = answer.modes != OPEN
     acceleration = free + contacts.changes(answer.forces)
     if stays.all():
@@ -167,13 +179,17 @@ def held_by(contacts: Contacts, answer: Answer, free: Array) -> Held:
     return Held(contacts.chosen(stays), answer.chosen(stays), acceleration, opened=(contacts.chosen(~stays),))
 
 
-def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: float = 0.0) -> Held:
-    """Return which of contacts without a speed of parting stay closed, and how.
+def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: float | None = None) -> Held:
+    """Return which of contacts that do not part stay closed, and which of these stick and slip.
+
+    In space the frames of ``contacts`` are turned, so that slips lie along their first tangents.
 
     Parameters
     ----------
+    free
+        (n, q) accelerations without contacts.
     lasts
-        Time in which speeds of contacts are taken off [s], slips as far as friction can; 0 where they have none.
+        Time in which a series of rebounds takes off the speeds of the contacts [s], slips as far as friction can.
 
     Raises
     ------
@@ -183,8 +199,8 @@ def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: f
         See `Problem.solved`.
     """
     if not len(contacts):
-        return Held(contacts, nothing(0, world.dimension), free)
-    directions = directed(contacts.rows.speed[:, 1:], np.inf if lasts > 0.0 else world.slipping)
+        return Held(contacts, all_open(0, world.dimension), free)
+    directions = directed(contacts.rows.speed[:, 1:], world.slipping if lasts is None else np.inf)
     slips = np.asarray(directions.any(axis=1))
     if world.dimension == 3 and slips.any():
         # Frames take up the slip, so that its rows are along and across it.
@@ -192,14 +208,16 @@ def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: f
         contacts.along = np.where(slips[:, None], tangents, contacts.along)
         contacts.at_state(state)
         directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
-    wanted = accelerations(contacts, free) + (contacts.rows.speed.ravel() / lasts if lasts > 0.0 else 0.0)
-    if np.abs(wanted).max() < ROUND_OFF * world.weight:
-        wanted[:] = 0.0
-    return replace(held_by(contacts, Problem(contacts, wanted, directions).solved(state.t), free), lasts=lasts)
+    rates = accelerations(contacts, free) + (0.0 if lasts is None else contacts.rows.speed.ravel() / lasts)
+    if np.abs(rates).max() < ROUND_OFF * world.weight:
+        rates[:] = 0.0
+    return replace(held_by(contacts, Problem(contacts, rates, directions).solved(state.t), free), lasts=lasts)
 
 
 def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:
-    """Return the contacts with some modes changed, their forces nearest to those now; None if that breaks a law (E38).
+    """Return the contacts with some modes changed, their forces nearest to those now (E38).
+
+    None if there are no such forces, or if they break a law.
 
     Parameters
     ----------
@@ -209,7 +227,7 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
     free
         (n, q) accelerations without contacts.
     strictly
-        Whether the laws are looked at: what ends is known to be round-off where a mode ends as soon as it begins.
+        Whether laws may not be broken. Where a mode ends as soon as it begins, what breaks them is round-off.
     """
     contacts, answer = held.contacts, held.answer
     now, directions = answer.modes.copy(), answer.directions.copy()
@@ -224,7 +242,7 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
         return None
     now_held = held_by(contacts, found, free)
     now_held.opened += held.opened
-    now_held.begins = held.begins | {contacts.names[k] for k, mode in modes.items() if mode == SLIP}
+    now_held.slipped = held.slipped | {contacts.names[k] for k, mode in modes.items() if mode == SLIP}
     after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
     force, load = np.abs(found.forces).max(), found.forces[:, 0]
     least = -NONE * (LEAST * contacts.world.load + force)

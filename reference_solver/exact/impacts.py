@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from reference_solver.exact.bodies import State, World
-from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.forces import accelerations
 from reference_solver.exact.motion import free_acceleration
 from reference_solver.exact.problem import Problem
 from reference_solver.exact.record import Blow
-from reference_solver.exact.refusals import NoImpulses, TooManyImpacts
+from reference_solver.exact.refusals import NoImpulses, NoSolution, TooManyImpacts
 from reference_solver.exact.rows import Contacts
 from reference_solver.exact.series import height
 from reference_solver.model import Array
@@ -35,6 +34,8 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
     ------
     NoImpulses, TooManyImpacts
         If bodies cannot part, or impacts do not end.
+    Undecided, Unlawful, Unconverged
+        See `Problem.solved`.
     """
     blows: list[Blow] = []
     if not (contacts.at_state(state).rows.speed[:, 0] < -world.still).any():
@@ -79,10 +80,10 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
 
 def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
     """Return one impact of contacts with restitutions (m,): u+ >= -e u- of each that approaches, without forces."""
-    wanted = part.rows.speed.copy()
-    wanted[:, 0] += rebounds * np.minimum(wanted[:, 0], 0.0)
+    free = part.rows.speed.copy()
+    free[:, 0] += rebounds * np.minimum(free[:, 0], 0.0)
     try:
-        impulses = Problem(part, wanted.ravel(), np.zeros_like(wanted[:, 1:])).solved(state.t).forces
+        impulses = Problem(part, free.ravel(), np.zeros_like(free[:, 1:])).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
     return Blow.of(state.moving(state.velocity + part.changes(impulses)), part, impulses)
@@ -95,9 +96,11 @@ def jam(world: World, state: State, contacts: Contacts, instant: float) -> Blow:
     ------
     NoSolution
         If there are no such impulses.
+    Undecided, Unlawful, Unconverged
+        See `Problem.solved`.
     """
     contacts.at_state(state)
-    free = free_acceleration(world, state.axes, state.velocity)
-    wanted = contacts.rows.speed.ravel() + instant * accelerations(contacts, free)
-    impulses = Problem(contacts, wanted, np.zeros_like(contacts.rows.speed[:, 1:])).solved(state.t).forces
+    rates = accelerations(contacts, free_acceleration(world, state.axes, state.velocity))
+    free = contacts.rows.speed.ravel() + instant * rates
+    impulses = Problem(contacts, free, np.zeros_like(contacts.rows.speed[:, 1:])).solved(state.t).forces
     return Blow.of(state.moving(state.velocity + contacts.changes(impulses)), contacts, impulses)

@@ -8,7 +8,6 @@ import numpy as np
 
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.checks import check
-from reference_solver.exact.cones import NoSolution
 from reference_solver.exact.events import Event, Kind, first_event
 from reference_solver.exact.features import no_gap
 from reference_solver.exact.forces import Held, changed, decide
@@ -17,7 +16,7 @@ from reference_solver.exact.motion import Piece, constant, free_acceleration, st
 from reference_solver.exact.problem import OPEN, SLIP, STICK
 from reference_solver.exact.projection import projected
 from reference_solver.exact.record import Blow
-from reference_solver.exact.refusals import NoForces, NoProgress, TooManyPieces
+from reference_solver.exact.refusals import NoForces, NoProgress, NoSolution, TooManyPieces
 from reference_solver.exact.rows import Contacts, touching_contacts
 from reference_solver.exact.series import settling
 from reference_solver.exact.stiff import step
@@ -58,17 +57,20 @@ class Loop:
     tolerance
         Error of a step of `Turning`.
     longest
-        Longest piece [s]: longer ones would be the same.
+        Longest piece [s]. Motion is the same with any.
     pieces, steps, events
         How many there were; steps are the pieces that were made to the tolerance.
+    ends
+        Why the piece that was returned last ends.
     held
         Contacts that go on from the piece before, with their forces; None where all is to be found anew.
-    ended_features
-        Contacts whose feature ends where the next piece begins.
+    left_out
+        Contacts that are not found where the next piece begins: their feature ends there, or neither sticking nor
+        slipping holds.
     blows
-        What came before the piece that is returned next.
+        Blows since the piece that was returned last.
     next_length
-        Of the next step to the tolerance [s]; 0 where a closed form is tried first.
+        Of the next step to the tolerance [s]; None where a closed form is tried first.
     after_instant
         Whether the piece before was an instant, see `PROGRESS`.
     row_began
@@ -82,10 +84,11 @@ class Loop:
     pieces: int = 0
     steps: int = 0
     events: int = 0
+    ends: Kind = Kind.LOOK
     held: Held | None = None
-    ended_features: frozenset[tuple[int, ...]] = frozenset()
+    left_out: frozenset[tuple[int, ...]] = frozenset()
     blows: list[Blow] = field(default_factory=list)
-    next_length: float = 0.0
+    next_length: float | None = None
     after_instant: bool = False
     row_began: float = 0.0
 
@@ -98,12 +101,8 @@ class Loop:
             Where the loop has no answer.
         """
         while True:
-            held = self.held
-            if held is None:  # nothing goes on from the piece before
-                contacts = self._find()
-                struck = self._strike(contacts)
-                held = self._decide(self._find() if struck else contacts, struck)
-            if held is None:  # a jam has changed velocities
+            held = self.held or self._found_anew()
+            if held is None:  # no forces exist, and a jam has changed velocities
                 continue
             piece = self._move(held)
             event = first_event(self.world, piece, self.after_instant)
@@ -113,11 +112,21 @@ class Loop:
             piece, event = self._cut(piece, event)
             check(self.world, piece, self.tolerance)
             blows, self.blows = self.blows, []
-            self._enter(piece, event)
+            self._finish(piece, event)
             return blows, piece
 
+    def _found_anew(self) -> Held | None:
+        """Strike what touches, and return which contacts hold then; None after a jam."""
+        contacts = self._find()
+        if self._strike(contacts):
+            contacts = self._find()
+            held = settling(self.world, self.state, self._closed(contacts))
+            if held is not None:  # its speeds are not round-off: the piece takes them off
+                return held
+        return self._decide(contacts)
+
     def _find(self) -> Contacts:
-        return touching_contacts(self.world, self.state, self.ended_features)
+        return touching_contacts(self.world, self.state, self.left_out)
 
     def _closed(self, contacts: Contacts) -> Contacts:
         """Return those whose gaps count as none."""
@@ -141,15 +150,8 @@ class Loop:
         self.blows += [*blows[:-1], replace(blows[-1], after=self.state)]
         return True
 
-    def _decide(self, contacts: Contacts, struck: bool) -> Held | None:
-        """Return which contacts hold, stick and slip; None where no forces exist and a jam changes velocities.
-
-        ``struck``: whether bodies have just been struck; what then rebounds no higher than a gap that is none is held.
-        """
-        if struck:
-            held = settling(self.world, self.state, self._closed(contacts))
-            if held is not None:
-                return held
+    def _decide(self, contacts: Contacts) -> Held | None:
+        """Return which contacts hold, stick and slip; None where no forces exist and a jam changes velocities."""
         speed, still = contacts.rows.speed[:, 0], self.world.still
         parts, approaches = speed >= still, speed <= -still
         closed = contacts.touch(no_gap(self.world, self.state.place))
@@ -159,7 +161,7 @@ class Loop:
         except NoSolution:
             self._jam(contacts)
             return None
-        self.next_length = 0.0
+        self.next_length = None
         self._project(held)
         return held
 
@@ -178,9 +180,9 @@ class Loop:
 
     def _move(self, held: Held) -> Piece:
         """Return the piece from here on: exact where accelerations are constant, else a step."""
-        if held.lasts > 0.0:
+        if held.lasts is not None:
             return steady(self.state, held, held.acceleration, held.lasts)
-        if self.next_length == 0.0:
+        if self.next_length is None:
             piece = constant(self.world, self.state, held, self.longest)
             if piece is not None:
                 return piece
@@ -211,21 +213,22 @@ class Loop:
         shorter, _ = step(self.world, piece.start, piece.held, self._tolerance_of(piece.held), length)
         return shorter, event if shorter.length == length else Event(Kind.LOOK, 1.0)
 
-    def _enter(self, piece: Piece, event: Event) -> None:
+    def _finish(self, piece: Piece, event: Event) -> None:
         """Move the world to the end of a piece, and keep its contacts if forces do not jump there."""
+        self.ends = event.kind
         self.pieces += 1
         if self.pieces > MOST_PIECES:
             raise TooManyPieces(count=MOST_PIECES, t=self.state.t)
         self._count(event.kind.value)
         self.after_instant = piece.length <= PROGRESS * self.world.time
         if not self.after_instant:
-            self.ended_features = frozenset()
+            self.left_out = frozenset()
         self.state, self.held = piece.state(1.0), None
         if piece.turns:
             self.held = self._carried_on(piece.held, event)
             return
-        self.next_length = 0.0
-        if piece.held.lasts > 0.0 and event.kind is Kind.LOOK:  # rebounds that are summed end where contacts are closed
+        self.next_length = None
+        if piece.held.lasts is not None and event.kind is Kind.LOOK:  # a series is over: its contacts are closed
             self._project(piece.held)
 
     def _carried_on(self, held: Held, event: Event) -> Held | None:
@@ -240,12 +243,12 @@ class Loop:
         """Return contacts with what ends as their piece begins changed; None where all is to be found anew."""
         self._count(event.kind.value)
         if event.ended:
-            self.ended_features |= event.ended
+            self.left_out |= event.ended
             return None
         modes = dict(event.modes)
-        neither = held.begins & {held.contacts.names[k] for k, mode in modes.items() if mode == STICK}
-        if neither:  # friction is used up, and would turn a slip back: forces jump, and these open
-            self.ended_features |= neither
+        neither = held.slipped & {held.contacts.names[k] for k, mode in modes.items() if mode == STICK}
+        if neither:  # it stuck, its friction ended, and its slip would turn back at once: neither mode holds
+            self.left_out |= neither
             return None
         found = changed(held, modes, self._free_acceleration())
         if found is None and STICK in modes.values():  # no forces hold it, and none let it go

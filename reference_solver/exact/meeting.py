@@ -37,7 +37,10 @@ NOISE, SLOW = 1e-12, 1e-10
 
 
 class Course(NamedTuple):
-    """A piece as kernels read it: places (n, d), axes (n, d, d), ways (n, q, k), spins (n, s, k) by its share."""
+    """A piece as kernels read it: places (n, d) and axes (n, d, d) at its start, and polynomials by its share.
+
+    Ways are (n, q, k), spins (n, s, k) in radians per whole piece.
+    """
 
     place: Array
     axes: Array
@@ -58,7 +61,7 @@ def course_of(piece: Piece) -> Course:
 def next_meeting(world: World, piece: Piece, contacts: Contacts, after_instant: bool) -> tuple[float, bool]:
     """Return the share of the first meeting in a piece in which contacts stay closed, `NEVER` if there is none.
 
-    And whether the search was given up there, and goes on.
+    Where the search takes too many steps, return the share up to which nothing meets, and True.
     """
     bodies, n = world.bodies, len(world.bodies.free)
     held = np.zeros((n, n, bodies.point.shape[1]), np.bool_)

@@ -30,7 +30,7 @@ SHORTEST = 1e-20
 
 
 def free_acceleration(world: World, axes: Array, velocity: Array) -> Array:
-    """Return accelerations (n, q) without contacts."""
+    """Return accelerations (n, q) without contacts [m/s^2], [rad/s^2], with axes (n, d, d) and twists (n, q)."""
     out = np.zeros(velocity.shape)
     write_free_acceleration(world.bodies, axes, velocity, out)
     return out
@@ -65,11 +65,11 @@ class Piece:
 
     @cached_property
     def own_contacts(self) -> Contacts:
-        """Contacts that the loop does not go on with: they may be brought anywhere."""
+        """A copy of the contacts, which may be brought to any state."""
         return self.held.contacts.chosen(np.arange(len(self.held.contacts)))
 
     def at(self, s: float) -> tuple[Array, Array, Array]:
-        """Return positions, axes and twists at a share."""
+        """Return places (n, d), axes (n, d, d) and twists (n, q) at a share."""
         way = self.way @ s ** np.arange(self.way.shape[2])
         moved = np.empty(self.start.place.shape), np.empty(self.start.axes.shape), np.empty(way.shape)
         velocity = self.velocity @ s ** np.arange(self.velocity.shape[2])
@@ -77,7 +77,7 @@ class Piece:
         return moved[0], moved[1], velocity
 
     def impulse(self, s: float, rate: bool = False) -> Array:
-        """Return impulses (m, d) up to a share of a piece that turns, or their rates by it."""
+        """Return impulses (m, d) up to a share of a piece that turns [N s], or their rates by the share."""
         powers = np.arange(self.push.shape[2])
         return np.asarray(self.push @ (powers * s ** np.maximum(powers - 1, 0) if rate else s**powers))
 
@@ -105,12 +105,12 @@ class Piece:
         return np.concatenate([place, orientation], axis=2), velocity
 
     def state(self, s: float) -> State:
-        """Return the state at a share."""
+        """Return the state at a share of the piece."""
         place, orientation, velocity = self.states(np.array([s]))
         return State(self.start.t + s * self.length, place[0], orientation[0], velocity[0])
 
     def cut(self, share: float) -> Piece:
-        """Return the piece up to a share."""
+        """Return the piece up to a share of it; contacts and forces are the same."""
         way, velocity, push = (
             each * share ** np.arange(each.shape[2]) for each in (self.way, self.velocity, self.push)
         )
@@ -125,7 +125,7 @@ def steady(state: State, held: Held, acceleration: Array, length: float) -> Piec
 
 
 def constant(world: World, state: State, held: Held, length: float) -> Piece | None:
-    """Return the piece under constant accelerations, exact whatever its length; None where they are not constant.
+    """Return the piece of a length [s] under constant accelerations, which is exact; None where they are not constant.
 
     They are if no body precesses, no slip turns, and no row of a free body does: neither now (gamma, E36), nor
     half-way, nor at the end.
@@ -178,6 +178,8 @@ class Turning:
 
     Parameters
     ----------
+    state, held
+        Where the step begins, and contacts whose modes are held.
     tolerance
         Error of a step, as a share of the smallest half width or of the speeds and ways in it.
     """
@@ -187,18 +189,23 @@ class Turning:
         n, d = state.place.shape
         self._moved = np.empty((n, d)), np.empty((n, d, d)), np.empty(state.velocity.shape)
 
-    def after(self, way: Array, velocity: Array, directions: Array | None = None) -> tuple[Array, Array, Array]:
-        """Return rates of ways, accelerations without contacts and with them (n, q), after ways, with twists (n, q)."""
+    def after(self, way: Array, velocity: Array, directions: Array | None = None) -> tuple[Array, Array, Array, Array]:
+        """Return what moves bodies after ways, with twists (n, q).
+
+        That is rates of ways, accelerations without contacts and with them (n, q), and forces (m, d) in world axes.
+        ``directions``: (m, d - 1) of slips, where they are not those of the velocities.
+        """
         write_moved(self._state.place, self._state.axes, way, velocity, self._moved)
         place, axes, rate = self._moved
         free = free_acceleration(self._world, axes, velocity)
-        return rate, free, self._held.follow(place, axes, velocity, free, directions)
+        forces, acceleration = self._held.follow(place, axes, velocity, free, directions)
+        return rate, free, acceleration, self._held.contacts.along_axes(forces)
 
     def _rates(self, y: Array) -> Array:
         """Rates (2 N + m d,) of ways and twists, and of impulses of contacts."""
         way, velocity = y[: 2 * self._state.velocity.size].reshape(2, *self._state.velocity.shape)
-        rate, _, acceleration = self.after(way, velocity)
-        return np.concatenate([rate.ravel(), acceleration.ravel(), self._held.pushes.ravel()])
+        rate, _, acceleration, pushes = self.after(way, velocity)
+        return np.concatenate([rate.ravel(), acceleration.ravel(), pushes.ravel()])
 
     def step(self, length: float) -> tuple[Piece, float]:
         """Return a piece of at most a length [s], as long as the error stays below the tolerance, and the next length.

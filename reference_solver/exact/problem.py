@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.exact.cones import within_cones
+from reference_solver.exact.cones import add_friction, loads_with_friction, within_cones
 from reference_solver.exact.kernels.forces import OPEN, SLIP, STICK, solve_near
 from reference_solver.exact.refusals import Undecided, Unlawful
 from reference_solver.exact.rows import Contacts
@@ -51,8 +51,8 @@ def directed(slips: Array, least: float, otherwise: Array | float = 0.0) -> Arra
     return np.where(moves, slips / np.where(moves, size, 1.0), otherwise)
 
 
-def nothing(count: int, d: int) -> Answer:
-    """Return the answer of contacts that are open."""
+def all_open(count: int, d: int) -> Answer:
+    """Return the answer of contacts without forces."""
     return Answer(np.zeros(count, np.int64), np.zeros((count, d - 1)), np.zeros((count, d)))
 
 
@@ -65,11 +65,11 @@ class Problem:
     contacts
         With their rows at the instant.
     free
-        q (m d,): what contacts would do without forces.
+        q (m d,): velocities [m/s] or accelerations [m/s^2] of contacts without impulses or forces.
     slips
         (m, d - 1) directions of contacts that slip already; zeros where friction may do anything within its cone.
     size
-        What velocities or accelerations are measured by.
+        What velocities or accelerations are measured by, in their unit; at least the largest of ``free``.
     """
 
     contacts: Contacts
@@ -85,18 +85,18 @@ class Problem:
 
     @property
     def slipping(self) -> NDArray[np.bool_]:
-        """(m,) whether a contact slips already."""
+        """(m,) whether the direction of a slip is given."""
         return np.asarray(np.abs(self.slips).max(axis=1) > 0.0)
 
     def solved(self, t: float) -> Answer:
-        """Return the answer.
+        """Return modes and forces; refusals name the time ``t`` [s].
 
         Raises
         ------
-        NoSolution
-            If no forces exist (see `cones`).
+        NoSolution, Unconverged
+            If no forces exist, or none are found (`cones`).
         Undecided, Unlawful
-            If none are found that obey the laws to `BROKEN`.
+            If the modes that were found have no forces, or those break a law by more than `BROKEN`.
         """
         if self._parts:
             return self._joined([part.solved(t) for _, part in self._parts])
@@ -121,7 +121,7 @@ class Problem:
 
     def _joined(self, answers: list[Answer]) -> Answer:
         """Return answers of all parts as one."""
-        whole = nothing(len(self.contacts), self.dimension)
+        whole = all_open(len(self.contacts), self.dimension)
         for (group, _), answer in zip(self._parts, answers, strict=True):
             for each, own in zip(whole, answer, strict=True):
                 each[group] = own
@@ -148,19 +148,17 @@ class Problem:
         held, sticks = np.flatnonzero(modes != OPEN), np.flatnonzero(modes == STICK)
         tangents = (sticks[:, None] * d + np.arange(1, d)).ravel()
         blocks = self.yields.reshape(len(self.yields), -1, d)
-        rubs = np.where(modes == SLIP, self.friction, 0.0)
-        normals = blocks[:, :, 0] - (rubs * (blocks[:, :, 1:] * directions).sum(axis=2))
+        normals = loads_with_friction(blocks, np.where(modes == SLIP, self.friction, 0.0), directions)
         return np.concatenate([held * d, tangents]), np.concatenate(
             [normals[:, held], self.yields[:, tangents]], axis=1
         )
 
     def spread(self, modes: Indices, directions: Array, rows: Indices, forces: Array) -> Array:
-        """Return forces (m, d) from those on the rows of `equations` (r,): slips rub as their loads have it."""
+        """Return all forces (m, d) from those on the rows of `equations` (r,), with the friction of slips."""
         flat = np.zeros(len(modes) * self.dimension)
         flat[rows] = forces
         out = flat.reshape(len(modes), -1)
-        slips = modes == SLIP
-        out[slips, 1:] = -(self.friction * out[:, 0])[slips, None] * directions[slips]
+        add_friction(out, self.friction, directions, modes == SLIP)
         return out
 
     def with_modes(self, modes: Indices, directions: Array, near: Array | None = None) -> Answer | None:
@@ -170,7 +168,7 @@ class Problem:
         (E37); without, the least.
         """
         if not (modes != OPEN).any():
-            return nothing(len(modes), self.dimension)
+            return all_open(len(modes), self.dimension)
         if self._parts:
             answers = []
             for group, part in self._parts:
@@ -196,7 +194,7 @@ class Problem:
         return max(self.size, 10.0 * ROUND_OFF / NONE * float(alone.max()))
 
     def broken(self, answer: Answer) -> float:
-        """Share of their size by which velocities or forces break a law."""
+        """Return the largest share of their size by which velocities or forces of an answer break a law."""
         p = answer.forces
         u = (self.rows @ (self.yields @ p.ravel()) + self.free).reshape(p.shape)
         size_u, stiffest = self._told_by(p), float(np.einsum("ij,ji->i", self.rows, self.yields).max())
@@ -235,7 +233,10 @@ class Problem:
 
 
 def loads_shared(contacts: Contacts, near: Array) -> Array:
-    """Return how changes of redundant forces (m, d) are weighed: by what is carried there (E37)."""
+    """Return weights (m, d) of changes of redundant forces: the larger, the more a contact carries (E37).
+
+    ``near``: (m, d) forces that the redundant ones are nearest to.
+    """
     bears = np.maximum(near[:, :1] / max(1e-300, near[:, 0].max()), 1e-12)
     weight = np.repeat(bears, near.shape[1], axis=1)
     weight[:, 1:] *= contacts.friction[:, None]

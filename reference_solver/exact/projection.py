@@ -23,7 +23,12 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
     """Return the state with gaps of held contacts closed, and speeds taken off along rows that are held.
 
     Ways and changes of velocity are those of the least kinetic energy: M^-1 G'. What is left of slips is more than
-    round-off: what takes it off is a blow of the record.
+    round-off: what takes it off is a blow of the record, which is returned as well.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a least-squares solution does not converge: rows without numbers.
     """
     contacts, d = held.contacts, world.dimension
     if not len(contacts):

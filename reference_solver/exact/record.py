@@ -34,7 +34,10 @@ GAUSS = [0.5 + 0.5 * roots_legendre(4)[0], 0.5 * roots_legendre(4)[1]]
 
 
 class Acting(NamedTuple):
-    """What contacts did: features (m, 6), gaps (m,), points, normals and impulses on B (m, d), moments (m, s)."""
+    """What contacts did: features (m, 6), gaps (m,) and points (m, d) [m], normals (m, d), impulses on B (m, d) [N s].
+
+    Moments (m, s) [N m s] are those of the impulses about the world's origin.
+    """
 
     features: Indices
     gap: Array
@@ -44,7 +47,7 @@ class Acting(NamedTuple):
     moment: Array
 
     def chosen(self, which: NDArray[np.bool_]) -> Acting:
-        """Return some of them."""
+        """Return those that a mask (m,) tells."""
         features, *numbers = self
         return Acting(features[which], *(each[which] for each in numbers))
 
@@ -55,7 +58,7 @@ class Acting(NamedTuple):
 
     @classmethod
     def of(cls, contacts: Contacts, impulse: Array) -> Acting:
-        """Return what contacts did with impulses in world axes, which act where they are."""
+        """Return what contacts did by impulses (m, d) in world axes, at the places where the contacts are now."""
         gap, place, normal = (
             each.copy() for each in (contacts.rows.gap, contacts.rows.place, contacts.rows.frame[:, 0])
         )
@@ -63,7 +66,7 @@ class Acting(NamedTuple):
 
     @classmethod
     def between(cls, piece: Piece, begin: Array, end: Array) -> list[Acting]:
-        """Return what contacts did between shares (k,) of a piece; those that the loop goes on with stay."""
+        """Return what contacts did in each of k parts of a piece, between shares (k,)."""
         if not len(piece.held.contacts):
             return [cls.of(piece.held.contacts, np.zeros((0, piece.start.place.shape[1])))] * len(begin)
         if piece.turns:
@@ -94,8 +97,8 @@ class Acting(NamedTuple):
                 contacts.at(place, axes, velocity)
                 rate = piece.impulse(share, rate=True)
             else:  # how loads are shared is known less well between the ends of a piece than forces are
-                own.follow(place, axes, velocity, free_acceleration(contacts.world, axes, velocity))
-                rate = piece.length * own.pushes
+                forces, _ = own.follow(place, axes, velocity, free_acceleration(contacts.world, axes, velocity))
+                rate = piece.length * contacts.along_axes(forces)
             impulse = impulse + length * weight * rate
             # Far from the origin the way of a place is known to more digits than the place.
             moment = moment + length * weight * moments(contacts.rows.place - first, rate)
@@ -127,7 +130,7 @@ class Blow:
 
 
 class Part(NamedTuple):
-    """A piece between two shares."""
+    """A piece between two shares of it, 0 <= first < last <= 1."""
 
     piece: Piece
     first: float
@@ -141,13 +144,16 @@ class Recorder:
         self._world = world
 
     def begin(self, pose: Array, twist: Array) -> None:
-        """Begin a record where bodies are."""
+        """Begin a record where bodies have poses (n, 3 | 7) and twists (n, q)."""
         self._state = np.concatenate([pose, twist], axis=1)
         self._rows: list[tuple[Array | Indices, ...]] = [empty_journal(self._world.dimension)[1:]]
         self._bodies = self._contacts = 0
 
     def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
-        """Return contacts as a simulation hands them out: each once, as it was first, with the sum of its impulses."""
+        """Return the contacts of a step as a simulation hands them out.
+
+        Each stands there once, with gap, point and normal as it was first, and the sum of its impulses in all parts.
+        """
         found = [
             part.acting if isinstance(part, Blow) else Acting.between(part.piece, *np.array(part[1:])[:, None])[0]
             for part in parts
@@ -164,7 +170,7 @@ class Recorder:
         return Handed(a, b, feature, every.point[first], every.normal[first], impulse, every.gap[first])
 
     def contacts_between(self, piece: Piece, begin: Array, end: Array) -> Handed:
-        """Return contacts of steps between shares (k,) of one piece, all of one step after all of another."""
+        """Return the contacts of k steps, which one piece makes between shares (k,), step by step."""
         key = self._keys(piece.held.contacts.features)
         order = np.lexsort(key.T[::-1])
         _, *fields = zip(*Acting.between(piece, begin, end), strict=True)
@@ -180,7 +186,10 @@ class Recorder:
         return np.column_stack([features[:, :2], number])
 
     def write(self, step: int, dt: float, before: Sequence[Part | Blow], piece: Piece, shares: Array) -> None:
-        """Write what happened in a step up to a piece, and the piece in parts between shares (k + 1,), one a step."""
+        """Write what came in a step before a piece, and the piece in k parts between shares (k + 1,), one in each step.
+
+        ``step``: number of the first; ``dt``: length of all [s].
+        """
         for is_blow, group in groupby(before, lambda part: isinstance(part, Blow)):
             if is_blow:
                 self._write_blows(step, dt, [part for part in group if isinstance(part, Blow)])
@@ -229,7 +238,7 @@ class Recorder:
             return
         bodies, own, k = np.concatenate([each for each, _ in groups]), [each for _, each in groups], len(steps)
         contacts = np.concatenate([np.flatnonzero(each) for each in own])
-        scheme = FIFTH_ORDER if piece.turns else ROCKING if piece.held.lasts > 0.0 else FROZEN
+        scheme = FIFTH_ORDER if piece.turns else FROZEN if piece.held.lasts is None else ROCKING
         label = np.zeros((k, len(groups), 5), np.int64)
         label[:, :, 0], label[:, :, 1] = steps[:, None], FORCES
         label[:, :, 2] = [scheme if each[:held].any() else FROZEN for each in own]

@@ -18,8 +18,14 @@ class Refused(Exception):
         super().__init__(self.sentence.format(**facts))
 
 
+class NoSolution(Refused):
+    """A contact problem has no solution; of impacts `NoImpulses` says so, of forces a jam (E54) or `NoForces`."""
+
+    sentence = "a contact problem has no solution"
+
+
 class NoImpulses(Refused):
-    """Bodies that meet cannot part: what is moved crushes something."""
+    """Bodies that meet cannot part: one with a prescribed motion crushes something."""
 
     sentence = "no impulses part the bodies that meet at {t:.9g} s: something is crushed by what is moved"
 
@@ -37,7 +43,7 @@ class NoForces(Refused):
 
 
 class Undecided(Refused):
-    """A solution is known by its signs alone, and the equations of these signs have none."""
+    """An iteration shows which contacts hold, stick and slip, but the equations of these modes have no solution."""
 
     sentence = "it is not decided at {t:.9g} s which contacts hold, stick and slip"
 

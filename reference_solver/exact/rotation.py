@@ -24,7 +24,7 @@ GENERATORS = {
 
 
 def turned(orientation: Array, turn: Array) -> Array:
-    """Return orientations (..., 1 | 4) after turns (..., 1 | 3)."""
+    """Return orientations (..., 1 | 4) after turns (..., 1 | 3) [rad]."""
     if orientation.shape[-1] == 1:
         return orientation + turn
     half = 0.5 * np.sqrt((turn * turn).sum(-1, keepdims=True))

@@ -35,7 +35,7 @@ class Rows(NamedTuple):
     Parameters
     ----------
     gap
-        (m,) [m].
+        (m,) distances of the surfaces, < 0 where they overlap [m].
     frame
         (m, d, d): normal, then tangents. In space ``frame[:, 1]`` comes in as the tangent that is wished.
     place
@@ -45,9 +45,9 @@ class Rows(NamedTuple):
     yields
         (m, d, 2, q): M^-1 G'.
     speed
-        (m, d): u along the frame.
+        (m, d): u along the frame [m/s].
     rate
-        (m, d): its acceleration without that of bodies, gamma.
+        (m, d): its acceleration without that of bodies, gamma [m/s^2].
     """
 
     gap: Array
@@ -60,7 +60,7 @@ class Rows(NamedTuple):
 
 
 def empty_rows(count: int, d: int, q: int) -> Rows:
-    """Return room for ``count`` contacts."""
+    """Return rows of zeros for ``count`` contacts in d dimensions, with q numbers of a twist."""
     shapes = ((), (d, d), (d,), (d, 2, q), (d, 2, q), (d,), (d,))
     return Rows(*(np.zeros((count, *shape)) for shape in shapes))
 
@@ -141,22 +141,22 @@ class Contacts:
         return Contacts(self.world, self.features[which], self.along[which], rows)
 
     def touch(self, none: Array) -> NDArray[np.bool_]:
-        """Whether gaps (m,) count as none, of those of all pairs (n, n)."""
+        """Return which contacts (m,) have a gap that counts as none: up to ``none`` of their pair (n, n) [m]."""
         return np.asarray(self.rows.gap <= none[self.features[:, 0], self.features[:, 1]])
 
     @property
     def names(self) -> list[tuple[int, ...]]:
-        """Features as tuples, to look contacts up by."""
+        """Rows of ``features`` as m tuples, to look contacts up by."""
         return [tuple(row) for row in self.features.tolist()]
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
-        """Bodies of each contact."""
+        """Bodies (a, b) of each of m contacts."""
         return [(a, b) for a, b in self.features[:, :2].tolist()]
 
     @cached_property
     def groups(self) -> list[Indices]:
-        """Contacts that share free bodies, at first hand or not, by their numbers."""
+        """Numbers of the contacts of each group: contacts share free bodies, directly or through others."""
         free = self.world.bodies.free.tolist()
         label = labels(free, self.pairs)
         of: dict[int, list[int]] = {}
@@ -175,11 +175,14 @@ class Contacts:
         return out.reshape(m * d, n * q)
 
     def changes(self, forces: Array) -> Array:
-        """Return accelerations (n, q) by forces (m, d) along the frames, or changes of velocities by impulses."""
+        """Return accelerations (n, q) [m/s^2], [rad/s^2] by forces (m, d) along the frames [N].
+
+        Of impulses [N s], changes of velocities.
+        """
         return np.asarray((self.matrices[1] @ forces.ravel()).reshape(self.world.shape))
 
     def along_axes(self, forces: Array) -> Array:
-        """Return forces (m, d) along the frames in world axes."""
+        """Return in world axes the forces (m, d) that are told along the frames, in their unit."""
         return np.asarray(np.einsum("mk,mkp->mp", forces, self.rows.frame))
 
     @property
@@ -192,7 +195,7 @@ class Contacts:
 
 
 def labels(free: Sequence[int], pairs: Iterable[Sequence[int]]) -> list[int]:
-    """Return a number for each body, the same for free ones that pairs join, at first hand or not."""
+    """Return a number for each of n bodies, the same for free ones that pairs join, directly or through others."""
     label = list(range(len(free)))
     for a, b in pairs:
         if free[a] and free[b] and label[a] != label[b]:
@@ -202,16 +205,16 @@ def labels(free: Sequence[int], pairs: Iterable[Sequence[int]]) -> list[int]:
 
 
 def moments(place: Array, force: Array) -> Array:
-    """Return moments (..., 1 | 3) of forces at places (..., d) about the origin."""
+    """Return moments (..., 1 | 3) [N m] about the origin, of forces (..., d) [N] at places (..., d) [m]."""
     parts = ((0, 1),) if place.shape[-1] == 2 else ((1, 2), (2, 0), (0, 1))
     return np.stack([place[..., i] * force[..., j] - place[..., j] * force[..., i] for i, j in parts], axis=-1)
 
 
 def touching_contacts(world: World, state: State, ended: frozenset[tuple[int, ...]] = frozenset()) -> Contacts:
-    """Return the contacts of a state, each place once: what lies on a corner touches both faces beside it.
+    """Return the contacts of a state, of those of a pair at the same place only one.
 
-    There bodies meet along the normal along which they close last. Edges that cross count at one place each: where a
-    corner leaves a face two begin, which part.
+    What lies on a corner touches both faces beside it: of these the one counts along which the bodies close last. Edges
+    that cross count at one place each: where a corner leaves a face two begin, which part.
     """
     features = find(world, state, ended)
     contacts = Contacts.of(world, features).at_state(state)

@@ -16,15 +16,15 @@ from reference_solver.exact.rows import Contacts
 
 
 def height(world: World, state: State) -> float:
-    """Return how high a rebound may be that is summed [m]: no higher than gaps that are none, or coordinates tell."""
+    """Return how high a rebound may be that is summed [m]: as gaps that are none, or two last places of coordinates."""
     return NO_GAP * world.size + 2.0 * float(np.spacing(np.abs(state.place).max()))
 
 
 def settling(world: World, state: State, contacts: Contacts) -> Held | None:
     """Return forces under which what rocks or rebounds too low to be followed comes to rest; None if nothing does.
 
-    Rebounds of speed u and restitution e take ``2 u / (g (1 - e))``. In that time contacts stay closed, and carry so
-    much less that loads take off u.
+    None as well where such forces are refused: then rebounds are followed. Rebounds of speed u and restitution e take
+    ``2 u / (g (1 - e))``. In that time contacts stay closed, and carry so much less that loads take off u.
     """
     parts = contacts.at_state(state).rows.speed[:, 0].copy()
     lies, free = parts < world.still, free_acceleration(world, state.axes, state.velocity)
@@ -38,7 +38,7 @@ def settling(world: World, state: State, contacts: Contacts) -> Held | None:
             return None
         lasts = float((2.0 * parts[low] / falls[low] / (1.0 - contacts.restitution[low])).max())
         held = decide(world, state, contacts.chosen(low | lies), free, lasts)
-    except Refused:  # then they are followed
+    except Refused:
         return None
     closed = set(held.contacts.names)
     return held if any(name in closed for name in contacts.chosen(low).names) else None

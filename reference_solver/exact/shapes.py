@@ -15,7 +15,7 @@ from reference_solver.shapes import Box, Capsule, Disc, HalfSpace, Polygon, Sphe
 
 @dataclass(frozen=True)
 class Core:
-    """What a radius grows (E50).
+    """Polytope that a radius grows on all sides (E50).
 
     Parameters
     ----------
@@ -24,9 +24,10 @@ class Core:
     normals, offsets
         (f, d) outward unit normals, (f,) distances from the centre [m]; a segment in the plane has two faces.
     sides
-        For each face its sides (normal, distance from the centre): a place is over the face within all of them.
+        For each face a list of its sides: normal (d,) and distance from the centre [m]. A place is over the face if it
+        lies within all of them.
     radius
-        [m]
+        By how much the polytope is grown [m].
     """
 
     points: Array

@@ -4,7 +4,7 @@ Friction turns a slip s at the rate ``k = mu N w / |s|``, where w says how its p
 has no bound, while the motion stays smooth: the slip points where its acceleration leads. Explicit steps must resolve
 1/k. Collocation at Radau's points need not (E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
 IV.5), if directions d of slips are unknown at each point, with the equation that s lies along d: it holds where s is
-none. By Newton's method, in which only directions count: what else changes is found by repeating it.
+none. Newton's method finds the directions; all else is found by repeating it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,13 @@ STABLE, CLOSE, MOST = 5.0, 0.03, 20
 
 
 def step(world: World, state: State, held: Held, tolerance: float, length: float) -> tuple[Piece, float]:
-    """Return a piece of at most a length [s] as `Turning.step` does, and the next length."""
+    """Return a piece of at most a length [s] to a tolerance, explicit or implicit, and the next length [s].
+
+    Raises
+    ------
+    NoStep
+        See `Turning.step`.
+    """
     if world.dimension == 3 and len(held.contacts):
         stiff = Stiff(world, state, held, tolerance)
         # What order 8 could do with the smallest half width's time to fall through.
@@ -47,7 +53,7 @@ def step(world: World, state: State, held: Held, tolerance: float, length: float
 
 
 class Stiff(Turning):
-    """An implicit step from a state on: at each point the directions of slips are unknown as well."""
+    """Motion with slow slips in space, in implicit steps: directions of slips are unknown at each point as well."""
 
     def __init__(self, world: World, state: State, held: Held, tolerance: float) -> None:
         super().__init__(world, state, held, tolerance)
@@ -64,7 +70,7 @@ class Stiff(Turning):
     def _at(self, way: Array, velocity: Array, directions: Array) -> tuple[Array, ...]:
         """Rates of ways, accelerations (N,), pushes; of slips, how they turn accelerations, along and across, rows."""
         held = self._held
-        rate, free, acceleration = self.after(way, velocity, directions)
+        rate, free, acceleration, pushes = self.after(way, velocity, directions)
         turn, across = np.zeros((2, len(self._slips), velocity.size))
         rows = held.contacts.matrices[0].reshape(len(held.contacts), 3, -1)
         slip = np.zeros((len(self._slips), 2))
@@ -74,7 +80,7 @@ class Stiff(Turning):
             across[out] = first * rows[k, 2] - second * rows[k, 1]
             speed = held.contacts.rows.speed[k, 1:]
             slip[out] = first * speed[0] + second * speed[1], first * speed[1] - second * speed[0]
-        return rate.ravel().copy(), acceleration.ravel(), held.pushes, turn, slip, across
+        return rate.ravel().copy(), acceleration.ravel(), pushes, turn, slip, across
 
     def implicit_step(self, length: float) -> tuple[Piece | None, float]:
         """Return a piece of a length [s] and the next length; None and a shorter length where that is too long."""

@@ -50,7 +50,13 @@ class World:
         return self._run(steps, stride, contacts, kept=False)
 
     def recorded(self, steps: int, stride: int, contacts: bool) -> tuple[Frames, Journal]:
-        """Run, and return what was done as well; see `run`."""
+        """Run, and return what was done as well.
+
+        Raises
+        ------
+        Refused
+            See `run`.
+        """
         self._recorder.begin(self.pose, self.twist)
         first = self._steps
         frames = self._run(steps, stride, contacts, kept=True)

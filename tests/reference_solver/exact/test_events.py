@@ -124,7 +124,7 @@ def test_search_that_stops_in_a_sum_of_rebounds(monkeypatch):
     """The series goes on: speeds are not taken off before its end."""
     model = falling_ball(0.5)
     moving = Loop(world_of(model), start_of(model), 1e-11, 1.0)
-    while (piece := moving.next_piece()[1]).held.lasts == 0.0:
+    while (piece := moving.next_piece()[1]).held.lasts is None:
         begin = copy.deepcopy(moving)
     assert piece.held.lasts == piece.length
     monkeypatch.setattr(events, "next_meeting", lambda *_: (0.5, True))

@@ -148,7 +148,8 @@ def forces_of_a_step(monkeypatch):
     follow = forces.Held.follow
 
     def wrong(self, place, axes, velocity, free, directions=None):
-        return free + (1.0 + SIZE) * (follow(self, place, axes, velocity, free, directions) - free)
+        forces, acceleration = follow(self, place, axes, velocity, free, directions)
+        return forces, free + (1.0 + SIZE) * (acceleration - free)
 
     monkeypatch.setattr(forces.Held, "follow", wrong)
 
